@@ -1,0 +1,349 @@
+"""Robot descriptions: what a robot is, said once in `protocol/robots/*.toml`.
+
+From one description come the firmware's pin header and parameter defaults (`protocol/generate.py`), what the host
+expects of the board (`boebot.run`) and how the simulated world is joined to the pins (`sim_bridge`). Units stand in the
+keys' names; lengths are in the robot's frame, x forward, y left, origin at the middle of the axle.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import msgspec
+
+from boebot import resources
+from boebot.errors import RobotError
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Point = tuple[float, float]
+
+PIN_COUNT = 20  # Arduino numbers: 0..13, A0..A5 = 14..19
+
+
+def pin_number(pin: int | str) -> int:
+    """The Arduino number 0..19 of a pin written as 0..13 or "A0".."A5".
+
+    Raises:
+        ValueError: there is no such pin.
+    """
+    if isinstance(pin, str) and len(pin) == 2 and pin[0] == "A" and pin[1] in "012345":
+        return 14 + int(pin[1])
+    if isinstance(pin, int) and 0 <= pin <= 13:
+        return pin
+    raise ValueError(f"there is no pin {pin!r}; expected 0..13 or 'A0'..'A5'")
+
+
+def pin_name(number: int) -> str:
+    """How the board's print names pin `number`: "0".."13", "A0".."A5"."""
+    return str(number) if number < 14 else f"A{number - 14}"
+
+
+class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Masses and lengths of the robot (SI units)."""
+
+    mass_kg: Positive
+    inertia_kg_m2: Positive
+    radius_m: Positive
+    track_width_m: Positive
+    wheel_radius_m: Positive
+    wheel_mass_kg: NotNegative
+    wheel_inertia_kg_m2: NotNegative
+    linear_damping_n_s_m: NotNegative
+    angular_damping_n_m_s: NotNegative
+    wheel_speed_maximum_m_s: Positive
+
+
+class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, tag_field="type"):
+    """What every device has. `on = false` reserves its pins and leaves it switched off."""
+
+    on: bool = True
+
+    PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
+    NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # field of the pin -> the pins that can do it
+
+    def pins(self) -> dict[str, int]:
+        """Role of each pin ("" for a device with one pin) and its Arduino number."""
+        return {role: pin_number(getattr(self, field)) for field, role in self.PINS.items()}
+
+
+_ANALOG = tuple(range(14, 20))
+
+
+class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True):
+    """A servo modified for continuous rotation: the pulse sets the wheel's speed."""
+
+    pin: int | str
+    centre_us: Annotated[float, msgspec.Meta(ge=1400, le=1600)]
+    gain_us: Annotated[float, msgspec.Meta(ge=-200, le=200)]  # pulse offset at full forward signal
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+
+
+class PositionServo(Device, tag="position_servo", frozen=True, kw_only=True):
+    """A servo that turns to an angle."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+
+
+class Encoder(Device, tag="encoder", frozen=True, kw_only=True):
+    """Single-channel wheel encoder: both edges counted, direction unknown."""
+
+    pin: int | str
+    edges_per_turn: Annotated[int, msgspec.Meta(ge=2, le=4096)]
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
+
+
+class QuadratureEncoder(Device, tag="quadrature_encoder", frozen=True, kw_only=True):
+    """Two-channel wheel encoder: four edges per period, direction known."""
+
+    pin_a: int | str
+    pin_b: int | str
+    edges_per_turn: Annotated[int, msgspec.Meta(ge=4, le=4096)]
+
+    PINS: ClassVar[dict[str, str]] = {"pin_a": "a", "pin_b": "b"}
+    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin_a": _ANALOG, "pin_b": _ANALOG}
+
+
+class Whisker(Device, tag="whisker", frozen=True, kw_only=True):
+    """A wire that closes a switch to ground when it is bent."""
+
+    pin: int | str
+    root_m: Point
+    tip_m: Point
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+
+
+class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
+    """An infra-red LED and a 38 kHz receiver that looks the same way."""
+
+    led_pin: int | str
+    receiver_pin: int | str
+    position_m: Point
+    heading_rad: float
+    beam_rad: Positive
+    range_m: Positive
+
+    PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
+
+
+class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=True):
+    """How often the IR pairs are read."""
+
+    period_ticks: Annotated[int, msgspec.Meta(ge=2, le=250)]
+
+
+class Ping(Device, tag="ping", frozen=True, kw_only=True):
+    """Parallax Ping))): an ultrasonic range finder on one pin."""
+
+    pin: int | str
+    position_m: Point
+    heading_rad: float
+    beam_rad: Positive
+    range_min_m: Positive
+    range_max_m: Positive
+    period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
+
+
+class Battery(Device, tag="battery", frozen=True, kw_only=True):
+    """Battery voltage behind a divider."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
+
+
+class AnalogInfrared(Device, tag="analog_infrared", frozen=True, kw_only=True):
+    """Sharp analog infra-red distance sensor."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
+
+
+class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
+    """Phototransistor read by its RC decay time."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+
+
+class Compass(Device, tag="compass", frozen=True, kw_only=True):
+    """HMC5883L on the two-wire bus."""
+
+    sda_pin: int | str
+    scl_pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
+    NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
+
+
+class Buzzer(Device, tag="buzzer", frozen=True, kw_only=True):
+    """Piezo speaker."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
+
+
+class Uart(Device, tag="uart", frozen=True, kw_only=True):
+    """The serial line to the host."""
+
+    receive_pin: int | str
+    transmit_pin: int | str
+    baud: Annotated[int, msgspec.Meta(ge=9600, le=1_000_000)]
+
+    PINS: ClassVar[dict[str, str]] = {"receive_pin": "receive", "transmit_pin": "transmit"}
+    NEEDS: ClassVar[dict[str, str]] = {"USART0": ""}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"receive_pin": (0,), "transmit_pin": (1,)}
+
+
+AnyDevice = (
+    ContinuousServo
+    | PositionServo
+    | Encoder
+    | QuadratureEncoder
+    | Whisker
+    | InfraredPair
+    | InfraredSchedule
+    | Ping
+    | Battery
+    | AnalogInfrared
+    | LightSensor
+    | Compass
+    | Buzzer
+    | Uart
+)
+
+
+class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One robot. `device` maps names such as "servo_left" to their descriptions."""
+
+    name: str
+    title: str
+    board: str
+    pin_map: str
+    body: Body
+    device: dict[str, AnyDevice]
+
+    def has(self, name: str) -> bool:
+        """Whether the robot has a device of that name, switched on."""
+        return name in self.device and self.device[name].on
+
+
+def robot_names() -> list[str]:
+    """The bundled robots."""
+    return sorted(path.stem for path in resources.folder("robots").glob("*.toml"))
+
+
+def load_robot(robot: str | Path) -> RobotDescription:
+    """The robot of that bundled name, or described by that file.
+
+    Raises:
+        RobotError: unknown robot, unreadable file, wrong key or value, or devices that cannot live on one board.
+    """
+    path = _find(robot)
+    table = _read(path, seen=())
+    try:
+        description = msgspec.convert(table, RobotDescription, strict=True)
+    except msgspec.ValidationError as error:
+        raise RobotError(f"{path.name}: {error}") from None
+    _check_pins(description, path.name)
+    return description
+
+
+def _find(robot: str | Path) -> Path:
+    path = Path(robot)
+    if path.suffix == ".toml":
+        if path.is_file():
+            return path
+        raise RobotError(f"there is no robot file {path}")
+    bundled = resources.folder("robots") / f"{robot}.toml"
+    if bundled.is_file():
+        return bundled
+    raise RobotError(f"there is no robot {str(robot)!r}; expected one of {', '.join(robot_names())}, or a .toml file")
+
+
+def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
+    """The file's table, laid over the robot that it extends."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path.name} cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise RobotError(f"{path.name} is no valid TOML: {error}") from None
+    base_name = table.pop("extends", None)
+    removed = table.pop("remove", [])
+    if base_name is None:
+        return table
+    base_path = _find(base_name)
+    if base_path in seen:
+        raise RobotError(f"{path.name} extends itself by way of {base_name!r}")
+    base = _read(base_path, (*seen, path))
+    for name in removed:
+        if base.get("device", {}).pop(name, None) is None:
+            raise RobotError(f"{path.name} removes device {name!r}, which {base_name!r} does not have")
+    return _overlay(base, table)
+
+
+def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+    """`top` over `base`; a table that names its type replaces the whole table below it."""
+    merged = dict(base)
+    for key, value in top.items():
+        below = merged.get(key)
+        if isinstance(value, dict) and isinstance(below, dict) and "type" not in value:
+            merged[key] = _overlay(below, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _check_pins(robot: RobotDescription, file: str) -> None:
+    """Refuses devices that cannot share a pin or a unit of the chip, naming both (ATmega328P data sheet, pin functions)."""
+    pin_owner: dict[int, str] = {}
+    unit_owner: dict[str, tuple[str, str]] = {}
+    for name, device in robot.device.items():
+        try:
+            pins = {field: pin_number(getattr(device, field)) for field in device.PINS}
+        except ValueError as error:
+            raise RobotError(f"{file}: device.{name}: {error}") from None
+        for field, pin in pins.items():
+            allowed = device.ONLY_PINS.get(field)
+            if allowed is not None and pin not in allowed:
+                expected = ", ".join(pin_name(number) for number in allowed)
+                raise RobotError(
+                    f"{file}: device.{name}.{field} is pin {pin_name(pin)}, which cannot do that; expected {expected}"
+                )
+            if pin in pin_owner:
+                raise RobotError(f"{file}: {pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}")
+            pin_owner[pin] = name
+        for unit, group in device.NEEDS.items():
+            owner, owner_group = unit_owner.setdefault(unit, (name, group))
+            if owner != name and (group == "" or group != owner_group):
+                raise RobotError(f"{file}: {owner} and {name} cannot share {unit}")

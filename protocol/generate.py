@@ -1,0 +1,432 @@
+"""Makes everything that follows from messages.toml and robots/*.toml.
+
+    python protocol/generate.py            writes the files
+    python protocol/generate.py --check    exits 1 and names each file that is stale
+
+Made: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, the golden vectors
+protocol/vectors/frames.json with their C twin firmware/test/vectors.h, and the tables of PROTOCOL.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(ROOT / "host"), str(HERE)]
+
+import reference_frame  # noqa: E402
+import schema  # noqa: E402
+
+from boebot.robots import RobotDescription, load_robot, robot_names  # noqa: E402
+
+STATUS_NOTE = "Made by protocol/generate.py; do not edit."
+
+
+def number(value: float) -> str:
+    """A number as short as it can be written."""
+    return str(int(value)) if float(value).is_integer() else repr(float(value))
+
+
+# ---- C ---------------------------------------------------------------------------------------------------------------
+
+
+def messages_header(spec: schema.Schema) -> str:
+    """firmware/src/generated/messages.h"""
+    lines = [
+        "/* messages.h: every message of the protocol, from protocol/messages.toml.",
+        f" * {STATUS_NOTE} */",
+        "#ifndef GENERATED_MESSAGES_H",
+        "#define GENERATED_MESSAGES_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        f"#define PROTOCOL_VERSION {spec.version}u",
+        f"#define SCHEMA_HASH 0x{spec.hash:08X}ul",
+        f"#define MESSAGE_PAYLOAD_MAX {max(m.length for m in spec.message)}u /* bytes */",
+        "#define MESSAGE_PAYLOAD_MAX_TO_BOARD "
+        f"{max(m.length for m in spec.message if m.direction == 'to_board')}u /* bytes */",
+    ]
+    for name, flags in spec.flags.items():
+        lines += ["", f"/* {flags.doc} */"]
+        lines += [f"#define {name.upper()}_{bit.upper()} (1u << {i})" for i, bit in enumerate(flags.bits)]
+    for name, enum in spec.enum.items():
+        lines += ["", f"/* {enum.doc} */", "enum {"]
+        lines += [f"  {name.upper()}_{value.upper()} = {i}," for i, value in enumerate(enum.values)]
+        lines += ["};"]
+    for message in spec.message:
+        upper = message.name.upper()
+        lines += ["", f"/* {message.doc} */", f"#define MSG_{upper}_ID 0x{message.id:02X}u"]
+        lines += [f"#define MSG_{upper}_LENGTH {message.length}u"]
+        if message.fields:
+            lines += ["typedef struct __attribute__((packed)) {"]
+            for field in message.fields:
+                ctype = "char" if field.text_length else schema.INTEGERS[field.type][1]
+                size = f"[{field.text_length}]" if field.text_length else ""
+                comment = field_comment(field)
+                lines.append(f"  {ctype} {field.name}{size};" + (f" /* {comment} */" if comment else ""))
+            lines += [f"}} msg_{message.name};"]
+        for field in message.fields:
+            if field.min is not None or field.max is not None:
+                lines.append(f"#define MSG_{upper}_{field.name.upper()}_MIN ({field.least})")
+                lines.append(f"#define MSG_{upper}_{field.name.upper()}_MAX ({field.greatest})")
+    lines += [
+        "",
+        "/* Payload bytes of the message, or -1 if there is no such message. */",
+        "static inline int16_t message_length(uint8_t id) {",
+        "  switch (id) {",
+    ]
+    for message in spec.message:
+        lines += [f"    case MSG_{message.name.upper()}_ID:", f"      return MSG_{message.name.upper()}_LENGTH;"]
+    lines += ["    default:", "      return -1;", "  }", "}", "", "#endif", ""]
+    return "\n".join(lines)
+
+
+def field_comment(field: schema.Field) -> str:
+    """Unit, scale and explanation of a field in one phrase."""
+    unit = field.unit if field.scale == 1.0 else f"{number(field.scale)} {field.unit}"
+    return "; ".join(part for part in (unit, field.flags or field.enum, field.doc) if part)
+
+
+def parameters_header(spec: schema.Schema) -> str:
+    """firmware/src/generated/parameters.h"""
+    lines = [
+        "/* parameters.h: the run-time parameters, from protocol/messages.toml.",
+        f" * {STATUS_NOTE} */",
+        "#ifndef GENERATED_PARAMETERS_H",
+        "#define GENERATED_PARAMETERS_H",
+        "",
+    ]
+    for p in spec.parameter:
+        unit = p.unit if p.scale == 1.0 else f"{number(p.scale)} {p.unit}"
+        lines.append(f"#define PARAMETER_{p.name.upper()} {p.id}u /* {unit}: {p.doc} */")
+    lines += [f"#define PARAMETER_COUNT {len(spec.parameter)}u", ""]
+    lines += ["/* X(NAME, id, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]
+    rows = []
+    for p in spec.parameter:
+        default = str(p.default) if p.default is not None else f"DEFAULT_{p.name.upper()}"
+        rows.append(f"  X({p.name.upper()}, {p.id}, {p.min}, {p.max}, {default})")
+    width = max(len(row) for row in [*rows, "#define PARAMETER_LIST(X)"]) + 1
+    lines += [row.ljust(width) + "\\" for row in ["#define PARAMETER_LIST(X)", *rows[:-1]]]
+    lines += [rows[-1], "", "#endif", ""]
+    return "\n".join(lines)
+
+
+def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
+    """firmware/src/generated/pins_<map>.h"""
+    guard = f"GENERATED_PINS_{robot.pin_map.upper().replace('-', '_')}_H"
+    lines = [
+        f"/* {pins_file(robot)}: pin map and defaults of the {robot.title}, from protocol/robots.",
+        f" * {STATUS_NOTE} */",
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        f'#define PIN_MAP_NAME "{robot.pin_map}"',
+    ]
+    for name, device in robot.device.items():
+        for role, pin in device.pins().items():
+            full = "_".join(part.upper() for part in (name, role) if part)
+            port, bit = ("D", pin) if pin < 8 else ("B", pin - 8) if pin < 14 else ("C", pin - 14)
+            lines += ["", f"#define PIN_{full} {pin}"]
+            lines += [f"#define {full}_PORT PORT{port}", f"#define {full}_DDR DDR{port}"]
+            lines += [f"#define {full}_PINR PIN{port}", f"#define {full}_BIT {bit}"]
+    quadrature = type(robot.device["encoder_left"]).__name__ == "QuadratureEncoder"
+    lines += ["", f"#define ENCODER_QUADRATURE {int(quadrature)}"]
+    lines += ["", "/* Defaults of the parameters, in counts of their scale. */"]
+    lines.append(f"#define DEFAULT_DEVICES {devices_default(spec, robot)}")
+    for p in spec.parameter:
+        if p.default_from:
+            lines.append(f"#define DEFAULT_{p.name.upper()} {default_counts(p, robot)}")
+    lines += ["", "#endif", ""]
+    return "\n".join(lines)
+
+
+# bit of the devices flags -> the device that must be on in the robot
+DEVICE_OF_BIT = {
+    "servos": "servo_left",
+    "encoders": "encoder_left",
+    "whiskers": "whisker_left",
+    "infrared": "infrared_left",
+    "ping": "ping",
+    "battery": "battery",
+    "light": "light_left",
+    "analog_infrared": "analog_infrared",
+    "compass": "compass",
+    "turret": "turret",
+    "buzzer": "buzzer",
+}
+
+
+def devices_default(spec: schema.Schema, robot: RobotDescription) -> int:
+    """The devices bits of what the robot has switched on."""
+    return sum(1 << i for i, bit in enumerate(spec.flags["devices"].bits) if robot.has(DEVICE_OF_BIT[bit]))
+
+
+def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
+    """The parameter's default for that robot in counts: a key of its body or of one of its devices."""
+    owner_name, key = parameter.default_from.split(".")
+    owner = robot.body if owner_name == "body" else robot.device[owner_name]
+    counts = round(float(getattr(owner, key)) / parameter.scale)
+    if not parameter.min <= counts <= parameter.max:
+        raise ValueError(f"{robot.name}: {parameter.default_from} is outside parameter {parameter.name}'s range")
+    return counts
+
+
+def pins_file(robot: RobotDescription) -> str:
+    """Name of the robot's pin header."""
+    return f"pins_{robot.pin_map.replace('-', '_')}.h"
+
+
+# ---- Python ----------------------------------------------------------------------------------------------------------
+
+
+def class_name(name: str) -> str:
+    """telemetry -> Telemetry, setpoint_signal -> SetpointSignal"""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def python_module(spec: schema.Schema) -> str:
+    """host/boebot/link/messages.py"""
+    lines = [
+        '"""Every message of the protocol, from protocol/messages.toml: wire integers in, wire integers out.',
+        "",
+        STATUS_NOTE,
+        '"""',
+        "",
+        "# fmt: off",
+        "# ruff: noqa: E501",
+        "",
+        "from __future__ import annotations",
+        "",
+        "import struct",
+        "from enum import IntEnum, IntFlag",
+        "from typing import ClassVar, NamedTuple, Self",
+        "",
+        f"PROTOCOL_VERSION = {spec.version}",
+        f"SCHEMA_HASH = 0x{spec.hash:08X}",
+    ]
+    for name, flags in spec.flags.items():
+        lines += ["", "", f"class {class_name(name)}(IntFlag):", f'    """{flags.doc}"""', ""]
+        lines += [f"    {bit.upper()} = 1 << {i}" for i, bit in enumerate(flags.bits)]
+    for name, enum in spec.enum.items():
+        lines += ["", "", f"class {class_name(name)}(IntEnum):", f'    """{enum.doc}"""', ""]
+        lines += [f"    {value.upper()} = {i}" for i, value in enumerate(enum.values)]
+    for message in spec.message:
+        lines += python_message(message)
+    lines += ["", "", "Message = ("]
+    lines += [f"    {'' if i == 0 else '| '}{class_name(m.name)}" for i, m in enumerate(spec.message)]
+    lines += [")", "", "MESSAGES: dict[int, type[Message]] = {"]
+    lines += [f"    0x{m.id:02X}: {class_name(m.name)}," for m in spec.message]
+    lines += ["}", "", "# id -> payload bytes", "LENGTHS: dict[int, int] = {"]
+    lines += [f"    0x{m.id:02X}: {m.length}," for m in spec.message]
+    lines += ["}"]
+    lines += ["", "", "class ParameterSpec(NamedTuple):", '    """A run-time parameter of the firmware."""', ""]
+    lines += ["    id: int", "    unit: str", "    scale: float  # unit per count", "    minimum: int  # counts"]
+    lines += ["    maximum: int  # counts", "    doc: str", "", "", "PARAMETERS: dict[str, ParameterSpec] = {"]
+    for p in spec.parameter:
+        row = f'{p.id}, "{p.unit}", {p.scale!r}, {p.min}, {p.max}, "{p.doc}"'
+        lines.append(f'    "{p.name}": ParameterSpec({row}),')
+    lines += ["}", ""]
+    return "\n".join(lines)
+
+
+def python_message(message: schema.Message) -> list[str]:
+    """The class of one message."""
+    code = "<" + "".join(field.struct_code for field in message.fields)
+    name = class_name(message.name)
+    lines = ["", "", f"class _{name}Fields(NamedTuple):"]
+    for field in message.fields:
+        comment = field_comment(field)
+        kind = "bytes" if field.text_length else "int"
+        lines.append(f"    {field.name}: {kind}" + (f"  # {comment}" if comment else ""))
+    if not message.fields:
+        lines.append("    pass")
+    return [
+        *lines,
+        "",
+        "",
+        f"class {name}(_{name}Fields):",
+        f'    """{message.doc}"""',
+        "",
+        "    __slots__ = ()",
+        f"    ID: ClassVar[int] = 0x{message.id:02X}",
+        f"    LENGTH: ClassVar[int] = {message.length}",
+        f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{code}")',
+        "",
+        "    def pack(self) -> bytes:",
+        '        """The payload."""',
+        "        return self.STRUCT.pack(*self)",
+        "",
+        "    @classmethod",
+        "    def unpack(cls, payload: bytes) -> Self:",
+        '        """The message in a payload of exactly its length."""',
+        "        return cls(*cls.STRUCT.unpack(payload))",
+    ]
+
+
+# ---- golden vectors --------------------------------------------------------------------------------------------------
+
+
+def vectors(spec: schema.Schema) -> list[dict[str, object]]:
+    """Frames of every message: all zero, all greatest, all least, and three drawn at random."""
+    draw = random.Random(20120321)
+    out: list[dict[str, object]] = []
+    for message in spec.message:
+        rows: list[list[object]] = [[0 if not f.text_length else b"" for f in message.fields]]
+        rows.append([f.greatest if not f.text_length else b"x" * f.text_length for f in message.fields])
+        rows.append([f.least if not f.text_length else b"a" for f in message.fields])
+        for _ in range(3):
+            rows.append(
+                [
+                    draw.randint(f.least, f.greatest)
+                    if not f.text_length
+                    else bytes(draw.randrange(97, 123) for _ in range(draw.randrange(f.text_length + 1)))
+                    for f in message.fields
+                ]
+            )
+        for row in rows if message.fields else rows[:1]:
+            sequence = draw.randrange(256)
+            payload = b"".join(
+                value.ljust(f.text_length, b"\0")
+                if isinstance(value, bytes)
+                else int(str(value)).to_bytes(f.size, "little", signed=f.type.startswith("i"))
+                for f, value in zip(message.fields, row, strict=True)
+            )
+            out.append(
+                {
+                    "message": message.name,
+                    "id": message.id,
+                    "sequence": sequence,
+                    "fields": {
+                        f.name: value.decode() if isinstance(value, bytes) else value
+                        for f, value in zip(message.fields, row, strict=True)
+                    },
+                    "payload": payload.hex(),
+                    "frame": reference_frame.frame(message.id, sequence, payload).hex(),
+                }
+            )
+    return out
+
+
+def vectors_header(rows: list[dict[str, object]]) -> str:
+    """firmware/test/vectors.h"""
+    lines = [
+        "/* vectors.h: the golden frames of protocol/vectors/frames.json for the C tests.",
+        f" * {STATUS_NOTE} */",
+        "#ifndef VECTORS_H",
+        "#define VECTORS_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        "typedef struct {",
+        "  const char *message;",
+        "  uint8_t id;",
+        "  uint8_t sequence;",
+        "  const char *payload; /* hexadecimal */",
+        "  const char *frame;   /* hexadecimal, with both delimiters */",
+        "} golden_frame;",
+        "",
+        "static const golden_frame GOLDEN_FRAMES[] = {",
+    ]
+    for row in rows:
+        lines.append(f'    {{"{row["message"]}", {row["id"]}, {row["sequence"]}, "{row["payload"]}",')
+        lines.append(f'     "{row["frame"]}"}},')
+    lines += ["};", "", "#endif", ""]
+    return "\n".join(lines)
+
+
+# ---- tables of PROTOCOL.md -------------------------------------------------------------------------------------------
+
+
+def tables(spec: schema.Schema) -> str:
+    """The message and parameter tables, in Markdown."""
+    lines = [f"Version {spec.version}, schema hash `0x{spec.hash:08X}`.", ""]
+    lines += ["| id | message | direction | delivery | payload | meaning |", "|---|---|---|---|---|---|"]
+    for m in spec.message:
+        way = "host → board" if m.direction == "to_board" else "board → host"
+        lines.append(f"| `0x{m.id:02X}` | `{m.name}` | {way} | {m.delivery} | {m.length} B | {m.doc} |")
+    for m in spec.message:
+        if not m.fields:
+            continue
+        lines += ["", f"#### `{m.name}`", "", "| offset | field | type | unit per count | range | meaning |"]
+        lines += ["|---|---|---|---|---|---|"]
+        offset = 0
+        for f in m.fields:
+            unit = " ".join(part for part in ("" if f.scale == 1.0 else number(f.scale), f.unit) if part)
+            limits = f"{f.least} … {f.greatest}" if f.min is not None or f.max is not None else ""
+            meaning = "; ".join(x for x in (f.doc, f"see {f.flags or f.enum}" if f.flags or f.enum else "") if x)
+            lines.append(f"| {offset} | `{f.name}` | {f.type} | {unit} | {limits} | {meaning} |")
+            offset += f.size
+    for name, flags in spec.flags.items():
+        lines += ["", f"#### Flags `{name}`", "", flags.doc, "", "| bit | name |", "|---|---|"]
+        lines += [f"| {i} | `{bit}` |" for i, bit in enumerate(flags.bits)]
+    for name, enum in spec.enum.items():
+        lines += ["", f"#### Values `{name}`", "", enum.doc, "", "| value | name |", "|---|---|"]
+        lines += [f"| {i} | `{value}` |" for i, value in enumerate(enum.values)]
+    lines += ["", "#### Parameters", "", "| number | parameter | unit per count | range | default | meaning |"]
+    lines += ["|---|---|---|---|---|---|"]
+    for p in spec.parameter:
+        unit = " ".join(part for part in ("" if p.scale == 1.0 else number(p.scale), p.unit) if part)
+        default = str(p.default) if p.default is not None else "the robot's"
+        lines.append(f"| {p.id} | `{p.name}` | {unit} | {p.min} … {p.max} | {default} | {p.doc} |")
+    return "\n".join(lines)
+
+
+BEGIN, END = "<!-- tables: made by generate.py -->", "<!-- end of tables -->"
+
+
+def protocol_page(spec: schema.Schema) -> str:
+    """PROTOCOL.md with its tables renewed."""
+    text = (HERE / "PROTOCOL.md").read_text(encoding="utf-8")
+    head, rest = text.split(BEGIN)
+    tail = rest.split(END)[1]
+    return f"{head}{BEGIN}\n\n{tables(spec)}\n\n{END}{tail}"
+
+
+# ---- all together ----------------------------------------------------------------------------------------------------
+
+
+def outputs() -> dict[Path, str]:
+    """Every made file and its text."""
+    spec = schema.load()
+    golden = vectors(spec)
+    generated = ROOT / "firmware" / "src" / "generated"
+    made = {
+        generated / "messages.h": messages_header(spec),
+        generated / "parameters.h": parameters_header(spec),
+        ROOT / "host" / "boebot" / "link" / "messages.py": python_module(spec),
+        HERE / "vectors" / "frames.json": json.dumps(golden, indent=1) + "\n",
+        ROOT / "firmware" / "test" / "vectors.h": vectors_header(golden),
+        HERE / "PROTOCOL.md": protocol_page(spec),
+    }
+    maps: dict[str, str] = {}
+    for name in robot_names():
+        robot = load_robot(name)
+        header = pins_header(spec, robot)
+        if maps.setdefault(robot.pin_map, robot.name) == robot.name:
+            made[generated / pins_file(robot)] = header
+    return made
+
+
+def main() -> int:
+    """Writes the files, or checks them."""
+    parser = argparse.ArgumentParser(description="Makes everything that follows from the protocol's schema.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file is stale")
+    check = parser.parse_args().check
+    stale = [path for path, text in outputs().items() if not path.is_file() or path.read_text("utf-8") != text]
+    for path in stale:
+        if check:
+            print(f"{path.relative_to(ROOT)} is stale; run: python protocol/generate.py")
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(outputs()[path], "utf-8")
+            print(f"wrote {path.relative_to(ROOT)}")
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,162 @@
+"""The protocol's schema, read from messages.toml and checked; generate.py turns it into code and tables."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import zlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+HERE = Path(__file__).resolve().parent
+
+# wire type -> (size in bytes, C type, struct letter, least, greatest)
+INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
+    "u8": (1, "uint8_t", "B", 0, 2**8 - 1),
+    "u16": (2, "uint16_t", "H", 0, 2**16 - 1),
+    "u32": (4, "uint32_t", "I", 0, 2**32 - 1),
+    "i8": (1, "int8_t", "b", -(2**7), 2**7 - 1),
+    "i16": (2, "int16_t", "h", -(2**15), 2**15 - 1),
+    "i32": (4, "int32_t", "i", -(2**31), 2**31 - 1),
+}
+
+
+class Field(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One field of a message."""
+
+    name: str
+    type: str
+    unit: str = ""
+    scale: float = 1.0
+    min: int | None = None
+    max: int | None = None
+    flags: str = ""
+    enum: str = ""
+    doc: str = ""
+
+    @property
+    def text_length(self) -> int:
+        """Bytes of a text field; 0 for an integer."""
+        return int(self.type[5:-1]) if self.type.startswith("text[") else 0
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return self.text_length or INTEGERS[self.type][0]
+
+    @property
+    def struct_code(self) -> str:
+        """The field's letter in Python's struct notation."""
+        return f"{self.text_length}s" if self.text_length else INTEGERS[self.type][2]
+
+    @property
+    def least(self) -> int:
+        """Smallest count allowed."""
+        return self.min if self.min is not None else INTEGERS[self.type][3]
+
+    @property
+    def greatest(self) -> int:
+        """Largest count allowed."""
+        return self.max if self.max is not None else INTEGERS[self.type][4]
+
+
+class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One message: a fixed list of fields, hence one exact length."""
+
+    name: str
+    id: int
+    direction: str
+    delivery: str
+    doc: str
+    fields: list[Field]
+
+    @property
+    def length(self) -> int:
+        """Payload bytes."""
+        return sum(field.size for field in self.fields)
+
+
+class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A set of named bits."""
+
+    doc: str
+    type: str
+    bits: list[str]
+
+
+class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Named values, counted from 0."""
+
+    doc: str
+    values: list[str]
+
+
+class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A value of the firmware that the host may change at run time."""
+
+    name: str
+    id: int
+    unit: str
+    doc: str
+    min: int
+    max: int
+    scale: float = 1.0
+    default: int | None = None
+    default_from: str = ""
+
+
+class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Everything that messages.toml says."""
+
+    version: int
+    flags: dict[str, Flags]
+    enum: dict[str, Enum]
+    message: list[Message]
+    parameter: list[Parameter]
+
+    @property
+    def hash(self) -> int:
+        """CRC-32 of what both ends must agree on: everything but the explanations."""
+        return zlib.crc32(json.dumps(_without_docs(msgspec.to_builtins(self)), sort_keys=True).encode())
+
+
+def _without_docs(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _without_docs(value) for key, value in node.items() if key != "doc"}
+    if isinstance(node, list):
+        return [_without_docs(value) for value in node]
+    return node
+
+
+def load(path: Path = HERE / "messages.toml") -> Schema:
+    """Reads and checks the schema.
+
+    Raises:
+        ValueError: a name or number is used twice, or a field names what is not there.
+    """
+    schema = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Schema)
+    _unique("message", [m.name for m in schema.message], [m.id for m in schema.message])
+    _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])
+    if [p.id for p in schema.parameter] != list(range(len(schema.parameter))):
+        raise ValueError("parameter ids must count from 0 without gaps, in order")
+    for message in schema.message:
+        if (message.id >= 0x80) != (message.direction == "to_host"):
+            raise ValueError(f"message {message.name}: ids from 0x80 on are for messages to the host")
+        if message.delivery not in ("telemetry", "set_point", "request"):
+            raise ValueError(f"message {message.name}: unknown delivery {message.delivery!r}")
+        for field in message.fields:
+            if not field.text_length and field.type not in INTEGERS:
+                raise ValueError(f"message {message.name}: field {field.name} has unknown type {field.type!r}")
+            if field.flags and field.flags not in schema.flags:
+                raise ValueError(f"message {message.name}: field {field.name} names unknown flags {field.flags!r}")
+            if field.enum and field.enum not in schema.enum:
+                raise ValueError(f"message {message.name}: field {field.name} names unknown enum {field.enum!r}")
+    return schema
+
+
+def _unique(kind: str, names: list[str], ids: list[int]) -> None:
+    twice = [name for name in names if names.count(name) > 1] + [hex(i) for i in ids if ids.count(i) > 1]
+    if twice:
+        raise ValueError(f"{kind}: {', '.join(sorted(set(twice)))} used twice")

@@ -1,0 +1,103 @@
+/* board.h: one emulated board, whatever emulates it.
+ *
+ * A board runs firmware on a 16 MHz clock, has the Arduino Uno's pins and one serial line. Everybody outside (loop,
+ * parts, tests, the Python face) sees it through these operations only; boards/avr and boards/native implement them.
+ *
+ * Time is in CPU cycles since power-on and never goes back, not even at a reset. Stamps and bytes do not depend on how
+ * a run is cut into calls of `advance`.
+ */
+#ifndef BOARD_H
+#define BOARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define BOARD_CLOCK_HZ 16000000u
+#define BOARD_PIN_COUNT 20u /* Arduino numbers: 0..13, then A0..A5 as 14..19 */
+#define BOARD_INTERFACE_VERSION 1u
+#define BOARD_GUARD_CYCLES 64u
+
+/* What the firmware does to a pin, and what the outside may do to it (the first three only). */
+enum { BOARD_LOW = 0, BOARD_HIGH = 1, BOARD_RELEASED = 2, BOARD_PULLED_UP = 3 };
+
+typedef enum { BOARD_RESET_POWER, BOARD_RESET_EXTERNAL, BOARD_RESET_BROWN_OUT, BOARD_RESET_WATCHDOG } board_reset_cause;
+
+typedef enum {
+  BOARD_RUNNING = 0,
+  BOARD_CRASHED = 1, /* the program cannot go on; see `fault` */
+} board_state;
+
+typedef struct {
+  uint64_t executed_cycles; /* cycles in which the CPU executed instructions or entered interrupts; 0 if not known */
+  uint64_t instructions;    /* 0 if not known */
+  uint64_t interrupts;
+  uint64_t bytes_in;  /* bytes whose stop bit reached the board */
+  uint64_t bytes_out; /* bytes whose stop bit left the board */
+  uint64_t overruns;  /* received bytes lost because the receiver was full (DOR0) */
+  uint64_t framing_errors;
+  uint64_t resets; /* since power-on */
+  uint64_t edges_out;
+} board_counters;
+
+typedef struct board board;
+
+/* Called from inside `advance` at the very cycle at which the firmware changes what it does to a pin (LOW, HIGH, RELEASED,
+ * PULLED_UP); at a reset for each pin that changes. Whoever owns the board owns the sink and hands edges on. */
+typedef void board_edge_sink(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
+
+typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channel);
+
+typedef struct {
+  uint32_t version; /* BOARD_INTERFACE_VERSION */
+  const char *kind; /* "avr" or "native" */
+
+  /* Frees the board. */
+  void (*destroy)(board *self);
+
+  /* The cycle up to which the board has run. */
+  uint64_t (*now)(const board *self);
+
+  /* Runs until `now` >= `until` (an instruction is never split). Returns BOARD_RUNNING or BOARD_CRASHED. */
+  board_state (*advance)(board *self, uint64_t until);
+
+  /* From cycle `at` on the outside drives `pin` to LOW, HIGH, or RELEASED. Replaces what was queued for that pin at or
+   * after `at`. May be called from a sink. `at` in the past means now: runs are independent of how they are cut when
+   * edges are queued at least BOARD_GUARD_CYCLES ahead of `until`. */
+  void (*drive)(board *self, uint64_t at, uint8_t pin, uint8_t level);
+
+  /* What the firmware does to the pin now: LOW, HIGH, RELEASED, PULLED_UP. */
+  uint8_t (*output)(const board *self, uint8_t pin);
+
+  /* Who is asked for the voltage at analog channel 0..5 when the converter samples it; NULL: 0 V. */
+  void (*analog)(board *self, board_analog_source *source, void *context);
+
+  /* Puts bytes on the line towards the board, back to back, the first start bit not before cycle `at`. */
+  void (*send)(board *self, uint64_t at, const uint8_t *bytes, size_t count);
+
+  /* Takes bytes that left the board (their stop bit has ended); `cycles`, if not NULL, gets the cycle of each one's
+   * end. Returns how many, at most `capacity`. */
+  size_t (*receive)(board *self, uint8_t *bytes, uint64_t *cycles, size_t capacity);
+
+  /* Bit rate of the outside's side of the line, default 500,000. */
+  void (*line_rate)(board *self, uint32_t baud);
+
+  /* Resets the microcontroller at its next instruction. Time and what drives its pins from outside stay; POWER also
+   * loses RAM. Bytes in flight are lost. */
+  void (*reset)(board *self, board_reset_cause cause);
+
+  void (*counters)(const board *self, board_counters *out);
+
+  /* One sentence about a crash, or NULL. */
+  const char *(*fault)(const board *self);
+
+  /* What only one kind of board offers, by name, or NULL. */
+  void *(*extension)(board *self, const char *name);
+} board_operations;
+
+struct board {
+  const board_operations *op;
+  board_edge_sink *sink; /* NULL: nobody listens */
+  void *sink_context;
+};
+
+#endif
