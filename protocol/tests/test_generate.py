@@ -1,0 +1,60 @@
+"""The made files are fresh, and the golden frames agree with independent libraries."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cobs import cobs
+
+PROTOCOL = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(PROTOCOL))
+
+import reference_frame  # noqa: E402
+import schema  # noqa: E402
+
+GOLDEN = json.loads((PROTOCOL / "vectors" / "frames.json").read_text())
+
+
+def test_made_files_are_fresh() -> None:
+    run = subprocess.run([sys.executable, PROTOCOL / "generate.py", "--check"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout
+
+
+def test_every_message_has_golden_frames() -> None:
+    assert {row["message"] for row in GOLDEN} == {message.name for message in schema.load().message}
+
+
+@pytest.mark.parametrize("row", GOLDEN, ids=lambda row: f"{row['message']}-{row['sequence']}")
+def test_golden_frame_unpacks_with_an_independent_cobs_and_polynomial_division(row: dict[str, str]) -> None:
+    frame = bytes.fromhex(row["frame"])
+    assert frame[0] == frame[-1] == 0 and 0 not in frame[1:-1]
+    stuffed, check = frame[1:-4], frame[-4:-1]
+    assert cobs.decode(stuffed) == bytes([int(row["id"]), int(row["sequence"])]) + bytes.fromhex(row["payload"])
+    # The CRC is the remainder of (seed·x^(8n) + data)·x^21 over GF(2): long division with Python's integers.
+    bits = 8 * len(stuffed)
+    dividend = (int.from_bytes(stuffed, "big") << 21) ^ (reference_frame.SEED << bits)
+    divisor = 1 << 21 | reference_frame.POLYNOMIAL
+    while dividend.bit_length() > 21:
+        dividend ^= divisor << (dividend.bit_length() - 22)
+    assert all(byte & 0x80 for byte in check)
+    assert dividend == (check[0] & 0x7F) << 14 | (check[1] & 0x7F) << 7 | check[2] & 0x7F
+
+
+def test_schema_refuses_a_number_used_twice(tmp_path: Path) -> None:
+    text = (PROTOCOL / "messages.toml").read_text().replace("id = 0x12", "id = 0x11")
+    (tmp_path / "messages.toml").write_text(text)
+    with pytest.raises(ValueError, match="0x11 used twice"):
+        schema.load(tmp_path / "messages.toml")
+
+
+def test_hash_ignores_explanations_and_sees_layout(tmp_path: Path) -> None:
+    original = (PROTOCOL / "messages.toml").read_text()
+    file = tmp_path / "messages.toml"
+    file.write_text(original.replace('doc = "Asks the board to say hello."', 'doc = "Asks for a hello."'))
+    assert schema.load(file).hash == schema.load().hash
+    file.write_text(original.replace('name = "answers_tick", type = "u16"', 'name = "answers_tick", type = "u32"', 1))
+    assert schema.load(file).hash != schema.load().hash

@@ -1,0 +1,71 @@
+"""Robot descriptions: the bundled ones load, wrong ones are refused in one sentence that names the place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from boebot.errors import RobotError
+from boebot.robots import QuadratureEncoder, load_robot, pin_name, pin_number, robot_names
+
+
+def variant(tmp_path: Path, text: str) -> Path:
+    file = tmp_path / "variant.toml"
+    file.write_text('extends = "shieldbot"\n' + text)
+    return file
+
+
+def test_bundled_robots_load_under_their_own_names() -> None:
+    assert {load_robot(name).name for name in robot_names()} == set(robot_names()) >= {"shieldbot", "shieldbot-quad"}
+
+
+def test_shieldbot_pins_are_those_of_the_default_map() -> None:
+    pins = {name: device.pins() for name, device in load_robot("shieldbot").device.items()}
+    assert pins["servo_left"] == {"": 13} and pins["servo_right"] == {"": 12}
+    assert pins["infrared_left"] == {"led": 9, "receiver": 10} and pins["infrared_right"] == {"led": 2, "receiver": 3}
+    assert pins["whisker_left"] == {"": 5} and pins["whisker_right"] == {"": 7} and pins["ping"] == {"": 8}
+    assert pins["encoder_left"] == {"": 16} and pins["encoder_right"] == {"": 17}
+
+
+def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
+    robot = load_robot("shieldbot-quad")
+    assert isinstance(robot.device["encoder_left"], QuadratureEncoder)
+    assert "battery" not in robot.device and "light_left" not in robot.device
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[device.buzzer]\ntype = 'buzzer'\npin = 5", "whisker_left and buzzer cannot share pin 5"),
+        ("[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
+         "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5", "ping and ping_rear cannot share pin 8"),
+        ("remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6", "buzzer and horn cannot share Timer0"),
+        ("[device.ping]\npin = 7", "ping.pin is pin 7, which cannot do that; expected 8"),
+        ("[device.servo_left]\npin = 20", "there is no pin 20; expected 0..13 or 'A0'..'A5'"),
+        ("[device.servo_left]\npin = 13\nwidth_us = 3", "width_us"),
+        ("[body]\nmass_kg = -1.0", r"mass_kg|> 0"),
+        ("[body]\nmass_kg = 'heavy'", "mass_kg"),
+        ("remove = ['wings']", "removes device 'wings'"),
+        ("[body", "no valid TOML"),
+    ],
+)
+def test_wrong_description_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(variant(tmp_path, text))
+
+
+def test_unknown_robot_names_the_known_ones() -> None:
+    with pytest.raises(RobotError, match="there is no robot 'dalek'; expected one of shieldbot, shieldbot-quad"):
+        load_robot("dalek")
+
+
+def test_robot_that_extends_itself_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "loop.toml"
+    file.write_text(f"extends = '{file}'")
+    with pytest.raises(RobotError, match="extends itself"):
+        load_robot(file)
+
+
+def test_pin_names_and_numbers_are_inverse() -> None:
+    assert [pin_number(pin_name(n) if n > 13 else n) for n in range(20)] == list(range(20))
