@@ -1,0 +1,11 @@
+"""PlatformIO, after the build: the image goes to build/images/<pin map>.elf and .hex, where everybody loads it from."""
+
+from SCons.Script import Copy, Default, Import
+
+Import("env")
+env = globals()["env"]
+
+for suffix in (".elf", ".hex"):
+    built = "$BUILD_DIR/${PROGNAME}" + suffix
+    copied = f"$PROJECT_DIR/build/images/{env.GetProjectOption('custom_pin_map')}{suffix}"
+    Default(env.Command(copied, built, env.VerboseAction(Copy("$TARGET", "$SOURCE"), "Copying $TARGET")))
