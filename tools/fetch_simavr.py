@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Brings simavr, the AVR emulator's instruction core, into build/simavr.
 
-simavr (GPL-3) travels in the registry crate `simavr-ffi`. The ordinary cargo client downloads it with whatever mirror
-and proxy settings the user has; this script only asks cargo for it, checks its SHA-256 and unpacks it. No source of
-simavr is kept in this repository. Needs cargo 1.82 or newer (Debian 12: apt package `cargo-web`).
+simavr (GPL-3) travels in the registry crate `simavr-ffi`. The ordinary cargo client downloads it, with whatever
+mirror and proxy settings the user has; this script asks cargo for it, checks its SHA-256 and unpacks it. No source
+of simavr is kept in this repository. Needs cargo 1.82 or newer (Debian 12: apt package `cargo-web`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 from pathlib import Path
 
 CRATE = "simavr-ffi"
@@ -49,7 +50,7 @@ def find_cargo() -> str:
     """The cargo client, checked to be new enough."""
     cargo = shutil.which("cargo")
     if cargo is None:
-        raise FetchError("cargo is not installed; the AVR emulator needs it once (Debian 12: apt install cargo-web).")
+        raise FetchError("cargo is not installed; simavr comes by it (Debian 12: apt install cargo-web).")
     answer = subprocess.run([cargo, "--version"], capture_output=True, text=True, check=False).stdout
     version = re.match(r"cargo (\d+)\.(\d+)", answer)
     if version is None or (int(version[1]), int(version[2])) < OLDEST_CARGO:
@@ -61,9 +62,8 @@ def download() -> Path:
     """Lets cargo download the crate into its cache."""
     cargo = find_cargo()
     # outside the repository, so that cargo looks for no workspace there
-    result = subprocess.run(
-        [cargo, "info", f"{CRATE}@{VERSION}"], capture_output=True, text=True, check=False, cwd=cargo_home().parent
-    )
+    command = [cargo, "info", f"{CRATE}@{VERSION}"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tempfile.gettempdir())
     crate = cached_crate()
     if crate is None:
         reason = result.stderr.strip().splitlines()
