@@ -1,0 +1,178 @@
+# boebot: `make run` shows the whole circle, `make test` proves it, `make help` lists the rest.
+#
+# Everything is set up on the way: system packages (Debian, Ubuntu), a virtual environment under build/venv, simavr's
+# sources, the firmware images, the compiled parts. Files named .done-* below build/ say what is finished; the second
+# time nothing is done again.
+
+JOBS := $(shell nproc 2>/dev/null || echo 2)
+VENV := build/venv
+PYTHON_VENV := $(VENV)/bin/python
+# Steps that do not depend on each other run side by side; what a step prints stays together.
+SIDE_BY_SIDE := $(MAKE) --no-print-directory --jobs=$(JOBS) --output-sync=target
+PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-check --no-warn-script-location \
+	--constraint requirements.lock
+
+FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[chS]' -o -name '*.def')
+CORE_SOURCES := $(shell find sim_bridge -name '*.[ch]' -o -name 'build_*.py')
+IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
+
+.DELETE_ON_ERROR:
+.PHONY: help run test check bench soak fuzz wheel firmware format setup clean lock compile_commands.json
+
+help:
+	@echo "make run       build everything, let the wander brain drive the emulated robot, write build/run"
+	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
+	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
+	@echo "make bench     the figures, as a table and in build/bench.json"
+	@echo "make soak      a long run in the emulator; SECONDS=3600 by default"
+	@echo "make fuzz      many more random cases for the tests that take random input"
+	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
+	@echo "make wheel     dist/*.whl, with images and arenas inside"
+	@echo "make format    format all sources"
+	@echo "make setup     only what run, test and check need; do no more"
+	@echo "make clean     remove everything that was built"
+
+# ---- what people call --------------------------------------------------------------------------------------------
+
+run:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds 60 --out build/run
+
+test:
+	@$(SIDE_BY_SIDE) ready-test
+	@tools/test.sh
+
+check:
+	@$(SIDE_BY_SIDE) ready-check
+	@$(SIDE_BY_SIDE) --keep-going check-python check-types check-format check-static check-warnings check-generated \
+		check-images
+	@echo "check: all passed"
+
+bench:
+	@$(SIDE_BY_SIDE) ready-test
+	@$(PYTHON_VENV) tools/bench.py
+
+SECONDS ?= 3600
+soak:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
+
+fuzz:
+	@$(SIDE_BY_SIDE) ready-test
+	@BOEBOT_EXAMPLES=20000 $(PYTHON_VENV) -m pytest -q -m fuzz
+
+firmware: ready-firmware
+
+wheel:
+	@$(SIDE_BY_SIDE) ready-run
+	@rm -rf build/lib.* build/bdist.*
+	@$(PYTHON_VENV) -m pip wheel --quiet --no-index --no-deps --no-build-isolation --wheel-dir dist .
+	@ls dist/*.whl
+
+format:
+	@$(SIDE_BY_SIDE) ready-check
+	@$(PYTHON_VENV) -m ruff format --quiet .
+	@$(PYTHON_VENV) -m ruff check --quiet --fix .
+	@$(VENV)/bin/clang-format -i $$(tools/c_sources.sh)
+
+setup:
+	@$(SIDE_BY_SIDE) ready-test ready-check
+
+compile_commands.json:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(PYTHON_VENV) tools/compile_commands.py
+
+clean:
+	@rm -rf build dist compile_commands.json host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
+	@find sim_bridge -name '*.so' -delete
+	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
+
+lock:
+	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
+	@build/lock-venv/bin/pip install --quiet \
+		$$(build/lock-venv/bin/python tools/requirements.py build run firmware test check)
+	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
+	@mv build/requirements.lock requirements.lock
+
+# ---- single checks -----------------------------------------------------------------------------------------------
+
+.PHONY: check-python check-types check-format check-static check-warnings check-generated check-images
+check-python:
+	@$(PYTHON_VENV) -m ruff check --quiet .
+	@$(PYTHON_VENV) -m ruff format --check --quiet . || { echo "run: make format"; exit 1; }
+check-types:
+	@$(PYTHON_VENV) -m mypy --no-error-summary
+check-format:
+	@$(VENV)/bin/clang-format --dry-run -Werror $$(tools/c_sources.sh)
+check-static:
+	@tools/static_analysis.sh
+check-warnings:
+	@tools/warnings.sh
+check-generated:
+	@$(PYTHON_VENV) protocol/generate.py --check
+check-images: $(IMAGES)
+	@$(PYTHON_VENV) tools/image_size.py $(IMAGES)
+
+# ---- steps ---------------------------------------------------------------------------------------------------------
+
+.PHONY: ready-run ready-test ready-check ready-firmware
+ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
+ready-test: ready-run build/.done-system-test $(VENV)/.done-test
+ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
+ready-firmware: $(IMAGES)
+
+build/.done-system-%: tools/setup_system.sh tools/find_python.sh
+	@mkdir -p build
+	@tools/setup_system.sh $*
+	@touch $@
+# one apt at a time
+build/.done-system-test: build/.done-system-run
+build/.done-system-check: build/.done-system-test
+
+$(VENV)/.done-venv: build/.done-system-run
+	@echo "Making a virtual environment in $(VENV)"
+	@rm -rf $(VENV)
+	@$$(tools/find_python.sh) -m venv $(VENV)
+	@touch $@
+
+# PlatformIO first: the firmware is built while the rest is installed. One pip at a time.
+DECLARED := requirements.lock pyproject.toml
+INSTALL = $(PIP) $$($(PYTHON_VENV) tools/requirements.py $(1)) && touch $@
+$(VENV)/.done-firmware: $(VENV)/.done-venv $(DECLARED)
+	@echo "Installing PlatformIO and the build tools"
+	@$(call INSTALL,build firmware)
+$(VENV)/.done-run: $(VENV)/.done-firmware $(DECLARED)
+	@echo "Installing Python packages"
+	@$(call INSTALL,run)
+$(VENV)/.done-test: $(DECLARED) | $(VENV)/.done-boebot
+	@echo "Installing Python packages for tests"
+	@$(call INSTALL,test)
+$(VENV)/.done-check: $(DECLARED) | $(VENV)/.done-test
+	@echo "Installing Python packages for checks"
+	@$(call INSTALL,check)
+$(VENV)/.done-boebot: pyproject.toml $(VENV)/.done-run | build/.done-core
+	@$(PIP) --no-index --no-deps --no-build-isolation --editable .
+	@touch $@
+
+build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
+	@$$(tools/find_python.sh) tools/fetch_simavr.py
+	@touch $@
+
+build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) build/simavr/.done $(VENV)/.done-firmware
+	@echo "Compiling the simulated world and the emulated boards"
+	@$(PYTHON_VENV) setup.py --quiet build_ext --inplace >build/core.log 2>&1 || { cat build/core.log; exit 1; }
+	@touch $@
+
+build/platformio-core/appstate.json: tools/prepare_platformio.py $(VENV)/.done-firmware \
+		$(shell find tools/platformio -name '*.py' -o -name '*.json')
+	@$(PYTHON_VENV) tools/prepare_platformio.py
+
+build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES)
+	@echo "Building the firmware images"
+	@tools/pio run --silent
+	@touch $@
+$(IMAGES): build/.done-images
+	@test -e $@ || tools/pio run --silent

@@ -1,0 +1,172 @@
+"""Builds what is not Python: the simulated world, the emulated microcontroller and the firmware for this computer.
+
+* `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
+* `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py), GPL-3.0-or-later. Built
+  where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything else works without it.
+* `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
+
+A wheel also carries the robots, the arenas and the AVR images. BOEBOT_SANITIZE=1 builds all C with the address and
+undefined-behaviour sanitizers.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from setuptools import find_namespace_packages, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.command.build_py import build_py
+
+ROOT = Path(__file__).resolve().parent
+os.chdir(ROOT)
+
+FIRMWARE = Path("firmware/src")
+LIBRARIES = Path("sim_bridge/images")
+HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
+PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in FIRMWARE.glob("generated/pins_*.h"))
+
+# What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
+WHEEL_DATA = {
+    "boebot/data/robots": ("protocol/robots", ("*.toml",)),
+    "boebot/data/arenas": ("sim_bridge/arenas", ("*.toml",)),
+    "boebot/data/images": ("build/images", ("*.elf", "*.hex")),
+}
+
+CFFI_MODULES = [
+    f"{script}:ffi"
+    for script, wanted in (
+        ("sim_bridge/build_core.py", True),
+        ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),
+    )
+    if wanted and Path(script).exists()
+]
+
+SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O1", "-g"]
+SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
+MSVC = sys.platform == "win32"
+
+
+def firmware_sources() -> list[str]:
+    """The firmware without what belongs to the microcontroller: start-up and AVR hardware layer."""
+    return sorted(
+        str(path)
+        for path in FIRMWARE.rglob("*.c")
+        if path != FIRMWARE / "main.c" and "avr" not in path.relative_to(FIRMWARE).parts
+    )
+
+
+def headers() -> list[str]:
+    """Every header of ours: when one changes, what includes it is compiled again."""
+    return sorted(str(path) for folder in ("sim_bridge", "firmware/src") for path in Path(folder).rglob("*.h"))
+
+
+class BuildExt(build_ext):
+    """Compiles on all processors and only what has changed, then links one firmware library per pin map."""
+
+    def build_extensions(self) -> None:
+        self.compiler.compile = self.compile_in_parallel(self.compiler.compile)
+        for extension in self.extensions:
+            extension.depends = [*extension.depends, *headers(), "setup.py"]
+            extension.extra_compile_args = [*extension.extra_compile_args, *SANITIZE]
+            extension.extra_link_args = [*extension.extra_link_args, *SANITIZE]
+        super().build_extensions()
+        for pin_map in PIN_MAPS:
+            self.build_firmware_library(pin_map)
+
+    def compile_in_parallel(self, compile_some: Callable[..., list[str]]) -> Callable[..., list[str]]:
+        """A compile method for the compiler that takes each source by itself and skips what is up to date."""
+        newest_header = max(Path(name).stat().st_mtime for name in [*headers(), "setup.py"])
+
+        def compile_one(source: str, output_dir: str, options: dict[str, Any]) -> list[str]:
+            objects: list[str] = self.compiler.object_filenames([source], output_dir=output_dir)
+            changed = max(newest_header, Path(source).stat().st_mtime)
+            if all(Path(name).exists() and Path(name).stat().st_mtime > changed for name in objects):
+                return objects
+            return compile_some([source], output_dir=output_dir, **options)
+
+        def compile_all(sources: list[str], output_dir: str, **options: Any) -> list[str]:
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                results = list(pool.map(lambda source: compile_one(source, output_dir, options), sources))
+            return [name for result in results for name in result]
+
+        return compile_all
+
+    def build_firmware_library(self, pin_map: str) -> None:
+        sources = firmware_sources()
+        if not sources:
+            return
+        library = Path(self.build_lib, LIBRARIES, f"firmware-{pin_map}{'.dll' if MSVC else '.so'}")
+        objects = self.compiler.compile(
+            sources,
+            output_dir=str(Path(self.build_temp, "firmware", pin_map)),
+            macros=[(f"PIN_MAP_{pin_map.replace('-', '_').upper()}", None)],
+            include_dirs=[str(FIRMWARE)],
+            extra_postargs=[] if MSVC else ["-std=gnu11", "-O2", "-fvisibility=hidden", *SANITIZE],
+        )
+        if library.exists() and all(library.stat().st_mtime > Path(name).stat().st_mtime for name in objects):
+            return
+        library.parent.mkdir(parents=True, exist_ok=True)
+        self.compiler.link_shared_object(
+            objects,
+            str(library),
+            export_symbols=["firmware_board_api"],
+            extra_postargs=SANITIZE,
+        )
+
+    def copy_extensions_to_source(self) -> None:
+        super().copy_extensions_to_source()
+        for library in Path(self.build_lib, LIBRARIES).glob("firmware-*"):
+            LIBRARIES.mkdir(exist_ok=True)
+            # A new file, not new bytes in a file that a running program may have mapped.
+            (LIBRARIES / library.name).unlink(missing_ok=True)
+            shutil.copy2(library, LIBRARIES / library.name)
+
+
+class BuildPy(build_py):
+    """Copies the data that a wheel carries; a checkout reads them where they are."""
+
+    def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
+        """Without the scripts that describe the extensions to cffi."""
+        found = super().find_package_modules(package, package_dir)
+        return [entry for entry in found if not entry[1].startswith("build_")]
+
+    def run(self) -> None:
+        super().run()
+        if self.editable_mode:
+            return
+        for target, (source, patterns) in WHEEL_DATA.items():
+            files = [path for pattern in patterns for path in sorted(Path(source).glob(pattern))]
+            if not files:
+                raise SystemExit(f"setup.py: {source} is empty; run `make firmware` before building a wheel")
+            folder = Path(self.build_lib, target)
+            folder.mkdir(parents=True, exist_ok=True)
+            for path in files:
+                shutil.copyfile(path, folder / path.name)
+
+
+setup(
+    # The licence depends on what is linked in: simavr brings the GPL.
+    license_expression="MIT AND GPL-3.0-or-later" if HAS_SIMAVR else "MIT",
+    license_files=["LICENSE", *(["LICENSES/GPL-3.0-or-later.txt"] if HAS_SIMAVR else [])],
+    cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
+    package_dir={"boebot": "host/boebot", "sim_bridge": "sim_bridge"},
+    packages=[
+        *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data", "*.data.*"]),
+        *find_namespace_packages(
+            ".",
+            include=["sim_bridge", "sim_bridge.*"],
+            exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "world", "parts", "arenas", "images")],
+        ),
+    ],
+    package_data={"boebot": ["py.typed"], "sim_bridge": ["py.typed"]},
+    include_package_data=False,
+    cffi_modules=CFFI_MODULES,
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+    zip_safe=False,
+)

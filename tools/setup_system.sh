@@ -1,0 +1,72 @@
+#!/bin/sh
+# Makes sure that the tools which are not Python packages are there: tools/setup_system.sh run|test|check ...
+# On Debian and Ubuntu it installs what is missing, by package name, as root or with a sudo that asks nothing; otherwise
+# it prints the one command to type. Does nothing where nothing is missing.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+missing=
+
+# need PACKAGE COMMAND...: the package is missing unless the command succeeds.
+need() {
+  package=$1
+  shift
+  "$@" >/dev/null 2>&1 || missing="$missing $package"
+}
+
+has() { command -v "$1"; }
+
+# cargo 1.82 has `cargo info`, which brings simavr's sources.
+has_cargo() {
+  for cargo in ${CARGO:-} cargo; do
+    minor=$("$cargo" --version 2>/dev/null | sed -n 's/^cargo 1\.\([0-9]*\)\..*/\1/p')
+    [ "${minor:-0}" -ge 82 ] && return 0
+  done
+  return 1
+}
+
+for purpose in "$@"; do
+  case $purpose in
+    run)
+      need build-essential has cc
+      need "python3 python3-venv python3-dev" "$here/find_python.sh"
+      need gcc-avr has avr-gcc
+      need binutils-avr has avr-objcopy
+      need avr-libc sh -c 'echo "#include <avr/io.h>" | avr-gcc -mmcu=atmega328p -E -'
+      need "cargo-web ca-certificates" has_cargo
+      ;;
+    test)
+      need doctest-dev sh -c 'echo "#include <doctest/doctest.h>" | c++ -x c++ -E -'
+      need avrdude has avrdude
+      need build-essential has c++
+      ;;
+    check)
+      need clang has clang
+      need cppcheck has cppcheck
+      ;;
+    *)
+      echo "setup_system.sh: unknown purpose '$purpose'; known: run test check" >&2
+      exit 2
+      ;;
+  esac
+done
+
+[ -n "$missing" ] || exit 0
+missing=$(echo "$missing" | tr ' ' '\n' | sort -u | tr '\n' ' ' | sed 's/^ *//; s/ *$//')
+
+if ! command -v apt-get >/dev/null 2>&1; then
+  echo "Please install what these Debian packages hold, then try again: $missing" >&2
+  exit 1
+fi
+if [ "$(id -u)" = 0 ]; then
+  as_root=
+elif command -v sudo >/dev/null 2>&1 && sudo -n true 2>/dev/null; then
+  as_root="sudo -n"
+else
+  echo "Some tools are missing. Please type this, then try again:" >&2
+  echo "  sudo apt-get update && sudo apt-get install -y $missing" >&2
+  exit 1
+fi
+echo "Installing: $missing"
+export DEBIAN_FRONTEND=noninteractive
+$as_root apt-get update -q
+$as_root apt-get install -q -y --no-install-recommends $missing

@@ -1,0 +1,16 @@
+#!/bin/sh
+# The simulator's own tests with all C built under the address and undefined-behaviour sanitizers.
+# Builds a second copy of the packages under build/sanitized.
+set -eu
+cd "$(dirname "$0")/.."
+python=build/venv/bin/python
+
+BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --build-lib build/sanitized/lib \
+  >build/sanitized.log 2>&1 || { cat build/sanitized.log; exit 1; }
+
+asan=$(cc -print-file-name=libasan.so)
+ubsan=$(cc -print-file-name=libubsan.so)
+# Python itself leaves memory to the end of the process, and must use malloc for its objects to be watched.
+echo "Simulator under sanitizers"
+LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc PYTHONPATH=build/sanitized/lib \
+  $python -m pytest -q -p no:cacheprovider sim_bridge/tests

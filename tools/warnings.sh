@@ -1,0 +1,24 @@
+#!/bin/sh
+# Compiles the C parts for this computer with gcc and with clang, every warning an error. The microcontroller's build
+# has the same warnings in platformio.ini.
+set -eu
+cd "$(dirname "$0")/.."
+warnings="-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
+simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | head -n 1)
+
+# compile COMPILER FLAGS...: compiles the files named on standard input
+compile() {
+  xargs -P "$(nproc)" -I{} "$@" $warnings -c {} -o /dev/null
+}
+
+for compiler in gcc clang; do
+  for pin_map in SHIELDBOT SHIELDBOT_QUAD; do
+    find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c |
+      compile $compiler -DPIN_MAP_$pin_map -Ifirmware/src
+  done
+  find sim_bridge -name '*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards
+  if [ -n "$simavr" ]; then
+    find sim_bridge -name '*.c' -path '*/avr/*' |
+      compile $compiler -Isim_bridge -Isim_bridge/boards -isystem "$simavr" -isystem "$simavr/cores"
+  fi
+done
