@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Brings simavr, the AVR emulator's instruction core, into build/simavr.
 
-simavr (GPL-3) travels in the registry crate `simavr-ffi`. The ordinary cargo client downloads it, with whatever
-mirror and proxy settings the user has; this script asks cargo for it, checks its SHA-256 and unpacks it. No source
-of simavr is kept in this repository. Needs cargo 1.82 or newer (Debian 12: apt package `cargo-web`).
+simavr (GPL-3) travels in the registry crate `simavr-ffi`. The ordinary cargo client downloads it, with
+whatever mirror and proxy settings the user has; this script asks cargo for it, checks its SHA-256 and unpacks
+it. No source of simavr is kept in this repository. Needs cargo 1.82 or newer (Debian 12: apt package
+`cargo-web`).
 """
 
 from __future__ import annotations

@@ -1,0 +1,55 @@
+/* board_access.h: a board by itself, for tests and tools: its pin log, its analog voltages, its operations as functions.
+ *
+ * In a simulated world the loop owns the board and its sink; here nobody else does. Works on every kind of board.
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef BOARD_ACCESS_H
+#define BOARD_ACCESS_H
+
+#include "board.h"
+
+typedef struct {
+  uint64_t cycle;
+  uint8_t pin;
+  uint8_t level; /* LOW, HIGH, RELEASED, PULLED_UP */
+} board_edge;
+
+/* A pin log that grows. Its `board_log_add` is a board_edge_sink with the log as context. */
+typedef struct {
+  board_edge *edges;
+  size_t count;
+  size_t capacity;
+} board_log;
+
+void board_log_add(void *log, uint64_t cycle, uint8_t pin, uint8_t level);
+void board_log_clear(board_log *log);
+void board_log_free(board_log *log);
+
+typedef struct {
+  board *board;
+  board_log log;
+  double volts[6]; /* at analog channels 0..5 */
+  int echo_pin;    /* pin whose every output edge is answered on `echo_to`, or -1; tests of answers from the sink */
+  int echo_to;
+  uint64_t echo_delay;
+} board_access;
+
+/* Becomes the board's sink and analog source. NULL if there is no memory or the board's interface is of another
+ * version. */
+board_access *board_access_open(board *target);
+
+/* Lets go of the board without freeing it. */
+void board_access_close(board_access *self);
+
+uint64_t board_access_now(const board_access *self);
+int board_access_advance(board_access *self, uint64_t until);
+void board_access_drive(board_access *self, uint64_t at, uint8_t pin, uint8_t level);
+uint8_t board_access_output(const board_access *self, uint8_t pin);
+void board_access_send(board_access *self, uint64_t at, const uint8_t *bytes, size_t count);
+size_t board_access_receive(board_access *self, uint8_t *bytes, uint64_t *cycles, size_t capacity);
+void board_access_line_rate(board_access *self, uint32_t baud);
+void board_access_reset(board_access *self, int cause);
+void board_access_counters(const board_access *self, board_counters *out);
+const char *board_access_fault(const board_access *self);
+
+#endif
