@@ -1,0 +1,85 @@
+"""Builder of `sim_bridge._core`: world, parts, loop and the boards that need no emulator, by cffi's API mode.
+
+What Python may call is what stands between `/* python: begin */` and `/* python: end */` in the headers below. setup.py
+uses `ffi`; by itself `python sim_bridge/build_core.py` builds the extension in place.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+from cffi import FFI
+
+HEADERS = [
+    "world/numbers.h",
+    "world/noise.h",
+    "world/arena.h",
+    "world/motor.h",
+    "world/body.h",
+    "parts/servo.h",
+    "parts/whisker.h",
+    "parts/infrared.h",
+    "parts/ping.h",
+    "parts/battery.h",
+    "boards/script_board.h",
+    "boards/native/native_board.h",
+    "loop.h",
+]
+SOURCES = [
+    "world/*.c",
+    "parts/*.c",
+    "boards/script_board.c",
+    "boards/native/*.c",
+    "loop.c",
+]
+# No fused multiply-add: the same bits on every machine.
+WINDOWS = sys.platform == "win32"
+COMPILE = ["/O2", "/fp:precise"] if WINDOWS else ["-std=gnu11", "-O2", "-ffp-contract=off"]
+LINK = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
+
+
+def declarations(header: Path) -> str:
+    """What a header offers to Python."""
+    return "\n".join(re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", header.read_text("utf-8"), re.S))
+
+
+def builder(root: Path) -> FFI:
+    """The extension, with its sources named from `root`."""
+    here = Path(__file__).resolve().parent
+    headers = [name for name in HEADERS if (here / name).is_file()]
+    built = FFI()
+    built.cdef("\n".join(declarations(here / name) for name in headers))
+    built.set_source(
+        "sim_bridge._core",
+        "\n".join(f'#include "{name}"' for name in headers),
+        sources=sorted(
+            (root / path.relative_to(here)).as_posix() for pattern in SOURCES for path in here.glob(pattern)
+        ),
+        include_dirs=[root.as_posix()],
+        extra_compile_args=COMPILE,
+        extra_link_args=LINK,
+    )
+    return built
+
+
+ffi = builder(Path("sim_bridge"))
+
+
+def main() -> None:
+    """Builds below build/core and puts the extension into the package."""
+    room = Path(__file__).resolve().parent
+    folder = room.parent / "build" / "core"
+    folder.mkdir(parents=True, exist_ok=True)
+    os.chdir(folder)
+    built = builder(room).compile(tmpdir=".", verbose="-v" in sys.argv)
+    for stale in room.glob("_core.*.so"):
+        stale.unlink()
+    shutil.copy(built, room / ("_core.pyd" if WINDOWS else "_core.abi3.so"))  # as setup.py names it
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+/* loop.h: one simulation: an arena, robots in it, a board on each, everything in lockstep.
+ *
+ * The world leads: a step takes world and parts from t to t + dt by what the pins did until t, and parts queue their edges
+ * at exact cycles of that span; then each board runs through it, and its edges go to the parts as they happen. Everything
+ * is counted in cycles of the boards' 16 MHz. The simulation knows bytes, not messages.
+ *
+ * Boards and arena belong to whoever made them and must outlive the simulation.
+ */
+#ifndef LOOP_H
+#define LOOP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "boards/board.h"
+#include "parts/battery.h"
+#include "parts/infrared.h"
+#include "parts/ping.h"
+#include "parts/servo.h"
+#include "parts/whisker.h"
+#include "world/arena.h"
+#include "world/body.h"
+
+/* python: begin */
+enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
+enum { SIM_OK = 0, SIM_NO_MEMORY = -1, SIM_WRONG_BOARD = -2, SIM_BAD_ARGUMENT = -3 };
+
+/* One row of the truth. */
+typedef struct {
+  double time;             /* s */
+  double x, y, heading;    /* m, m, rad */
+  double speed, turn_rate; /* m/s, rad/s */
+  double left, right;      /* wheel speeds along the ground, m/s */
+  double contact;          /* 1: touched something since the last row */
+} sim_truth;
+
+/* One edge on a pin of the board. */
+typedef struct {
+  uint64_t cycle;
+  uint8_t pin;
+  uint8_t level;
+  uint8_t unused[6];
+} sim_edge;
+
+/* What a range sensor saw. */
+typedef struct {
+  double time;          /* s */
+  double kind;          /* 0 IR pair, 1 Ping */
+  double x, y, heading; /* of the sensor, in the arena */
+  double beam;          /* full opening, rad */
+  double reach;         /* m */
+  double distance;      /* m; -1: nothing */
+} sim_look;
+
+typedef struct sim sim;
+
+/* step_cycles: world step; record_cycles: between two rows of the truth, a multiple of it, 0: no record. NULL without
+ * memory or on bad arguments. */
+sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise);
+void sim_destroy(sim *self);
+
+/* Adds a robot at rest with its board (the address of a `board`). Returns its number or an error. */
+int sim_add_robot(sim *self, uintptr_t board, const body_parameters *parameters, double x, double y, double heading);
+
+/* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
+int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_parameters *parameters);
+int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn);
+int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
+int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
+                     const infrared_parameters *parameters);
+int sim_add_ping(sim *self, int robot, uint8_t pin, const ping_parameters *parameters);
+int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
+
+/* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from a board and its line has
+ * been idle for two byte times. Returns 0, or 1 + the number of a robot whose board crashed. */
+int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles);
+
+/* The cycle up to which the simulation has run. */
+uint64_t sim_now(const sim *self);
+
+/* Bytes to and from a robot's board. */
+void sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
+size_t sim_waiting(const sim *self, int robot);
+size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
+
+/* Truth. The pointers stay good until the next run. */
+void sim_body(const sim *self, int robot, body_state *out);
+const sim_truth *sim_record(const sim *self, int robot, size_t *count);
+const sim_look *sim_looks(const sim *self, int robot, size_t *count);
+uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
+uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies */
+
+/* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */
+size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
+uint64_t sim_edges_seen(const sim *self, int robot);
+
+/* For tests: a robot put elsewhere, at rest (0, or SIM_BAD_ARGUMENT if the place is not free); a pin taken from its part
+ * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
+ * every echo pulse in cycles, -1: as the world says, -2: no pulse at all. */
+int sim_place(sim *self, int robot, double x, double y, double heading);
+int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
+int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
+int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
+int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
+
+/* Voltages of pack and regulator. */
+double sim_pack_voltage(const sim *self, int robot);
+double sim_supply_voltage(const sim *self, int robot);
+
+/* Operations of a board by its address, for Python. */
+int board_check(uintptr_t board); /* 0, or SIM_WRONG_BOARD where it was built for another interface */
+const char *board_kind(uintptr_t board);
+uint8_t board_output(uintptr_t board, uint8_t pin);
+void board_reset(uintptr_t board, int cause);
+void board_line_rate(uintptr_t board, uint32_t baud);
+const char *board_fault(uintptr_t board);
+/* executed_cycles, instructions, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
+void board_read_counters(uintptr_t board, uint64_t counters[9]);
+/* python: end */
+
+#define SIM_EDGES_KEPT (1u << 20)
+
+#endif

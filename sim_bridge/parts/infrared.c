@@ -1,0 +1,65 @@
+/* infrared.c: see infrared.h. */
+#include "infrared.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PERIOD_MINIMUM 360u /* 44.4 kHz */
+#define PERIOD_MAXIMUM 480u /* 33.3 kHz */
+#define CYCLES_TO_HEAR 8u
+#define HOLD_CYCLES (10u * 421u) /* the output stays low for ten periods after the last one */
+
+double infrared_range_share(uint32_t period_cycles) {
+  /* Sensitivity against frequency, relative to its peak; light falls with the square of the distance. */
+  static const double kilohertz[] = {33.0, 35.0, 36.5, 38.0, 38.5, 39.0, 40.0, 41.0, 42.0, 45.0};
+  static const double sensitivity[] = {0.02, 0.15, 0.55, 0.97, 1.00, 0.90, 0.50, 0.33, 0.20, 0.02};
+  const double f = 16000.0 / (double)period_cycles;
+  double s = 0.02;
+  for (size_t i = 0; i + 1 < sizeof kilohertz / sizeof kilohertz[0]; i++) {
+    if (f < kilohertz[i] || f > kilohertz[i + 1]) continue;
+    s = sensitivity[i] + (sensitivity[i + 1] - sensitivity[i]) * (f - kilohertz[i]) / (kilohertz[i + 1] - kilohertz[i]);
+    break;
+  }
+  return sqrt(s / 0.97);
+}
+
+void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
+                   const infrared_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  self->place = *place;
+  self->led_pin = led_pin;
+  self->receiver_pin = receiver_pin;
+  self->parameters = *parameters;
+  part_drive(&self->place, 0, receiver_pin, BOARD_HIGH);
+}
+
+static void look(infrared *self, uint64_t cycle, uint32_t period) {
+  const infrared_parameters *p = &self->parameters;
+  const part_mount mount = {p->x, p->y, p->heading, p->beam};
+  const double spread = 1.0 + p->range_sigma * noise_next_normal(&self->place.noise); /* (3.1) */
+  const int falsely = noise_next_uniform(&self->place.noise) < p->false_hit;
+  self->reach = p->range_m * infrared_range_share(period) * (spread > 0.0 ? spread : 0.0);
+  self->distance = part_look(&self->place, &mount, p->rays, self->reach, 0.0);
+  self->seen = (uint8_t)(falsely || self->distance >= 0.0);
+  self->burst_cycle = cycle;
+  self->bursts++;
+}
+
+int infrared_edge(infrared *self, uint64_t cycle, uint8_t level) {
+  if (level != BOARD_HIGH) return 0;
+  const uint64_t period = cycle - self->last_rise;
+  self->last_rise = cycle;
+  if (period < PERIOD_MINIMUM || period > PERIOD_MAXIMUM) {
+    self->carrier_cycles = 0;
+    self->seen = 0;
+    return 0;
+  }
+  self->carrier_cycles++;
+  const int recognised = self->carrier_cycles == CYCLES_TO_HEAR;
+  if (recognised) {
+    look(self, cycle, (uint32_t)period);
+    if (self->seen) part_drive(&self->place, cycle, self->receiver_pin, BOARD_LOW);
+  }
+  if (self->seen) part_drive(&self->place, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
+  return recognised;
+}

@@ -1,0 +1,31 @@
+/* whisker.h: a wire that closes a switch to ground when something bends it; a resistor pulls the pin up otherwise.
+ *
+ * The wire is a segment on the body. The switch bounces: for some milliseconds after a change its contact opens and closes a
+ * few times.
+ */
+#ifndef PART_WHISKER_H
+#define PART_WHISKER_H
+
+#include "part.h"
+
+/* python: begin */
+typedef struct {
+  double root_x, root_y, tip_x, tip_y; /* in the body's frame, m */
+  double bounce_s;                     /* mean length of a bounce; 0: none */
+} whisker_parameters;
+/* python: end */
+
+typedef struct {
+  part_place place;
+  uint8_t pin;
+  whisker_parameters parameters;
+  int held; /* -1: as the world says, 0: held free, 1: held pressed */
+  uint8_t pressed;
+} whisker;
+
+void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters);
+
+/* The world's step ends at `cycle`. */
+void whisker_step(whisker *self, uint64_t cycle);
+
+#endif
