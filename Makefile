@@ -13,7 +13,7 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 	--constraint requirements.lock
 
 FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[chS]' -o -name '*.def')
-CORE_SOURCES := $(shell find sim_bridge -name '*.[ch]' -o -name 'build_*.py')
+CORE_SOURCES := $(shell find sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
 IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -53,16 +53,17 @@ check:
 
 bench:
 	@$(SIDE_BY_SIDE) ready-test
-	@$(PYTHON_VENV) tools/bench.py
+	@$(PYTHON_VENV) -m tools.bench
 
 SECONDS ?= 3600
 soak:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 
+EXAMPLES ?= 5000
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
-	@BOEBOT_EXAMPLES=20000 $(PYTHON_VENV) -m pytest -q -m fuzz
+	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis
 
 firmware: ready-firmware
 
@@ -120,7 +121,7 @@ check-images: $(IMAGES)
 
 .PHONY: ready-run ready-test ready-check ready-firmware
 ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
-ready-test: ready-run build/.done-system-test $(VENV)/.done-test
+ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
 ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 
@@ -155,6 +156,12 @@ $(VENV)/.done-check: $(DECLARED) | $(VENV)/.done-test
 	@$(call INSTALL,check)
 $(VENV)/.done-boebot: pyproject.toml $(VENV)/.done-run | build/.done-core
 	@$(PIP) --no-index --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# What an installation without a network takes its packages from (tools/tests/test_wheel.py).
+build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test
+	@$(PYTHON_VENV) -m pip download --quiet --only-binary :all: --dest build/wheelhouse --constraint requirements.lock \
+		$$($(PYTHON_VENV) tools/requirements.py run)
 	@touch $@
 
 build/simavr/.done: tools/fetch_simavr.py build/.done-system-run

@@ -143,7 +143,8 @@ class BuildPy(build_py):
         for target, (source, patterns) in WHEEL_DATA.items():
             files = [path for pattern in patterns for path in sorted(Path(source).glob(pattern))]
             if not files:
-                raise SystemExit(f"setup.py: {source} is empty; run `make firmware` before building a wheel")
+                print(f"setup.py: nothing in {source}; this wheel goes without it", file=sys.stderr)
+                continue
             folder = Path(self.build_lib, target)
             folder.mkdir(parents=True, exist_ok=True)
             for path in files:

@@ -17,4 +17,5 @@ analyse avr --platform=avr8 -D__AVR_ATmega328P__ -DF_CPU=16000000L -DPIN_MAP_SHI
   -i firmware/src/hal/native firmware/src
 analyse native --platform=unix64 -DPIN_MAP_SHIELDBOT -Ifirmware/src -i firmware/src/hal/avr -i firmware/src/main.c \
   firmware/src
-analyse sim_bridge --platform=unix64 -Isim_bridge -Isim_bridge/boards sim_bridge
+analyse sim_bridge --platform=unix64 -Isim_bridge -Isim_bridge/boards -i sim_bridge/_core.c -i sim_bridge/boards/avr/_avr.c \
+  sim_bridge

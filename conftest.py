@@ -1,0 +1,13 @@
+"""Settings for all tests: how many random cases, and the same ones each time unless `make fuzz` asks for new ones."""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import settings
+
+EXAMPLES = os.environ.get("BOEBOT_EXAMPLES")
+
+settings.register_profile("same every time", max_examples=100, deadline=None, derandomize=True)
+settings.register_profile("fuzz", max_examples=int(EXAMPLES or 100), deadline=None, print_blob=True)
+settings.load_profile("fuzz" if EXAMPLES else "same every time")

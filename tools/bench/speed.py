@@ -1,0 +1,57 @@
+"""How much faster than real time runs go."""
+
+from __future__ import annotations
+
+import time
+
+from boebot.boards import BoardRequest, open_board
+from boebot.robots import load_robot
+from boebot.runner import execute
+from tools.bench.figures import Peer, figure
+
+ARENA = "room"
+
+
+def times_real_time(on: str, seconds: float, period: float) -> float:
+    """Speed of a whole run of the wander brain, as the command prints it."""
+    result = execute("wander", arena=ARENA, on=on, seconds=seconds, period=period)
+    if result.error is not None:
+        raise result.error
+    return float(result.run_time / result.wall_time)
+
+
+@figure(
+    "AVR image in the closed loop, wander at 50 ms, IR at 20 Hz",
+    "× real time",
+    at_least=30,
+    peer=Peer("avr8js, board alone", 1.5),
+)
+def avr_closed_loop() -> float:
+    return times_real_time("avr", 30.0, 0.05)
+
+
+@figure(
+    "native board and world, no brain",
+    "× real time",
+    at_least=1000,
+    peer=Peer("Enki, 488,873 steps/s of 1 ms", 488.9),
+)
+def native_without_a_brain() -> float:
+    session = open_board("native", BoardRequest(robot=load_robot("shieldbot"), arena=ARENA, record=False))
+    try:
+        seconds = 60.0
+        started = time.perf_counter()
+        session.transport.read(seconds, seconds)
+        return seconds / (time.perf_counter() - started)
+    finally:
+        session.close()
+
+
+@figure(
+    "native board and world, wander at every 10 ms tick",
+    "× real time",
+    at_least=300,
+    peer=Peer("ir-sim 2.12, 1,511 steps/s of 10 ms", 15.1),
+)
+def native_with_wander() -> float:
+    return times_real_time("native", 60.0, 0.01)

@@ -1,0 +1,53 @@
+"""The wheel that `make wheel` builds: installed into an empty environment without a network, it runs without a compiler.
+
+The packages it depends on come from build/wheelhouse, which `make test` fills.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[2]
+
+
+def without_network(command: list[str]) -> list[str]:
+    """The command in a network namespace of its own, where this system lets us make one."""
+    unshare = shutil.which("unshare")
+    if unshare is None:
+        return command
+    for isolate in ([unshare, "--net"], [unshare, "--net", "--map-root-user"]):
+        if subprocess.run([*isolate, "true"], capture_output=True, check=False).returncode == 0:
+            return [*isolate, *command]
+    return command
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty environment with the wheel in it."""
+    subprocess.run(["make", "wheel"], cwd=PROJECT, check=True, stdout=subprocess.DEVNULL)
+    (wheel,) = (PROJECT / "dist").glob("boebot-*.whl")
+    environment = tmp_path_factory.mktemp("wheel") / "environment"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
+    install = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "install", "--quiet"]
+    offline = ["--no-index", "--no-compile", "--find-links", str(PROJECT / "build" / "wheelhouse")]
+    subprocess.run(without_network([*install, *offline, str(wheel)]), check=True)
+    return environment
+
+
+@pytest.mark.parametrize("board", ["native", "avr"])
+def test_an_installed_wheel_runs_wander(installed: Path, tmp_path: Path, board: str) -> None:
+    out = tmp_path / "out"
+    command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", board, "--seconds", "5", "--out", str(out)]
+    bare = {"PATH": str(installed / "bin"), "HOME": str(tmp_path), "LANG": os.environ.get("LANG", "C.UTF-8")}
+    done = subprocess.run(
+        without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in out.iterdir()}
+    assert len((out / "run.csv").read_text(encoding="utf-8").splitlines()) > 450  # 100 ticks a second
