@@ -1,0 +1,38 @@
+/* encoder.h: wheel encoders on pin-change interrupts: counts of edges and the time between the last two.
+ *
+ * One line per wheel counts up whatever the direction; two lines (ENCODER_QUADRATURE) count down when the wheel turns
+ * backward. Forward is A leading B: (A, B) runs 00, 10, 11, 01. The pin map says which it is.
+ * A line that fires more often in a tick than the parameter encoder_limit allows is masked until the next tick. */
+#ifndef ENCODER_H
+#define ENCODER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct {
+  int32_t count;   /* edges since reset */
+  uint16_t period; /* time between the last two edges in 16 us; 0: none within 0.5 s */
+  bool masked;     /* a line of this wheel was masked in the tick that ended */
+} encoder_reading;
+
+void encoder_start(void);
+
+/* Once per tick: closes the tick's readings and lifts masks. */
+void encoder_task(void);
+
+/* The reading at the start of this tick. */
+const encoder_reading *encoder_read(uint8_t side);
+
+/* Change of the count for one step of two lines. `before` and `now` are (A << 1 | B); 0 also where both changed, which
+ * tells nothing. */
+int8_t encoder_quadrature_step(uint8_t before, uint8_t now);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,37 @@
+/* firmware.c: start-up order and what one round of the main loop does. */
+#include "firmware.h"
+
+#include "encoder.h"
+#include "hal/hal.h"
+#include "infrared.h"
+#include "link/identity.h"
+#include "link/link.h"
+#include "link/parameters.h"
+#include "ping.h"
+#include "safety.h"
+#include "schedule.h"
+#include "servo.h"
+#include "whisker.h"
+
+void firmware_start(void) {
+  identity_start();
+  parameters_start();
+  servo_start();
+  encoder_start();
+  whisker_start();
+  infrared_start();
+  ping_start();
+  safety_start();
+  hal_start_serial();
+  link_start();
+  schedule_start();
+  hal_start_timers();
+  hal_start_watchdog();
+}
+
+void firmware_poll(void) {
+  link_poll();
+  schedule_poll();
+}
+
+bool firmware_due(void) { return schedule_due() || link_due(); }

@@ -1,0 +1,26 @@
+/* firmware.h: the whole firmware as main() sees it: start once, then poll whenever something may be due. */
+#ifndef FIRMWARE_H
+#define FIRMWARE_H
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FIRMWARE_VERSION "0.1.0"
+
+/* Brings up board, devices and link, says hello, and starts the slots. */
+void firmware_start(void);
+
+/* Does what is due, at most one received frame and one slot's tasks, and returns. */
+void firmware_poll(void);
+
+/* Whether there is something for firmware_poll() to do. */
+bool firmware_due(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

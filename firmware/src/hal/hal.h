@@ -1,0 +1,98 @@
+/* hal.h: what a board must offer. The same firmware runs on the ATmega328P (hal/avr) and in a PC process (hal/native).
+ *
+ * Time is counted in CPU cycles of 16 MHz. hal_time() is a free-running 16-bit count (Timer1 at clk/1); it starts at 0
+ * in hal_start_timers(), and the slot interrupt fires every HAL_SLOT_CYCLES of it, first at HAL_SLOT_CYCLES.
+ *
+ * Interrupts are defined where their device lives, by these words in front of a body:
+ *   HAL_INTERRUPT_SLOT        a new slot has begun                                  schedule.c
+ *   HAL_INTERRUPT_EDGE        the time given to hal_edge_arm() is HAL_EDGE_LEAD off  schedule.c
+ *   HAL_INTERRUPT_CAPTURE     an edge on the Ping pin; hal_capture_time() has when  ping.c
+ *   HAL_INTERRUPT_PIN_CHANGE  an encoder line in the mask has changed               encoder.c
+ * They stamp and store. What they share with the rest is read and written inside HAL_ATOMIC { ... }, the only way that
+ * this firmware turns interrupts off outside an interrupt.
+ *
+ * Pins are named by device, as in the generated pins header: HAL_PIN_HIGH(SERVO_LEFT).
+ *   HAL_PIN_OUTPUT HAL_PIN_INPUT HAL_PIN_PULL_UP      direction; INPUT leaves the pull-up off
+ *   HAL_PIN_HIGH HAL_PIN_LOW HAL_PIN_TOGGLE           single instructions, safe beside interrupts
+ *   HAL_PIN_READ(NAME)                                0 or 1
+ *   HAL_PORT_READ(NAME)                               the eight pins of NAME's port, NAME at bit NAME_BIT
+ */
+#ifndef HAL_H
+#define HAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define HAL_SLOT_CYCLES 40000u
+#define HAL_CARRIER_CYCLES 211u /* half a period of 37.9 kHz */
+#define HAL_CYCLES_PER_US 16u
+
+#ifdef __AVR__
+#include "hal/avr/hal_avr.h"
+#else
+#include "hal/native/hal_native.h"
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Saves why the chip started, before anything else can lose it. */
+uint8_t hal_reset_cause(void); /* RESET_CAUSE_... of generated/messages.h */
+
+/* Line at 500,000 baud, 8N1. Call once, before the timers. */
+void hal_start_serial(void);
+
+/* Starts the time and the slots. Interrupts are enabled from here on. */
+void hal_start_timers(void);
+
+/* The chip resets itself unless kicked every 120 ms. */
+void hal_start_watchdog(void);
+void hal_kick_watchdog(void);
+
+/* Sleeps until the next interrupt unless something is due. `due` is asked with interrupts off. */
+void hal_sleep_unless(bool (*due)(void));
+
+/* Takes the oldest received byte; false if there is none. */
+bool hal_serial_receive(uint8_t *byte);
+bool hal_serial_received(void);
+
+/* Whether `count` more bytes can be queued for sending now. If not, the CPU is woken when more can. */
+bool hal_serial_room(uint8_t count);
+
+/* Queues bytes for sending. The caller has asked for room. */
+void hal_serial_send(const uint8_t *bytes, uint8_t count);
+
+/* Whether received bytes were lost since the last call. */
+bool hal_serial_overrun(void);
+
+/* Turns a 38 kHz carrier on the LED of one side on or off; off leaves the LED dark. Interrupt context. */
+void hal_carrier_start(uint8_t side);
+void hal_carrier_stop(void);
+
+/* Makes the pin named PING give a 5 us pulse, leaves it an input and waits for the echo's rising edge. */
+void hal_ping_trigger(void);
+
+/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 50 ms. */
+uint32_t hal_image_size(void);
+uint32_t hal_image_hash(void);
+
+/* Each target's header also gives, as macros or inline functions:
+ *   uint16_t hal_time(void)                       now
+ *   void hal_edge_arm(uint16_t time)              the edge interrupt comes HAL_EDGE_LEAD cycles before `time`, or sooner
+ *                                                 than that if it must; one at a time, a new one replaces the last
+ *   void hal_edge_arm_plain(uint16_t time)        the same without a lead: for what needs no cycle-exact time
+ *   void hal_edge_disarm(void)
+ *   void hal_edge_wait(uint16_t time)             in the edge interrupt: returns at a fixed distance from `time`
+ *   uint16_t hal_capture_time(void)               when the captured edge came
+ *   void hal_capture_falling(void)                next, capture the falling edge
+ *   void hal_capture_stop(void)
+ *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt
+ *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
+ */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

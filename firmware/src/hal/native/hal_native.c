@@ -1,0 +1,312 @@
+/* hal_native.c: the microcontroller as an event queue. Each source of interrupts has the cycle of its next event; the
+ * earliest comes first, the firmware's interrupt runs at that cycle, and then its main loop if the event would have
+ * woken it with something to do. Between events nothing happens, so nothing is spent. */
+#include <string.h>
+
+#include "firmware.h"
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "hal/native/machine.h"
+#include "pins.h"
+
+#define RECEIVE_RING 256u
+#define SEND_RING 128u
+#define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
+
+uint8_t hal_native_port_b, hal_native_port_c, hal_native_port_d;
+
+static native_machine *machine;
+static uint8_t reset_cause;
+static uint64_t epoch; /* cycle at which the timer read 0 */
+
+/* Cycles of the next events. */
+static uint64_t next_slot = NATIVE_NEVER;
+static uint64_t next_edge_match = NATIVE_NEVER;
+static uint64_t next_carrier = NATIVE_NEVER;
+static uint64_t next_room = NATIVE_NEVER; /* when a sender that asked for room has it */
+
+static uint8_t carrier_pin;
+static bool level_high[NATIVE_PINS]; /* PORT bits */
+static bool is_output[NATIVE_PINS];  /* DDR bits */
+static uint8_t pin_change_bits;      /* port C */
+static enum { CAPTURE_OFF, CAPTURE_RISING, CAPTURE_FALLING } capture;
+static uint16_t capture_time;
+
+static uint8_t receive_ring[RECEIVE_RING];
+static uint16_t receive_first, receive_count;
+static bool overrun;
+static uint64_t sender_free; /* cycle at which the last queued byte has left */
+
+/* ---- pins ---- */
+
+static uint8_t *port_of(uint8_t pin) {
+  return pin < 8 ? &hal_native_port_d : pin < 14 ? &hal_native_port_b : &hal_native_port_c;
+}
+
+static uint8_t bit_of(uint8_t pin) { return (uint8_t)(1u << (pin < 8 ? pin : pin < 14 ? pin - 8 : pin - 14)); }
+
+/* Works out the level on a pin; interrupts if it has changed. */
+static void settle(uint8_t pin) {
+  uint8_t state = machine->output[pin];
+  if (state == NATIVE_RELEASED || state == NATIVE_PULLED_UP) {
+    if (machine->outside[pin] != NATIVE_RELEASED) {
+      state = machine->outside[pin];
+    }
+  }
+  const bool high = state == NATIVE_HIGH || state == NATIVE_PULLED_UP;
+  uint8_t *port = port_of(pin);
+  const uint8_t bit = bit_of(pin);
+  const bool was_high = (*port & bit) != 0;
+  if (high == was_high) {
+    return;
+  }
+  *port = (uint8_t)(*port ^ bit);
+  if (port == &hal_native_port_c && (pin_change_bits & bit) != 0) {
+    machine->interrupts++;
+    hal_native_pin_change();
+  }
+  if (pin == PIN_PING && capture == (high ? CAPTURE_RISING : CAPTURE_FALLING)) {
+    capture_time = hal_time();
+    machine->interrupts++;
+    hal_native_capture();
+  }
+}
+
+/* Tells the outside what the firmware now does to a pin. */
+static void show(uint8_t pin) {
+  const uint8_t state = is_output[pin] ? (level_high[pin] ? NATIVE_HIGH : NATIVE_LOW)
+                                       : (level_high[pin] ? NATIVE_PULLED_UP : NATIVE_RELEASED);
+  if (state != machine->output[pin]) {
+    machine->output[pin] = state;
+    machine->edge(machine, machine->now, pin, state);
+    settle(pin);
+  }
+}
+
+void hal_native_direction(uint8_t pin, bool output) {
+  is_output[pin] = output;
+  show(pin);
+}
+
+void hal_native_write(uint8_t pin, bool high) {
+  level_high[pin] = high;
+  show(pin);
+}
+
+void hal_native_toggle(uint8_t pin) { hal_native_write(pin, !level_high[pin]); }
+
+void hal_pin_change_mask(uint8_t bits) { pin_change_bits = bits; }
+
+/* ---- time ---- */
+
+uint16_t hal_time(void) { return (uint16_t)(machine->now - epoch); }
+
+void hal_start_timers(void) {
+  epoch = machine->now;
+  next_slot = epoch + HAL_SLOT_CYCLES;
+}
+
+void hal_edge_arm(uint16_t time) {
+  const uint16_t ahead = (uint16_t)(time - hal_time());
+  next_edge_match = machine->now + (ahead != 0 ? ahead : 65536u);
+}
+
+void hal_edge_disarm(void) { next_edge_match = NATIVE_NEVER; }
+
+/* ---- devices ---- */
+
+void hal_carrier_start(uint8_t side) {
+  carrier_pin = side == LEFT ? PIN_INFRARED_LEFT_LED : PIN_INFRARED_RIGHT_LED;
+  next_carrier = machine->now + HAL_CARRIER_CYCLES;
+}
+
+void hal_carrier_stop(void) {
+  next_carrier = NATIVE_NEVER;
+  hal_native_write(carrier_pin, false);
+}
+
+void hal_ping_trigger(void) {
+  capture = CAPTURE_OFF;
+  HAL_PIN_LOW(PING);
+  HAL_PIN_OUTPUT(PING);
+  HAL_PIN_HIGH(PING);
+  machine->now += PING_TRIGGER_CYCLES;
+  HAL_PIN_LOW(PING);
+  HAL_PIN_INPUT(PING);
+  capture = CAPTURE_RISING;
+}
+
+uint16_t hal_capture_time(void) { return capture_time; }
+
+void hal_capture_falling(void) { capture = CAPTURE_FALLING; }
+
+void hal_capture_stop(void) { capture = CAPTURE_OFF; }
+
+/* ---- serial line ---- */
+
+void hal_start_serial(void) { sender_free = machine->now; }
+
+bool hal_serial_receive(uint8_t *byte) {
+  if (receive_count == 0) {
+    return false;
+  }
+  *byte = receive_ring[receive_first];
+  receive_first = (uint16_t)((receive_first + 1u) % RECEIVE_RING);
+  receive_count--;
+  return true;
+}
+
+bool hal_serial_received(void) { return receive_count != 0; }
+
+bool hal_serial_overrun(void) {
+  const bool lost = overrun;
+  overrun = false;
+  return lost;
+}
+
+bool hal_serial_room(uint8_t count) {
+  /* Bytes not yet wholly sent stand in the ring, but for the one being shifted out. */
+  const uint64_t queued = sender_free > machine->now ? (sender_free - machine->now) / NATIVE_BYTE_CYCLES : 0;
+  if (queued + count <= SEND_RING) {
+    return true;
+  }
+  next_room = sender_free - (SEND_RING - (uint64_t)count + 1u) * NATIVE_BYTE_CYCLES + 1u;
+  return false;
+}
+
+void hal_serial_send(const uint8_t *bytes, uint8_t count) {
+  const uint64_t start = sender_free > machine->now ? sender_free : machine->now;
+  machine->transmit(machine, start + NATIVE_BYTE_CYCLES, bytes, count);
+  sender_free = start + (uint64_t)count * NATIVE_BYTE_CYCLES;
+}
+
+static void byte_arrived(void) {
+  const native_byte byte = native_take_byte(machine);
+  machine->bytes_in++;
+  machine->interrupts++;
+  if (byte.bad) {
+    machine->framing_errors++; /* the byte is read all the same; the frame's checksum refuses it */
+  }
+  if (receive_count == RECEIVE_RING - 1u) {
+    overrun = true;
+  } else {
+    receive_ring[(receive_first + receive_count) % RECEIVE_RING] = byte.byte;
+    receive_count++;
+  }
+}
+
+/* ---- the rest of hal.h ---- */
+
+uint8_t hal_reset_cause(void) { return reset_cause; }
+
+void hal_start_watchdog(void) {}
+void hal_kick_watchdog(void) {}
+
+void hal_sleep_unless(bool (*due)(void)) { (void)due; }
+
+uint32_t hal_image_size(void) { return 0; }
+
+uint32_t hal_image_hash(void) { return 0; }
+
+/* ---- the event queue ---- */
+
+static void poll_firmware(void) {
+  do {
+    firmware_poll();
+  } while (firmware_due());
+}
+
+static void start(native_machine *owner, uint8_t cause) {
+  machine = owner;
+  reset_cause = cause;
+  for (uint8_t pin = 0; pin < NATIVE_PINS; pin++) {
+    show(pin); /* a reset releases every pin */
+    settle(pin);
+  }
+  firmware_start();
+  poll_firmware();
+}
+
+/* Bursts are three thousand edges a second: a loop of their own, until something else comes. */
+static void run_carrier(uint64_t until) {
+  do {
+    machine->now = next_carrier;
+    next_carrier += HAL_CARRIER_CYCLES;
+    machine->interrupts++;
+    hal_native_toggle(carrier_pin);
+  } while (next_carrier <= until && next_carrier < machine->next_edge && next_carrier < machine->next_byte &&
+           next_carrier < next_slot && next_carrier < next_edge_match && next_carrier < next_room && !machine->stop);
+}
+
+static void advance(uint64_t until) {
+  while (!machine->stop) {
+    /* At the same cycle: input edges, bytes, carrier, exact edges, slots. */
+    uint64_t next = machine->next_edge;
+    enum { PIN, BYTE, CARRIER, EDGE, SLOT, ROOM } kind = PIN;
+    if (machine->next_byte < next) {
+      next = machine->next_byte;
+      kind = BYTE;
+    }
+    if (next_carrier < next) {
+      next = next_carrier;
+      kind = CARRIER;
+    }
+    if (next_edge_match < next) {
+      next = next_edge_match;
+      kind = EDGE;
+    }
+    if (next_slot < next) {
+      next = next_slot;
+      kind = SLOT;
+    }
+    if (next_room < next) {
+      next = next_room;
+      kind = ROOM;
+    }
+    if (next > until) {
+      break;
+    }
+    if (next > machine->now) {
+      machine->now = next;
+    }
+    switch (kind) {
+      case PIN: {
+        const uint8_t pin = machine->next_edge_pin;
+        machine->outside[pin] = native_take_edge(machine).level;
+        settle(pin);
+        break;
+      }
+      case BYTE:
+        byte_arrived();
+        poll_firmware();
+        break;
+      case CARRIER:
+        run_carrier(until);
+        break;
+      case EDGE:
+        next_edge_match = NATIVE_NEVER;
+        machine->interrupts++;
+        hal_native_edge();
+        break;
+      case SLOT:
+        next_slot += HAL_SLOT_CYCLES;
+        machine->interrupts++;
+        hal_native_slot();
+        poll_firmware();
+        break;
+      case ROOM:
+        next_room = NATIVE_NEVER;
+        poll_firmware();
+        break;
+    }
+  }
+  if (machine->now < until && !machine->stop) {
+    machine->now = until;
+  }
+}
+
+NATIVE_EXPORT const native_api *firmware_board_api(void);
+const native_api *firmware_board_api(void) {
+  static const native_api api = {NATIVE_API_VERSION, PIN_MAP_NAME, start, advance};
+  return &api;
+}

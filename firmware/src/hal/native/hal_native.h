@@ -1,0 +1,64 @@
+/* hal_native.h: the board in a PC process; see hal/hal.h for what each of these means. */
+#ifndef HAL_NATIVE_H
+#define HAL_NATIVE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define HAL_INTERRUPT_SLOT void hal_native_slot(void)
+#define HAL_INTERRUPT_EDGE void hal_native_edge(void)
+#define HAL_INTERRUPT_CAPTURE void hal_native_capture(void)
+#define HAL_INTERRUPT_PIN_CHANGE void hal_native_pin_change(void)
+HAL_INTERRUPT_SLOT;
+HAL_INTERRUPT_EDGE;
+HAL_INTERRUPT_CAPTURE;
+HAL_INTERRUPT_PIN_CHANGE;
+
+/* Interrupts come between calls, never inside one. */
+#define HAL_ATOMIC
+
+#define HAL_EDGE_LEAD 0u
+
+/* Levels on the pins, as in the PIN registers. */
+extern uint8_t hal_native_port_b, hal_native_port_c, hal_native_port_d;
+#define PINB hal_native_port_b
+#define PINC hal_native_port_c
+#define PIND hal_native_port_d
+
+void hal_native_direction(uint8_t pin, bool output);
+void hal_native_write(uint8_t pin, bool high);
+void hal_native_toggle(uint8_t pin);
+
+#define HAL_PIN_OUTPUT(name) hal_native_direction(PIN_##name, true)
+#define HAL_PIN_INPUT(name) (hal_native_direction(PIN_##name, false), hal_native_write(PIN_##name, false))
+#define HAL_PIN_PULL_UP(name) (hal_native_direction(PIN_##name, false), hal_native_write(PIN_##name, true))
+#define HAL_PIN_HIGH(name) hal_native_write(PIN_##name, true)
+#define HAL_PIN_LOW(name) hal_native_write(PIN_##name, false)
+#define HAL_PIN_TOGGLE(name) hal_native_toggle(PIN_##name)
+#define HAL_PORT_READ(name) (name##_PINR)
+#define HAL_PIN_READ(name) ((uint8_t)((name##_PINR >> name##_BIT) & 1u))
+
+uint16_t hal_time(void);
+void hal_edge_arm(uint16_t time);
+#define hal_edge_arm_plain hal_edge_arm
+void hal_edge_disarm(void);
+static inline void hal_edge_wait(uint16_t time) { (void)time; /* the event comes at its very cycle */ }
+uint16_t hal_capture_time(void);
+void hal_capture_falling(void);
+void hal_capture_stop(void);
+void hal_pin_change_mask(uint8_t bits);
+
+#define HAL_TABLE static const
+static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
+static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,32 @@
+/* infrared.h: the two IR pairs. Every infrared_period ticks each LED gives a 1 ms burst of 38 kHz, left in the third
+ * slot of the tick and right in the fourth; at its end the receiver is sampled: its output is low when an object
+ * reflects the burst. */
+#ifndef INFRARED_H
+#define INFRARED_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void infrared_start(void);
+
+/* Once per tick: takes over what the last burst found, and decides whether this tick has one. */
+void infrared_task(void);
+
+/* INFRARED_... bits of the last reading. */
+uint8_t infrared_read(void);
+
+/* Its age in ticks; 255: none yet, or older. */
+uint8_t infrared_age(void);
+
+/* Interrupt context: a side's slot begins at hal_time() `start`; its burst is to end. */
+void infrared_begin(uint8_t side, uint16_t start);
+void infrared_end(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,55 @@
+/* frame.h: messages to bytes on the wire and back (protocol/PROTOCOL.md, "Frame"). Portable C, no state but the
+ * decoder's.
+ *
+ *   wire = 00 . COBS(id, sequence, payload) . c2 c1 c0 . 00
+ *
+ * c2 c1 c0: CRC-21 of the stuffed bytes as on the wire, seven bits each under a set top bit, so that 00 occurs only as
+ * the delimiter. A frame is accepted only if its length is exactly that of its id, its checksum is right, and its
+ * stuffing ends exactly at its end. Neighbours may share a delimiter; empty frames are nothing. */
+#ifndef FRAME_H
+#define FRAME_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "generated/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FRAME_SEED 0x155555ul
+#define FRAME_OVERHEAD 8u                                     /* bytes added to a payload, with both delimiters */
+#define FRAME_SIZE_MAX (MESSAGE_PAYLOAD_MAX + FRAME_OVERHEAD) /* longest frame sent */
+#define FRAME_INSIDE_MAX (MESSAGE_PAYLOAD_MAX + FRAME_OVERHEAD - 2u) /* longest between delimiters */
+
+/* CRC-21 of `count` bytes, after `seed`. */
+uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count);
+
+/* Writes the frame of a message to `wire` (FRAME_SIZE_MAX bytes); returns its length. The session's seed is used but
+ * for the messages of the handshake, which keep FRAME_SEED. length <= MESSAGE_PAYLOAD_MAX */
+uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed);
+
+typedef struct {
+  uint32_t seed;     /* the session's */
+  uint8_t bad;       /* frames refused, modulo 256 */
+  bool synchronised; /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
+  uint8_t count;     /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
+  uint8_t bytes[FRAME_INSIDE_MAX];
+} frame_decoder;
+
+void frame_decoder_start(frame_decoder *decoder, uint32_t seed);
+
+/* Takes one byte; true when it completes an accepted message. Until the next call its parts are in id, sequence and
+ * payload below. */
+bool frame_decode(frame_decoder *decoder, uint8_t byte);
+
+static inline uint8_t frame_id(const frame_decoder *decoder) { return decoder->bytes[1]; }
+static inline uint8_t frame_sequence(const frame_decoder *decoder) { return decoder->bytes[2]; }
+static inline const uint8_t *frame_payload(const frame_decoder *decoder) { return &decoder->bytes[3]; }
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,31 @@
+/* link.h: messages to and from the host over the serial line. */
+#ifndef LINK_H
+#define LINK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Forgets everything and queues the hello. */
+void link_start(void);
+
+/* Takes received bytes, up to the end of one frame, and does what it asks. Bytes wait while there is no room for an
+ * answer. */
+void link_poll(void);
+bool link_due(void);
+
+/* Sends a message; false if there is no room. A message that is not sent leaves a gap in the sequence numbers, so that
+ * the host can count it. */
+bool link_send(uint8_t id, const void *payload, uint8_t length);
+
+/* Frames refused since reset, modulo 256. */
+uint8_t link_frames_bad(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,39 @@
+/* motion.c: see motion.h. */
+#include "motion.h"
+
+#include "generated/parameters.h"
+#include "link/parameters.h"
+#include "servo.h"
+
+#define FULL 10000 /* a signal of 1 */
+
+/* numerator / denominator, rounded to nearest, halves away from zero. denominator > 0 */
+static int32_t divide(int32_t numerator, int32_t denominator) {
+  const int32_t half = denominator / 2;
+  return (numerator < 0 ? numerator - half : numerator + half) / denominator;
+}
+
+static int32_t clamp(int32_t value, int32_t low, int32_t high) {
+  return value < low ? low : value > high ? high : value;
+}
+
+uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal) {
+  return (uint16_t)clamp(centre + divide(gain * signal, FULL), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
+}
+
+int16_t motion_signal_of_speed(int16_t speed, int16_t maximum) {
+  return (int16_t)clamp(divide((int32_t)speed * FULL, maximum), -FULL, FULL);
+}
+
+void motion_signals(int16_t left, int16_t right) {
+  servo_set(
+      motion_pulse(parameters_get(PARAMETER_SERVO_LEFT_CENTRE), parameters_get(PARAMETER_SERVO_LEFT_GAIN), left),
+      motion_pulse(parameters_get(PARAMETER_SERVO_RIGHT_CENTRE), parameters_get(PARAMETER_SERVO_RIGHT_GAIN), right));
+}
+
+void motion_speeds(int16_t left, int16_t right) {
+  const int16_t maximum = (int16_t)parameters_get(PARAMETER_WHEEL_SPEED_MAXIMUM);
+  motion_signals(motion_signal_of_speed(left, maximum), motion_signal_of_speed(right, maximum));
+}
+
+void motion_off(void) { servo_set(0, 0); }

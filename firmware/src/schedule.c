@@ -1,0 +1,171 @@
+/* schedule.c: slots, tasks and overruns; see schedule.h and tasks.def. */
+#include "schedule.h"
+
+#include "encoder.h"
+#include "infrared.h"
+#include "link/link.h"
+#include "link/telemetry.h"
+#include "ping.h"
+#include "pins.h"
+#include "safety.h"
+#include "servo.h"
+#include "whisker.h"
+
+#define SLOTS_PER_FRAME 8u
+
+enum {
+#define TASK(name, period, phase, budget) TASK_##name,
+#define RESERVED(name, period, phase, budget)
+#include "tasks.def"
+#undef TASK
+#undef RESERVED
+  TASKS
+};
+
+#define TASK(name, period, phase, budget) \
+  _Static_assert(256 % (period) == 0 && (phase) < (period), "task " #name ": period and phase");
+#define RESERVED(name, period, phase, budget) TASK(name, period, phase, budget)
+#include "tasks.def"
+#undef TASK
+#undef RESERVED
+_Static_assert(TASKS <= 16, "the due tasks are bits of 16");
+
+volatile uint8_t schedule_slot;
+volatile uint16_t schedule_slot_start;
+
+static volatile uint32_t slot_cycles; /* time at which schedule_slot began */
+static volatile bool edge_is_servo;   /* whom the next edge interrupt is for */
+
+static uint8_t next_slot; /* first slot whose tasks have not run */
+static uint32_t tick;
+static uint8_t overruns;
+static bool late;    /* a slot of this tick was worked on when the next tick had begun */
+static bool overran; /* so it was in the previous tick */
+
+void schedule_start(void) {
+  schedule_slot = 0xFF;
+  schedule_slot_start = 0;
+  slot_cycles = 0;
+  edge_is_servo = false;
+  next_slot = 0;
+  tick = 0;
+  overruns = 0;
+  late = false;
+  overran = false;
+}
+
+HAL_INTERRUPT_SLOT {
+  schedule_slot++;
+  schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
+  slot_cycles += HAL_SLOT_CYCLES;
+  switch (schedule_slot % SLOTS_PER_FRAME) {
+    case 0:
+      servo_frame();
+      edge_is_servo = true;
+      servo_begin(LEFT, schedule_slot_start);
+      break;
+    case 1:
+      servo_begin(RIGHT, schedule_slot_start);
+      break;
+    case 2:
+    case 6:
+      edge_is_servo = false;
+      infrared_begin(LEFT, schedule_slot_start);
+      break;
+    case 3:
+    case 7:
+      infrared_begin(RIGHT, schedule_slot_start);
+      break;
+    default: /* 4: the turret's */
+      break;
+  }
+}
+
+HAL_INTERRUPT_EDGE {
+  if (edge_is_servo) {
+    servo_edge();
+  } else {
+    infrared_end();
+  }
+}
+
+int32_t schedule_between(schedule_moment from, schedule_moment to) {
+  /* An offset above three quarters of the count is an edge captured just before its slot began. */
+  const int32_t start = from.offset >= 0xC000u ? (int32_t)from.offset - 65536 : (int32_t)from.offset;
+  const int32_t end = to.offset >= 0xC000u ? (int32_t)to.offset - 65536 : (int32_t)to.offset;
+  return (int32_t)(uint8_t)(to.slot - from.slot) * (int32_t)HAL_SLOT_CYCLES + end - start;
+}
+
+uint32_t schedule_now(void) {
+  uint32_t cycles = 0;
+  HAL_ATOMIC { cycles = slot_cycles + (uint16_t)(hal_time() - schedule_slot_start); }
+  return cycles;
+}
+
+uint32_t schedule_tick(void) { return tick; }
+
+uint8_t schedule_overruns(void) { return overruns; }
+
+bool schedule_overran(void) { return overran; }
+
+/* Slots that have begun and whose tasks have not run. */
+static uint8_t slots_waiting(void) { return (uint8_t)(schedule_slot + 1u - next_slot); }
+
+bool schedule_due(void) { return slots_waiting() != 0; }
+
+static void begin_tick(void) {
+  overran = late;
+  overruns = (uint8_t)(overruns + late);
+  late = false;
+  while (slots_waiting() >
+         2u * SCHEDULE_SLOTS_PER_TICK) { /* hopelessly behind: drop whole ticks, keep the time right */
+    next_slot = (uint8_t)(next_slot + SCHEDULE_SLOTS_PER_TICK);
+    tick++;
+    overruns++;
+    overran = true;
+  }
+}
+
+/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run. */
+static void run_tasks(uint8_t slot) {
+  uint16_t due = 0;
+#define RESERVED(name, period, phase, budget)
+#define TASK(name, period, phase, budget)    \
+  if (slot % (uint8_t)(period) == (phase)) { \
+    due |= (uint16_t)(1u << TASK_##name);    \
+  }
+#include "tasks.def"
+#undef TASK
+#define TASK(name, period, phase, budget)             \
+  if ((due & (uint16_t)(1u << TASK_##name)) != 0) {   \
+    name##_task();                                    \
+    due &= (uint16_t) ~(uint16_t)(1u << TASK_##name); \
+    link_poll();                                      \
+  }
+#include "tasks.def"
+#undef TASK
+#undef RESERVED
+  if (due == 0) {
+    hal_kick_watchdog();
+  }
+}
+
+void schedule_poll(void) {
+  if (slots_waiting() == 0) {
+    return;
+  }
+  if (next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+    begin_tick();
+  }
+  run_tasks(next_slot);
+  next_slot++;
+  if (next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+    tick++;
+  }
+  /* Work of a tick that ends when a later tick has already begun has overrun. */
+  const uint8_t waiting = slots_waiting();
+  const uint8_t left = (uint8_t)(0u - next_slot) % SCHEDULE_SLOTS_PER_TICK; /* slots of this tick still to come */
+  if (waiting > left) {
+    late = true;
+  }
+}

@@ -1,0 +1,57 @@
+/* schedule.h: the tick. A time-triggered cyclic executive after tasks.def: Timer1 begins a slot every 2.5 ms; the slot
+ * interrupt starts what needs an exact time, the main loop then runs the tasks that are due. */
+#ifndef SCHEDULE_H
+#define SCHEDULE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "hal/hal.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define SCHEDULE_SLOTS_PER_TICK 4u
+#define SCHEDULE_TICK_RATE 100u /* Hz */
+#define SCHEDULE_TICK_US 10000u
+#define SCHEDULE_CYCLES_PER_MS 16000u
+
+void schedule_start(void);
+
+/* Runs the tasks of the next slot that has begun, if any. */
+void schedule_poll(void);
+bool schedule_due(void);
+
+/* The control tick whose tasks run now. */
+uint32_t schedule_tick(void);
+
+/* Cycles since the timers started, modulo 2^32 (268 s). Main loop only. */
+uint32_t schedule_now(void);
+
+/* Ticks whose work did not end in time since reset, modulo 256; and whether the previous one did not. */
+uint8_t schedule_overruns(void);
+bool schedule_overran(void);
+
+/* A moment, as interrupts note it: cheap to take, 640 ms long before it repeats. */
+typedef struct {
+  uint8_t slot;    /* low byte of the number of the slot that had begun */
+  uint16_t offset; /* cycles since that slot began; an edge captured just before it counts from 65536 down */
+} schedule_moment;
+
+extern volatile uint8_t schedule_slot;        /* low byte of the number of the slot that has begun */
+extern volatile uint16_t schedule_slot_start; /* hal_time() at which it began */
+
+/* Interrupt context: the moment at which hal_time() was `time`. */
+static inline schedule_moment schedule_moment_at(uint16_t time) {
+  return (schedule_moment){schedule_slot, (uint16_t)(time - schedule_slot_start)};
+}
+
+/* Cycles from one moment to a later one. */
+int32_t schedule_between(schedule_moment from, schedule_moment to);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

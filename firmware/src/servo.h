@@ -1,0 +1,32 @@
+/* servo.h: pulses for the two continuous-rotation servos, one each in a 20 ms frame.
+ *
+ * Widths are in cycles (1/16 us). A width takes effect with the next frame, for both wheels at once; a pulse under way
+ * is finished at its old width, so a pulse is whole or absent, never cut. Width 0: no pulses; a Boe-Bot servo then
+ * free-wheels. Edges are exact: the interrupt starts HAL_EDGE_LEAD early and waits for the very cycle. */
+#ifndef SERVO_H
+#define SERVO_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void servo_start(void);
+
+/* Widths from the next frame on. */
+void servo_set(uint16_t left, uint16_t right);
+
+/* Width of the pulses in the frame that runs. */
+uint16_t servo_pulse(uint8_t side);
+
+/* Interrupt context: a frame begins; a side's slot begins at hal_time() `start`; an edge is due. */
+void servo_frame(void);
+void servo_begin(uint8_t side, uint16_t start);
+void servo_edge(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,43 @@
+/* whisker.c: see whisker.h. */
+#include "whisker.h"
+
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "link/parameters.h"
+#include "pins.h"
+
+#define PRESSED_SAMPLES 2u
+#define RELEASED_SAMPLES 4u
+
+static whisker_state states[SIDES];
+
+bool whisker_debounce(whisker_state *state, bool touching) {
+  if (touching == state->pressed) {
+    state->streak = 0;
+    return state->pressed;
+  }
+  state->streak++;
+  if (state->streak >= (touching ? PRESSED_SAMPLES : RELEASED_SAMPLES)) {
+    state->pressed = touching;
+    state->streak = 0;
+  }
+  return state->pressed;
+}
+
+void whisker_start(void) {
+  HAL_PIN_PULL_UP(WHISKER_LEFT);
+  HAL_PIN_PULL_UP(WHISKER_RIGHT);
+  states[LEFT] = states[RIGHT] = (whisker_state){false, 0};
+}
+
+void whisker_task(void) {
+  whisker_debounce(&states[LEFT], HAL_PIN_READ(WHISKER_LEFT) == 0);
+  whisker_debounce(&states[RIGHT], HAL_PIN_READ(WHISKER_RIGHT) == 0);
+}
+
+uint8_t whisker_read(void) {
+  if (!parameters_device_on(DEVICES_WHISKERS)) {
+    return 0;
+  }
+  return (uint8_t)((states[LEFT].pressed ? WHISKERS_LEFT : 0u) | (states[RIGHT].pressed ? WHISKERS_RIGHT : 0u));
+}

@@ -1,0 +1,357 @@
+/* native_board.c: see native_board.h. Keeps what outlives a reset (hal/native/machine.h) and gives it the face of a
+ * board. */
+#include "boards/native/native_board.h"
+
+#include <inttypes.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "boards/native/library_copy.h"
+#include "generated/messages.h"
+#include "hal/native/machine.h"
+
+#define RATE_TOLERANCE 40u /* a line more than 1/40 (2.5 %) off the board's rate is not understood */
+#define GARBLED 0xFEu      /* what either side reads then */
+
+typedef struct {
+  board face;
+  native_machine machine;
+  unsigned char *image; /* the library file */
+  size_t image_size;
+  library_copy library;
+  const native_api *api;
+
+  bool started; /* the program has begun; it does so at the first advance, when somebody listens */
+  bool reset_asked;
+  board_reset_cause reset_cause;
+  char *fault; /* one sentence, or NULL */
+
+  uint32_t baud;      /* of the outside's side of the line */
+  uint64_t line_free; /* cycle at which the last byte to the board has arrived */
+  native_byte_queue outgoing;
+  uint64_t bytes_out; /* taken by receive() */
+  uint64_t edges_out, resets;
+} native_board;
+
+static native_board *of_board(board *self) { return (native_board *)(void *)self; }
+
+static const native_board *of_const_board(const board *self) { return (const native_board *)(const void *)self; }
+
+static native_board *of_machine(native_machine *machine) {
+  return (native_board *)(void *)((char *)machine - offsetof(native_board, machine));
+}
+
+/* Memory for `capacity` items that may not fail: a board that lost edges or bytes would be wrong in silence. */
+static void *grow(void *items, size_t capacity, size_t size) {
+  void *grown = realloc(items, capacity * size);
+  if (grown == NULL) {
+    fputs("native board: out of memory\n", stderr);
+    abort();
+  }
+  return grown;
+}
+
+static void push_edge(native_edge_queue *queue, native_edge edge) {
+  if (queue->first + queue->count == queue->capacity) {
+    if (queue->first > queue->capacity / 2) {
+      memmove(queue->edges, queue->edges + queue->first, queue->count * sizeof *queue->edges);
+      queue->first = 0;
+    } else {
+      queue->capacity = queue->capacity == 0 ? 16 : 2 * queue->capacity;
+      queue->edges = grow(queue->edges, queue->capacity, sizeof *queue->edges);
+    }
+  }
+  queue->edges[queue->first + queue->count++] = edge;
+}
+
+static void push_byte(native_byte_queue *queue, native_byte byte) {
+  if (queue->first + queue->count == queue->capacity) {
+    if (queue->first > queue->capacity / 2) {
+      memmove(queue->bytes, queue->bytes + queue->first, queue->count * sizeof *queue->bytes);
+      queue->first = 0;
+    } else {
+      queue->capacity = queue->capacity == 0 ? 256 : 2 * queue->capacity;
+      queue->bytes = grow(queue->bytes, queue->capacity, sizeof *queue->bytes);
+    }
+  }
+  queue->bytes[queue->first + queue->count++] = byte;
+}
+
+static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_t level) {
+  native_board *self = of_machine(machine);
+  self->edges_out++;
+  if (self->face.sink != NULL) {
+    self->face.sink(self->face.sink_context, cycle, pin, level);
+  }
+}
+
+static bool rates_differ(const native_board *self) {
+  const uint32_t difference = self->baud > NATIVE_BAUD ? self->baud - NATIVE_BAUD : NATIVE_BAUD - self->baud;
+  return difference > NATIVE_BAUD / RATE_TOLERANCE;
+}
+
+static void on_transmit(native_machine *machine, uint64_t cycle, const uint8_t *bytes, size_t count) {
+  native_board *self = of_machine(machine);
+  const bool garbled = rates_differ(self);
+  for (size_t i = 0; i < count; i++) {
+    push_byte(&self->outgoing, (native_byte){cycle + i * NATIVE_BYTE_CYCLES, garbled ? GARBLED : bytes[i], 0});
+  }
+}
+
+/* Loads a fresh copy of the library and finds its face. */
+static bool load(native_board *self, char *error, size_t error_size) {
+  if (!library_load(&self->library, self->image, self->image_size, error, error_size)) {
+    return false;
+  }
+  native_api_function *function = NULL;
+  void *symbol = library_symbol(&self->library, NATIVE_API_SYMBOL);
+  memcpy(&function, &symbol, sizeof function);
+  if (function == NULL) {
+    snprintf(error, error_size, "the library is not a boebot firmware: it has no %s", NATIVE_API_SYMBOL);
+    return false;
+  }
+  self->api = function();
+  if (self->api->version != NATIVE_API_VERSION) {
+    snprintf(error, error_size, "the firmware library speaks version %" PRIu32 " of the board's interface, not %u",
+             self->api->version, NATIVE_API_VERSION);
+    return false;
+  }
+  return true;
+}
+
+static uint8_t cause_on_the_wire(board_reset_cause cause) {
+  switch (cause) {
+    case BOARD_RESET_POWER:
+      return RESET_CAUSE_POWER;
+    case BOARD_RESET_EXTERNAL:
+      return RESET_CAUSE_EXTERNAL;
+    case BOARD_RESET_BROWN_OUT:
+      return RESET_CAUSE_BROWN_OUT;
+    case BOARD_RESET_WATCHDOG:
+      return RESET_CAUSE_WATCHDOG;
+    default:
+      return RESET_CAUSE_UNKNOWN;
+  }
+}
+
+/* Takes bytes off the end of the line that have not wholly left by now. */
+static void cut_outgoing(native_board *self) {
+  native_byte_queue *queue = &self->outgoing;
+  while (queue->count > 0 && queue->bytes[queue->first + queue->count - 1].cycle > self->machine.now) {
+    queue->count--;
+  }
+}
+
+/* Loses the byte that is arriving now; those that the outside sends later arrive. */
+static void cut_incoming(native_board *self) {
+  const uint64_t byte_cycles = 10u * (uint64_t)BOARD_CLOCK_HZ / self->baud;
+  if (self->machine.next_byte != NATIVE_NEVER && self->machine.next_byte < self->machine.now + byte_cycles) {
+    (void)native_take_byte(&self->machine);
+  }
+}
+
+/* Begins the program, the first time or anew. */
+static bool restart(native_board *self) {
+  char error[256];
+  self->reset_asked = false;
+  self->machine.stop = 0;
+  if (!self->started) {
+    self->started = true;
+    self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
+    return true;
+  }
+  self->resets++;
+  cut_outgoing(self);
+  cut_incoming(self);
+  library_unload(&self->library);
+  if (!load(self, error, sizeof error)) {
+    self->fault = malloc(sizeof error);
+    if (self->fault != NULL) {
+      memcpy(self->fault, error, sizeof error);
+    }
+    self->api = NULL;
+    return false;
+  }
+  self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
+  return true;
+}
+
+/* ---- the face of a board ---- */
+
+static void board_destroy(board *face) {
+  native_board *self = of_board(face);
+  library_unload(&self->library);
+  for (size_t pin = 0; pin < NATIVE_PINS; pin++) {
+    free(self->machine.edges[pin].edges);
+  }
+  free(self->machine.incoming.bytes);
+  free(self->outgoing.bytes);
+  free(self->image);
+  free(self->fault);
+  free(self);
+}
+
+static uint64_t board_now(const board *face) { return of_const_board(face)->machine.now; }
+
+static board_state board_advance(board *face, uint64_t until) {
+  native_board *self = of_board(face);
+  do {
+    if (self->reset_asked && !restart(self)) {
+      return BOARD_CRASHED;
+    }
+    if (self->api == NULL) {
+      return BOARD_CRASHED;
+    }
+    self->api->advance(until);
+  } while (self->reset_asked);
+  return BOARD_RUNNING;
+}
+
+static void board_drive(board *face, uint64_t at, uint8_t pin, uint8_t level) {
+  native_machine *machine = &of_board(face)->machine;
+  if (pin >= NATIVE_PINS) {
+    return;
+  }
+  native_edge_queue *queue = &machine->edges[pin];
+  while (queue->count > 0 && queue->edges[queue->first + queue->count - 1].cycle >= at) {
+    queue->count--;
+  }
+  push_edge(queue, (native_edge){at > machine->now ? at : machine->now, level});
+  if (at <= machine->next_edge || machine->next_edge_pin == pin) {
+    native_find_next_edge(machine);
+  }
+}
+
+static uint8_t board_output(const board *face, uint8_t pin) {
+  return pin < NATIVE_PINS ? of_const_board(face)->machine.output[pin] : (uint8_t)BOARD_RELEASED;
+}
+
+static void board_analog(board *face, board_analog_source *source, void *context) {
+  (void)face; /* this firmware reads no voltages */
+  (void)source;
+  (void)context;
+}
+
+static void board_send(board *face, uint64_t at, const uint8_t *bytes, size_t count) {
+  native_board *self = of_board(face);
+  uint64_t start = at > self->machine.now ? at : self->machine.now;
+  if (start < self->line_free) {
+    start = self->line_free;
+  }
+  const bool garbled = rates_differ(self);
+  for (size_t i = 0; i < count; i++) {
+    const uint64_t end = start + (i + 1) * 10u * (uint64_t)BOARD_CLOCK_HZ / self->baud;
+    push_byte(&self->machine.incoming, (native_byte){end, garbled ? GARBLED : bytes[i], garbled});
+    self->line_free = end;
+  }
+  const native_byte_queue *queue = &self->machine.incoming;
+  if (queue->count > 0) {
+    self->machine.next_byte = queue->bytes[queue->first].cycle;
+  }
+}
+
+static size_t board_receive(board *face, uint8_t *bytes, uint64_t *cycles, size_t capacity) {
+  native_board *self = of_board(face);
+  native_byte_queue *queue = &self->outgoing;
+  size_t taken = 0;
+  while (taken < capacity && queue->count > 0 && queue->bytes[queue->first].cycle <= self->machine.now) {
+    bytes[taken] = queue->bytes[queue->first].byte;
+    if (cycles != NULL) {
+      cycles[taken] = queue->bytes[queue->first].cycle;
+    }
+    taken++;
+    queue->count--;
+    queue->first = queue->count == 0 ? 0 : queue->first + 1;
+  }
+  self->bytes_out += taken;
+  return taken;
+}
+
+static void board_line_rate(board *face, uint32_t baud) {
+  if (baud > 0) {
+    of_board(face)->baud = baud;
+  }
+}
+
+static void board_reset(board *face, board_reset_cause cause) {
+  native_board *self = of_board(face);
+  self->reset_asked = true;
+  self->reset_cause = cause;
+  self->machine.stop = 1;
+}
+
+static void board_counters_now(const board *face, board_counters *out) {
+  const native_board *self = of_const_board(face);
+  const native_byte_queue *queue = &self->outgoing;
+  uint64_t waiting = 0; /* bytes that have left and were not taken yet */
+  while (waiting < queue->count && queue->bytes[queue->first + waiting].cycle <= self->machine.now) {
+    waiting++;
+  }
+  *out = (board_counters){
+      .interrupts = self->machine.interrupts,
+      .bytes_in = self->machine.bytes_in,
+      .bytes_out = self->bytes_out + waiting,
+      .overruns = self->machine.overruns,
+      .framing_errors = self->machine.framing_errors,
+      .resets = self->resets,
+      .edges_out = self->edges_out,
+  };
+}
+
+static const char *board_fault(const board *face) { return of_const_board(face)->fault; }
+
+static void *board_extension(board *face, const char *name) {
+  native_board *self = of_board(face);
+  if (strcmp(name, "pin_map") == 0 && self->api != NULL) {
+    const char *const *pin_map = &self->api->pin_map;
+    void *result = NULL;
+    memcpy(&result, pin_map, sizeof result);
+    return result;
+  }
+  return NULL;
+}
+
+static const board_operations operations = {
+    .version = BOARD_INTERFACE_VERSION,
+    .kind = "native",
+    .destroy = board_destroy,
+    .now = board_now,
+    .advance = board_advance,
+    .drive = board_drive,
+    .output = board_output,
+    .analog = board_analog,
+    .send = board_send,
+    .receive = board_receive,
+    .line_rate = board_line_rate,
+    .reset = board_reset,
+    .counters = board_counters_now,
+    .fault = board_fault,
+    .extension = board_extension,
+};
+
+board *native_board_create(const char *library_path, char *error, size_t error_size) {
+  native_board *self = calloc(1, sizeof *self);
+  if (self == NULL) {
+    snprintf(error, error_size, "out of memory");
+    return NULL;
+  }
+  self->face.op = &operations;
+  self->baud = NATIVE_BAUD;
+  self->reset_asked = true;
+  self->reset_cause = BOARD_RESET_POWER;
+  native_machine *machine = &self->machine;
+  machine->next_edge = NATIVE_NEVER;
+  machine->next_byte = NATIVE_NEVER;
+  machine->edge = on_edge;
+  machine->transmit = on_transmit;
+  memset(machine->output, NATIVE_RELEASED, sizeof machine->output);
+  memset(machine->outside, NATIVE_RELEASED, sizeof machine->outside);
+  self->image = library_read(library_path, &self->image_size, error, error_size);
+  if (self->image == NULL || !load(self, error, error_size)) {
+    board_destroy(&self->face);
+    return NULL;
+  }
+  return &self->face;
+}

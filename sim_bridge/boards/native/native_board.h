@@ -1,0 +1,18 @@
+/* native_board.h: an emulated board that runs the firmware's own C, compiled for the PC (firmware/src/hal/native).
+ *
+ * Each board loads a copy of the firmware library of its own, so that boards share no state, and a reset is the
+ * unloading of that copy and the loading of a fresh one. Much faster than the AVR board; it has the same events at the
+ * same cycles but for what the AVR's own instructions take: here the firmware's work takes no time. */
+#ifndef NATIVE_BOARD_H
+#define NATIVE_BOARD_H
+
+#include <stddef.h>
+
+#include "boards/board.h"
+
+/* A board at cycle 0, just powered on. NULL and one sentence in `error` if the library cannot be used.
+ *
+ * Extensions: "pin_map" -> const char *, the name of the pin map that the library was built for. */
+board *native_board_create(const char *library_path, char *error, size_t error_size);
+
+#endif
