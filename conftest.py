@@ -1,4 +1,4 @@
-"""Settings for all tests: how many random cases, and the same ones each time unless `make fuzz` asks for new ones."""
+"""Settings for all tests: how many random cases; the same ones each time unless `make fuzz` asks for new."""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
-"""Builds what is not Python: the simulated world, the emulated microcontroller and the firmware for this computer.
+"""Builds what is not Python: the simulated world, the emulated boards, the firmware for this computer.
 
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
-* `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py), GPL-3.0-or-later. Built
-  where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything else works without it.
+* `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
+  GPL-3.0-or-later. Built where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything
+  else works without it.
 * `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
 
-A wheel also carries the robots, the arenas and the AVR images. BOEBOT_SANITIZE=1 builds all C with the address and
-undefined-behaviour sanitizers.
+A wheel also carries the robots, the arenas and the AVR images. BOEBOT_SANITIZE=1 builds all C with the
+address and undefined-behaviour sanitizers.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ os.chdir(ROOT)
 FIRMWARE = Path("firmware/src")
 LIBRARIES = Path("sim_bridge/images")
 HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
-PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in FIRMWARE.glob("generated/pins_*.h"))
+PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
+PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
 WHEEL_DATA = {
@@ -47,7 +49,13 @@ CFFI_MODULES = [
     if wanted and Path(script).exists()
 ]
 
-SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O1", "-g"]
+SANITIZERS = [
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=all",
+    "-fno-omit-frame-pointer",
+    "-O1",
+    "-g",
+]
 SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
 MSVC = sys.platform == "win32"
 
@@ -63,7 +71,8 @@ def firmware_sources() -> list[str]:
 
 def headers() -> list[str]:
     """Every header of ours: when one changes, what includes it is compiled again."""
-    return sorted(str(path) for folder in ("sim_bridge", "firmware/src") for path in Path(folder).rglob("*.h"))
+    found = [*Path("sim_bridge").rglob("*.h"), *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
+    return sorted(str(path) for path in found)
 
 
 class BuildExt(build_ext):
@@ -133,7 +142,7 @@ class BuildPy(build_py):
 
     def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         """Without the scripts that describe the extensions to cffi."""
-        found = super().find_package_modules(package, package_dir)
+        found = super().find_package_modules(package, package_dir)  # type: ignore[no-untyped-call]
         return [entry for entry in found if not entry[1].startswith("build_")]
 
     def run(self) -> None:

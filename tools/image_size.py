@@ -1,6 +1,6 @@
 """Prints how much flash and static RAM firmware images use, and fails when one uses more than it may.
 
-    python tools/image_size.py build/images/shieldbot.elf ...
+python tools/image_size.py build/images/shieldbot.elf ...
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main(paths: list[str]) -> int:
     too_large = False
     for path in map(Path, paths):
         flash, ram = sizes(path)
-        print(f"{path.name:22} flash {flash:6d} of {FLASH_LIMIT} bytes   static RAM {ram:5d} of {RAM_LIMIT} bytes")
+        print(f"{path.name:22} flash {flash} of {FLASH_LIMIT} bytes, static RAM {ram} of {RAM_LIMIT} bytes")
         too_large |= flash > FLASH_LIMIT or ram > RAM_LIMIT
     if too_large:
         print("image_size.py: an image is larger than it may be", file=sys.stderr)

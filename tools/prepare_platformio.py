@@ -1,7 +1,8 @@
-"""Prepares a PlatformIO core directory of this project's own, in build/platformio-core, without PlatformIO's registry.
+"""Prepares a PlatformIO core directory of this project's own, build/platformio-core, without the registry.
 
-Afterwards `tools/pio` builds the same platformio.ini that plain `pio` does, with the compilers of the distribution and
-SCons from PyPI. The user's own PlatformIO directory is never touched. Needs the packages `platformio` and `scons`.
+Afterwards `tools/pio` builds the same platformio.ini that plain `pio` does, with the compilers of the
+distribution and SCons from PyPI. The user's own PlatformIO directory is never touched. Needs the packages
+`platformio` and `scons`.
 
     python tools/prepare_platformio.py [FOLDER]
 """
@@ -65,7 +66,7 @@ def add_tool(core: Path, name: str, tool_version: str, description: str) -> Path
 
 
 def prepare(core: Path) -> None:
-    """Makes the core directory anew: SCons, avrdude where there is one, the two stand-in platforms, quiet settings."""
+    """Makes the core directory anew: SCons, avrdude where there is one, the two platforms, quiet settings."""
     shutil.rmtree(core, ignore_errors=True)
 
     scons = add_tool(core, "tool-scons", platformio_version_of_scons(), "SCons from PyPI")
@@ -80,8 +81,13 @@ def prepare(core: Path) -> None:
         manifest = json.loads((source / "platform.json").read_text(encoding="utf-8"))
         mark_installed(folder, "platform", manifest["name"], manifest["version"])
 
-    settings = {"enable_telemetry": False, "check_platformio_interval": 36500, "check_prune_system_threshold": 0}
-    write_json(core / "appstate.json", {"last_version": version("platformio"), "settings": settings})
+    write_json(
+        core / "appstate.json",
+        {
+            "last_version": version("platformio"),
+            "settings": {"enable_telemetry": False, "check_platformio_interval": 36500},
+        },
+    )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
     python tools/requirements.py build|run|firmware|test|check ...
 
-`build` is what setup.py needs, `run` what the installed distribution needs; the others are its extras. The exact
-versions stand in requirements.lock: pip install --constraint requirements.lock $(python tools/requirements.py run)
+`build` is what setup.py needs, `run` what the installed distribution needs; the others are its extras. The
+exact versions stand in requirements.lock, which pip takes as --constraint.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""How `pio test` reads the output of our unit tests: they are written with doctest, and its header is the system's
-(Debian package doctest-dev) where there is one; elsewhere PlatformIO fetches it."""
+"""How `pio test` runs our unit tests: they are written with doctest. Its header is the system's (Debian's
+doctest-dev) where there is one; elsewhere PlatformIO fetches it."""
 
 from __future__ import annotations
 
@@ -13,4 +13,5 @@ SYSTEM_HEADERS = [Path("/usr/include/doctest/doctest.h"), Path("/usr/local/inclu
 class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
     """Doctest without a download."""
 
-    EXTRA_LIB_DEPS = None if any(header.exists() for header in SYSTEM_HEADERS) else DoctestTestRunner.EXTRA_LIB_DEPS
+    if any(header.exists() for header in SYSTEM_HEADERS):
+        EXTRA_LIB_DEPS = None

@@ -74,8 +74,9 @@ def main(wanted: list[str]) -> int:
             rows.append(row(figure, figure.measure()))
     console.print(table(rows))
     RESULT.parent.mkdir(exist_ok=True)
-    machine = {"machine": platform.machine(), "system": platform.platform(), "python": platform.python_version()}
-    RESULT.write_text(json.dumps({"on": machine, "figures": rows}, indent=2) + "\n", encoding="utf-8")
+    computer = {"system": platform.platform(), "python": platform.python_version()}
+    text = json.dumps({"computer": computer, "figures": rows}, indent=2)
+    RESULT.write_text(text + "\n", encoding="utf-8")
     missed = [entry["name"] for entry in rows if not entry["met"]]
     if missed:
         console.print(f"missed: {'; '.join(missed)}")

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link import frame, messages
 from boebot.runner import execute
 from tools.bench.figures import figure
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hil_tests"))
 
-from rig import CYCLES_PER_US, Rig  # noqa: E402
+from rig import CYCLES_PER_US, Rig
 
 SERVO_LEFT, SERVO_RIGHT = 13, 12
 
@@ -32,10 +33,11 @@ def servo_width() -> float:
                 rig.transport.write((wire * (5000 // len(wire) + 1))[:5000])
                 telemetry = rig.listen(0.1)
             settled = rig.session.transport.now() - 0.5
-            for pin, pulse in ((SERVO_LEFT, telemetry[-1].pulse_left), (SERVO_RIGHT, telemetry[-1].pulse_right)):
+            in_force = {SERVO_LEFT: telemetry[-1].pulse_left, SERVO_RIGHT: telemetry[-1].pulse_right}
+            for pin, pulse in in_force.items():
                 pulses = rig.pulses(pin)
                 recent = pulses[pulses[:, 0] > settled * 1e6 * CYCLES_PER_US]
-                expected = pulse * messages.Telemetry.PULSE_SCALE_US * CYCLES_PER_US
+                expected = pulse * PULSE_SCALE_US * CYCLES_PER_US
                 worst = max(worst, float(np.abs(recent[:, 1] - expected).max()))
     return worst
 

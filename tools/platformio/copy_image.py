@@ -1,4 +1,4 @@
-"""PlatformIO, after the build: the image goes to build/images/<pin map>.elf and .hex, where everybody loads it from."""
+"""PlatformIO, after the build: copies the image to build/images/<pin map>.elf and .hex, where everybody looks."""
 
 from SCons.Script import Copy, Default, Import
 

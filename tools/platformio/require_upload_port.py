@@ -1,4 +1,4 @@
-"""PlatformIO, before the build: an upload names its port. Without one PlatformIO would take any serial port it finds."""
+"""PlatformIO, before the build: an upload names its port. PlatformIO would take any serial port it finds."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The wheel that `make wheel` builds: installed into an empty environment without a network, it runs without a compiler.
+"""The wheel that `make wheel` builds: installed without a network, it runs without a compiler.
 
 The packages it depends on come from build/wheelhouse, which `make test` fills.
 """
@@ -34,16 +34,17 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (wheel,) = (PROJECT / "dist").glob("boebot-*.whl")
     environment = tmp_path_factory.mktemp("wheel") / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
-    install = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "install", "--quiet"]
+    pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "--quiet"]
     offline = ["--no-index", "--no-compile", "--find-links", str(PROJECT / "build" / "wheelhouse")]
-    subprocess.run(without_network([*install, *offline, str(wheel)]), check=True)
+    subprocess.run(without_network([*pip, "install", *offline, str(wheel)]), check=True)
     return environment
 
 
 @pytest.mark.parametrize("board", ["native", "avr"])
 def test_an_installed_wheel_runs_wander(installed: Path, tmp_path: Path, board: str) -> None:
     out = tmp_path / "out"
-    command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", board, "--seconds", "5", "--out", str(out)]
+    command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", board, "--seconds", "5"]
+    command += ["--out", str(out)]
     bare = {"PATH": str(installed / "bin"), "HOME": str(tmp_path), "LANG": os.environ.get("LANG", "C.UTF-8")}
     done = subprocess.run(
         without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False

@@ -1,9 +1,7 @@
 """SCons script of the stand-in platform `atmelavr`: builds an AVR program without a framework and uploads it.
 
-The flags are those that PlatformIO's own platform gives to a project without a framework, so that both build alike.
+The flags are those that PlatformIO's own platform gives to a project without a framework: both build alike.
 """
-
-from os.path import join
 
 from SCons.Script import AlwaysBuild, Builder, Default, DefaultEnvironment
 
@@ -24,7 +22,7 @@ env.Replace(
     SIZECHECKCMD="$SIZETOOL -A -d $SOURCES",
     SIZEPRINTCMD="$SIZETOOL -B -d $SOURCES",
     UPLOADER="avrdude",
-    UPLOADERFLAGS=["-p", "$BOARD_MCU", "-c", "$UPLOAD_PROTOCOL", "-b", "$UPLOAD_SPEED", "-P", "$UPLOAD_PORT", "-D"],
+    UPLOADERFLAGS="-p $BOARD_MCU -c $UPLOAD_PROTOCOL -b $UPLOAD_SPEED -P $UPLOAD_PORT -D",
     UPLOADHEXCMD="$UPLOADER $UPLOADERFLAGS -U flash:w:$SOURCES:i",
     PROGNAME="firmware",
     PROGSUFFIX=".elf",
@@ -47,7 +45,7 @@ env.Append(
 )
 
 elf = env.BuildProgram()
-image = env.ElfToHex(join("$BUILD_DIR", "${PROGNAME}"), elf)
+image = env.ElfToHex("$BUILD_DIR/${PROGNAME}", elf)
 env.Depends(image, "checkprogsize")
 
 AlwaysBuild(env.Alias("nobuild", image))
