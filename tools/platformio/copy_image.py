@@ -1,4 +1,4 @@
-"""PlatformIO, after the build: copies the image to build/images/<pin map>.elf and .hex, where everybody looks."""
+"""PlatformIO, after the build: copies the image to build/images/<pin map>.elf and .hex, for everybody."""
 
 from SCons.Script import Copy, Default, Import
 
