@@ -1,0 +1,217 @@
+"""Boards by URL: what the host asks of a board, whoever emulates or is it.
+
+One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group `boebot.boards`
+offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`, `serial:/dev/ttyUSB0?baud=250000`,
+`socket://localhost:5000`). The host library knows emulated boards only through the interfaces below; it never imports
+the simulator.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from boebot.errors import BoardError
+from boebot.link.transport import SerialTransport, SocketTransport, Transport
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from boebot.robots import RobotDescription
+
+    Floats = NDArray[np.float64]
+
+BOARDS_GROUP = "boebot.boards"  # kind -> BoardFactory
+SERVERS_GROUP = "boebot.servers"  # any name -> Server
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoardRequest:
+    """What is wanted of a board. Real boards heed `robot` only."""
+
+    robot: RobotDescription
+    arena: str | None = None  # bundled name or .toml file; None: the simulator's default
+    seed: int = 1
+    realtime: bool = False  # pace simulated time by the wall clock
+    start_pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own
+    image: str | None = None  # firmware to load in place of the bundled one
+    record: bool = True  # keep the truth for the pictures
+    noise: bool = True
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """What really happened, for pictures and figures after a run. No brain ever sees it.
+
+    The series have one row per sample; `time` is on the clock of the session's transport (s).
+    """
+
+    time: Floats
+    x: Floats  # m
+    y: Floats  # m
+    heading: Floats  # rad
+    contact: NDArray[np.bool_]  # the body touches something
+    left_speed: Floats | None = None  # m/s along the ground
+    right_speed: Floats | None = None
+    arena_name: str = "arena"
+    outlines: Sequence[Floats] = ()  # closed polygons, one row per corner (m): walls and obstacles
+    charger: tuple[float, float, float] | None = None  # x, y, radius (m), where the arena has one
+
+
+class BoardSession(Protocol):
+    """An opened board. `close` gives everything back; nothing else is called after it."""
+
+    @property
+    def transport(self) -> Transport:
+        """The bytes to and from the board."""
+
+    @property
+    def description(self) -> str:
+        """The board in a few words, such as "emulated ATmega328P"."""
+
+    def truth(self) -> Truth | None:
+        """What happened so far, or None where nobody knows (a real robot)."""
+
+    def counters(self) -> Mapping[str, float]:
+        """What the board counted, by name; may be empty."""
+
+    def close(self) -> None:
+        """Closes the board."""
+
+
+@runtime_checkable
+class HasPins(Protocol):
+    """A session whose board's pins can be reached, for tests."""
+
+    @property
+    def board(self) -> Any:
+        """Pins: log, drive, output, reset, counters."""
+
+
+class BoardFactory(Protocol):
+    """What an entry point of the group `boebot.boards` loads to."""
+
+    def __call__(self, request: BoardRequest) -> BoardSession:
+        """Opens a board; raises a BoebotError with one sentence if it cannot."""
+
+
+class Server(Protocol):
+    """What an entry point of the group `boebot.servers` loads to: offers an emulated robot to other programs."""
+
+    def __call__(
+        self,
+        kind: str,
+        request: BoardRequest,
+        *,
+        tcp: int | None,
+        announce: Callable[[str], None],
+        running: Callable[[], bool],
+    ) -> None:
+        """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty, or on TCP port `tcp` of loopback (0: any
+        free one). Calls `announce(url)` once clients may open that URL."""
+
+
+class LiveSession:
+    """A board behind a port: a robot, or an emulated one that somebody serves."""
+
+    def __init__(self, transport: Transport, description: str) -> None:
+        self.transport = transport
+        self.description = description
+
+    def truth(self) -> Truth | None:
+        """Nobody knows where a real robot is."""
+        return None
+
+    def counters(self) -> Mapping[str, float]:
+        """A port counts nothing."""
+        return {}
+
+    def close(self) -> None:
+        """Closes the port."""
+        self.transport.close()
+
+
+def board_kinds() -> list[str]:
+    """The emulated boards that are installed."""
+    return sorted(point.name for point in entry_points(group=BOARDS_GROUP))
+
+
+def open_board(url: str, request: BoardRequest) -> BoardSession:
+    """Opens the board that `url` names.
+
+    Raises:
+        BoardError: no such board, or it cannot be opened.
+    """
+    for point in entry_points(group=BOARDS_GROUP):
+        if point.name == url:
+            factory: BoardFactory = _load(point.load, url)
+            return factory(request)
+    if is_live(url):
+        transport = open_port(url, _default_baud(request.robot))
+        return LiveSession(transport, f"board at {transport.name}")
+    raise BoardError(_unknown(url))
+
+
+def find_server() -> Server:
+    """Who offers emulated robots to other programs.
+
+    Raises:
+        BoardError: nobody does.
+    """
+    for point in entry_points(group=SERVERS_GROUP):
+        server: Server = _load(point.load, point.name)
+        return server
+    raise BoardError("there is nobody to serve an emulated robot: the simulator is not installed")
+
+
+def is_live(url: str) -> bool:
+    """Whether `url` names a port rather than an emulated board."""
+    return bool(re.match(r"(serial:|socket://|/|COM\d+$)", url))
+
+
+def open_port(url: str, baud: int) -> Transport:
+    """Opens a serial port or a socket by URL.
+
+    Raises:
+        BoardError: the URL is malformed, or the port is missing, busy, forbidden or refused.
+    """
+    if url.startswith("socket://"):
+        match = re.fullmatch(r"socket://(\[[0-9a-fA-F:]+\]|[^:/\[\]]+):(\d{1,5})/?", url)
+        if match is None or not 0 < int(match[2]) < 65536:
+            raise BoardError(f"{url!r} is no socket address; expected socket://HOST:PORT")
+        return SocketTransport(match[1].strip("[]"), int(match[2]))
+    path, _, query = url.removeprefix("serial:").partition("?")
+    if query:
+        match = re.fullmatch(r"baud=(\d+)", query)
+        if match is None:
+            raise BoardError(f"{url!r} has an unknown setting {query!r}; expected baud=RATE")
+        baud = int(match[1])
+    if not path:
+        raise BoardError(f"{url!r} names no port; expected serial:PORT, as in serial:/dev/ttyUSB0")
+    return SerialTransport(path, baud)
+
+
+def _default_baud(robot: RobotDescription) -> int:
+    uart = robot.device.get("uart")
+    return int(getattr(uart, "baud", 500_000))
+
+
+def _unknown(url: str) -> str:
+    kinds = board_kinds()
+    emulated = ", ".join(kinds) if kinds else "none: the simulator is not installed"
+    return (
+        f"there is no board {url!r}; expected an emulated board ({emulated}), "
+        "a port such as /dev/ttyACM0, serial:PORT, or socket://HOST:PORT"
+    )
+
+
+def _load(load: Callable[[], Any], name: str) -> Any:
+    try:
+        return load()
+    except ImportError as error:
+        raise BoardError(f"the emulated board {name!r} is not usable here: {error}") from None

@@ -1,0 +1,85 @@
+"""Wander about, and keep out of the way of things.
+
+Wandering follows code listings 5.1 and 5.2 of the notes: drive straight on; now and then, by chance, turn on the spot for
+a while. Whiskers and infra-red come on top: a touched whisker makes the robot back off and turn away, something seen by
+infra-red makes it turn until the way is clear.
+"""
+
+from boebot import Robot
+
+NEEDS = ["whiskers", "infrared"]
+
+FORWARD = 0.5  # motor signal straight ahead
+TURN = 0.7  # motor signal of turning on the spot
+TURN_CHANCE = 0.01  # in each hundredth of a second: begin to turn ...
+STOP_TURN_CHANCE = 0.03  # ... and stop turning
+LEFT_CHANCE = 0.5  # turn left rather than right
+
+AVOID_TURN = 0.5  # motor signal of turning away from what infra-red sees
+CLEAR_TIME = 0.2  # s to turn on after infra-red sees nothing any more
+BACK_TIME = 0.5  # s to back off after a touch
+ESCAPE_TIME = 0.6  # s to turn away after backing off: about 110 degrees
+
+
+class Brain:
+    """A state machine: "straight" and "turn" wander, "avoid" heeds infra-red, "back" and "escape" follow a touch."""
+
+    def __init__(self) -> None:
+        self.state = "straight"
+        self.left = False  # which way it turns
+        self.until = 0.0  # when the present state ends (s)
+
+    def step(self, robot: Robot) -> None:
+        touched_left, touched_right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        seen_left, seen_right = robot.left_ir.detected, robot.right_ir.detected
+
+        if touched_left or touched_right:
+            self.state = "back"
+            self.until = robot.time + BACK_TIME
+            self.choose_side(robot, touched_left, touched_right)
+        elif (seen_left or seen_right) and self.state in ("straight", "turn"):
+            self.state = "avoid"
+            self.choose_side(robot, seen_left, seen_right)
+
+        if self.state == "straight":
+            robot.drive(FORWARD, FORWARD)
+            if robot.chance(TURN_CHANCE, per=0.01):
+                self.left = robot.chance(LEFT_CHANCE)
+                self.state = "turn"
+
+        elif self.state == "turn":
+            self.spin(robot, TURN)
+            if robot.chance(STOP_TURN_CHANCE, per=0.01):
+                self.state = "straight"
+
+        elif self.state == "avoid":
+            self.spin(robot, AVOID_TURN)
+            if seen_left or seen_right:
+                self.until = robot.time + CLEAR_TIME
+            elif robot.time >= self.until:
+                self.state = "straight"
+
+        elif self.state == "back":
+            robot.drive(-FORWARD, -FORWARD)
+            if robot.time >= self.until:
+                self.until = robot.time + ESCAPE_TIME
+                self.state = "escape"
+
+        elif self.state == "escape":
+            self.spin(robot, TURN)
+            if robot.time >= self.until:
+                self.state = "straight"
+
+    def choose_side(self, robot: Robot, on_left: bool, on_right: bool) -> None:
+        """Turn away from where something is; by chance if it is on both sides."""
+        if on_left and on_right:
+            self.left = robot.chance(0.5)
+        else:
+            self.left = on_right
+
+    def spin(self, robot: Robot, signal: float) -> None:
+        """Turn on the spot to the chosen side."""
+        if self.left:
+            robot.drive(-signal, signal)
+        else:
+            robot.drive(signal, -signal)

@@ -1,0 +1,70 @@
+"""`boebot info URL`: who is there. Firmware, compiler, image, devices, parameters, and one look at the sensors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from boebot.boards import BoardRequest, open_board
+from boebot.cli import options, output
+from boebot.errors import BoardError
+from boebot.link import messages
+from boebot.link.session import Link, text
+from boebot.robots import load_robot
+
+
+def info(
+    url: Annotated[str, typer.Argument(metavar="URL", help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT.")],
+    robot: options.RobotName = "shieldbot",
+    json: options.Json = False,
+) -> None:
+    """Say who is at a port: firmware, compiler, image, devices."""
+    session = open_board(url, BoardRequest(robot=load_robot(robot), record=False))
+    try:
+        link = Link(session.transport, record=False)
+        hello = link.handshake()
+        identity = link.identity()
+        values: dict[str, Any] = {
+            "board": session.description,
+            "protocol_version": hello.protocol_version,
+            "schema": f"{hello.schema_hash:08x}",
+            "firmware": text(identity.firmware_version),
+            "compiler": text(identity.compiler),
+            "pin_map": text(hello.pin_map),
+            "image_size_bytes": identity.image_size or None,
+            "image_hash": f"{identity.image_hash:08x}" if identity.image_size else None,
+            "tick_rate_hz": hello.tick_rate,
+            "reset_cause": _name(messages.ResetCause, hello.reset_cause),
+            "devices": [
+                device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
+            ],
+        }
+        parameters = {name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"}
+        telemetry = _latest(link)
+    finally:
+        session.close()
+    values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)
+    values["status"] = [flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name]
+    if json:
+        output.print_json(values | {"parameters": parameters})
+        return
+    output.print_table(values | {"status": values["status"] or "nothing to report"})
+    output.print_table(
+        {f"{name}": f"{value:g} {messages.PARAMETERS[name].unit}" for name, value in parameters.items()}
+    )
+
+
+def _latest(link: Link) -> messages.Telemetry:
+    for _ in range(50):
+        telemetry = link.poll(0.02)
+        if telemetry:
+            return messages.Telemetry.unpack(telemetry[-1])
+    raise BoardError(f"the board at {link.transport.name} sends no telemetry")
+
+
+def _name(kind: type[messages.ResetCause], value: int) -> str:
+    try:
+        return kind(value).name.lower().replace("_", " ")
+    except ValueError:
+        return f"unknown ({value})"

@@ -1,0 +1,86 @@
+"""How sub-commands print: tables for people, JSON for programs, a progress bar for runs that take longer than 2 s."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from boebot.runner import Progress
+
+BAR_AFTER_S = 2.0
+_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes)$")
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """One JSON object on standard output."""
+    print(json.dumps(values, indent=1))
+
+
+def print_table(values: Mapping[str, Any]) -> None:
+    """Names, values and units as a table on standard output; what is not known is left out."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(justify="right", overflow="fold")
+    table.add_column(style="dim")
+    for name, value in values.items():
+        if value is None:
+            continue
+        match = _UNIT.search(name)
+        unit = match[1].replace("m_s", "m/s").replace("hz", "Hz") if match else ""
+        table.add_row(_UNIT.sub("", name).replace("_", " "), _text(value), unit)
+    Console().print(table)
+
+
+@contextlib.contextmanager
+def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
+    """Gives a function to call with the seconds that have passed; shows a bar once 2 s of wall time have gone by."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn(title),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} s" if math.isinf(seconds) else "{task.completed:.0f} of {task.total:g} s"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task("run", total=None if math.isinf(seconds) else seconds)
+    begun = time.monotonic()
+    shown = False
+
+    def report(passed: float) -> None:
+        nonlocal shown
+        if not shown and time.monotonic() - begun > BAR_AFTER_S:
+            bar.start()
+            shown = True
+        bar.update(task, completed=passed)
+
+    try:
+        yield report
+    finally:
+        if shown:
+            bar.stop()
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:,.10g}" if abs(value) >= 1000 else f"{value:.10g}"
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}"
+    if isinstance(value, list):
+        return ", ".join(str(item) for item in value)
+    return str(value)

@@ -1,0 +1,49 @@
+"""`boebot run BRAIN`: a brain drives a robot, emulated or real."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from boebot.cli import options, output
+from boebot.runner import execute
+
+
+def run(
+    brain: Annotated[str, typer.Argument(metavar="BRAIN", help="Bundled brain (wander) or Python file.")],
+    on: options.On = "native",
+    robot: options.RobotName = "shieldbot",
+    arena: options.ArenaName = None,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
+    seed: options.Seed = 1,
+    period: options.Period = None,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Let a brain drive a robot, and say what happened."""
+    with output.progress_bar(f"{brain} on {on}", seconds) as progress:
+        result = execute(
+            brain,
+            robot=robot,
+            arena=arena,
+            on=on,
+            seconds=seconds,
+            seed=seed,
+            realtime=realtime,
+            period=None if period is None else period / 1000,
+            progress=progress,
+        )
+    files = [] if out is None else result.save(out)
+    if json:
+        output.print_json(result.table() | {"files": [str(path) for path in files]})
+    else:
+        output.print_table(result.table())
+        if files:
+            print(f"files in {out}: {', '.join(path.name for path in files)}")
+    if result.error is not None:
+        raise result.error

@@ -1,0 +1,48 @@
+"""`boebot serve`: offers the emulated robot on a pty or a TCP port, at real-time pace, to any program."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from typing import Annotated
+
+import click
+import typer
+
+from boebot.boards import BoardRequest, board_kinds, find_server
+from boebot.cli import options, output
+from boebot.errors import BoardError
+from boebot.robots import load_robot
+
+
+def serve(
+    on: Annotated[str, typer.Option("--on", metavar="BOARD", help="avr or native.")] = "avr",
+    pty: Annotated[bool, typer.Option("--pty", help="On a new pseudo-terminal, which looks like a serial port.")] = False,
+    tcp: Annotated[
+        int | None, typer.Option("--tcp", metavar="PORT", min=0, max=65535, help="On this TCP port of loopback; 0: any.")
+    ] = None,
+    robot: options.RobotName = "shieldbot",
+    arena: options.ArenaName = None,
+    seed: options.Seed = 1,
+    json: options.Json = False,
+) -> None:
+    """Offer the emulated robot to other programs, until Ctrl-C."""
+    if pty == (tcp is not None):
+        raise click.UsageError("give one of --pty and --tcp PORT")
+    if pty and os.name != "posix":
+        raise BoardError("there are no pseudo-terminals on this system; use --tcp PORT")
+    if on not in board_kinds():
+        raise BoardError(
+            f"there is no emulated board {on!r} to serve; expected {' or '.join(board_kinds()) or 'an installed one'}"
+        )
+    request = BoardRequest(robot=load_robot(robot), arena=arena, seed=seed, realtime=True, record=False)
+
+    def announce(url: str) -> None:
+        if json:
+            output.print_json({"url": url, "board": on, "robot": request.robot.name})
+        else:
+            print(f"{request.robot.name} on {on} is at {url}")
+            print(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C", flush=True)
+
+    with contextlib.suppress(KeyboardInterrupt):
+        find_server()(on, request, tcp=tcp, announce=announce, running=lambda: True)

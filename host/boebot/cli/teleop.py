@@ -1,0 +1,152 @@
+"""`boebot teleop`: drives by keyboard. Keys act while they are held; let go, and the robot stops."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from boebot.cli import options, output
+from boebot.errors import BoebotError
+from boebot.robot import Robot
+from boebot.runner import execute
+
+HOLD_S = 0.6  # a key counts as held so long: terminals begin to repeat it after half a second
+TURN = 0.35
+HELP = "arrows or W A S D drive, 1..9 set the speed, space stops, Q ends"
+_ARROWS = {"A": "w", "B": "s", "C": "d", "D": "a"}  # last byte of an arrow key's escape sequence
+_MOVES = {"w": (1.0, 1.0), "s": (-1.0, -1.0), "a": (-TURN, TURN), "d": (TURN, -TURN)}
+
+
+class Keyboard:
+    """The brain behind `boebot teleop`: turns keys into motor signals."""
+
+    PERIOD = 0.05
+
+    def __init__(self, read_keys: Callable[[], str], show: Callable[[str], None]) -> None:
+        self._read_keys = read_keys
+        self._show = show
+        self._speed = 0.5
+        self._move = (0.0, 0.0)
+        self._until = 0.0
+
+    def step(self, robot: Robot) -> None:
+        """One look at the keys."""
+        for key in keys(self._read_keys()):
+            if key == "q":
+                raise KeyboardInterrupt
+            if key in _MOVES:
+                self._move = _MOVES[key]
+                self._until = time.monotonic() + HOLD_S
+            elif key == " ":
+                self._until = 0.0
+            elif key in "123456789":
+                self._speed = int(key) / 9
+        if time.monotonic() < self._until:
+            left, right = self._move
+            robot.drive(left * self._speed, right * self._speed)
+        else:
+            robot.stop()
+        self._show(sensors(robot))
+
+
+def keys(typed: str) -> Iterator[str]:
+    """What was typed, key by key; arrow keys become w, a, s, d."""
+    rest = iter(typed.replace("\x1bO", "\x1b["))
+    for letter in rest:
+        if letter == "\x1b":
+            if next(rest, "") == "[":
+                yield _ARROWS.get(next(rest, ""), "")
+        elif letter == "\x03":
+            yield "q"
+        else:
+            yield letter.lower()
+
+
+def sensors(robot: Robot) -> str:
+    """One line about what the robot senses."""
+    parts = [f"{robot.time:7.1f} s", f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"]
+    equipment = robot.observation.equipment
+    if equipment.has("left_whisker") and equipment.has("right_whisker"):
+        parts.append(f"whiskers {'L' if robot.left_whisker.pressed else '·'}{'R' if robot.right_whisker.pressed else '·'}")
+    if equipment.has("left_ir") and equipment.has("right_ir"):
+        parts.append(f"IR {'L' if robot.left_ir.detected else '·'}{'R' if robot.right_ir.detected else '·'}")
+    if equipment.has("ping"):
+        distance = robot.ping.distance
+        parts.append("ping    –  " if distance is None else f"ping {distance:4.2f} m")
+    if equipment.has("left_encoder") and equipment.has("right_encoder"):
+        parts.append(f"encoders {robot.left_encoder.count} {robot.right_encoder.count}")
+    return "   ".join(parts)
+
+
+def teleop(
+    on: options.On = "native",
+    robot: options.RobotName = "shieldbot",
+    arena: options.ArenaName = None,
+    seed: options.Seed = 1,
+    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after so long.")] = float("inf"),
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
+    json: options.Json = False,
+) -> None:
+    """Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."""
+    if not sys.stdin.isatty():
+        raise BoebotError("teleop needs a keyboard, but its input is not a terminal")
+    print(HELP)
+    with raw_keyboard() as read_keys:
+        brain = Keyboard(read_keys, _show)
+        result = execute(brain, robot=robot, arena=arena, on=on, seconds=seconds, seed=seed, realtime=True)
+    print()
+    if out is not None:
+        result.save(out)
+    if json:
+        output.print_json(result.table())
+    else:
+        output.print_table(result.table())
+    if result.error is not None and not isinstance(result.error, KeyboardInterrupt):
+        raise result.error
+
+
+def _show(line: str) -> None:
+    width = max(20, os.get_terminal_size().columns - 1) if sys.stdout.isatty() else 200
+    print("\r" + line[:width].ljust(width), end="", flush=True)
+
+
+@contextlib.contextmanager
+def raw_keyboard() -> Iterator[Callable[[], str]]:
+    """Keys as they are typed, without waiting and without echo; gives a function that returns what was typed."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        def read_console() -> str:
+            typed = ""
+            while msvcrt.kbhit():
+                letter = msvcrt.getwch()
+                if letter in "\x00\xe0":  # an arrow key comes as two
+                    letter = {"H": "w", "P": "s", "K": "a", "M": "d"}.get(msvcrt.getwch(), "")
+                typed += letter
+            return typed
+
+        yield read_console
+        return
+    import select
+    import termios
+    import tty
+
+    file = sys.stdin.fileno()
+    before = termios.tcgetattr(file)
+
+    def read_terminal() -> str:
+        ready, _, _ = select.select([file], [], [], 0)
+        return os.read(file, 1024).decode("utf-8", errors="ignore") if ready else ""
+
+    try:
+        tty.setcbreak(file)
+        yield read_terminal
+    finally:
+        termios.tcsetattr(file, termios.TCSADRAIN, before)

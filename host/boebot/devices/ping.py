@@ -1,0 +1,58 @@
+"""Ping))): an ultrasonic range finder. The echo pulse lasts as long as sound takes to the obstacle and back.
+
+    distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature     (HARDWARE sheet, section 6)
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.link.messages import Telemetry
+
+TEMPERATURE_C = 20.0
+
+
+def speed_of_sound(temperature_c: float = TEMPERATURE_C) -> float:
+    """Speed of sound in air (m/s)."""
+    return 331.5 + 0.6 * temperature_c
+
+
+class Ping(NamedTuple):
+    """The range finder's last measurement."""
+
+    distance: float | None
+    """Metres to the nearest thing ahead, or None if no echo came back from within its range."""
+    age: float
+    """Seconds since the echo ended or was given up; infinite if nothing was measured yet."""
+    valid: bool
+    """The measurement is fresh. Fresh and None means: nothing near ahead."""
+
+
+class PingReader:
+    """Reads the Ping; distances outside its range count as no echo."""
+
+    def __init__(self, range_min_m: float, range_max_m: float, period_ticks: int, tick_s: float) -> None:
+        self._metres_per_us = speed_of_sound() / 2 * 1e-6
+        # what the range's ends look like on the wire, with a little room for the clock's and the air's tolerance
+        self._least_us = 0.9 * range_min_m / self._metres_per_us
+        self._greatest_us = 1.1 * range_max_m / self._metres_per_us
+        self._fresh = min(STALE_PERIODS * period_ticks, NEVER - 1)
+        self._tick_s = tick_s
+
+    def __call__(self, telemetry: Telemetry) -> Ping:
+        """The last measurement as of that tick."""
+        ticks = telemetry.ping_age
+        if ticks >= NEVER:
+            return Ping(None, float("inf"), False)
+        echo_us = telemetry.ping_echo
+        distance = echo_us * self._metres_per_us if self._least_us <= echo_us <= self._greatest_us else None
+        return Ping(distance, ticks * self._tick_s, ticks <= self._fresh)
+
+    def distances(self, echo_us: NDArray[Any], age_ticks: NDArray[Any]) -> NDArray[np.float64]:
+        """Distances of many telemetry messages at once (m), NaN where there was no echo."""
+        heard = (self._least_us <= echo_us) & (echo_us <= self._greatest_us) & (age_ticks < NEVER)
+        return np.where(heard, echo_us * self._metres_per_us, np.nan)

@@ -1,0 +1,1 @@
+"""The serial link: frames, transports, session and the generated messages."""

@@ -1,0 +1,54 @@
+"""Where the robot believes it is: dead reckoning from wheel encoders (THEORY 1.4 and 2.2).
+
+    ds = (ds_L + ds_R) / 2,   dphi = (ds_R - ds_L) / (2 R)
+    x += ds cos(phi + dphi/2),   y += ds sin(phi + dphi/2),   phi += dphi      (midpoint rule; 2 R = track width)
+
+A single-channel encoder knows no direction. Its sign is that of the commanded signal; while the command reverses, the old
+sign stays until the new command has been beyond the dead band for 0.1 s, as long as a wheel needs to turn round.
+"""
+
+from __future__ import annotations
+
+import math
+
+DEAD_BAND = 0.05  # motor signal below which a servo does not turn
+HOLD_S = 0.1
+
+
+class WheelDirection:
+    """The way in which a wheel is taken to turn: +1 or -1."""
+
+    def __init__(self) -> None:
+        self.sign = 1
+        self._reversed_s = 0.0
+
+    def update(self, signal: float, step_s: float) -> int:
+        """Takes the commanded signal of the last `step_s` seconds; returns the sign now believed in."""
+        if signal * self.sign < 0 and abs(signal) >= DEAD_BAND:
+            self._reversed_s += step_s
+            if self._reversed_s >= HOLD_S - 1e-9:
+                self.sign = -self.sign
+                self._reversed_s = 0.0
+        else:
+            self._reversed_s = 0.0
+        return self.sign
+
+
+class Odometry:
+    """The pose estimate; heading counter-clockwise, in (-pi, pi]."""
+
+    def __init__(self, track_width_m: float, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        self._track_width_m = track_width_m
+        self.x = x
+        self.y = y
+        self.heading = heading
+
+    def update(self, left_m: float, right_m: float) -> None:
+        """Adds what the wheels have rolled since the last update (m, forward positive)."""
+        travelled = (left_m + right_m) / 2
+        turned = (right_m - left_m) / self._track_width_m
+        middle = self.heading + turned / 2
+        self.x += travelled * math.cos(middle)
+        self.y += travelled * math.sin(middle)
+        heading = self.heading + turned
+        self.heading = math.atan2(math.sin(heading), math.cos(heading))

@@ -1,0 +1,67 @@
+"""What both pictures of a run show: the arena, the paths, and where something was touched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from boebot.record import Bools, Floats, Pose
+    from boebot.result import RunResult
+
+MARGIN_M = 0.12
+
+
+@dataclass(frozen=True)
+class View:
+    """A run seen from above; lengths in metres."""
+
+    known: bool
+    """The truth is known, and `path` is it; otherwise `path` is the odometric estimate."""
+    path: Pose
+    estimate: Pose | None
+    outlines: list[Floats]
+    """The arena's polygons, largest first: the outer wall, then obstacles."""
+    contacts: Floats
+    """Where the body came to touch something, shape (n, 2)."""
+    touches: Floats
+    """Where the robot was when a whisker was pressed, shape (n, 2)."""
+
+
+def view(result: RunResult) -> View:
+    """The run as the pictures show it."""
+    known = result.true_pose is not None
+    path = result.true_pose if result.true_pose is not None else result.odometry
+    truth = result.truth
+    outlines = [np.asarray(outline, dtype=np.float64) for outline in truth.outlines] if truth is not None else []
+    outlines.sort(key=_extent, reverse=True)
+    contacts = np.empty((0, 2))
+    if truth is not None and known:
+        inside = truth.time >= result.clock_offset
+        begins = _onset_indices(truth.contact & inside)
+        contacts = np.column_stack((truth.x[begins], truth.y[begins]))
+    begins = _onset_indices(result.series.left_whisker | result.series.right_whisker)
+    touches = np.column_stack((path.x[begins], path.y[begins]))
+    return View(known, path, result.odometry if known else None, outlines, contacts, touches)
+
+
+def bounds(scene: View) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what there is to see, with a margin (m)."""
+    points = [np.column_stack((scene.path.x, scene.path.y))]
+    if scene.outlines:
+        points += scene.outlines
+    else:
+        points = [points[0] + offset for offset in (-0.3, 0.3)]
+    together = np.vstack(points)
+    margin = max(MARGIN_M if not scene.outlines else 0.0, 0.02 * float(np.ptp(together, axis=0).max()))
+    return together.min(axis=0) - margin, together.max(axis=0) + margin
+
+
+def _extent(outline: Floats) -> float:
+    return float(np.ptp(outline, axis=0).prod()) if len(outline) else 0.0
+
+
+def _onset_indices(flags: Bools) -> np.ndarray:
+    return np.flatnonzero(flags & ~np.concatenate(([False], flags[:-1])))

@@ -1,0 +1,100 @@
+"""The record of a run as files for other programs: run.csv, summary.json, the raw bytes and their time stamps."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from boebot.result import RunResult
+
+
+def columns(result: RunResult) -> dict[str, list[str]]:
+    """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
+    series = result.series
+    estimate = result.odometry
+    kinds, left, right = zip(*series.commands, strict=True) if len(series) else ((), (), ())
+    table: dict[str, list[str]] = {
+        "time_s": _cells(series.time, 4),
+        "tick": _cells(series.raw["tick"]),
+        "encoder_left": _cells(series.raw["encoder_left"]),
+        "encoder_right": _cells(series.raw["encoder_right"]),
+        "edge_period_left_s": _cells(series.left_edge_period, 6),
+        "edge_period_right_s": _cells(series.right_edge_period, 6),
+        "whisker_left": _cells(series.left_whisker),
+        "whisker_right": _cells(series.right_whisker),
+        "infrared_left": _cells(series.left_ir),
+        "infrared_right": _cells(series.right_ir),
+        "infrared_age_s": _cells(series.infrared_age, 3),
+        "ping_distance_m": _cells(series.ping_distance, 4),
+        "ping_age_s": _cells(series.ping_age, 3),
+        "pulse_left_us": _cells(series.left_pulse_us, 4),
+        "pulse_right_us": _cells(series.right_pulse_us, 4),
+        "status": _cells(series.raw["status"]),
+        "setpoint_sequence": _cells(series.raw["setpoint_sequence"]),
+        "frames_bad": _cells(series.raw["frames_bad"]),
+        "overruns": _cells(series.raw["overruns"]),
+        "command": list(kinds),
+        "command_left": [f"{value:.4f}" for value in left],
+        "command_right": [f"{value:.4f}" for value in right],
+        "odometry_x_m": _cells(estimate.x, 5),
+        "odometry_y_m": _cells(estimate.y, 5),
+        "odometry_heading_rad": _cells(estimate.heading, 5),
+    }
+    true = result.true_pose
+    if true is not None and result.truth is not None:
+        moment = np.searchsorted(result.truth.time, series.time + result.clock_offset)
+        contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
+        table |= {
+            "true_x_m": _cells(true.x, 5),
+            "true_y_m": _cells(true.y, 5),
+            "true_heading_rad": _cells(true.heading, 5),
+            "contact": _cells(contact),
+        }
+    return table
+
+
+def write_run(result: RunResult, path: Path) -> Path:
+    """run.csv"""
+    table = columns(result)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    return path
+
+
+def write_summary(result: RunResult, path: Path) -> Path:
+    """summary.json"""
+    summary = result.table() | {"counters": result.counters}
+    path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def write_wire(result: RunResult, folder: Path) -> list[Path]:
+    """to_board.bin and to_host.bin; wire.csv tells when which of their bytes were sent or read (transport's clock)."""
+    rows: list[tuple[float, str, int, int]] = []
+    for name, chunks in (("to_board", result.sent), ("to_host", result.received)):
+        (folder / f"{name}.bin").write_bytes(b"".join(data for _, data in chunks))
+        first = 0
+        for stamp, data in chunks:
+            rows.append((stamp, name, first, len(data)))
+            first += len(data)
+    rows.sort(key=lambda row: row[0])
+    with (folder / "wire.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("time_s", "file", "first_byte", "bytes"))
+        writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
+    return [folder / "to_board.bin", folder / "to_host.bin", folder / "wire.csv"]
+
+
+def _cells(values: Any, digits: int | None = None) -> list[str]:
+    """Array to text: numbers with so many digits, flags as 0 and 1, not-a-number as nothing."""
+    if digits is None:
+        return [str(int(value)) for value in values.tolist()]
+    form = f"%.{digits}f"
+    return ["" if value != value else form % value for value in values.tolist()]

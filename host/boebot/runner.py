@@ -1,0 +1,315 @@
+"""Runs a brain on a board: `boebot.run(...)` does from a script or a notebook what the command `boebot run` does.
+
+One loop serves every board. The brain's period is a whole number n of the board's control ticks; the brain steps on the
+first telemetry whose tick has reached the next multiple of n, and its command goes out at once. On a board in this
+process time stands still while the brain thinks, so that a run is a function of brain, robot, arena and seed; on a live
+board the newest telemetry counts.
+
+However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes), the motors are stopped and the record
+is complete up to there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time as wall
+from collections.abc import Callable
+from pathlib import Path
+
+from boebot import brains
+from boebot.boards import BoardRequest, BoardSession, open_board
+from boebot.brains import LoadedBrain
+from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
+from boebot.link import messages
+from boebot.link.session import Link, text
+from boebot.parameters import configure
+from boebot.record import Record
+from boebot.result import RunResult
+from boebot.robot import Equipment, Observation, Robot
+from boebot.robots import RobotDescription, load_robot
+
+DEFAULT_PERIOD = 0.05  # s
+TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
+TIME_TO_LIVE_LIMIT_MS = 2000
+SILENCE_S = 1.0  # a board that says nothing for so long is lost
+_PROGRESS_S = 0.1  # wall time between two reports of progress
+_Telemetry = messages.Telemetry
+
+Progress = Callable[[float], None]
+"""Called now and then with the seconds of the run that have passed."""
+
+
+def run(
+    brain: object = "wander",
+    robot: str | Path | RobotDescription = "shieldbot",
+    arena: str | Path | None = None,
+    on: str = "native",
+    seconds: float = 60.0,
+    seed: int = 1,
+    realtime: bool = False,
+    out: str | Path | None = None,
+    period: float | None = None,
+    progress: Progress | None = None,
+) -> RunResult:
+    """Runs a brain and returns what happened.
+
+    Args:
+        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with `step(robot)`.
+        robot: bundled name, .toml file, or a description.
+        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
+        on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT".
+        seconds: length of the run by the board's clock; may be infinite.
+        seed: of the brain's chance, and of the noise of the simulated world.
+        realtime: slow a simulated run down to the wall clock.
+        out: folder for run.csv, run.png, replay.html and the raw bytes.
+        period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05.
+        progress: called with the seconds that have passed, about ten times a second.
+
+    Raises:
+        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
+            there or that vanishes. The record up to there is written to `out` all the same.
+        KeyboardInterrupt: Ctrl-C; motors stopped and record written.
+    """
+    result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
+    if out is not None:
+        result.save(out)
+    if result.error is not None:
+        raise result.error
+    return result
+
+
+def execute(
+    brain: object,
+    robot: str | Path | RobotDescription = "shieldbot",
+    arena: str | Path | None = None,
+    on: str = "native",
+    seconds: float = 60.0,
+    seed: int = 1,
+    realtime: bool = False,
+    period: float | None = None,
+    progress: Progress | None = None,
+) -> RunResult:
+    """As `run`, but once the run has begun every end of it, even by an error, is a result: see `RunResult.error`.
+
+    Raises:
+        BoebotError: the run could not begin.
+    """
+    if not seconds > 0:
+        raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
+    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
+    loaded = brains.load_brain(brain)
+    period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
+    check_time_to_live(period_s)
+    missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
+    if missing:
+        raise BrainError(
+            f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
+        )
+    request = BoardRequest(
+        robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime
+    )
+    session = open_board(on, request)
+    try:
+        return _Run(session, request, loaded, on, seconds, period_s, progress).execute()
+    finally:
+        session.close()
+
+
+def check_time_to_live(period_s: float) -> int:
+    """The set-points' time to live (ms) at a brain period.
+
+    Raises:
+        BoebotError: the period is so long that the motors would stop between two steps.
+    """
+    if not (period_s > 0 and math.isfinite(period_s)):
+        raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
+    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000))
+    if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
+        raise BoebotError(
+            f"a brain period of {period_s * 1000:g} ms is too long; expected at most "
+            f"{TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
+        )
+    return time_to_live_ms
+
+
+class _Run:
+    """One run, from handshake to result."""
+
+    def __init__(
+        self,
+        session: BoardSession,
+        request: BoardRequest,
+        brain: LoadedBrain,
+        on: str,
+        seconds: float,
+        period_s: float,
+        progress: Progress | None,
+    ) -> None:
+        self.session = session
+        self.request = request
+        self.brain = brain
+        self.on = on
+        self.progress = progress
+        self.time_to_live_ms = check_time_to_live(period_s)
+        self.link = Link(session.transport)
+        hello = self.link.handshake()
+        self.tick_s = 1.0 / hello.tick_rate
+        self.period_s = period_s
+        self.period_ticks = _whole_ticks(period_s, self.tick_s)
+        pin_map = text(hello.pin_map)
+        if pin_map != request.robot.pin_map:
+            raise ProtocolError(
+                f"the board at {session.transport.name} runs firmware for pin map {pin_map!r}, but robot "
+                f"{request.robot.name!r} needs {request.robot.pin_map!r}"
+            )
+        self.seconds = seconds
+        self.equipment = Equipment(request.robot, self.tick_s)
+        self.robot = Robot(request.robot.name, period_s, request.seed)
+        self.identity: messages.Identity | None = None
+        self.record = Record()
+        self.resets = 0
+        self.late_steps = 0
+        self.clock_offset_s = 0.0  # transport's clock at the run's time 0
+
+    def execute(self) -> RunResult:
+        """The whole run."""
+        error: BaseException | None = None
+        started = wall.perf_counter()
+        begun_s = self.session.transport.now()
+        try:
+            configure(self.link, self.request.robot)
+            self.identity = self.link.identity()
+            begun_s = self.session.transport.now()
+            started = wall.perf_counter()
+            self._loop()
+        except (BoebotError, KeyboardInterrupt) as caught:
+            error = caught
+        finally:
+            elapsed = wall.perf_counter() - started
+            lasted_s = self.session.transport.now() - begun_s
+            self._stop_motors()
+        return self._result(error, lasted_s, elapsed)
+
+    def _loop(self) -> None:
+        link, robot, transport = self.link, self.robot, self.session.transport
+        poll, step, unpack = link.poll, self.brain.step, _Telemetry.STRUCT.unpack
+        telemetry_log, times, steps = self.record.telemetry, self.record.times, self.record.steps
+        equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
+        paced = self.request.realtime and not transport.realtime
+        time_to_live_ms = self.time_to_live_ms
+
+        last = due = -1
+        time_zero = 0.0  # run time at tick 0 of the board's present count
+        end_s = self.seconds - tick_s / 2
+        wait_s, quiet_s = 2 * tick_s, 0.0
+        heard_s = transport.now()
+        started = next_progress = wall.perf_counter()
+        started_s = heard_s
+        while True:
+            payloads = poll(wait_s, quiet_s)
+            if not payloads:
+                if transport.now() - heard_s > SILENCE_S:
+                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
+                wait_s, quiet_s = 2 * tick_s, 0.0
+                continue
+            for payload in payloads:
+                tick = int.from_bytes(payload[:4], "little")
+                if due < 0:
+                    due = tick + -tick % n
+                    time_zero = -due * tick_s
+                    self.clock_offset_s = transport.now() - _AIR_S + (due - tick) * tick_s
+                elif tick <= last:  # the board was reset: its ticks begin afresh
+                    due = tick + -tick % n
+                    time_zero = (times[-1] if times else 0.0) + tick_s - tick * tick_s
+                    self._again_after_reset()
+                last = tick
+                if tick >= due or times:
+                    telemetry_log.append(payload)
+                    times.append(tick * tick_s + time_zero)
+            heard_s = transport.now()
+            if last >= due:
+                time_s = times[-1]
+                if time_s >= end_s:
+                    break
+                if last - due >= n:
+                    self.late_steps += (last - due) // n
+                if paced:
+                    ahead = (heard_s - started_s) - (wall.perf_counter() - started)
+                    if ahead > 0:
+                        wall.sleep(ahead)
+                robot.observation = Observation(_Telemetry._make(unpack(payload)), equipment, time_s)
+                try:
+                    step(robot)
+                except (Exception, SystemExit) as error:
+                    raise BrainError(brains.explain(error, self.brain.path)) from error
+                kind, left, right = robot.command
+                if kind == "signal":
+                    link.send_signal(left, right, time_to_live_ms, last)
+                elif kind == "speed":
+                    link.send_speed(left, right, time_to_live_ms, last)
+                else:
+                    link.send_stop()
+                steps.append((len(times) - 1, kind, left, right))
+                due = last - last % n + n
+                if self.progress is not None and wall.perf_counter() >= next_progress:
+                    next_progress = wall.perf_counter() + _PROGRESS_S
+                    self.progress(time_s)
+            ahead_ticks = due - last
+            wait_s, quiet_s = (ahead_ticks + 2) * tick_s, (ahead_ticks - 0.5) * tick_s
+
+    def _again_after_reset(self) -> None:
+        """The board restarted: its parameters are its defaults again."""
+        self.resets += 1
+        configure(self.link, self.request.robot)
+
+    def _stop_motors(self) -> None:
+        """Tells the board to stop and waits until it says so; a board that has gone stops by its dead-man."""
+        with contextlib.suppress(BoebotError, KeyboardInterrupt):
+            for _ in range(3):
+                self.link.send_stop()
+                for payload in self.link.poll(4 * self.tick_s, 2.5 * self.tick_s):
+                    if _Telemetry.unpack(payload).status & messages.Status.STOPPED:
+                        return
+
+    def _result(self, error: BaseException | None, lasted_s: float, elapsed_s: float) -> RunResult:
+        link = self.link
+        return RunResult(
+            brain=self.brain.name,
+            robot=self.request.robot,
+            board=self.on,
+            description=self.session.description,
+            arena=self.request.arena,
+            seed=self.request.seed,
+            period=self.period_s,
+            tick=self.tick_s,
+            error=error,
+            record=self.record,
+            truth=self.session.truth(),
+            clock_offset=self.clock_offset_s,
+            steps=len(self.record.steps),
+            late_steps=self.late_steps,
+            resets=self.resets,
+            lost_frames=link.decoder.lost,
+            bad_frames=link.decoder.bad,
+            run_time=lasted_s,
+            wall_time=elapsed_s,
+            sent=link.sent,
+            received=link.received,
+            identity=self.identity,
+            counters=dict(self.session.counters()),
+        )
+
+
+# From a tick's start to the moment its telemetry has been read: work, 43 bytes at 500,000 baud and the pause after them.
+# The true path is joined to the telemetry with it; pictures need no more than this.
+_AIR_S = 0.0012
+
+
+def _whole_ticks(period_s: float, tick_s: float) -> int:
+    ticks = round(period_s / tick_s)
+    if ticks < 1 or abs(ticks * tick_s - period_s) > 1e-6:
+        raise BoebotError(
+            f"a brain period of {period_s * 1000:g} ms does not fit; expected a multiple of {tick_s * 1000:g} ms"
+        )
+    return ticks
