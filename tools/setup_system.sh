@@ -68,5 +68,10 @@ else
 fi
 echo "Installing: $missing"
 export DEBIAN_FRONTEND=noninteractive
-$as_root apt-get update -q
-$as_root apt-get install -q -y --no-install-recommends $missing
+log=$here/../build/apt.log
+mkdir -p "$here/../build"
+{ $as_root apt-get update && $as_root apt-get install -y --no-install-recommends $missing; } >"$log" 2>&1 || {
+  tail -n 20 "$log" >&2
+  echo "apt-get could not install what is missing (all of its output: build/apt.log)" >&2
+  exit 1
+}
