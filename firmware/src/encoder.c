@@ -45,11 +45,6 @@ static encoder_reading readings[SIDES];
 static int16_t counted[SIDES];
 static uint8_t silence[SIDES]; /* ticks since the last edge, at most SILENT_TICKS */
 
-int8_t encoder_quadrature_step(uint8_t from, uint8_t to) {
-  static const int8_t step[16] = {0, -1, 1, 0, 1, 0, 0, -1, -1, 0, 0, 1, 0, 1, -1, 0};
-  return step[(uint8_t)(from << 2 | to) & 15u];
-}
-
 /* Counts one edge of a line; masks the line when it fires too often. */
 static inline void count_line(uint8_t line) {
   if (fired[line] >= limit) {

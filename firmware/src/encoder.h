@@ -27,9 +27,15 @@ void encoder_task(void);
 /* The reading at the start of this tick. */
 const encoder_reading *encoder_read(uint8_t side);
 
-/* Change of the count for one step of two lines. `before` and `now` are (A << 1 | B); 0 also where both changed, which
- * tells nothing. */
-int8_t encoder_quadrature_step(uint8_t before, uint8_t now);
+/* Change of the count for one step of two lines, each (A << 1 | B): forward while the new B is the old A. 0 also where
+ * both changed, which tells nothing. */
+static inline int8_t encoder_quadrature_step(uint8_t from, uint8_t to) {
+  const uint8_t changed = from ^ to;
+  if (changed != 1u && changed != 2u) {
+    return 0;
+  }
+  return (from >> 1) == (to & 1u) ? 1 : -1;
+}
 
 #ifdef __cplusplus
 }

@@ -58,6 +58,7 @@ HAL_INTERRUPT_SLOT {
   schedule_slot++;
   schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
   slot_cycles += HAL_SLOT_CYCLES;
+  hal_slot_arm((uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES));
   switch (schedule_slot % SLOTS_PER_FRAME) {
     case 0:
       servo_frame();

@@ -1,7 +1,7 @@
 /* hal.h: what a board must offer. The same firmware runs on the ATmega328P (hal/avr) and in a PC process (hal/native).
  *
  * Time is counted in CPU cycles of 16 MHz. hal_time() is a free-running 16-bit count (Timer1 at clk/1); it starts at 0
- * in hal_start_timers(), and the slot interrupt fires every HAL_SLOT_CYCLES of it, first at HAL_SLOT_CYCLES.
+ * in hal_start_timers(); the first slot interrupt comes at HAL_SLOT_CYCLES, and arms the next.
  *
  * Interrupts are defined where their device lives, by these words in front of a body:
  *   HAL_INTERRUPT_SLOT        a new slot has begun                                  schedule.c
@@ -78,7 +78,8 @@ uint32_t hal_image_size(void);
 uint32_t hal_image_hash(void);
 
 /* Each target's header also gives, as macros or inline functions:
- *   uint16_t hal_time(void)                       now
+ *   uint16_t hal_time(void)                       now; interrupt context or HAL_ATOMIC
+ *   void hal_slot_arm(uint16_t time)              the slot interrupt comes at `time`
  *   void hal_edge_arm(uint16_t time)              the edge interrupt comes HAL_EDGE_LEAD cycles before `time`, or sooner
  *                                                 than that if it must; one at a time, a new one replaces the last
  *   void hal_edge_arm_plain(uint16_t time)        the same without a lead: for what needs no cycle-exact time

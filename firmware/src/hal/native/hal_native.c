@@ -106,10 +106,15 @@ void hal_start_timers(void) {
   next_slot = epoch + HAL_SLOT_CYCLES;
 }
 
-void hal_edge_arm(uint16_t time) {
+/* The cycle at which the count will be `time` next. */
+static uint64_t cycle_of(uint16_t time) {
   const uint16_t ahead = (uint16_t)(time - hal_time());
-  next_edge_match = machine->now + (ahead != 0 ? ahead : 65536u);
+  return machine->now + (ahead != 0 ? ahead : 65536u);
 }
+
+void hal_slot_arm(uint16_t time) { next_slot = cycle_of(time); }
+
+void hal_edge_arm(uint16_t time) { next_edge_match = cycle_of(time); }
 
 void hal_edge_disarm(void) { next_edge_match = NATIVE_NEVER; }
 
@@ -289,7 +294,6 @@ static void advance(uint64_t until) {
         hal_native_edge();
         break;
       case SLOT:
-        next_slot += HAL_SLOT_CYCLES;
         machine->interrupts++;
         hal_native_slot();
         poll_firmware();

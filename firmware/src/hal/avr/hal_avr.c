@@ -1,0 +1,134 @@
+/* hal_avr.c: start-up, carrier, Ping trigger, watchdog and image of the ATmega328P. */
+#include <avr/wdt.h>
+
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "pins.h"
+
+#if F_CPU != 16000000UL
+#error "the board runs at 16 MHz"
+#endif
+
+#define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
+
+/* Why the chip started, saved before the start-up code clears memory; behind Optiboot it is 0, unknown. */
+static uint8_t saved_mcusr __attribute__((section(".noinit")));
+
+/* After a watchdog reset the watchdog goes on with its shortest time: it is switched off before memory is set up. */
+void hal_before_start(void) __attribute__((naked, used, section(".init3")));
+void hal_before_start(void) {
+  saved_mcusr = MCUSR;
+  MCUSR = 0;
+  wdt_disable();
+}
+
+uint8_t hal_reset_cause(void) {
+  const uint8_t mcusr = saved_mcusr;
+  if ((mcusr & _BV(PORF)) != 0) { /* power-on may set the others too */
+    return RESET_CAUSE_POWER;
+  }
+  if ((mcusr & _BV(WDRF)) != 0) {
+    return RESET_CAUSE_WATCHDOG;
+  }
+  if ((mcusr & _BV(BORF)) != 0) {
+    return RESET_CAUSE_BROWN_OUT;
+  }
+  return (mcusr & _BV(EXTRF)) != 0 ? RESET_CAUSE_EXTERNAL : RESET_CAUSE_UNKNOWN;
+}
+
+void hal_start_timers(void) {
+  TCCR2A = _BV(WGM21);
+  OCR2A = HAL_CARRIER_CYCLES - 1u;
+  PCICR = _BV(PCIE1);
+  SMCR = _BV(SE); /* idle: timers and UART go on */
+
+  TCCR1A = 0;
+  TCCR1B = 0;
+  TCNT1 = 0;
+  hal_slot_arm(HAL_SLOT_CYCLES);
+  TIFR1 = _BV(OCF1B);
+  TIMSK1 = _BV(OCIE1B);
+  TCCR1B = _BV(CS10);
+  sei();
+}
+
+void hal_start_watchdog(void) { wdt_enable(WDTO_120MS); }
+
+void hal_kick_watchdog(void) { wdt_reset(); }
+
+/* ---- IR carrier ---- */
+
+enum { CARRIER_LEFT = 0, CARRIER_RIGHT = 1 }; /* bits of GPIOR0 */
+
+/* Toggles the LEDs that GPIOR0 names, 13 cycles with entry and return; neither flags nor registers change. */
+ISR(TIMER2_COMPA_vect, ISR_NAKED) {
+  __asm__ volatile(
+      "sbic %[which], %[left]            \n"
+      "sbi %[left_pin], %[left_bit]      \n"
+      "sbic %[which], %[right]           \n"
+      "sbi %[right_pin], %[right_bit]    \n"
+      "reti                              \n"
+      :
+      : [which] "I"(_SFR_IO_ADDR(GPIOR0)), [left] "I"(CARRIER_LEFT), [right] "I"(CARRIER_RIGHT),
+        [left_pin] "I"(_SFR_IO_ADDR(INFRARED_LEFT_LED_PINR)), [left_bit] "I"(INFRARED_LEFT_LED_BIT),
+        [right_pin] "I"(_SFR_IO_ADDR(INFRARED_RIGHT_LED_PINR)), [right_bit] "I"(INFRARED_RIGHT_LED_BIT));
+}
+
+void hal_carrier_start(uint8_t side) {
+  if (side == LEFT) {
+    GPIOR0 = (uint8_t)(GPIOR0 | _BV(CARRIER_LEFT));
+  } else {
+    GPIOR0 = (uint8_t)(GPIOR0 | _BV(CARRIER_RIGHT));
+  }
+  TCNT2 = 0;
+  TIFR2 = _BV(OCF2A);
+  TIMSK2 = _BV(OCIE2A);
+  TCCR2B = _BV(CS20);
+}
+
+void hal_carrier_stop(void) {
+  TCCR2B = 0;
+  TIMSK2 = 0;
+  GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(CARRIER_LEFT));
+  GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(CARRIER_RIGHT));
+  HAL_PIN_LOW(INFRARED_LEFT_LED);
+  HAL_PIN_LOW(INFRARED_RIGHT_LED);
+}
+
+/* ---- Ping ---- */
+
+void hal_ping_trigger(void) {
+  HAL_ATOMIC {
+    hal_capture_stop();
+    HAL_PIN_LOW(PING);
+    HAL_PIN_OUTPUT(PING);
+    HAL_PIN_HIGH(PING);
+    __builtin_avr_delay_cycles(PING_TRIGGER_CYCLES - 2u);
+    HAL_PIN_LOW(PING);
+    HAL_PIN_MAKE_INPUT(PING);
+    TCCR1B = _BV(ICES1) | _BV(CS10);
+    TIFR1 = _BV(ICF1);
+    TIMSK1 = (uint8_t)(TIMSK1 | _BV(ICIE1));
+  }
+}
+
+/* ---- image ---- */
+
+extern const uint8_t __data_load_end[]; /* by the linker: the first byte of flash after the image */
+
+uint32_t hal_image_size(void) { return (uint16_t)(uintptr_t)__data_load_end; }
+
+/* CRC-32 as of zlib, four bits at a time. */
+uint32_t hal_image_hash(void) {
+  static const uint32_t table[16] PROGMEM = {
+      0x00000000ul, 0x1DB71064ul, 0x3B6E20C8ul, 0x26D930ACul, 0x76DC4190ul, 0x6B6B51F4ul, 0x4DB26158ul, 0x5005713Cul,
+      0xEDB88320ul, 0xF00F9344ul, 0xD6D6A3E8ul, 0xCB61B38Cul, 0x9B64C2B0ul, 0x86D3D2D4ul, 0xA00AE278ul, 0xBDBDF21Cul};
+  uint32_t crc = 0xFFFFFFFFul;
+  const uint16_t size = (uint16_t)hal_image_size();
+  for (uint16_t address = 0; address < size; address++) {
+    const uint8_t byte = pgm_read_byte(address);
+    crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ byte) & 0x0Fu]);
+    crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ (byte >> 4)) & 0x0Fu]);
+  }
+  return ~crc;
+}

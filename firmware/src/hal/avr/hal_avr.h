@@ -1,0 +1,106 @@
+/* hal_avr.h: the ATmega328P; see hal/hal.h for what each of these means.
+ *
+ *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots
+ *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier
+ *   Timer0  free for the buzzer
+ *   GPIOR0  bit 0, 1: the carrier toggles the left, right LED; bit 2: received bytes were lost
+ *   GPIOR1  head of the receive ring      GPIOR2  tail of the send ring      (one-cycle access in the interrupts)
+ */
+#ifndef HAL_AVR_H
+#define HAL_AVR_H
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/pgmspace.h>
+#include <avr/sleep.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <util/atomic.h>
+
+#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect)
+#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect)
+#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect)
+#define HAL_INTERRUPT_PIN_CHANGE ISR(PCINT1_vect)
+
+#define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+
+/* Covers every interrupt that can stand before the edge's, and its own prologue; short enough for the two bytes that the
+ * receiver holds (640 cycles). */
+#define HAL_EDGE_LEAD 400u
+
+#define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
+#define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
+#define HAL_PIN_INPUT(name) (HAL_PIN_MAKE_INPUT(name), HAL_PIN_LOW(name))
+#define HAL_PIN_PULL_UP(name) (HAL_PIN_MAKE_INPUT(name), HAL_PIN_HIGH(name))
+#define HAL_PIN_MAKE_INPUT(name) (name##_DDR = (uint8_t)(name##_DDR & (uint8_t)~HAL_PIN_BIT(name)))
+#define HAL_PIN_HIGH(name) (name##_PORT = (uint8_t)(name##_PORT | HAL_PIN_BIT(name)))
+#define HAL_PIN_LOW(name) (name##_PORT = (uint8_t)(name##_PORT & (uint8_t)~HAL_PIN_BIT(name)))
+#define HAL_PIN_TOGGLE(name) (name##_PINR = HAL_PIN_BIT(name))
+#define HAL_PORT_READ(name) (name##_PINR)
+#define HAL_PIN_READ(name) ((uint8_t)((name##_PINR & HAL_PIN_BIT(name)) != 0 ? 1u : 0u))
+
+#define HAL_TABLE static const __attribute__((__progmem__))
+static inline uint8_t hal_table_byte(const uint8_t *byte) { return pgm_read_byte(byte); }
+static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy_P(to, from, size); }
+
+/* Interrupt context or HAL_ATOMIC: the two halves of the count share a latch. */
+static inline uint16_t hal_time(void) { return TCNT1; }
+
+static inline void hal_slot_arm(uint16_t time) { OCR1B = time; }
+
+static inline void hal_edge_arm_plain(uint16_t time) {
+  OCR1A = time;
+  TIFR1 = _BV(OCF1A);
+  TIMSK1 = (uint8_t)(TIMSK1 | _BV(OCIE1A));
+}
+
+static inline void hal_edge_arm(uint16_t time) { hal_edge_arm_plain((uint16_t)(time - HAL_EDGE_LEAD)); }
+
+static inline void hal_edge_disarm(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(OCIE1A)); }
+
+/* Returns 26 cycles after the timer has read `time`, to the cycle, whenever it was called: the coarse loop ends within
+ * 256 cycles of it, the fine one takes the rest three by three, the branches after it the last 0 to 2. */
+static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
+  uint16_t left;
+  __asm__ volatile(
+      "1: movw %A[left], %A[time]       \n"
+      "   lds __tmp_reg__, %[low]       \n" /* also latches the high byte */
+      "   sub %A[left], __tmp_reg__     \n"
+      "   lds __tmp_reg__, %[high]      \n"
+      "   sbc %B[left], __tmp_reg__     \n"
+      "   brmi 5f                       \n" /* late */
+      "   tst %B[left]                  \n"
+      "   brne 1b                       \n"
+      "2: subi %A[left], 3              \n"
+      "   brcc 2b                       \n"
+      "   cpi %A[left], 0xFE            \n" /* -3, -2 or -1 remain: 0, 1 or 2 cycles more */
+      "   brcc 3f                       \n"
+      "3: cpi %A[left], 0xFF            \n"
+      "   brcc 5f                       \n"
+      "5:                               \n"
+      : [left] "=&d"(left)
+      : [time] "r"(time), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)));
+}
+
+static inline uint16_t hal_capture_time(void) { return ICR1; }
+
+static inline void hal_capture_falling(void) {
+  TCCR1B = _BV(CS10);
+  TIFR1 = _BV(ICF1);
+}
+
+static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
+
+static inline void hal_pin_change_mask(uint8_t bits) { PCMSK1 = bits; }
+
+static inline __attribute__((always_inline)) void hal_sleep_unless(bool (*due)(void)) {
+  cli();
+  if (due()) {
+    sei();
+  } else {
+    sei(); /* takes effect after the next instruction: no interrupt slips in before the sleep */
+    sleep_cpu();
+  }
+}
+
+#endif
