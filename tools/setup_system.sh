@@ -32,7 +32,8 @@ for purpose in "$@"; do
       need gcc-avr has avr-gcc
       need binutils-avr has avr-objcopy
       need avr-libc sh -c 'echo "#include <avr/io.h>" | avr-gcc -mmcu=atmega328p -E -'
-      need "cargo-web ca-certificates" has_cargo
+      need cargo-web has_cargo
+      need ca-certificates test -e /etc/ssl/certs/ca-certificates.crt
       ;;
     test)
       need doctest-dev sh -c 'echo "#include <doctest/doctest.h>" | c++ -x c++ -E -'
