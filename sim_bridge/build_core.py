@@ -29,6 +29,10 @@ HEADERS = [
     "boards/native/native_board.h",
     "loop.h",
 ]
+NATIVE_BOARD = """
+typedef struct board board;
+board *native_board_create(const char *library_path, char *error, size_t error_size);
+"""
 SOURCES = [
     "world/*.c",
     "parts/*.c",
@@ -44,22 +48,23 @@ LINK = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
 
 def declarations(header: Path) -> str:
     """What a header offers to Python."""
-    return "\n".join(re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", header.read_text("utf-8"), re.S))
+    return "\n".join(
+        re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", header.read_text("utf-8"), re.S)
+    )
 
 
 def builder(root: Path) -> FFI:
     """The extension, with its sources named from `root`."""
     here = Path(__file__).resolve().parent
-    headers = [name for name in HEADERS if (here / name).is_file()]
     built = FFI()
-    built.cdef("\n".join(declarations(here / name) for name in headers))
+    built.cdef("\n".join([NATIVE_BOARD, *(declarations(here / name) for name in HEADERS)]))
     built.set_source(
         "sim_bridge._core",
-        "\n".join(f'#include "{name}"' for name in headers),
+        "\n".join(f'#include "{name}"' for name in HEADERS),
         sources=sorted(
             (root / path.relative_to(here)).as_posix() for pattern in SOURCES for path in here.glob(pattern)
         ),
-        include_dirs=[root.as_posix()],
+        include_dirs=[root.as_posix(), (root.parent / "firmware" / "src").as_posix()],
         extra_compile_args=COMPILE,
         extra_link_args=LINK,
     )

@@ -369,8 +369,9 @@ static void step_robot(sim *self, robot *r) {
     servo *s = &r->servo[side];
     const double speed = side == SIM_LEFT ? body_left_speed(b) : body_right_speed(b);
     torque[side] = servo_torque(s, begin, speed, r->supply);
-    if (s->pulses > 0) current += r->battery.parameters.servo_idle_a;
-    current += r->battery.parameters.servo_a_per_n_m * fabs(torque[side]);
+    const battery_parameters *p = &r->battery.parameters;
+    if (s->pulses > 0) current += p->servo_idle_a + p->servo_run_a_s_m * fabs(speed);
+    current += p->servo_a_per_n_m * fabs(torque[side]);
   }
   body_advance(b, self->arena, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
   if (r->has_battery) {
@@ -612,6 +613,16 @@ const char *board_kind(uintptr_t address) { return ((const board *)address)->op-
 uint8_t board_output(uintptr_t address, uint8_t pin) {
   const board *b = (const board *)address;
   return pin < BOARD_PIN_COUNT ? b->op->output(b, pin) : (uint8_t)BOARD_RELEASED;
+}
+
+void board_destroy(uintptr_t address) {
+  board *b = (board *)address;
+  b->op->destroy(b);
+}
+
+const char *board_pin_map(uintptr_t address) {
+  board *b = (board *)address;
+  return b->op->extension(b, "pin_map");
 }
 
 void board_reset(uintptr_t address, int cause) {

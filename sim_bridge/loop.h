@@ -111,6 +111,8 @@ double sim_supply_voltage(const sim *self, int robot);
 int board_check(uintptr_t board); /* 0, or SIM_WRONG_BOARD where it was built for another interface */
 const char *board_kind(uintptr_t board);
 uint8_t board_output(uintptr_t board, uint8_t pin);
+void board_destroy(uintptr_t board);
+const char *board_pin_map(uintptr_t board); /* that its firmware was built for, or NULL where the board does not know */
 void board_reset(uintptr_t board, int cause);
 void board_line_rate(uintptr_t board, uint32_t baud);
 const char *board_fault(uintptr_t board);

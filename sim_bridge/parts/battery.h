@@ -16,6 +16,7 @@ typedef struct {
   double drop_out_v;      /* of the regulator */
   double board_a;         /* drawn by the board */
   double servo_idle_a;    /* by a servo that gets pulses */
+  double servo_run_a_s_m; /* and by its speed at the rim */
   double servo_a_per_n_m; /* and by its torque */
   double divider;         /* pin voltage / pack voltage */
   double noise_v;         /* standard deviation of one sample at the pin */

@@ -56,10 +56,10 @@ int infrared_edge(infrared *self, uint64_t cycle, uint8_t level) {
   }
   self->carrier_cycles++;
   const int recognised = self->carrier_cycles == CYCLES_TO_HEAR;
-  if (recognised) {
-    look(self, cycle, (uint32_t)period);
-    if (self->seen) part_drive(&self->place, cycle, self->receiver_pin, BOARD_LOW);
+  if (recognised) look(self, cycle, (uint32_t)period);
+  if (self->seen) { /* low from now on takes back the end that was queued a period ago */
+    part_drive(&self->place, cycle, self->receiver_pin, BOARD_LOW);
+    part_drive(&self->place, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
   }
-  if (self->seen) part_drive(&self->place, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
   return recognised;
 }

@@ -1,0 +1,221 @@
+"""Offers an emulated robot to other programs, at real-time pace: on a pseudo-terminal or on a TCP port of loopback.
+
+To a client it is a robot on a port: `boebot run BRAIN --on /dev/pts/N`. Time also passes while no client is there. As
+on a real Uno, the board is reset when a client opens the port. Pseudo-terminals exist on POSIX systems only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+from collections.abc import Callable
+from typing import Protocol
+
+from boebot.boards import BoardRequest
+from boebot.errors import BoardError
+from sim_bridge.session import Pace, SimSession, open_avr, open_native
+
+IDLE_S = 0.002  # how long the loop sleeps when no byte comes
+CHUNK = 4096
+BACKLOG = 65536  # bytes that wait for a client that does not read; older ones are lost
+
+
+class Port(Protocol):
+    """Where a client comes and goes."""
+
+    url: str
+
+    def wait(self, seconds: float) -> None:
+        """Sleeps until something may have happened."""
+
+    def opened(self) -> bool:
+        """Whether a client came since the last call."""
+
+    def read(self) -> bytes:
+        """What the client sent."""
+
+    def write(self, data: bytes) -> None:
+        """To the client, if there is one."""
+
+    def close(self) -> None:
+        """Gives the port back."""
+
+
+class PtyPort:
+    """The master side of a pseudo-terminal. The other side hangs up when its last client closes it."""
+
+    def __init__(self) -> None:
+        """Raises BoardError where there are no pseudo-terminals."""
+        try:
+            import tty
+        except ImportError:
+            raise BoardError("this system has no pseudo-terminals; use --tcp PORT") from None
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.url = os.ttyname(slave)
+        os.close(slave)  # from now on the master hears a hang-up while nobody has the other side open
+        os.set_blocking(self._master, False)
+        self._poll = select.poll()
+        self._poll.register(self._master, select.POLLIN)
+        self._connected = False
+        self._waiting = b""
+
+    def _look(self, milliseconds: float) -> int:
+        events = self._poll.poll(milliseconds)
+        return events[0][1] if events else 0
+
+    def wait(self, seconds: float) -> None:
+        """Sleeps until bytes come; a hang-up, which lasts, wakes nobody."""
+        if self._look(0) & select.POLLHUP:
+            select.select([], [], [], seconds)
+        else:
+            self._look(seconds * 1000)
+
+    def opened(self) -> bool:
+        """Whether a client came since the last call."""
+        before, self._connected = self._connected, not self._look(0) & select.POLLHUP
+        if not self._connected:
+            self._waiting = b""
+        return self._connected and not before
+
+    def read(self) -> bytes:
+        """What the client sent."""
+        try:
+            return os.read(self._master, CHUNK)
+        except OSError:  # nothing there, or nobody
+            return b""
+
+    def write(self, data: bytes) -> None:
+        """To the client; what nobody reads is lost."""
+        if not self._connected:
+            return
+        self._waiting = (self._waiting + data)[-BACKLOG:]
+        with contextlib.suppress(OSError):
+            while self._waiting:
+                self._waiting = self._waiting[os.write(self._master, self._waiting) :]
+
+    def close(self) -> None:
+        """Ends the pseudo-terminal."""
+        os.close(self._master)
+
+
+class TcpPort:
+    """A port of loopback for one client at a time; a new client takes the place of the old one."""
+
+    def __init__(self, port: int) -> None:
+        """Raises BoardError where the port is taken."""
+        try:
+            self._listener = socket.create_server(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or "expected 0 to 65535"
+            raise BoardError(f"TCP port {port} cannot be opened: {reason}") from None
+        self._listener.setblocking(False)
+        self.url = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+        self._client: socket.socket | None = None
+        self._waiting = b""
+
+    def wait(self, seconds: float) -> None:
+        """Sleeps until a client or bytes come."""
+        select.select(
+            [self._listener] if self._client is None else [self._listener, self._client], [], [], seconds
+        )
+
+    def opened(self) -> bool:
+        """Whether a client came since the last call."""
+        try:
+            client, _ = self._listener.accept()
+        except OSError:
+            return False
+        self._drop()
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client = client
+        return True
+
+    def _drop(self) -> None:
+        client, self._client, self._waiting = self._client, None, b""
+        if client is not None:
+            client.close()
+
+    def read(self) -> bytes:
+        """What the client sent."""
+        if self._client is None:
+            return b""
+        try:
+            data = self._client.recv(CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """To the client; what nobody reads is lost."""
+        if self._client is None:
+            return
+        self._waiting = (self._waiting + data)[-BACKLOG:]
+        try:
+            self._waiting = self._waiting[self._client.send(self._waiting) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._drop()
+
+    def close(self) -> None:
+        """Closes client and port."""
+        self._drop()
+        self._listener.close()
+
+
+def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
+    """Carries bytes between `session` and `port` at real-time pace until `running()` is false.
+
+    Raises:
+        BoardError: the board's program crashed.
+    """
+    sim = session.sim
+    pace = Pace(sim)
+    while running():
+        if port.opened():
+            session.board.reset("external")
+        while data := port.read():
+            sim.send(data)
+        cycles = pace.due()
+        sim.run(cycles, cycles)
+        if data := sim.receive():
+            port.write(data)
+        port.wait(IDLE_S)
+
+
+def serve(
+    kind: str,
+    request: BoardRequest,
+    *,
+    tcp: int | None,
+    announce: Callable[[str], None],
+    running: Callable[[], bool],
+) -> None:
+    """Serves the board of that kind ("native" or "avr") until `running()` is false or Ctrl-C.
+
+    On a new pty, or on TCP port `tcp` of loopback (0: any free one). Calls `announce(url)` once clients may come.
+
+    Raises:
+        BoebotError: no such board or port, or the board's program crashed.
+    """
+    openers = {"native": open_native, "avr": open_avr}
+    if kind not in openers:
+        raise BoardError(
+            f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}"
+        )
+    with contextlib.ExitStack() as stack:
+        session = openers[kind](request)
+        stack.callback(session.close)
+        port: Port = PtyPort() if tcp is None else TcpPort(tcp)
+        stack.callback(port.close)
+        announce(port.url)
+        with contextlib.suppress(KeyboardInterrupt):
+            carry(session, port, running)
