@@ -10,9 +10,7 @@ distribution and SCons from PyPI. The user's own PlatformIO directory is never t
 from __future__ import annotations
 
 import json
-import re
 import shutil
-import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -48,16 +46,6 @@ def platformio_version_of_scons() -> str:
     return f"4.{major}{minor:02d}{patch:02d}.0"
 
 
-def avrdude_version() -> str | None:
-    """Version of the avrdude on PATH, or None; PlatformIO wants three numbers."""
-    program = shutil.which("avrdude")
-    if program is None:
-        return None
-    shown = subprocess.run([program, "-?"], capture_output=True, text=True, check=False)
-    found = re.search(r"version (\d+)\.(\d+)", shown.stdout + shown.stderr)
-    return f"{found[1]}.{found[2]}.0" if found else "0.0.0"
-
-
 def add_tool(core: Path, name: str, tool_version: str, description: str) -> Path:
     folder = core / "packages" / name
     write_json(folder / "package.json", {"name": name, "version": tool_version, "description": description})
@@ -66,14 +54,12 @@ def add_tool(core: Path, name: str, tool_version: str, description: str) -> Path
 
 
 def prepare(core: Path) -> None:
-    """Makes the core directory anew: SCons, avrdude where there is one, the two platforms, quiet settings."""
+    """Makes the core directory anew: SCons, avrdude, the two platforms, quiet settings."""
     shutil.rmtree(core, ignore_errors=True)
 
     scons = add_tool(core, "tool-scons", platformio_version_of_scons(), "SCons from PyPI")
     (scons / "scons.py").write_text(SCONS, encoding="utf-8")
-    avrdude = avrdude_version()
-    if avrdude is not None:
-        add_tool(core, "tool-avrdude", avrdude, "avrdude from PATH")
+    add_tool(core, "tool-avrdude", "1.0.0+path", "Whatever avrdude is on PATH")
 
     for source in sorted(path for path in PLATFORMS.iterdir() if path.is_dir()):
         folder = core / "platforms" / source.name

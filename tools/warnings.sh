@@ -16,7 +16,7 @@ for compiler in gcc clang; do
     find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c |
       compile $compiler -DPIN_MAP_$pin_map -Ifirmware/src
   done
-  find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards
+  find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards -Ifirmware/src
   if [ -n "$simavr" ]; then
     find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' |
       compile $compiler -Isim_bridge -Isim_bridge/boards -isystem "$simavr" -isystem "$simavr/cores"
