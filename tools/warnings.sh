@@ -4,7 +4,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 warnings="-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
-simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | head -n 1)
+simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | sed 's|/sim$||' | head -n 1)
 
 # compile COMPILER FLAGS...: compiles the files named on standard input
 compile() {
@@ -19,6 +19,6 @@ for compiler in gcc clang; do
   find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards -Ifirmware/src
   if [ -n "$simavr" ]; then
     find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' |
-      compile $compiler -Isim_bridge -Isim_bridge/boards -isystem "$simavr" -isystem "$simavr/cores"
+      compile $compiler -Isim_bridge -Isim_bridge/boards -isystem "$simavr/sim" -isystem "$simavr/cores"
   fi
 done
