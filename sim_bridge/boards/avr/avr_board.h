@@ -1,0 +1,25 @@
+/* avr_board.h: the Arduino Uno's ATmega328P, emulated: simavr executes the instructions, this layer does the rest.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#ifndef AVR_BOARD_H
+#define AVR_BOARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "../board.h"
+
+/* A board with the program of an ELF file (its bytes, not its name) in flash, powered on at cycle 0. On failure NULL,
+ * and one sentence in `error`. */
+board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
+
+/* The board's extension "data": its data space, 0x0000..0x08FF: registers, I/O registers as last written, RAM. */
+#define AVR_BOARD_DATA "data"
+#define AVR_BOARD_DATA_SIZE 0x0900u
+
+/* The board's extension "flash": its program memory. */
+#define AVR_BOARD_FLASH "flash"
+#define AVR_BOARD_FLASH_SIZE 0x8000u
+
+#endif

@@ -1,0 +1,134 @@
+/* avr_converter.c: the analog-to-digital converter (24): 13 clocks of the converter for a conversion, 25 for the first
+ * one after it was enabled; the input is held 1.5 (13.5) clocks after the start. Single conversions and free running.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include "avr_parts.h"
+
+#define BAND_GAP_VOLTS 1.1
+#define STEPS 1024.0
+
+enum {
+  ADEN = 0x80,
+  ADSC = 0x40,
+  ADATE = 0x20,
+  ADIF = 0x10,
+  ADIE = 0x08,
+  ADPS = 0x07,
+  ADLAR = 0x20,
+  REFS = 0xC0,
+  MUX = 0x0F
+};
+
+static uint64_t clock_cycles(const avr_board *b) {
+  unsigned setting = b->avr->data[REG_ADCSRA] & ADPS;
+  return UINT64_C(1) << (setting ? setting : 1);
+}
+
+/* A conversion that was asked for at `cycle`. */
+static void start(avr_board *b, uint64_t cycle) {
+  converter_state *c = &b->converter;
+  uint64_t clock = clock_cycles(b);
+  uint64_t first_edge = c->enabled_at + ((cycle - c->enabled_at) / clock + 1) * clock;
+  uint64_t hold = c->first ? clock * 27 / 2 : clock * 3 / 2;
+  c->done = first_edge + clock * (c->first ? 25 : 13);
+  c->first = false;
+  c->sampled = false;
+  set_due(b, DUE_CONVERTER, first_edge + hold);
+}
+
+static double volts_at(avr_board *b, uint64_t cycle) {
+  unsigned channel = b->avr->data[REG_ADMUX] & MUX;
+  if (channel == 14) return BAND_GAP_VOLTS;
+  if (channel > 5 || !b->converter.source) return 0.0;
+  return b->converter.source(b->converter.context, cycle, (uint8_t)channel);
+}
+
+static uint16_t quantize(const avr_board *b, double volts) {
+  bool band_gap = (b->avr->data[REG_ADMUX] & REFS) == REFS;
+  double steps = volts / (band_gap ? BAND_GAP_VOLTS : SUPPLY_VOLTS) * STEPS;
+  if (!(steps > 0.0)) return 0;
+  return steps >= STEPS - 1.0 ? 1023 : (uint16_t)steps;
+}
+
+void converter_due(avr_board *b, uint64_t cycle) {
+  converter_state *c = &b->converter;
+  uint8_t *control = &b->avr->data[REG_ADCSRA];
+  if (!c->sampled) {
+    c->sample = quantize(b, volts_at(b, cycle));
+    c->sampled = true;
+    set_due(b, DUE_CONVERTER, c->done);
+    return;
+  }
+  set_due(b, DUE_CONVERTER, NEVER);
+  if (!c->locked) c->result = (uint16_t)(b->avr->data[REG_ADMUX] & ADLAR ? c->sample << 6 : c->sample);
+  raise_flag(b, VECTOR_ADC);
+  if (*control & ADATE) {
+    start(b, cycle - 1); /* at this very edge */
+  } else {
+    *control &= (uint8_t)~ADSC;
+  }
+}
+
+static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  begin_access(b);
+  return (uint8_t)((avr->data[address] & ~ADIF) | (b->raised & FLAG(VECTOR_ADC) ? ADIF : 0));
+}
+
+static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  converter_state *c = &b->converter;
+  uint64_t cycle = begin_access(b) + 1;
+  bool converting = b->due[DUE_CONVERTER] != NEVER;
+  bool was_enabled = avr->data[address] & ADEN;
+  if (value & ADIF) clear_flag(b, VECTOR_ADC);
+  avr->data[address] = (uint8_t)(value & ~ADIF);
+  enable_interrupt(b, VECTOR_ADC, value & ADIE);
+  if (!(value & ADEN)) {
+    avr->data[address] &= (uint8_t)~ADSC;
+    set_due(b, DUE_CONVERTER, NEVER);
+    return;
+  }
+  if (!was_enabled) {
+    c->enabled_at = cycle;
+    c->first = true;
+  }
+  if (converting) {
+    avr->data[address] |= ADSC; /* writing 0 does not stop it */
+  } else if (value & ADSC) {
+    start(b, cycle);
+  }
+}
+
+static uint8_t read_low(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  (void)avr;
+  (void)address;
+  begin_access(b);
+  b->converter.locked = true; /* until the high byte is read */
+  return (uint8_t)b->converter.result;
+}
+
+static uint8_t read_high(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  (void)avr;
+  (void)address;
+  begin_access(b);
+  b->converter.locked = false;
+  return (uint8_t)(b->converter.result >> 8);
+}
+
+void converter_reset(avr_board *b) {
+  board_analog_source *source = b->converter.source;
+  void *context = b->converter.context;
+  b->converter = (converter_state){.source = source, .context = context};
+  set_due(b, DUE_CONVERTER, NEVER);
+}
+
+void converter_init(avr_board *b) {
+  on_read(b, REG_ADCSRA, read_control, b);
+  on_write(b, REG_ADCSRA, write_control, b);
+  on_read(b, REG_ADCL, read_low, b);
+  on_read(b, REG_ADCH, read_high, b);
+}

@@ -1,0 +1,88 @@
+/* avr_dog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include "avr_parts.h"
+
+#define OSCILLATOR_HZ 128000u
+#define CHANGE_CYCLES 4u /* how long WDCE stays set */
+
+enum { WDIF = 0x80, WDIE = 0x40, WDP3 = 0x20, WDCE = 0x10, WDE = 0x08, WDP_LOW = 0x07, WDRF = 0x08 };
+
+static uint64_t period(const avr_board *b) {
+  uint8_t control = b->avr->data[REG_WDTCSR];
+  unsigned step = (control & WDP_LOW) | (control & WDP3 ? 8u : 0u);
+  if (step > 9) step = 9; /* reserved */
+  return (UINT64_C(2048) << step) * (BOARD_CLOCK_HZ / OSCILLATOR_HZ);
+}
+
+static void plan(avr_board *b) {
+  bool runs = b->avr->data[REG_WDTCSR] & (WDE | WDIE);
+  set_due(b, DUE_WATCHDOG, runs ? b->watchdog.since + period(b) : NEVER);
+}
+
+void watchdog_due(avr_board *b, uint64_t cycle) {
+  uint8_t *control = &b->avr->data[REG_WDTCSR];
+  b->watchdog.since = cycle;
+  if (*control & WDIE) {
+    raise_flag(b, VECTOR_WDT);
+  } else {
+    want_reset(b, BOARD_RESET_WATCHDOG);
+  }
+  plan(b);
+}
+
+/* Interrupt and reset mode: the interrupt was the warning. */
+void watchdog_acknowledged(avr_board *b) {
+  uint8_t *control = &b->avr->data[REG_WDTCSR];
+  if (!(*control & WDE)) return;
+  *control &= (uint8_t)~WDIE;
+  enable_interrupt(b, VECTOR_WDT, false);
+}
+
+void watchdog_kick(avr_board *b) {
+  b->watchdog.since = b->avr->cycle + 1;
+  if (b->due[DUE_WATCHDOG] != NEVER) plan(b);
+}
+
+static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  uint64_t cycle = begin_access(b);
+  uint8_t value = avr->data[address] & (WDIE | WDP3 | WDE | WDP_LOW);
+  if (cycle < b->watchdog.change_until) value |= WDCE;
+  if (b->raised & FLAG(VECTOR_WDT)) value |= WDIF;
+  return value;
+}
+
+static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  uint64_t cycle = begin_access(b);
+  bool may_change = cycle < b->watchdog.change_until;
+  uint8_t old = avr->data[address];
+  uint8_t control = old & (WDP3 | WDP_LOW | WDE);
+  if (may_change && !(value & WDCE)) { /* the second write of the timed sequence */
+    control = value & (WDP3 | WDP_LOW | WDE);
+    b->watchdog.change_until = 0;
+  } else if ((value & WDCE) && (value & WDE)) {
+    b->watchdog.change_until = cycle + 1 + CHANGE_CYCLES;
+  }
+  control |= value & WDE; /* can always be set */
+  if (avr->data[REG_MCUSR] & WDRF) control |= WDE;
+  control |= value & WDIE;
+  avr->data[address] = control;
+  if (!(old & (WDE | WDIE))) b->watchdog.since = cycle + 1;
+  if (value & WDIF) clear_flag(b, VECTOR_WDT);
+  enable_interrupt(b, VECTOR_WDT, control & WDIE);
+  plan(b);
+}
+
+void watchdog_reset(avr_board *b, uint64_t cycle) {
+  b->watchdog = (watchdog_state){.since = cycle};
+  b->avr->data[REG_WDTCSR] = b->avr->data[REG_MCUSR] & WDRF ? WDE : 0;
+  plan(b);
+}
+
+void watchdog_init(avr_board *b) {
+  on_read(b, REG_WDTCSR, read_control, b);
+  on_write(b, REG_WDTCSR, write_control, b);
+}

@@ -1,0 +1,79 @@
+/* avr_image.c: puts the program of an ELF file into flash and EEPROM.
+ *
+ * Reads the little of ELF32 that an AVR image has: the header and its loadable segments, whose physical addresses say
+ * where they go: flash from 0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "avr_board.h"
+#include "avr_parts.h"
+
+#define ELF_HEADER_SIZE 52u
+#define SEGMENT_HEADER_SIZE 32u
+#define MACHINE_AVR 83u
+#define ARCHITECTURE_MASK 0x7Fu
+#define ARCHITECTURE_AVR5 5u /* that of the ATmega328P */
+#define SEGMENT_LOAD 1u
+#define EEPROM_BASE 0x810000u
+#define EEPROM_SIZE 1024u
+
+static uint32_t half(const uint8_t *p) { return p[0] | (uint32_t)p[1] << 8; }
+static uint32_t word(const uint8_t *p) { return half(p) | half(p + 2) << 16; }
+
+static bool is_elf(const uint8_t *elf, size_t size) {
+  static const uint8_t magic[] = {0x7F, 'E', 'L', 'F', 1 /* 32 bits */, 1 /* little-endian */};
+  return size >= ELF_HEADER_SIZE && !memcmp(elf, magic, sizeof magic);
+}
+
+/* Copies one segment; false if it does not fit. */
+static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, uint32_t size) {
+  if (address < AVR_BOARD_FLASH_SIZE) {
+    if (size > AVR_BOARD_FLASH_SIZE - address) return false;
+    memcpy(b->avr->flash + address, bytes, size);
+  } else if (address >= EEPROM_BASE && address < EEPROM_BASE + EEPROM_SIZE) {
+    if (size > EEPROM_BASE + EEPROM_SIZE - address) return false;
+    avr_eeprom_desc_t content = {(uint8_t *)bytes, (uint16_t)(address - EEPROM_BASE), size};
+    avr_ioctl(b->avr, AVR_IOCTL_EEPROM_SET, &content);
+  } else if (address < EEPROM_BASE) {
+    return false;
+  }
+  return true;
+}
+
+bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size) {
+  if (!is_elf(elf, size) || half(elf + 18) != MACHINE_AVR) {
+    snprintf(error, error_size, "it is not an ELF file for AVR");
+    return false;
+  }
+  if ((word(elf + 36) & ARCHITECTURE_MASK) != ARCHITECTURE_AVR5) {
+    snprintf(error, error_size, "it was built for another AVR than the ATmega328P");
+    return false;
+  }
+  uint32_t table = word(elf + 28), entry_size = half(elf + 42), entries = half(elf + 44);
+  bool loaded = false;
+  for (uint32_t i = 0; i < entries; i++) {
+    uint64_t at = table + (uint64_t)i * entry_size;
+    if (entry_size < SEGMENT_HEADER_SIZE || at + SEGMENT_HEADER_SIZE > size) {
+      snprintf(error, error_size, "its segment table is damaged");
+      return false;
+    }
+    const uint8_t *segment = elf + at;
+    uint32_t offset = word(segment + 4), address = word(segment + 12), length = word(segment + 16);
+    if (word(segment) != SEGMENT_LOAD || length == 0) continue;
+    if ((uint64_t)offset + length > size) {
+      snprintf(error, error_size, "it is cut short");
+      return false;
+    }
+    if (!load_segment(b, elf + offset, address, length)) {
+      snprintf(error, error_size, "its %lu bytes at address 0x%lX do not fit into an ATmega328P", (unsigned long)length,
+               (unsigned long)address);
+      return false;
+    }
+    loaded = loaded || address < AVR_BOARD_FLASH_SIZE;
+  }
+  if (!loaded) snprintf(error, error_size, "it holds no program");
+  return loaded;
+}

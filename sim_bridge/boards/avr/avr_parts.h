@@ -1,0 +1,347 @@
+/* avr_parts.h: what the files of the emulated ATmega328P know of each other.
+ *
+ * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
+ * here: run loop and interrupts (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c), USART
+ * (avr_usart.c), ADC (avr_converter.c), watchdog (avr_dog.c), program image (avr_image.c). Section numbers in these
+ * files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
+ *
+ * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
+ * instruction that starts at c and takes n cycles reads and writes I/O registers in the last of them (IN, OUT and SBIC
+ * in the only one), c + n - 1, and what it wrote takes effect at its end, c + n. Each source of events has one due
+ * time; the core runs no further than the earliest of them, so that every event happens at its own cycle, however long
+ * the instruction during which it falls and however the run is cut into calls.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#ifndef AVR_PARTS_H
+#define AVR_PARTS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "../board.h"
+#include "sim_megax8.h"
+
+#define NEVER UINT64_MAX
+#define SUPPLY_VOLTS 5.0
+
+/* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
+ * (13.2.1, 17.3). */
+#define INPUT_LATENCY_CYCLES 3u
+
+/* Interrupt vectors (12.4); a flag that is raised is a bit of that number in `raised`. */
+enum {
+  VECTOR_INT0 = 1,
+  VECTOR_INT1,
+  VECTOR_PCINT0,
+  VECTOR_PCINT1,
+  VECTOR_PCINT2,
+  VECTOR_WDT,
+  VECTOR_TIMER2_COMPA,
+  VECTOR_TIMER2_COMPB,
+  VECTOR_TIMER2_OVF,
+  VECTOR_TIMER1_CAPT,
+  VECTOR_TIMER1_COMPA,
+  VECTOR_TIMER1_COMPB,
+  VECTOR_TIMER1_OVF,
+  VECTOR_TIMER0_COMPA,
+  VECTOR_TIMER0_COMPB,
+  VECTOR_TIMER0_OVF,
+  VECTOR_SPI,
+  VECTOR_USART_RX,
+  VECTOR_USART_UDRE,
+  VECTOR_USART_TX,
+  VECTOR_ADC,
+  VECTOR_EE_READY,
+};
+#define FLAG(vector) (UINT32_C(1) << (vector))
+
+/* Where the events come from; of two at the same cycle the first listed happens first. */
+typedef enum {
+  DUE_DRIVEN_EDGE,  /* the outside changes what it drives */
+  DUE_SEEN_EDGE,    /* an edge has passed the synchronizer */
+  DUE_NOISE_FILTER, /* the capture pin was steady for four samples */
+  DUE_TIMER0,
+  DUE_TIMER1,
+  DUE_TIMER2,
+  DUE_TRANSMITTER,
+  DUE_RECEIVER,
+  DUE_CONVERTER,
+  DUE_WATCHDOG,
+  DUE_COUNT
+} due_source;
+
+/* I/O registers, by their address in the data space (36). */
+enum {
+  REG_PINB = 0x23,
+  REG_PINC = 0x26,
+  REG_PIND = 0x29,
+  REG_TIFR0 = 0x35,
+  REG_TIFR1 = 0x36,
+  REG_TIFR2 = 0x37,
+  REG_PCIFR = 0x3B,
+  REG_EIFR = 0x3C,
+  REG_EIMSK = 0x3D,
+  REG_GTCCR = 0x43,
+  REG_SMCR = 0x53,
+  REG_MCUSR = 0x54,
+  REG_MCUCR = 0x55,
+  REG_WDTCSR = 0x60,
+  REG_PCICR = 0x68,
+  REG_EICRA = 0x69,
+  REG_PCMSK0 = 0x6B,
+  REG_ADCL = 0x78,
+  REG_ADCH = 0x79,
+  REG_ADCSRA = 0x7A,
+  REG_ADMUX = 0x7C,
+  REG_UCSR0A = 0xC0,
+  REG_UCSR0B = 0xC1,
+  REG_UCSR0C = 0xC2,
+  REG_UBRR0L = 0xC4,
+  REG_UBRR0H = 0xC5,
+  REG_UDR0 = 0xC6,
+};
+
+/* ---- ports and edges ---- */
+
+enum { PORT_B, PORT_C, PORT_D, PORT_COUNT };
+
+typedef struct {
+  /* what the outside does */
+  uint8_t driven;       /* bits that the outside drives */
+  uint8_t driven_level; /* to this */
+  /* what other units do with pins of this port */
+  uint8_t forced; /* outputs that a timer or the transmitter has taken over */
+  uint8_t forced_level;
+  uint8_t forced_out; /* outputs whatever DDR says */
+  uint8_t forced_in;  /* inputs whatever DDR says */
+  /* what follows */
+  uint8_t out; /* bits that are outputs */
+  uint8_t out_level;
+  uint8_t pulled;       /* inputs with pull-up */
+  uint8_t level;        /* at the pins */
+  uint8_t level_before; /* before the change at `changed` */
+  uint64_t changed;
+} port_state;
+
+typedef struct {
+  uint64_t at;
+  uint8_t pin; /* Arduino's number, or bit of a port */
+  uint8_t level;
+  uint8_t port;
+} pin_change;
+
+/* A queue of changes in the order of their times. */
+typedef struct {
+  pin_change *items;
+  size_t first;
+  size_t end;
+  size_t capacity;
+} change_queue;
+
+/* ---- timers ---- */
+
+typedef enum {
+  COUNT_NORMAL,
+  COUNT_CLEAR_ON_MATCH,
+  COUNT_FAST_PWM,
+  COUNT_PHASE_PWM,
+  COUNT_PHASE_FREQUENCY_PWM
+} count_mode;
+typedef enum { TOP_FIXED, TOP_OCRA, TOP_ICR } top_source;
+
+typedef struct {
+  struct avr_board *owner;
+  /* what is built into this timer */
+  due_source source;
+  uint8_t number;
+  uint8_t address_control_a, address_count, address_compare[2], address_mask;
+  uint8_t vector_overflow, vector_compare[2];
+  uint8_t output_port[2], output_bit[2];
+  const uint16_t *dividers;
+  uint32_t maximum;
+  /* how it is set */
+  count_mode mode;
+  top_source top_from;
+  uint32_t fixed_top;
+  uint32_t divider;            /* CPU cycles per count, 0: stopped */
+  uint8_t action[2];           /* COMnx: 0 none, 1 toggle, 2 clear, 3 set */
+  uint32_t compare[2];         /* in force */
+  uint32_t compare_written[2]; /* comes into force at once, or in PWM modes at the end of a lap */
+  uint32_t capture;            /* ICR1 */
+  uint8_t high_byte;           /* TEMP */
+  /* where it is: `position` at cycle `known` */
+  uint64_t known;
+  uint32_t position;  /* in its lap: counts up from 0; in phase-correct modes on to twice the top */
+  bool match_blocked; /* the count was written: no compare match at the next count (17.10.4) */
+  uint8_t output_level[2];
+} timer_state;
+
+/* ---- USART ---- */
+
+typedef struct {
+  uint64_t start;    /* of the start bit, in cycles << 16 */
+  uint32_t bit_time; /* in cycles << 16 */
+  uint8_t byte;
+} line_frame;
+
+typedef struct {
+  uint8_t byte;
+  bool framing_error;
+  bool overrun; /* a byte was lost before this one */
+} received_byte;
+
+typedef struct {
+  uint64_t end; /* of the stop bit, in cycles */
+  uint8_t byte;
+} sent_byte;
+
+typedef struct {
+  /* set by the program */
+  uint32_t bit_time; /* in cycles */
+  uint8_t data_bits;
+  bool has_parity;
+  uint8_t frame_bits; /* with start, parity and stop bits */
+  /* transmitter */
+  bool sending;
+  bool holding; /* a byte waits in UDR0 */
+  uint8_t shifting_byte, holding_byte;
+  uint8_t shifting_bits;
+  uint32_t shifting_bit_time;
+  /* receiver */
+  enum { RECEIVER_OFF, RECEIVER_SEARCHING, RECEIVER_SAMPLING } receiver;
+  uint64_t from;         /* searching: since when; sampling: start of the frame; cycles << 16 */
+  received_byte waiting; /* in the shift register, the buffer being full */
+  bool has_waiting;
+  bool lost; /* since the last byte that went into the buffer */
+  received_byte buffer[2];
+  uint8_t buffered;
+  /* the outside */
+  uint32_t line_bit_time; /* in cycles << 16 */
+  uint64_t line_free;     /* when the line's last byte ends, cycles << 16 */
+  line_frame *line;       /* bytes on their way to the board */
+  size_t line_first, line_end, line_capacity;
+  sent_byte *out; /* bytes that left the board */
+  size_t out_first, out_end, out_capacity;
+} usart_state;
+
+/* ---- ADC, watchdog ---- */
+
+typedef struct {
+  board_analog_source *source;
+  void *context;
+  uint64_t enabled_at;
+  uint64_t done; /* when the conversion ends */
+  bool first;    /* the next conversion is the first since the converter was enabled */
+  bool sampled;
+  uint16_t result; /* in the register, as ADLAR has it */
+  uint16_t sample;
+  bool locked; /* ADCL was read, ADCH not yet */
+} converter_state;
+
+typedef struct {
+  uint64_t since;        /* when its counter was last reset */
+  uint64_t change_until; /* WDCE is set before this cycle */
+} watchdog_state;
+
+/* ---- the board ---- */
+
+/* A register of interrupt flags: bit n is the flag of vectors[n], 0 where there is none. */
+typedef struct {
+  struct avr_board *owner;
+  uint8_t vectors[8];
+} flag_register;
+
+#define FLAG_REGISTERS 5
+
+typedef struct avr_board {
+  board base;
+  avr_t *avr;
+  avr_io_t io; /* our place among simavr's modules */
+  uint64_t due[DUE_COUNT];
+  uint64_t next_due; /* the earliest */
+  uint64_t clock;    /* of what is happening now; never goes back */
+  uint32_t raised;   /* interrupt flags */
+  uint32_t enabled;  /* interrupts that are enabled */
+  bool sleeping;
+  uint8_t reset_wanted; /* bits 1 << board_reset_cause */
+  bool crashed;
+  char fault[160];
+  board_counters counters;
+  flag_register flag_registers[FLAG_REGISTERS];
+  uint8_t flag_register_count;
+  uint64_t timer_base[2]; /* when the prescalers were reset: timers 0 and 1, timer 2 */
+  port_state port[PORT_COUNT];
+  change_queue driven_edges;
+  change_queue seen_edges;
+  uint8_t capture_level; /* of the capture pin, behind the noise filter */
+  timer_state timer[3];
+  usart_state usart;
+  converter_state converter;
+  watchdog_state watchdog;
+} avr_board;
+
+/* avr_board.c */
+void set_due(avr_board *b, due_source source, uint64_t cycle);
+void raise_flag(avr_board *b, uint8_t vector);
+void clear_flag(avr_board *b, uint8_t vector);
+void enable_interrupt(avr_board *b, uint8_t vector, bool enabled);
+void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled` */
+void want_reset(avr_board *b, board_reset_cause cause);
+/* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
+ * returns the cycle of the access. */
+uint64_t begin_access(avr_board *b);
+void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);
+void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param);
+void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param);
+/* A register of interrupt flags for `vectors`, bit 0 first: read, write 1 to clear, SBI clears one. */
+void add_flag_register(avr_board *b, uint16_t address, const uint8_t vectors[8]);
+
+/* avr_pins.c */
+void pins_init(avr_board *b);
+void pins_reset(avr_board *b, uint64_t cycle);
+void pins_free(avr_board *b);
+void pins_due_driven(avr_board *b, uint64_t cycle);
+void pins_due_seen(avr_board *b, uint64_t cycle);
+void pins_due_noise_filter(avr_board *b, uint64_t cycle);
+void pins_update(avr_board *b, uint8_t port, uint64_t cycle); /* after a change of anything but `level` in `port` */
+void pins_drive(avr_board *b, uint64_t at, uint8_t pin, uint8_t level);
+uint8_t pins_output(const avr_board *b, uint8_t pin);
+void pins_acknowledged(avr_board *b, uint8_t vector);
+
+/* avr_timers.c */
+void timers_init(avr_board *b);
+void timers_reset(avr_board *b, uint64_t cycle);
+void timer_due(timer_state *t, uint64_t cycle);
+void timer_bring_up(timer_state *t, uint64_t cycle);             /* computes flags and count until `cycle` */
+void timer_plan(timer_state *t);                                 /* computes when it is due next */
+void timer_capture(avr_board *b, uint8_t level, uint64_t cycle); /* an edge at ICP1 */
+timer_state *timer_of_vector(avr_board *b, uint8_t vector);      /* NULL: no timer's */
+
+/* avr_usart.c */
+void usart_init(avr_board *b);
+void usart_reset(avr_board *b);
+void usart_free(avr_board *b);
+void usart_due_transmitter(avr_board *b, uint64_t cycle);
+void usart_due_receiver(avr_board *b, uint64_t cycle);
+void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count);
+size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity);
+void usart_line_rate(avr_board *b, uint32_t baud);
+
+/* avr_converter.c */
+void converter_init(avr_board *b);
+void converter_reset(avr_board *b);
+void converter_due(avr_board *b, uint64_t cycle);
+
+/* avr_dog.c */
+void watchdog_init(avr_board *b);
+void watchdog_reset(avr_board *b, uint64_t cycle);
+void watchdog_due(avr_board *b, uint64_t cycle);
+void watchdog_kick(avr_board *b);
+void watchdog_acknowledged(avr_board *b);
+
+/* avr_image.c */
+bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size);
+
+#endif

@@ -1,0 +1,377 @@
+/* avr_usart.c: USART0 in asynchronous mode (20), and the line between it and the outside.
+ *
+ * The line is a waveform: the outside's bytes back to back, 8N1, at the outside's bit rate. The receiver looks for a
+ * falling edge and samples the middle of each bit by its own clock, so that a wrong bit rate gives what it gives on
+ * the bench: garbage and framing errors. It holds two bytes in its buffer and one in the shift register; when a start
+ * bit comes while all three are full, the third is lost and the next byte read bears DOR0 (20.8.1). RXC is set when the
+ * stop bit has been sampled, a little before its end.
+ *
+ * The transmitter's byte is complete for the outside at the end of its stop bit. Bits do not show at pins 0 and 1, which
+ * rest high. Synchronous and SPI modes, the ninth bit's value and parity checks are not built.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "avr_parts.h"
+
+enum { RXC = 0x80, TXC = 0x40, UDRE = 0x20, FE = 0x10, DOR = 0x08, U2X = 0x02, MPCM = 0x01 }; /* UCSR0A */
+enum { RXCIE = 0x80, TXCIE = 0x40, UDRIE = 0x20, RXEN = 0x10, TXEN = 0x08, UCSZ2 = 0x04 };    /* UCSR0B */
+enum { UPM1 = 0x20, USBS = 0x08 };                                                            /* UCSR0C */
+enum { RX_MASK = 1, TX_MASK = 2 };                                                            /* of port D */
+
+#define LINE_BITS 10u /* of the outside's frames */
+#define FRACTION 16   /* binary places of the times on the line */
+#define SLOWEST_BAUD 300u
+
+/* ---- the line to the board ---- */
+
+static uint64_t end_of(const line_frame *f) { return f->start + (uint64_t)LINE_BITS * f->bit_time; }
+
+/* The level of a frame's bit: start, eight data bits, stop. */
+static bool bit_of(uint8_t byte, uint64_t index) {
+  if (index == 0) return false;
+  return index > 8 || (byte >> (index - 1) & 1);
+}
+
+static bool line_level(const usart_state *u, uint64_t time) {
+  for (size_t i = u->line_first; i < u->line_end; i++) {
+    const line_frame *f = &u->line[i];
+    if (time < f->start) break;
+    if (time < end_of(f)) return bit_of(f->byte, (time - f->start) / f->bit_time);
+  }
+  return true;
+}
+
+/* The first falling edge at or after `time`. */
+static uint64_t falling_edge(const usart_state *u, uint64_t time) {
+  for (size_t i = u->line_first; i < u->line_end; i++) {
+    const line_frame *f = &u->line[i];
+    if (end_of(f) <= time) continue;
+    bool before = true;
+    for (unsigned bit = 0; bit < LINE_BITS; bit++) {
+      uint64_t edge = f->start + (uint64_t)bit * f->bit_time;
+      bool level = bit_of(f->byte, bit);
+      if (before && !level && edge >= time) return edge;
+      before = level;
+    }
+  }
+  return NEVER;
+}
+
+static void forget_line(usart_state *u, uint64_t until) {
+  while (u->line_first < u->line_end && end_of(&u->line[u->line_first]) <= until) u->line_first++;
+  if (u->line_first == u->line_end) u->line_first = u->line_end = 0;
+}
+
+/* Makes room for `count` more items behind `*end`. */
+static void *grow(void *items, size_t size, size_t *first, size_t *end, size_t *capacity, size_t count) {
+  if (*end + count <= *capacity) return items;
+  size_t used = *end - *first;
+  size_t wanted = 2 * (used + count) + 64;
+  char *moved = wanted > *capacity ? malloc(wanted * size) : items;
+  if (!moved) abort(); /* a byte cannot be left out */
+  if (used) memmove(moved, (const char *)items + *first * size, used * size);
+  if (moved != items) {
+    free(items);
+    *capacity = wanted;
+  }
+  *first = 0;
+  *end = used;
+  return moved;
+}
+
+/* ---- receiver ---- */
+
+static void update_receive_flag(avr_board *b) {
+  if (b->usart.buffered) {
+    raise_flag(b, VECTOR_USART_RX);
+  } else {
+    clear_flag(b, VECTOR_USART_RX);
+  }
+}
+
+/* Start, data and parity bits: what comes before the stop bit that the receiver checks. */
+static unsigned bits_before_stop(const usart_state *u) { return 1u + u->data_bits + (u->has_parity ? 1u : 0u); }
+
+static uint64_t sampled_after(const avr_board *b) {
+  const usart_state *u = &b->usart;
+  bool double_speed = b->avr->data[REG_UCSR0A] & U2X;
+  uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
+  return bits_before_stop(u) * bit_time + bit_time * (double_speed ? 6 : 5) / 8; /* its last sample: 6 of 8, 10 of 16 */
+}
+
+static void plan_receiver(avr_board *b) {
+  usart_state *u = &b->usart;
+  uint64_t time = NEVER;
+  if (u->receiver == RECEIVER_SEARCHING) time = falling_edge(u, u->from);
+  if (u->receiver == RECEIVER_SAMPLING) time = u->from + sampled_after(b);
+  uint64_t round_up = (UINT64_C(1) << FRACTION) - 1;
+  set_due(b, DUE_RECEIVER, time == NEVER ? NEVER : (time + round_up) >> FRACTION);
+}
+
+static void start_bit(avr_board *b) {
+  usart_state *u = &b->usart;
+  u->from = falling_edge(u, u->from);
+  u->receiver = RECEIVER_SAMPLING;
+  if (u->has_waiting) { /* the shift register is overwritten */
+    u->has_waiting = false;
+    u->lost = true;
+    b->counters.overruns++;
+  }
+}
+
+static void stop_bit(avr_board *b) {
+  usart_state *u = &b->usart;
+  uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
+  received_byte r = {0};
+  for (unsigned bit = 0; bit < u->data_bits && bit < 8; bit++) {
+    if (line_level(u, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
+  }
+  r.framing_error = !line_level(u, u->from + bit_time * (2 * bits_before_stop(u) + 1) / 2);
+  bool noise = line_level(u, u->from + bit_time / 2); /* no start bit after all */
+  u->receiver = RECEIVER_SEARCHING;
+  u->from += noise ? bit_time / 2 : sampled_after(b);
+  forget_line(u, u->from);
+  if (noise) return;
+  b->counters.bytes_in++;
+  if (r.framing_error) b->counters.framing_errors++;
+  r.overrun = u->lost;
+  u->lost = false;
+  if (u->buffered < 2) {
+    u->buffer[u->buffered++] = r;
+    update_receive_flag(b);
+  } else {
+    u->waiting = r;
+    u->has_waiting = true;
+  }
+}
+
+void usart_due_receiver(avr_board *b, uint64_t cycle) {
+  (void)cycle;
+  if (b->usart.receiver == RECEIVER_SEARCHING) {
+    start_bit(b);
+  } else {
+    stop_bit(b);
+  }
+  plan_receiver(b);
+}
+
+static void empty_receiver(usart_state *u) {
+  u->buffered = 0;
+  u->has_waiting = false;
+  u->lost = false;
+}
+
+static uint8_t read_data(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  usart_state *u = &b->usart;
+  (void)avr;
+  (void)address;
+  begin_access(b);
+  uint8_t byte = u->buffer[0].byte;
+  if (u->buffered) {
+    u->buffer[0] = u->buffer[1];
+    u->buffered--;
+    if (u->has_waiting) {
+      u->buffer[u->buffered++] = u->waiting;
+      u->has_waiting = false;
+    }
+    update_receive_flag(b);
+  }
+  return byte;
+}
+
+/* ---- transmitter ---- */
+
+static void begin_frame(avr_board *b, uint8_t byte, uint64_t cycle) {
+  usart_state *u = &b->usart;
+  u->sending = true;
+  u->shifting_byte = byte;
+  u->shifting_bits = u->frame_bits;
+  u->shifting_bit_time = u->bit_time;
+  set_due(b, DUE_TRANSMITTER, cycle + (uint64_t)u->frame_bits * u->bit_time);
+}
+
+/* What the outside reads of the frame that was just sent. */
+static uint8_t as_outside_reads(const usart_state *u) {
+  uint64_t bit_time = (uint64_t)u->shifting_bit_time << FRACTION;
+  uint8_t byte = 0;
+  for (unsigned bit = 0; bit < 8; bit++) {
+    uint64_t index = (uint64_t)u->line_bit_time * (2 * bit + 3) / 2 / bit_time;
+    if (bit_of(u->shifting_byte, index)) byte |= (uint8_t)(1u << bit);
+  }
+  return byte;
+}
+
+static void drive_transmit_pin(avr_board *b, uint64_t cycle) {
+  port_state *p = &b->port[PORT_D];
+  bool on = (b->avr->data[REG_UCSR0B] & TXEN) || b->usart.sending;
+  bool was_on = p->forced_out & TX_MASK;
+  if (on == was_on) return;
+  p->forced_out ^= TX_MASK;
+  p->forced ^= TX_MASK;
+  p->forced_level |= TX_MASK;
+  pins_update(b, PORT_D, cycle);
+}
+
+void usart_due_transmitter(avr_board *b, uint64_t cycle) {
+  usart_state *u = &b->usart;
+  u->out = grow(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
+  u->out[u->out_end++] = (sent_byte){cycle, as_outside_reads(u)};
+  b->counters.bytes_out++;
+  if (u->holding) {
+    u->holding = false;
+    begin_frame(b, u->holding_byte, cycle);
+    raise_flag(b, VECTOR_USART_UDRE);
+  } else {
+    u->sending = false;
+    set_due(b, DUE_TRANSMITTER, NEVER);
+    raise_flag(b, VECTOR_USART_TX);
+    drive_transmit_pin(b, cycle);
+  }
+}
+
+static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  usart_state *u = &b->usart;
+  (void)address;
+  uint64_t cycle = begin_access(b) + 1;
+  if (!(avr->data[REG_UCSR0B] & TXEN) || u->holding) return;
+  if (u->sending) {
+    u->holding = true;
+    u->holding_byte = value;
+    clear_flag(b, VECTOR_USART_UDRE);
+  } else {
+    begin_frame(b, value, cycle);
+  }
+}
+
+/* ---- control registers ---- */
+
+static void update_settings(avr_board *b) {
+  static const uint8_t sizes[8] = {5, 6, 7, 8, 8, 8, 8, 9};
+  const uint8_t *data = b->avr->data;
+  usart_state *u = &b->usart;
+  uint32_t divisor = (data[REG_UBRR0L] | (uint32_t)(data[REG_UBRR0H] & 0x0F) << 8) + 1;
+  u->bit_time = divisor * (data[REG_UCSR0A] & U2X ? 8 : 16);
+  u->data_bits = sizes[(data[REG_UCSR0C] >> 1 & 3) | (data[REG_UCSR0B] & UCSZ2)];
+  u->has_parity = data[REG_UCSR0C] & UPM1;
+  u->frame_bits = (uint8_t)(2 + u->data_bits + (u->has_parity ? 1 : 0) + (data[REG_UCSR0C] & USBS ? 1 : 0));
+  plan_receiver(b);
+}
+
+static uint8_t read_status(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  const usart_state *u = &b->usart;
+  begin_access(b);
+  uint8_t value = avr->data[address] & (U2X | MPCM);
+  if (b->raised & FLAG(VECTOR_USART_RX)) value |= RXC;
+  if (b->raised & FLAG(VECTOR_USART_TX)) value |= TXC;
+  if (b->raised & FLAG(VECTOR_USART_UDRE)) value |= UDRE;
+  if (u->buffered && u->buffer[0].framing_error) value |= FE;
+  if (u->buffered && u->buffer[0].overrun) value |= DOR;
+  return value;
+}
+
+static void write_status(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  begin_access(b);
+  if (value & TXC) clear_flag(b, VECTOR_USART_TX);
+  avr->data[address] = value & (U2X | MPCM);
+  update_settings(b);
+}
+
+static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  usart_state *u = &b->usart;
+  uint64_t cycle = begin_access(b) + 1;
+  avr->data[address] = value;
+  enable_interrupt(b, VECTOR_USART_RX, value & RXCIE);
+  enable_interrupt(b, VECTOR_USART_TX, value & TXCIE);
+  enable_interrupt(b, VECTOR_USART_UDRE, value & UDRIE);
+  port_state *p = &b->port[PORT_D];
+  p->forced_in = (uint8_t)(value & RXEN ? p->forced_in | RX_MASK : p->forced_in & ~RX_MASK);
+  pins_update(b, PORT_D, cycle);
+  drive_transmit_pin(b, cycle);
+  if ((value & RXEN) && u->receiver == RECEIVER_OFF) {
+    u->receiver = RECEIVER_SEARCHING;
+    u->from = cycle << FRACTION;
+    forget_line(u, u->from);
+  } else if (!(value & RXEN)) {
+    u->receiver = RECEIVER_OFF;
+    empty_receiver(u);
+    update_receive_flag(b);
+  }
+  update_settings(b);
+}
+
+static void write_setting(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  begin_access(b);
+  avr->data[address] = value;
+  update_settings(b);
+}
+
+/* ---- the outside ---- */
+
+void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count) {
+  usart_state *u = &b->usart;
+  if (at < b->clock) at = b->clock;
+  uint64_t start = at << FRACTION;
+  if (start < u->line_free) start = u->line_free;
+  if (u->receiver == RECEIVER_OFF) forget_line(u, b->clock << FRACTION);
+  u->line = grow(u->line, sizeof *u->line, &u->line_first, &u->line_end, &u->line_capacity, count);
+  for (size_t i = 0; i < count; i++) {
+    u->line[u->line_end] = (line_frame){start, u->line_bit_time, bytes[i]};
+    start = end_of(&u->line[u->line_end++]);
+  }
+  u->line_free = start;
+  plan_receiver(b);
+}
+
+size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity) {
+  usart_state *u = &b->usart;
+  size_t count = 0;
+  for (; count < capacity && u->out_first < u->out_end; count++) {
+    const sent_byte *sent = &u->out[u->out_first++];
+    bytes[count] = sent->byte;
+    if (cycles) cycles[count] = sent->end;
+  }
+  return count;
+}
+
+void usart_line_rate(avr_board *b, uint32_t baud) {
+  if (baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
+  b->usart.line_bit_time = (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
+}
+
+/* ---- construction ---- */
+
+void usart_reset(avr_board *b) {
+  usart_state *u = &b->usart;
+  b->avr->data[REG_UCSR0C] = 0x06;
+  u->sending = u->holding = false;
+  u->receiver = RECEIVER_OFF;
+  empty_receiver(u);
+  set_due(b, DUE_TRANSMITTER, NEVER);
+  raise_flag(b, VECTOR_USART_UDRE);
+  update_settings(b);
+}
+
+void usart_init(avr_board *b) {
+  on_read(b, REG_UDR0, read_data, b);
+  on_write(b, REG_UDR0, write_data, b);
+  on_read(b, REG_UCSR0A, read_status, b);
+  on_write(b, REG_UCSR0A, write_status, b);
+  on_write(b, REG_UCSR0B, write_control, b);
+  on_write(b, REG_UCSR0C, write_setting, b);
+  on_write(b, REG_UBRR0L, write_setting, b);
+  on_write(b, REG_UBRR0H, write_setting, b);
+}
+
+void usart_free(avr_board *b) {
+  free(b->usart.line);
+  free(b->usart.out);
+}

@@ -1,0 +1,158 @@
+"""A board by itself: drive its pins, send it bytes, see what it does. For tests and tools; no world, no loop.
+
+Works on every kind of board: the extension that made it lends its `board_access` functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from boebot.errors import BoardError
+
+CLOCK_HZ = 16_000_000
+
+
+class Level(IntEnum):
+    """What the firmware does to a pin; the first three are also what the outside can do to it."""
+
+    LOW = 0
+    HIGH = 1
+    RELEASED = 2
+    PULLED_UP = 3
+
+
+class ResetCause(IntEnum):
+    """Why the microcontroller is reset."""
+
+    POWER = 0
+    EXTERNAL = 1
+    BROWN_OUT = 2
+    WATCHDOG = 3
+
+
+class Edge(NamedTuple):
+    """The firmware changed what it does to a pin."""
+
+    cycle: int
+    pin: int
+    level: Level
+
+
+class SentByte(NamedTuple):
+    """A byte that left the board; `cycle` is the end of its stop bit."""
+
+    cycle: int
+    byte: int
+
+
+COUNTERS = (
+    "executed_cycles",
+    "instructions",
+    "interrupts",
+    "bytes_in",
+    "bytes_out",
+    "overruns",
+    "framing_errors",
+    "resets",
+    "edges_out",
+)
+
+
+class BoardAccess:
+    """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
+
+    def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None) -> None:
+        """Becomes the listener of the board at `pointer`; `owner` is kept alive."""
+        self._lib = lib
+        self._ffi = ffi
+        self._owner = owner
+        self._access = lib.board_access_open(pointer)
+        if self._access == ffi.NULL:
+            raise BoardError(
+                "This board was built for another version of the board interface; build it again."
+            )
+
+    @property
+    def now(self) -> int:
+        """The cycle up to which the board has run."""
+        return int(self._lib.board_access_now(self._access))
+
+    def advance(self, until: int) -> None:
+        """Runs until `until`, or up to an instruction's length beyond. A crash raises BoardError."""
+        if self._lib.board_access_advance(self._access, until):
+            raise BoardError(f"The board stopped: {self.fault}.")
+
+    def run(self, cycles: int) -> None:
+        """Runs `cycles` further."""
+        self.advance(self.now + cycles)
+
+    def drive(self, pin: int, level: Level, at: int = 0) -> None:
+        """From cycle `at` (or now) on the outside drives `pin`; replaces what was queued for it from then on."""
+        self._lib.board_access_drive(self._access, at, pin, level)
+
+    def output(self, pin: int) -> Level:
+        """What the firmware does to `pin` now."""
+        return Level(self._lib.board_access_output(self._access, pin))
+
+    def send(self, data: bytes | Iterable[int], at: int = 0) -> None:
+        """Puts bytes on the line towards the board, not before cycle `at`."""
+        data = bytes(data)
+        self._lib.board_access_send(self._access, at, data, len(data))
+
+    def receive(self) -> list[SentByte]:
+        """Takes the bytes that left the board since the last call."""
+        result: list[SentByte] = []
+        size = 4096
+        data = self._ffi.new("uint8_t[]", size)
+        cycles = self._ffi.new("uint64_t[]", size)
+        while count := self._lib.board_access_receive(self._access, data, cycles, size):
+            result += [SentByte(int(cycles[i]), data[i]) for i in range(count)]
+        return result
+
+    def line_rate(self, baud: int) -> None:
+        """Sets the outside's bit rate."""
+        self._lib.board_access_line_rate(self._access, baud)
+
+    def reset(self, cause: ResetCause = ResetCause.EXTERNAL) -> None:
+        """Resets the microcontroller at its next instruction."""
+        self._lib.board_access_reset(self._access, cause)
+
+    def log(self) -> list[Edge]:
+        """Takes the output edges since the last call."""
+        log = self._access.log
+        edges = (
+            [Edge(int(e.cycle), e.pin, Level(e.level)) for e in log.edges[0 : log.count]] if log.count else []
+        )
+        self._lib.board_log_clear(self._ffi.addressof(self._access, "log"))
+        return edges
+
+    def analog(self, channel: int, volts: float) -> None:
+        """Sets the voltage at analog channel 0..5."""
+        self._access.volts[channel] = volts
+
+    def answer(self, pin: int, on: int, delay: int) -> None:
+        """Answers each output edge of `pin` by driving pin `on` to the same level `delay` cycles later."""
+        self._access.echo_pin = pin
+        self._access.echo_to = on
+        self._access.echo_delay = delay
+
+    def counters(self) -> dict[str, int]:
+        """What the board counted."""
+        out = self._ffi.new("board_counters *")
+        self._lib.board_access_counters(self._access, out)
+        return {name: int(getattr(out, name)) for name in COUNTERS}
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong after a crash, or None."""
+        text = self._lib.board_access_fault(self._access)
+        return None if text == self._ffi.NULL else self._ffi.string(text).decode()
+
+    def close(self) -> None:
+        """Lets go of the board."""
+        if self._access != self._ffi.NULL:
+            self._lib.board_access_close(self._access)
+            self._access = self._ffi.NULL
+            self._owner = None
