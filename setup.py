@@ -174,7 +174,7 @@ setup(
             exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "world", "parts", "arenas", "images")],
         ),
     ],
-    package_data={"boebot": ["py.typed"], "sim_bridge": ["py.typed"]},
+    package_data={"": ["py.typed", "*.html"]},
     include_package_data=False,
     cffi_modules=CFFI_MODULES,
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
