@@ -224,6 +224,14 @@ static void poll_firmware(void) {
 static void start(native_machine *owner, uint8_t cause) {
   machine = owner;
   reset_cause = cause;
+  hal_native_port_b = hal_native_port_c = hal_native_port_d = 0;
+  next_slot = next_edge_match = next_carrier = next_room = NATIVE_NEVER;
+  memset(level_high, 0, sizeof level_high);
+  memset(is_output, 0, sizeof is_output);
+  pin_change_bits = 0;
+  capture = CAPTURE_OFF;
+  receive_first = receive_count = 0;
+  overrun = false;
   for (uint8_t pin = 0; pin < NATIVE_PINS; pin++) {
     show(pin); /* a reset releases every pin */
     settle(pin);
