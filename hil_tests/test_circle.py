@@ -1,0 +1,81 @@
+"""The whole circle: a brain, the link, the board, the world."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import boebot
+
+
+def cells_visited(truth: boebot.boards.Truth, cell: float = 0.20) -> tuple[int, int]:
+    """How many of the arena's free cells the robot's centre visited, and how many there are.
+
+    A cell is free if its centre lies inside the arena and outside every obstacle.
+    """
+    from matplotlib.path import Path
+
+    outer, *obstacles = (Path(outline) for outline in sorted(truth.outlines, key=lambda o: -np.ptp(o[:, 0])))
+    low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
+    columns, rows = (np.floor((high - low) / cell + 1e-9)).astype(int)
+    centres = [
+        (i, j)
+        for i in range(columns)
+        for j in range(rows)
+        if outer.contains_point(point := low + cell * (np.array([i, j]) + 0.5))
+        and not any(obstacle.contains_point(point) for obstacle in obstacles)
+    ]
+    seen = {
+        (int(i), int(j)) for i, j in zip((truth.x - low[0]) // cell, (truth.y - low[1]) // cell, strict=True)
+    }
+    return len(seen & set(centres)), len(centres)
+
+
+def windows_moved(truth: boebot.boards.Truth, window_s: float = 5.0) -> np.ndarray:
+    """The greatest distance between two places of the robot in each window of that length."""
+    moved = []
+    for start in np.arange(truth.time[0], truth.time[-1] - window_s, 1.0):
+        inside = (truth.time >= start) & (truth.time <= start + window_s)
+        x, y = truth.x[inside], truth.y[inside]
+        moved.append(np.hypot(x - x[0], y - y[0]).max())
+    return np.array(moved)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_wander_keeps_moving_for_a_minute(board_url: str, seed: int) -> None:
+    result = boebot.run("wander", on=board_url, seconds=60, seed=seed)
+    assert result.truth is not None
+    assert windows_moved(result.truth).min() >= 0.05
+    assert result.lost_frames == 0 and result.dead_man_stops == 0 and result.overruns == 0
+
+
+def test_wander_visits_half_of_its_arena_in_five_minutes(board_url: str) -> None:
+    result = boebot.run("wander", on=board_url, seconds=300, seed=1)
+    assert result.truth is not None
+    visited, free = cells_visited(result.truth)
+    assert visited >= 0.5 * free, f"{visited} of {free} cells"
+
+
+def test_brain_that_does_nothing_fails_both_measures(board_url: str) -> None:
+    result = boebot.run(lambda robot: None, on=board_url, seconds=20)
+    assert result.truth is not None
+    assert windows_moved(result.truth).max() < 0.05
+    visited, free = cells_visited(result.truth)
+    assert visited < 0.5 * free
+
+
+def test_same_seed_same_bytes(board_url: str) -> None:
+    runs = [boebot.run("wander", on=board_url, seconds=10, seed=seed) for seed in (3, 3, 4)]
+    assert runs[0].bytes_from_board == runs[1].bytes_from_board
+    assert runs[0].bytes_to_board == runs[1].bytes_to_board
+    assert runs[0].bytes_from_board != runs[2].bytes_from_board
+
+
+def test_odometry_follows_the_truth(board_url: str) -> None:
+    """Encoder counts through the whole circle: a straight metre is a metre within 3 %."""
+    result = boebot.run(lambda robot: robot.drive(0.5, 0.5), on=board_url, arena="empty", seconds=8)
+    assert result.truth is not None
+    true = np.hypot(result.truth.x[-1] - result.truth.x[0], result.truth.y[-1] - result.truth.y[0])
+    estimate = np.hypot(result.odometry.x[-1], result.odometry.y[-1])
+    assert true > 0.5
+    assert abs(estimate - true) <= 0.03 * true

@@ -1,0 +1,101 @@
+"""From set-point to pulse at the pin, and the dead-man."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
+
+from boebot.link import frame, messages
+
+LEFT, RIGHT = 13, 12
+EDGE_TOLERANCE = 4  # cycles, issue: servo edges within ±4 cycles
+
+
+@pytest.mark.parametrize(
+    ("left", "right"), [(0.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.5, -0.25), (-0.7, 0.7), (0.0625, 0.125)]
+)
+def test_signal_becomes_pulse_width_at_the_pin(rig: Rig, left: float, right: float) -> None:
+    rig.drive_for(left, right, 0.3)
+    for pin, signal, mirror in ((LEFT, left, 1), (RIGHT, right, -1)):
+        pulses = rig.pulses(pin)[1:]
+        expected = (1500 + mirror * 200 * signal) * CYCLES_PER_US
+        assert len(pulses) >= 10
+        assert np.all(np.abs(pulses[:, 1] - expected) <= EDGE_TOLERANCE), (pin, pulses[:, 1] - expected)
+        assert np.all(np.abs(np.diff(pulses[:, 0]) - FRAME_CYCLES) <= EDGE_TOLERANCE)
+    now = rig.latest()
+    assert now.pulse_left == round((1500 + 200 * left) * CYCLES_PER_US)
+    assert now.pulse_right == round((1500 - 200 * right) * CYCLES_PER_US)
+
+
+def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> None:
+    """±4 cycles at the pin with 50,000 bytes/s arriving and both encoder lines at 1.5 kHz."""
+    for pin in (16, 17):
+        period = CYCLES_PER_S // 1500 + pin  # not in step with each other or with the tick
+        rig.board.square_wave(pin, period, seconds=1.0)
+    setpoint = messages.SetpointSignal(3000, -3000, 250, 0)
+    flood = b"".join(frame.encode(setpoint.ID, i & 0xFF, setpoint.pack()) for i in range(2500))
+    end = rig.transport.now() + 0.9
+    sent = 0
+    while rig.transport.now() < end:
+        rig.transport.write(flood[sent : sent + 500])
+        sent += 500
+        rig.listen(0.01)
+    for pin, expected in ((LEFT, 1560 * CYCLES_PER_US), (RIGHT, 1560 * CYCLES_PER_US)):
+        widths = rig.pulses(pin)[3:, 1]
+        assert len(widths) >= 35
+        assert np.all(np.abs(widths - expected) <= EDGE_TOLERANCE), widths - expected
+
+
+def test_speed_setpoint_scales_with_the_stored_maximum(rig: Rig) -> None:
+    maximum = messages.PARAMETERS["wheel_speed_maximum"]
+    rig.send(messages.SetParameter(maximum.id, 2000))  # 0.2 m/s at full signal
+    for _ in range(5):
+        rig.send(messages.SetpointSpeed(1000, -500, 250, 0))
+        rig.listen(0.05)
+    now = rig.latest()
+    assert now.pulse_left == 1600 * CYCLES_PER_US
+    assert now.pulse_right == 1550 * CYCLES_PER_US
+
+
+@pytest.mark.parametrize("time_to_live_ms", [60, 250, 1000])
+def test_dead_man_stops_the_pulses_after_the_time_to_live(rig: Rig, time_to_live_ms: int) -> None:
+    rig.drive(0.5, 0.5, time_to_live_ms)
+    sent = rig.transport.now() * CYCLES_PER_S
+    frames = rig.listen(time_to_live_ms / 1000 + 0.2)
+    last = rig.pulses(LEFT)[-1]
+    stopped_after = (last.sum() - sent) / CYCLES_PER_S
+    assert time_to_live_ms / 1000 - 0.025 <= stopped_after <= time_to_live_ms / 1000 + 0.035
+    assert frames[-1].pulse_left == frames[-1].pulse_right == 0
+    assert frames[-1].status & messages.Status.DEAD_MAN
+    rig.drive(0.5, 0.5)
+    rig.listen(0.05)
+    now = rig.latest()
+    assert now.pulse_left and not now.status & messages.Status.DEAD_MAN, "a fresh set-point ends a dead-man stop"
+
+
+def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
+    """The stop comes at 21 phases of the servo frame: no pulse is ever cut."""
+    for step in range(21):
+        rig.drive(1.0, 1.0, 2000)
+        rig.listen(0.06 + step * 0.001)
+        rig.send(messages.Stop())
+        rig.listen(0.045)
+        now = rig.latest()
+        assert now.pulse_left == now.pulse_right == 0
+        assert now.status & messages.Status.STOPPED
+    widths = {pin: rig.pulses(pin)[:, 1] for pin in (LEFT, RIGHT)}
+    assert np.all(np.abs(widths[LEFT] - 1700 * CYCLES_PER_US) <= EDGE_TOLERANCE)
+    assert np.all(np.abs(widths[RIGHT] - 1300 * CYCLES_PER_US) <= EDGE_TOLERANCE)
+
+
+def test_no_pulse_before_the_first_setpoint(rig: Rig) -> None:
+    rig.listen(0.5)
+    assert len(rig.pulses(LEFT)) == len(rig.pulses(RIGHT)) == 0
+
+
+@pytest.mark.parametrize("signal", [-10001, 10001, 32767])
+def test_setpoint_out_of_range_is_refused(rig: Rig, signal: int) -> None:
+    rig.send(messages.SetpointSignal(signal, 0, 250, 0))
+    rig.listen(0.05)
+    assert rig.latest().pulse_left == 0
