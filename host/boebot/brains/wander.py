@@ -4,8 +4,8 @@ Wandering follows code listings 5.1 and 5.2 of the notes: drive straight on; now
 the spot for a while. Whiskers and infra-red come on top: a touched whisker makes the robot back off and turn
 away, something seen by infra-red makes it turn until the way is clear.
 
-The notes' robot runs 0.68 m/s and begins to turn with probability 0.01 in a hundredth of a second: after 0.7 m on average.
-A Boe-Bot runs 0.14 m/s; with 0.002 it drives as far before it turns.
+The notes' robot runs 0.68 m/s and begins to turn with probability 0.01 in a hundredth of a second: after
+0.7 m on average. A Boe-Bot runs 0.14 m/s; with 0.002 it drives as far before it turns.
 """
 
 from boebot import Robot
@@ -14,12 +14,13 @@ NEEDS = ["whiskers", "infrared"]
 
 FORWARD = 0.5  # motor signal straight ahead
 TURN = 0.7  # motor signal of turning on the spot
-TURN_CHANCE = 0.002  # in each hundredth of a second: begin to turn (0.01 for the faster robot of the notes)
+TURN_CHANCE = 0.002  # in each hundredth of a second: begin to turn
 STOP_TURN_CHANCE = 0.03  # and, when turning, stop it
 LEFT_CHANCE = 0.5  # turn left rather than right
 
 AVOID_TURN = 0.5  # motor signal of turning away from what infra-red sees
-CLEAR_TIME = 0.1  # s to turn on after infra-red sees nothing any more
+CLEAR_TIME = 0.2  # s to turn on after infra-red sees nothing any more
+KEEP_SIDE_TIME = 1.5  # s in which it turns to the same side again: in a corner it would dither
 BACK_TIME = 0.5  # s to back off after a touch
 ESCAPE_TIME = 0.6  # s to turn away after backing off: about 110 degrees
 
@@ -53,15 +54,12 @@ class Brain:
                 self.state = "turn"
 
         elif self.state == "turn":
-            self.turn(robot, TURN, -TURN)
+            self.spin(robot, TURN)
             if robot.chance(STOP_TURN_CHANCE, per=0.01):
                 self.state = "straight"
 
         elif self.state == "avoid":
-            if seen_left and seen_right:  # ahead: turn on the spot
-                self.turn(robot, AVOID_TURN, -AVOID_TURN)
-            else:  # to one side: turn about the wheel on the other
-                self.turn(robot, AVOID_TURN, 0.0)
+            self.spin(robot, AVOID_TURN)
             if seen_left or seen_right:
                 self.until = robot.time + CLEAR_TIME
             elif robot.time >= self.until:
@@ -75,7 +73,7 @@ class Brain:
                 self.state = "escape"
 
         elif self.state == "escape":
-            self.turn(robot, TURN, -TURN)
+            self.spin(robot, TURN)
             if robot.time >= self.until:
                 self.state = "straight"
 
@@ -86,9 +84,9 @@ class Brain:
         else:
             self.left = on_right
 
-    def turn(self, robot: Robot, outer: float, inner: float) -> None:
-        """Turn to the chosen side, with these signals for the outer and the inner wheel."""
+    def spin(self, robot: Robot, signal: float) -> None:
+        """Turn on the spot to the chosen side."""
         if self.left:
-            robot.drive(inner, outer)
+            robot.drive(-signal, signal)
         else:
-            robot.drive(outer, inner)
+            robot.drive(signal, -signal)
