@@ -1,9 +1,9 @@
 """Boards by URL: what the host asks of a board, whoever emulates or is it.
 
-One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group `boebot.boards`
-offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`, `serial:/dev/ttyUSB0?baud=250000`,
-`socket://localhost:5000`). The host library knows emulated boards only through the interfaces below; it never imports
-the simulator.
+One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group
+`boebot.boards` offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`,
+`serial:/dev/ttyUSB0?baud=250000`, `socket://localhost:5000`). The host library knows emulated boards only
+through the interfaces below; it never imports the simulator.
 """
 
 from __future__ import annotations
@@ -112,8 +112,9 @@ class Server(Protocol):
         announce: Callable[[str], None],
         running: Callable[[], bool],
     ) -> None:
-        """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty, or on TCP port `tcp` of loopback (0: any
-        free one). Calls `announce(url)` once clients may open that URL."""
+        """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty,
+        or on TCP port `tcp` of loopback (0: any free one). Calls `announce(url)` once clients may open that
+        URL."""
 
 
 class LiveSession:

@@ -1,7 +1,7 @@
 """What a robot's description says about the firmware's run-time parameters.
 
-One image serves every robot with its pin map; what differs (servo centres, periods, devices on or off) the host sets
-after the handshake, and again after each reset.
+One image serves every robot with its pin map; what differs (servo centres, periods, devices on or off) the
+host sets after the handshake, and again after each reset.
 """
 
 from __future__ import annotations

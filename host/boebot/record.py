@@ -1,4 +1,5 @@
-"""The record of a run: what crossed the wire, every telemetry message, every command; and the table made of it.
+"""The record of a run: what crossed the wire, every telemetry message, every command; and the table made of
+it.
 
 While a run goes on, only bytes are put aside. Everything else is computed afterwards, from those bytes.
 """
@@ -43,7 +44,8 @@ class Record:
     Attributes:
         telemetry: payloads, oldest first.
         times: the run's time (s) of each, by the board's clock.
-        steps: (index into telemetry of the observation, command kind, left, right), one per step of the brain.
+        steps: (index into telemetry of the observation, command kind, left, right), one per step of the
+        brain.
     """
 
     telemetry: list[bytes] = field(default_factory=list)
@@ -200,7 +202,8 @@ class Series:
             return np.zeros(len(self))
         counts = self.raw[f"encoder_{side}"].astype(np.int64)
         edges = np.diff(counts, prepend=counts[0])
-        edges[np.diff(self.raw["tick"].astype(np.int64), prepend=0) < 0] = 0  # the board restarted: counts began afresh
+        restarted = np.diff(self.raw["tick"].astype(np.int64), prepend=0) < 0
+        edges[restarted] = 0  # counts began afresh
         metres_per_edge = EncoderReader(
             side == "left", device.edges_per_turn, self._robot.body.wheel_radius_m, directed=True
         ).metres_per_edge
@@ -208,7 +211,8 @@ class Series:
             direction = WheelDirection()
             steps = np.diff(self.time, prepend=self.time[0])
             edges *= np.array(
-                [direction.update(float(s), float(t)) for s, t in zip(signal, steps, strict=True)], dtype=np.int64
+                [direction.update(float(s), float(t)) for s, t in zip(signal, steps, strict=True)],
+                dtype=np.int64,
             )
         return edges * metres_per_edge
 

@@ -58,7 +58,7 @@ class RunResult:
     identity: Identity | None = None
     counters: dict[str, float] = field(default_factory=dict)
 
-    # ---- arrays ------------------------------------------------------------------------------------------------------
+    # ---- arrays --------------------------------------------------------------------------------------------
 
     @cached_property
     def series(self) -> Series:
@@ -94,7 +94,7 @@ class RunResult:
         """Every byte that went to the board."""
         return b"".join(data for _, data in self.sent)
 
-    # ---- figures -----------------------------------------------------------------------------------------------------
+    # ---- figures -------------------------------------------------------------------------------------------
 
     @cached_property
     def distance(self) -> float:
@@ -135,7 +135,9 @@ class RunResult:
         """Distance of the estimate from the true place at the end (m), where somebody knows it."""
         if self.true_pose is None:
             return None
-        return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
+        return float(
+            np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1])
+        )
 
     @property
     def real_time_factor(self) -> float:
@@ -171,11 +173,11 @@ class RunResult:
             "ended": "complete" if self.error is None else _why(self.error),
         }
 
-    # ---- files -------------------------------------------------------------------------------------------------------
+    # ---- files ---------------------------------------------------------------------------------------------
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Writes run.csv, summary.json, to_board.bin, to_host.bin, wire.csv, run.png and replay.html; returns their
-        paths."""
+        """Writes run.csv, summary.json, to_board.bin, to_host.bin, wire.csv, run.png and replay.html; returns
+        their paths."""
         from boebot.report import save
 
         return save(self, Path(folder))

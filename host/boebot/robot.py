@@ -1,5 +1,5 @@
-"""What a brain touches: an immutable `Observation` of the sensors, a `Command` for the motors, and `Robot`, the friendly
-face of both.
+"""What a brain touches: an immutable `Observation` of the sensors, a `Command` for the motors, and `Robot`,
+the friendly face of both.
 
     def step(robot):
         if robot.left_whisker.pressed:
@@ -7,8 +7,8 @@ face of both.
         else:
             robot.drive(0.5, 0.5)
 
-A brain sees what the robot's own sensors, motors and clock give, and nothing else (THEORY 7.3): here is no way to the
-simulated world, to the board or to the link.
+A brain sees what the robot's own sensors, motors and clock give, and nothing else (THEORY 7.3): here is no
+way to the simulated world, to the board or to the link.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ class Command(NamedTuple):
     """What the brain wants of the motors."""
 
     kind: str
-    """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (motors off)."""
+    """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (motors off).
+    """
     left: float
     right: float
 
@@ -82,7 +83,11 @@ class Equipment:
 
         def infrared(key: str, bit: messages.Infrared) -> Callable[[Telemetry], Infrared] | None:
             pair = device.get(key)
-            return InfraredReader(bit, infrared_period, tick_s) if isinstance(pair, robots.InfraredPair) else None
+            return (
+                InfraredReader(bit, infrared_period, tick_s)
+                if isinstance(pair, robots.InfraredPair)
+                else None
+            )
 
         def encoder(key: str, left: bool) -> Callable[[Telemetry], Encoder] | None:
             entry = device.get(key)
@@ -104,7 +109,9 @@ class Equipment:
             else None
         )
         self.left_whisker = self._or_refuse("left_whisker", whisker("whisker_left", messages.Whiskers.LEFT))
-        self.right_whisker = self._or_refuse("right_whisker", whisker("whisker_right", messages.Whiskers.RIGHT))
+        self.right_whisker = self._or_refuse(
+            "right_whisker", whisker("whisker_right", messages.Whiskers.RIGHT)
+        )
         self.left_ir = self._or_refuse("left_ir", infrared("infrared_left", messages.Infrared.LEFT))
         self.right_ir = self._or_refuse("right_ir", infrared("infrared_right", messages.Infrared.RIGHT))
         self.ping = self._or_refuse("ping", ping)
@@ -144,7 +151,8 @@ class Equipment:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What the robot's sensors said at one tick. It never changes; values are computed when they are looked at.
+    """What the robot's sensors said at one tick. It never changes; values are computed when they are looked
+    at.
 
     Each device is a small view with its values in SI units, their `age` (s) and whether they are `valid`.
     """
@@ -227,7 +235,7 @@ class Robot:
         """A `random.Random` of the brain's own: the same run gives the same numbers."""
         self._chances: dict[tuple[float, float], float] = {}
 
-    # ---- clock -------------------------------------------------------------------------------------------------------
+    # ---- clock ---------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -244,7 +252,7 @@ class Robot:
         """Seconds from one step of the brain to the next."""
         return self._period
 
-    # ---- sensors -----------------------------------------------------------------------------------------------------
+    # ---- sensors -------------------------------------------------------------------------------------------
 
     @property
     def left_whisker(self) -> Whisker:
@@ -281,7 +289,7 @@ class Robot:
         """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
         return self.observation.right_encoder
 
-    # ---- motors ------------------------------------------------------------------------------------------------------
+    # ---- motors --------------------------------------------------------------------------------------------
 
     def drive(self, left: float, right: float) -> None:
         """Sets the motor signals, -1 (full backward) to 1 (full forward); they hold until the next command.
@@ -294,28 +302,33 @@ class Robot:
         self.command = Command("signal", left, right)
 
     def drive_speed(self, left: float, right: float) -> None:
-        """Sets the wheels' speeds along the ground in m/s, forward positive; they hold until the next command.
+        """Sets the wheels' speeds along the ground in m/s, forward positive; they hold until the next
+        command.
 
         Raises:
             BrainError: a speed is beyond 0.5 m/s or no number.
         """
         if not (-SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT):
-            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s")
+            raise BrainError(
+                f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s"
+            )
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:
         """Switches the motors off until the next command."""
         self.command = STOP
 
-    # ---- chance ------------------------------------------------------------------------------------------------------
+    # ---- chance --------------------------------------------------------------------------------------------
 
     def chance(self, probability: float, per: float | None = None) -> bool:
         """True with that probability.
 
         Args:
             probability: 0..1, of happening within `per` seconds.
-            per: seconds that the probability is meant for. A brain that asks once per step then behaves alike at every
-                brain period: p' = 1 - (1 - p)^(period / per) (THEORY 4.1). None: the probability is meant as it stands.
+            per: seconds that the probability is meant for. A brain that asks once per step then behaves alike
+            at every
+                brain period: p' = 1 - (1 - p)^(period / per) (THEORY 4.1). None: the probability is meant as
+                it stands.
         """
         if per is not None:
             key = (probability, per)

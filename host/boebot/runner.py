@@ -1,12 +1,13 @@
-"""Runs a brain on a board: `boebot.run(...)` does from a script or a notebook what the command `boebot run` does.
+"""Runs a brain on a board: `boebot.run(...)` does from a script or a notebook what the command `boebot run`
+does.
 
-One loop serves every board. The brain's period is a whole number n of the board's control ticks; the brain steps on the
-first telemetry whose tick has reached the next multiple of n, and its command goes out at once. On a board in this
-process time stands still while the brain thinks, so that a run is a function of brain, robot, arena and seed; on a live
-board the newest telemetry counts.
+One loop serves every board. The brain's period is a whole number n of the board's control ticks; the brain
+steps on the first telemetry whose tick has reached the next multiple of n, and its command goes out at once.
+On a board in this process time stands still while the brain thinks, so that a run is a function of brain,
+robot, arena and seed; on a live board the newest telemetry counts.
 
-However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes), the motors are stopped and the record
-is complete up to there.
+However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes), the motors are stopped and
+the record is complete up to there.
 """
 
 from __future__ import annotations
@@ -55,19 +56,18 @@ def run(
     """Runs a brain and returns what happened.
 
     Args:
-        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with `step(robot)`.
-        robot: bundled name, .toml file, or a description.
-        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
-        on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT".
-        seconds: length of the run by the board's clock; may be infinite.
-        seed: of the brain's chance, and of the noise of the simulated world.
-        realtime: slow a simulated run down to the wall clock.
-        out: folder for run.csv, run.png, replay.html and the raw bytes.
-        period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05.
-        progress: called with the seconds that have passed, about ten times a second.
+        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with
+        `step(robot)`. robot: bundled name, .toml file, or a description. arena: bundled name or .toml file;
+        None: the simulator's own choice. Of no meaning on a real robot. on: "native", "avr", or a port:
+        "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT". seconds: length of the run by the board's clock;
+        may be infinite. seed: of the brain's chance, and of the noise of the simulated world. realtime: slow
+        a simulated run down to the wall clock. out: folder for run.csv, run.png, replay.html and the raw
+        bytes. period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05. progress:
+        called with the seconds that have passed, about ten times a second.
 
     Raises:
-        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
+        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board
+        that is not
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
@@ -90,7 +90,8 @@ def execute(
     period: float | None = None,
     progress: Progress | None = None,
 ) -> RunResult:
-    """As `run`, but once the run has begun every end of it, even by an error, is a result: see `RunResult.error`.
+    """As `run`, but once the run has begun every end of it, even by an error, is a result: see
+    `RunResult.error`.
 
     Raises:
         BoebotError: the run could not begin.
@@ -176,20 +177,18 @@ class _Run:
         """The whole run."""
         error: BaseException | None = None
         started = wall.perf_counter()
-        begun_s = self.session.transport.now()
         try:
             configure(self.link, self.request.robot)
             self.identity = self.link.identity()
-            begun_s = self.session.transport.now()
+            self.link.forget_telemetry()
             started = wall.perf_counter()
             self._loop()
         except (BoebotError, KeyboardInterrupt) as caught:
             error = caught
         finally:
             elapsed = wall.perf_counter() - started
-            lasted_s = self.session.transport.now() - begun_s
             self._stop_motors()
-        return self._result(error, lasted_s, elapsed)
+        return self._result(error, elapsed)
 
     def _loop(self) -> None:
         link, robot, transport = self.link, self.robot, self.session.transport
@@ -210,7 +209,9 @@ class _Run:
             payloads = poll(wait_s, quiet_s)
             if not payloads:
                 if transport.now() - heard_s > SILENCE_S:
-                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
+                    raise BoardError(
+                        f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s"
+                    )
                 wait_s, quiet_s = 2 * tick_s, 0.0
                 continue
             for payload in payloads:
@@ -272,7 +273,7 @@ class _Run:
                     if _Telemetry.unpack(payload).status & messages.Status.STOPPED:
                         return
 
-    def _result(self, error: BaseException | None, lasted_s: float, elapsed_s: float) -> RunResult:
+    def _result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         link = self.link
         return RunResult(
             brain=self.brain.name,
@@ -292,7 +293,7 @@ class _Run:
             resets=self.resets,
             lost_frames=link.decoder.lost,
             bad_frames=link.decoder.bad,
-            run_time=lasted_s,
+            run_time=self.record.times[-1] if self.record.times else 0.0,
             wall_time=elapsed_s,
             sent=link.sent,
             received=link.received,
@@ -301,8 +302,8 @@ class _Run:
         )
 
 
-# From a tick's start to the moment its telemetry has been read: work, 43 bytes at 500,000 baud and the pause after them.
-# The true path is joined to the telemetry with it; pictures need no more than this.
+# From a tick's start to the moment its telemetry has been read: work, 43 bytes at 500,000 baud and the pause
+# after them. The true path is joined to the telemetry with it; pictures need no more than this.
 _AIR_S = 0.0012
 
 

@@ -1,8 +1,8 @@
 """Bundled brains, and how a brain is found and loaded.
 
-A brain is a Python file with a function `step(robot)`, or with a class `Brain` that has a method `step(self, robot)`.
-It may also say `PERIOD = 0.1` (seconds from step to step) and `NEEDS = ["whiskers", "ping"]` (devices without which it
-cannot work).
+A brain is a Python file with a function `step(robot)`, or with a class `Brain` that has a method
+`step(self, robot)`. It may also say `PERIOD = 0.1` (seconds from step to step) and `NEEDS = ["whiskers", "ping"]`
+(devices without which it cannot work).
 """
 
 from __future__ import annotations
@@ -61,16 +61,21 @@ def load_brain(source: object) -> LoadedBrain:
     if callable(source):
         name = getattr(source, "__name__", "brain")
         return LoadedBrain(name, source, _period(source, name), _needs(source, name))
-    raise BrainError(f"{source!r} is no brain; expected a name, a Python file, a function step(robot) or an object with it")
+    raise BrainError(f"{source!r} is no brain; expected a name, a Python file, or something with step(robot)")
 
 
 def place(error: BaseException, path: Path | None) -> str:
     """Where in the brain's own file the error arose: "wander.py, line 12", or "" if it cannot be told."""
-    if isinstance(error, SyntaxError) and error.filename and path is not None and Path(error.filename) == path:
+    if (
+        isinstance(error, SyntaxError)
+        and error.filename
+        and path is not None
+        and Path(error.filename) == path
+    ):
         return f"{path}, line {error.lineno}"
     frames = traceback.extract_tb(error.__traceback__)
     inside = [frame for frame in frames if path is not None and frame.filename == str(path)]
-    if not inside and path is None:  # a function from a script or notebook: the outermost frame outside the kit
+    if not inside and path is None:  # from a script or notebook: the outermost frame outside the kit
         package = str(FOLDER.parent)
         inside = [frame for frame in frames if not frame.filename.startswith(package)][:1]
     return f"{inside[-1].filename}, line {inside[-1].lineno}" if inside else ""
@@ -174,6 +179,10 @@ def _needs(owner: object, where: str) -> tuple[str, ...]:
     needs = getattr(owner, "NEEDS", ())
     if isinstance(needs, str):
         return (needs,)
-    if not isinstance(needs, list | tuple | set | frozenset) or not all(isinstance(need, str) for need in needs):
-        raise BrainError(f'{where}: NEEDS is {needs!r}; expected a list of device names such as ["whiskers", "ping"]')
+    if not isinstance(needs, list | tuple | set | frozenset) or not all(
+        isinstance(need, str) for need in needs
+    ):
+        raise BrainError(
+            f'{where}: NEEDS is {needs!r}; expected a list of device names such as ["whiskers", "ping"]'
+        )
     return tuple(needs)

@@ -15,7 +15,9 @@ from boebot.robots import load_robot
 
 
 def info(
-    url: Annotated[str, typer.Argument(metavar="URL", help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT.")],
+    url: Annotated[
+        str, typer.Argument(metavar="URL", help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT.")
+    ],
     robot: options.RobotName = "shieldbot",
     json: options.Json = False,
 ) -> None:
@@ -37,15 +39,21 @@ def info(
             "tick_rate_hz": hello.tick_rate,
             "reset_cause": _name(messages.ResetCause, hello.reset_cause),
             "devices": [
-                device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
+                device.name.lower()
+                for device in messages.Devices
+                if hello.devices & device and device.name is not None
             ],
         }
-        parameters = {name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"}
+        parameters = {
+            name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"
+        }
         telemetry = _latest(link)
     finally:
         session.close()
     values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)
-    values["status"] = [flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name]
+    values["status"] = [
+        flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name
+    ]
     if json:
         output.print_json(values | {"parameters": parameters})
         return

@@ -9,7 +9,7 @@ import typer
 
 from boebot.errors import BrainError
 
-FIRST_BRAIN = '''"""{name}: drives about, backs away from what its whiskers touch, turns away from what infra-red sees.
+FIRST_BRAIN = '''"""{name}: backs away from what its whiskers touch and turns away from what infra-red sees.
 
 Run it:    boebot run {file} --out {stem}
 Watch it:  open {stem}/replay.html in a browser
@@ -32,13 +32,13 @@ def step(robot: Robot) -> None:
     else:
         robot.drive(0.5, 0.5)
 
-    # More to look at:  robot.ping.distance (metres, or None)   robot.left_encoder.count   robot.time (seconds)
-    # More to do:       robot.drive_speed(0.1, 0.1) (m/s)       robot.stop()               robot.chance(0.02)
+    # More to look at:  robot.ping.distance (m, or None)    robot.left_encoder.count    robot.time (s)
+    # More to do:       robot.drive_speed(0.1, 0.1) (m/s)   robot.stop()                robot.chance(0.02)
 '''
 
 
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the brain: letters, digits, underscores.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Letters, digits and underscores.")],
 ) -> None:
     """Write a first brain, NAME.py, to start from."""
     path = Path(name if name.endswith(".py") else f"{name}.py")

@@ -17,9 +17,10 @@ from boebot.robots import load_robot
 
 def serve(
     on: Annotated[str, typer.Option("--on", metavar="BOARD", help="avr or native.")] = "avr",
-    pty: Annotated[bool, typer.Option("--pty", help="On a new pseudo-terminal, which looks like a serial port.")] = False,
+    pty: Annotated[bool, typer.Option("--pty", help="On a new pseudo-terminal, like a serial port.")] = False,
     tcp: Annotated[
-        int | None, typer.Option("--tcp", metavar="PORT", min=0, max=65535, help="On this TCP port of loopback; 0: any.")
+        int | None,
+        typer.Option("--tcp", metavar="PORT", min=0, max=65535, help="On this TCP port of loopback; 0: any."),
     ] = None,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,

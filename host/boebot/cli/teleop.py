@@ -74,7 +74,9 @@ def sensors(robot: Robot) -> str:
     parts = [f"{robot.time:7.1f} s", f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"]
     equipment = robot.observation.equipment
     if equipment.has("left_whisker") and equipment.has("right_whisker"):
-        parts.append(f"whiskers {'L' if robot.left_whisker.pressed else '·'}{'R' if robot.right_whisker.pressed else '·'}")
+        parts.append(
+            f"whiskers {'L' if robot.left_whisker.pressed else '·'}{'R' if robot.right_whisker.pressed else '·'}"
+        )
     if equipment.has("left_ir") and equipment.has("right_ir"):
         parts.append(f"IR {'L' if robot.left_ir.detected else '·'}{'R' if robot.right_ir.detected else '·'}")
     if equipment.has("ping"):

@@ -1,6 +1,6 @@
 """Ping))): an ultrasonic range finder. The echo pulse lasts as long as sound takes to the obstacle and back.
 
-    distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature     (HARDWARE sheet, section 6)
+distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature     (HARDWARE sheet, section 6)
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ class PingReader:
 
     def __init__(self, range_min_m: float, range_max_m: float, period_ticks: int, tick_s: float) -> None:
         self._metres_per_us = speed_of_sound() / 2 * 1e-6
-        # what the range's ends look like on the wire, with a little room for the clock's and the air's tolerance
+        # what the range's ends look like on the wire, with a little room for the clock's and the air's
+        # tolerance
         self._least_us = 0.9 * range_min_m / self._metres_per_us
         self._greatest_us = 1.1 * range_max_m / self._metres_per_us
         self._fresh = min(STALE_PERIODS * period_ticks, NEVER - 1)

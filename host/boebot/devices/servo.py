@@ -1,6 +1,6 @@
 """Continuous-rotation servos: the pulse that the firmware sends them now, read back from telemetry.
 
-    signal = (pulse - centre) / gain
+signal = (pulse - centre) / gain
 """
 
 from __future__ import annotations

@@ -2,13 +2,14 @@
 
     wire = 00 · COBS(id, sequence, payload) · c2 c1 c0 · 00
 
-c2 c1 c0 are the CRC-21 of the stuffed bytes, seven bits to a byte under a set top bit, so that 00 occurs nowhere inside.
-A frame is accepted only if its length is exactly that of its id, its checksum is right and its stuffing ends exactly at
-the end. Damaged frames are counted and dropped; the next delimiter starts afresh.
+c2 c1 c0 are the CRC-21 of the stuffed bytes, seven bits to a byte under a set top bit, so that 00 occurs
+nowhere inside. A frame is accepted only if its length is exactly that of its id, its checksum is right and
+its stuffing ends exactly at the end. Damaged frames are counted and dropped; the next delimiter starts
+afresh.
 
-A CRC is linear: it is the XOR of what each byte contributes at its distance from the end. One table row per distance,
-walked by `map` and `reduce`, is about 1.6 times as fast in Python as the usual byte-by-byte loop. Rows hold the checksum
-already spread over its three bytes.
+A CRC is linear: it is the XOR of what each byte contributes at its distance from the end. One table row per
+distance, walked by `map` and `reduce`, is about 1.6 times as fast in Python as the usual byte-by-byte loop.
+Rows hold the checksum already spread over its three bytes.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ SEED = 0x155555
 FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters counted
 LONGEST_PAYLOAD = 251  # beyond it COBS would need a second code byte
 
-# Messages of the handshake keep the constant seed, so that both ends understand each other before they share another.
+# Messages of the handshake keep the constant seed: both ends understand each other before they share another.
 HANDSHAKE_IDS = frozenset(
     kind.ID for kind in (messages.HelloRequest, messages.Hello, messages.Identify, messages.Identity)
 )
@@ -124,7 +125,9 @@ class Decoder:
             self._kinds[message_id] = (length + _MINIMUM, start, _rows(length + 3))
         self._longest = max(lengths.values(), default=0) + _MINIMUM
         self._rest = b""
-        self._synchronised = False  # a delimiter was seen: what precedes the first is the tail of a frame we joined late
+        self._synchronised = (
+            False  # by a delimiter; what precedes the first is the tail of a frame we joined late
+        )
         self._next = -1  # sequence number expected, -1: any
 
     def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:
@@ -156,7 +159,7 @@ class Decoder:
         end = size - 3
         if reduce(xor, map(getitem, kind[2], piece), kind[1]) != int.from_bytes(piece[end:], "big"):
             return None
-        body = bytearray(piece)  # unstuffed in place: each code byte but the first becomes the zero it stands for
+        body = bytearray(piece)  # unstuffed in place: a code byte becomes the zero that it stands for
         at = body[0]
         while at < end:
             step = body[at]

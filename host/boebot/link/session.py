@@ -1,8 +1,8 @@
 """The link to one board: handshake, requests, set-points out, telemetry in.
 
-The host first listens, then asks until the board says hello; a board of another protocol version or schema is refused.
-Telemetry stays packed until somebody looks at it. Everything that crossed the wire is kept with its stamp when
-`record` is true.
+The host first listens, then asks until the board says hello; a board of another protocol version or schema is
+refused. Telemetry stays packed until somebody looks at it. Everything that crossed the wire is kept with its
+stamp when `record` is true.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Link:
         self._telemetry: list[bytes] = []  # arrived while somebody waited for an answer
         self._answers: list[messages.Message] = []
 
-    # ---- telemetry and set-points ------------------------------------------------------------------------------------
+    # ---- telemetry and set-points --------------------------------------------------------------------------
 
     def poll(self, wait_s: float, quiet_s: float = 0.0) -> list[bytes]:
         """The telemetry payloads that arrived, oldest first; waits as `Transport.read` does."""
@@ -64,6 +64,10 @@ class Link:
         telemetry = self._telemetry
         self._telemetry = []
         return telemetry
+
+    def forget_telemetry(self) -> None:
+        """Drops the telemetry that arrived while somebody waited for an answer."""
+        self._telemetry = []
 
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
         """Motor signals -1..1, in answer to the observation of `tick`."""
@@ -76,14 +80,16 @@ class Link:
         """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
         self._send(
             0x11,
-            _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
+            _SPEED.STRUCT.pack(
+                round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF
+            ),
         )
 
     def send_stop(self) -> None:
         """Stops the motors at once, until the next set-point."""
         self._send(0x12, b"")
 
-    # ---- handshake and requests --------------------------------------------------------------------------------------
+    # ---- handshake and requests ----------------------------------------------------------------------------
 
     def handshake(self, timeout_s: float | None = None) -> messages.Hello:
         """Waits for the board's hello, asking for it, and checks that both speak the same protocol.
@@ -134,8 +140,11 @@ class Link:
             )
         return self._parameter(messages.SetParameter(spec.id, counts), name) * spec.scale
 
-    def request(self, question: messages.Message, kind: type[_M], accept: Callable[[_M], bool], what: str) -> _M:
-        """Sends `question`, again and again while it stays unanswered; returns the answer of type `kind` that `accept`s.
+    def request(
+        self, question: messages.Message, kind: type[_M], accept: Callable[[_M], bool], what: str
+    ) -> _M:
+        """Sends `question`, again and again while it stays unanswered; returns the answer of type `kind` that
+        `accept`s.
 
         Raises:
             BoardError: no answer after five tries; `what` says what was asked of the board.
@@ -151,7 +160,7 @@ class Link:
                         return answer
         raise BoardError(f"the board at {self.transport.name} did not {what}, though asked {_REPEATS} times")
 
-    # ---- inside ------------------------------------------------------------------------------------------------------
+    # ---- inside --------------------------------------------------------------------------------------------
 
     def _parameter(self, question: messages.GetParameter | messages.SetParameter, name: str) -> int:
         answer = self.request(
@@ -215,7 +224,9 @@ class Link:
     def _no_hello(self, heard: int, timeout_s: float) -> BoebotError:
         where = self.transport.name
         if self.decoder.good:
-            return ProtocolError(f"the board at {where} sends frames but does not say hello within {timeout_s:g} s")
+            return ProtocolError(
+                f"the board at {where} sends frames but does not say hello within {timeout_s:g} s"
+            )
         if heard:
             return ProtocolError(
                 f"what answers at {where} does not speak this kit's protocol ({heard} bytes, no valid frame): "

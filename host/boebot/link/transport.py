@@ -1,4 +1,5 @@
-"""Ways for bytes to reach a board and come back: serial ports (and ptys, which look like them) and TCP sockets.
+"""Ways for bytes to reach a board and come back: serial ports (and ptys, which look like them) and TCP
+sockets.
 
 An in-process board brings a transport of its own with the same interface. A transport knows no frames.
 """
@@ -35,9 +36,9 @@ class Transport(Protocol):
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Everything that arrived.
 
-        Lets `quiet_s` pass without looking, then returns as soon as something has arrived and the line has gone idle,
-        at the latest after `wait_s`; both in seconds of the transport's clock, `wait_s` the whole. A live transport may
-        return earlier, with what there is.
+        Lets `quiet_s` pass without looking, then returns as soon as something has arrived and the line has
+        gone idle, at the latest after `wait_s`; both in seconds of the transport's clock, `wait_s` the whole.
+        A live transport may return earlier, with what there is.
 
         Raises:
             BoardError: the board has gone.
@@ -70,7 +71,9 @@ class SerialTransport:
         """
         self.name = port
         try:
-            self._port = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True if _POSIX else None)
+            self._port = serial.Serial(
+                port, baud, timeout=0, write_timeout=1.0, exclusive=True if _POSIX else None
+            )
         except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
             raise BoardError(_why_not(port, baud, error)) from None
 
@@ -176,7 +179,9 @@ def _why_not(port: str, baud: int, error: Exception) -> str:
     if number == errno.ENOENT or "filenotfound" in text or "no such file" in text:
         return f"there is no port {port}"
     if number == errno.EACCES or "permission" in text:
-        return f"{port} may not be opened by this user: permission denied (on Linux, join the group of {port})"
+        return (
+            f"{port} may not be opened by this user: permission denied (on Linux, join the group of {port})"
+        )
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text or "busy" in text:
         return f"{port} is busy: another program has it open"
     if "baud" in text:

@@ -1,11 +1,11 @@
-"""Files that a run leaves behind.
+"""Files that a run leaves behind:
 
-    run.csv        one row per control tick: sensors, commands, estimated and, where known, true pose
-    summary.json   the figures of the run
-    to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
-    wire.csv       when which stretch of those two files crossed the wire
-    run.png        a picture of the run
-    replay.html    a page that plays it; needs no network
+run.csv        one row per control tick: sensors, commands, estimated and, where known, true pose
+summary.json   the figures of the run
+to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
+wire.csv       when which stretch of those two files crossed the wire
+run.png        a picture of the run
+replay.html    a page that plays it; needs no network
 """
 
 from __future__ import annotations
@@ -38,5 +38,7 @@ def save(result: RunResult, folder: Path) -> list[Path]:
             paths.append(picture.write(result, folder / "run.png"))
             paths.append(replay.write(result, folder / "replay.html"))
     except OSError as error:
-        raise BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}") from None
+        raise BoebotError(
+            f"the run's files cannot be written to {folder}: {error.strerror or error}"
+        ) from None
     return paths

@@ -42,10 +42,10 @@ def write(result: RunResult, path: Path) -> Path:
     low, high = scene.bounds(view)
     width, height = high - low
     scale = 8.0 / max(width, height)
-    figure = Figure(figsize=(max(width * scale, 4.5) + 0.4, height * scale + 1.5), dpi=130, facecolor=PAPER)
+    figure = Figure(figsize=(max(width * scale, 4.5) + 0.4, height * scale + 1.6), dpi=130, facecolor=PAPER)
     FigureCanvasAgg(figure)
     total = figure.get_figheight()
-    axes = figure.add_axes((0.02, 0.55 / total, 0.96, (total - 1.35) / total))
+    axes = figure.add_axes((0.02, 0.72 / total, 0.96, (total - 1.52) / total))
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
@@ -70,7 +70,9 @@ def _draw_arena(axes: Axes, outlines: list[Floats]) -> None:
         if index == 0:  # the outer wall, around the floor
             axes.add_patch(Polygon(outline, closed=True, facecolor=FLOOR, edgecolor=WALL, lw=3.0, zorder=1))
         else:
-            axes.add_patch(Polygon(outline, closed=True, facecolor="#c9ced9", edgecolor=WALL, lw=1.6, zorder=2))
+            axes.add_patch(
+                Polygon(outline, closed=True, facecolor="#c9ced9", edgecolor=WALL, lw=1.6, zorder=2)
+            )
 
 
 def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
@@ -89,7 +91,9 @@ def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
 def _draw_ghost(axes: Axes, radius: float, estimate: Pose) -> None:
     """The odometric ghost: the robot where it believes to be at the end."""
     x, y, heading = float(estimate.x[-1]), float(estimate.y[-1]), float(estimate.heading[-1])
-    axes.add_patch(Circle((x, y), radius, facecolor="none", edgecolor=ESTIMATE, lw=1.1, ls=(0, (3, 2)), zorder=6))
+    axes.add_patch(
+        Circle((x, y), radius, facecolor="none", edgecolor=ESTIMATE, lw=1.1, ls=(0, (3, 2)), zorder=6)
+    )
     nose = (x + radius * math.cos(heading), y + radius * math.sin(heading))
     axes.plot((x, nose[0]), (y, nose[1]), color=ESTIMATE, lw=1.1, zorder=6)
 
@@ -128,12 +132,23 @@ def _draw_robot(axes: Axes, result: RunResult, path: Pose, index: int, colour: s
             )  # fmt: skip
         elif isinstance(device, robots.Whisker):
             (x0, y0), (x1, y1) = device.root_m, device.tip_m
-            axes.plot((x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round")
+            axes.plot(
+                (x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round"
+            )
     for side in (-1, 1):
         corner = (-wheel, side * body.track_width_m / 2 - 0.006)
-        axes.add_patch(Rectangle(corner, 2 * wheel, 0.012, facecolor=INK, transform=place, zorder=10))
+        axes.add_patch(Rectangle(corner, 2 * wheel, 0.012, facecolor=INK, transform=place, zorder=11))
     axes.add_patch(
-        Circle((0, 0), body.radius_m, facecolor=BODY, edgecolor=colour, lw=1.8, alpha=0.92, transform=place, zorder=10)
+        Circle(
+            (0, 0),
+            body.radius_m,
+            facecolor=BODY,
+            edgecolor=colour,
+            lw=1.8,
+            alpha=0.92,
+            transform=place,
+            zorder=10,
+        )
     )
     nose = np.array([(0.9, 0.0), (0.35, 0.32), (0.35, -0.32)]) * body.radius_m
     axes.add_patch(Polygon(nose, closed=True, facecolor=colour, edgecolor="none", transform=place, zorder=12))
@@ -143,9 +158,9 @@ def _draw_scale(axes: Axes, low: Floats, high: Floats) -> None:
     """A scale bar below the arena, a quarter of its width or so."""
     wanted = (high[0] - low[0]) / 4
     length = max(size for size in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0) if size <= max(wanted, 0.1))
-    x, y = low[0] + 0.02 * (high[0] - low[0]), low[1] + 0.012 * (high[1] - low[1])
-    axes.plot((x, x + length), (y, y), color=INK, lw=2.5, solid_capstyle="butt", zorder=12)
-    axes.text(x + length, y, f"  {length:g} m", va="center", fontsize=8.5, color=INK, zorder=12)
+    x, y = low[0] + scene.margin(low, high), low[1] - 0.018 * (high[1] - low[1])
+    axes.plot((x, x + length), (y, y), color=INK, lw=2.5, solid_capstyle="butt", clip_on=False)
+    axes.text(x + length, y, f"  {length:g} m", va="center", fontsize=8.5, color=INK)
 
 
 def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: float) -> None:
@@ -169,12 +184,26 @@ def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: flo
         parts.append("ended early")
     figure.text(0.03, 1 - 0.62 / height, "   ·   ".join(parts), fontsize=9.5, color=FAINT, va="center")
     handles = [
-        Line2D([], [], color="#3b8a8c", lw=2.2, label="true path, dark to light in time" if view.known else "path by odometry"),
-        *([Line2D([], [], color=ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate")] if view.known else []),
+        Line2D(
+            [],
+            [],
+            color="#3b8a8c",
+            lw=2.2,
+            label="true path, dark to light in time" if view.known else "path by odometry",
+        ),
+        *(
+            [Line2D([], [], color=ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate")]
+            if view.known
+            else []
+        ),
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=START, mew=1.8, ms=8, label="start"),
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=END, mew=1.8, ms=8, label="end"),
         Line2D([], [], ls="", marker="o", mfc="none", mec="#c98a2b", mew=1.2, ms=6, label="whisker touch"),
-        *([Line2D([], [], ls="", marker="x", color=CONTACT, mew=1.8, ms=7, label="body contact")] if view.known else []),
+        *(
+            [Line2D([], [], ls="", marker="x", color=CONTACT, mew=1.8, ms=7, label="body contact")]
+            if view.known
+            else []
+        ),
     ]
     figure.legend(
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8.5,

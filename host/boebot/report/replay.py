@@ -1,5 +1,5 @@
-"""replay.html: one page, offline, that plays and scrubs the run. The page itself is `replay_page.html` beside this file;
-the run's data are put into it as base64 arrays."""
+"""replay.html: one page, offline, that plays and scrubs the run. The page itself is `replay_page.html` beside
+this file; the run's data are put into it as base64 arrays."""
 
 from __future__ import annotations
 

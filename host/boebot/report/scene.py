@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from boebot.record import Bools, Floats, Pose
     from boebot.result import RunResult
 
-MARGIN_M = 0.12
+MARGIN = 0.02  # of the greater side
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,9 @@ def view(result: RunResult) -> View:
     known = result.true_pose is not None
     path = result.true_pose if result.true_pose is not None else result.odometry
     truth = result.truth
-    outlines = [np.asarray(outline, dtype=np.float64) for outline in truth.outlines] if truth is not None else []
+    outlines = (
+        [np.asarray(outline, dtype=np.float64) for outline in truth.outlines] if truth is not None else []
+    )
     outlines.sort(key=_extent, reverse=True)
     contacts = np.empty((0, 2))
     if truth is not None and known:
@@ -49,14 +51,17 @@ def view(result: RunResult) -> View:
 
 def bounds(scene: View) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of what there is to see, with a margin (m)."""
-    points = [np.column_stack((scene.path.x, scene.path.y))]
-    if scene.outlines:
-        points += scene.outlines
-    else:
-        points = [points[0] + offset for offset in (-0.3, 0.3)]
-    together = np.vstack(points)
-    margin = max(MARGIN_M if not scene.outlines else 0.0, 0.02 * float(np.ptp(together, axis=0).max()))
-    return together.min(axis=0) - margin, together.max(axis=0) + margin
+    points = np.vstack([np.column_stack((scene.path.x, scene.path.y)), *scene.outlines])
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not scene.outlines:  # no walls: leave room for the robot and its sensors
+        low, high = low - 0.3, high + 0.3
+    edge = MARGIN * float((high - low).max())
+    return low - edge, high + edge
+
+
+def margin(low: Floats, high: Floats) -> float:
+    """How far the corners that `bounds` gave stand off from what there is to see (m)."""
+    return float((high - low).max()) * MARGIN / (1 + 2 * MARGIN)
 
 
 def _extent(outline: Floats) -> float:
