@@ -455,12 +455,10 @@ def avr_board(image: Path) -> EmulatedBoard:
     Raises:
         BoardError: the emulator is not installed, or the file is no such image.
     """
-    try:
-        from sim_bridge.boards.avr import open_avr_board
-    except ImportError as error:
-        raise BoardError(f"the emulated AVR board is not installed: {error}") from None
-    board: EmulatedBoard = open_avr_board(image)
-    return board
+    from sim_bridge.boards import avr
+
+    board = avr.create(image)
+    return EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board)
 
 
 def open_native(request: BoardRequest) -> SimSession:
