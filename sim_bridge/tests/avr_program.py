@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 from sim_bridge.boards.avr import AvrBoard, create
@@ -46,6 +47,11 @@ class Machine:
 def edges_of(log: Iterable[Edge], pin: int) -> list[int]:
     """Cycles of the edges of one pin."""
     return [edge.cycle for edge in log if edge.pin == pin]
+
+
+def gaps(values: Iterable[int]) -> list[int]:
+    """From each value to the next."""
+    return [later - earlier for earlier, later in pairwise(values)]
 
 
 def pairs(values: list[int]) -> Iterator[tuple[int, int]]:

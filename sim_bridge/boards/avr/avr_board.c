@@ -229,7 +229,7 @@ static board_state advance(board *self, uint64_t until) {
       execute(b, horizon);
     }
   }
-  if (avr->cycle > b->clock) b->clock = avr->cycle;
+  catch_up(b, avr->cycle); /* from here on "now" is what `now` says */
   return b->crashed ? BOARD_CRASHED : BOARD_RUNNING;
 }
 

@@ -95,11 +95,13 @@ static void update_receive_flag(avr_board *b) {
 /* Start, data and parity bits: what comes before the stop bit that the receiver checks. */
 static unsigned bits_before_stop(const usart_state *u) { return 1u + u->data_bits + (u->has_parity ? 1u : 0u); }
 
+/* From the start of a frame to the stop bit's last sample, after which the next start bit may come: 5/8 or 9/16 into
+ * the bit (20.8.3). */
 static uint64_t sampled_after(const avr_board *b) {
   const usart_state *u = &b->usart;
   bool double_speed = b->avr->data[REG_UCSR0A] & U2X;
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
-  return bits_before_stop(u) * bit_time + bit_time * (double_speed ? 6 : 5) / 8; /* its last sample: 6 of 8, 10 of 16 */
+  return bits_before_stop(u) * bit_time + bit_time * (double_speed ? 10 : 9) / 16;
 }
 
 static void plan_receiver(avr_board *b) {

@@ -1,0 +1,333 @@
+"""The emulated board as a whole: images, resets, watchdog, and runs that do not depend on how they are cut."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from boebot.errors import BoardError
+from sim_bridge.boards.avr import create
+from sim_bridge.boards.board import Edge, Level, ResetCause, SentByte
+from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
+
+# ---- images ----
+
+
+def test_missing_image(tmp_path: Path) -> None:
+    with pytest.raises(BoardError, match=r"Cannot read the firmware image .*nothing\.elf: No such file"):
+        create(tmp_path / "nothing.elf")
+
+
+def test_image_that_is_none(tmp_path: Path) -> None:
+    image = tmp_path / "image.elf"
+    image.write_text("not an image", encoding="ascii")
+    with pytest.raises(BoardError, match="not an ELF file for AVR"):
+        create(image)
+
+
+def test_image_cut_short_or_changed_is_refused_or_runs(tmp_path: Path) -> None:
+    whole = assemble("main: rjmp main")
+    image = tmp_path / "image.elf"
+    rng = random.Random(1)
+    refused = 0
+    for _ in range(300):
+        damaged = bytearray(whole[: rng.randrange(len(whole))] if rng.random() < 0.5 else whole)
+        for _ in range(rng.randrange(1, 8)):
+            if damaged:
+                damaged[rng.randrange(min(len(damaged), 0x100))] = rng.randrange(256)
+        image.write_bytes(damaged)
+        try:
+            create(image).close()
+        except BoardError:
+            refused += 1
+    assert refused > 100
+
+
+def test_image_for_another_microcontroller(tmp_path: Path) -> None:
+    whole = bytearray(assemble("main: rjmp main"))
+    whole[36] = 35  # tiny AVR
+    image = tmp_path / "image.elf"
+    image.write_bytes(whole)
+    with pytest.raises(BoardError, match="another AVR"):
+        create(image)
+
+
+def test_closed_board_has_no_pointer() -> None:
+    machine = Machine("main: rjmp main")
+    assert machine.avr.pointer != 0
+    machine.board.close()
+    machine.avr.close()
+    with pytest.raises(BoardError, match="closed"):
+        _ = machine.avr.pointer
+
+
+# ---- resets and watchdog ----
+
+WATCHDOG_CYCLES = 2048 * 125  # the shortest: 2048 cycles of 128 kHz
+
+# Stores MCUSR when it starts, then lets the watchdog bite.
+WATCHDOG = """
+main:
+  in r24, MCUSR
+  out MCUSR, r1
+  sts 0x0200, r24
+  ldi r24, 1 << WDCE | 1 << WDE
+  sts WDTCSR, r24
+  ldi r24, 1 << WDE
+  wdr
+  sbi DDRB, 5
+  sbi PORTB, 5
+  sbi PORTD, 7
+  ldi r24, 1 << WDE
+  sts WDTCSR, r24
+1: rjmp 1b
+"""
+
+
+def test_watchdog_reset_keeps_time_and_levels() -> None:
+    machine = Machine(WATCHDOG)
+    board = machine.board
+    board.drive(7, Level.LOW)
+    board.run(1000)
+    assert machine.avr.data(0x200)[0] == 1  # power-on
+    started = edges_of(board.log(), 13)[1]
+    board.advance(3 * WATCHDOG_CYCLES + 3000)
+    log = board.log()
+    released = [edge.cycle for edge in log if edge.pin == 13 and edge.level == Level.RELEASED]
+    assert len(released) == 3
+    assert abs(released[0] - started - WATCHDOG_CYCLES) < 20
+    period = released[1] - released[0]
+    assert WATCHDOG_CYCLES < period < WATCHDOG_CYCLES + 100  # and the program up to the WDR
+    assert released[2] - released[1] == period
+    assert machine.avr.data(0x200)[0] == 8  # watchdog, and only that: the program cleared the rest
+    assert board.counters()["resets"] == 3
+    assert [edge.level for edge in log if edge.pin == 7][:2] == [Level.RELEASED, Level.PULLED_UP]
+
+
+def test_watchdog_that_is_kicked_does_not_bite() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 1 << WDE
+          sts WDTCSR, r24
+        1: wdr
+          rjmp 1b
+        """
+    )
+    machine.board.advance(10 * WATCHDOG_CYCLES)
+    assert machine.board.counters()["resets"] == 0
+
+
+def test_watchdog_survives_its_own_reset_until_it_is_turned_off() -> None:
+    # after a watchdog reset WDE stays set with the shortest time; a program that does not know bites its tail
+    machine = Machine(
+        """
+        main:
+          in r24, MCUSR
+          sbrc r24, WDRF
+        1: rjmp 1b                      ; does nothing about it
+          ldi r24, 1 << WDCE | 1 << WDE
+          sts WDTCSR, r24
+          ldi r24, 1 << WDE | 1 << WDP2 ; 16 times as long
+          sts WDTCSR, r24
+        2: rjmp 2b
+        """
+    )
+    machine.board.advance(16 * WATCHDOG_CYCLES + 1000)
+    assert machine.board.counters()["resets"] == 1
+    machine.board.advance(16 * WATCHDOG_CYCLES + 1000 + 4 * WATCHDOG_CYCLES)
+    assert machine.board.counters()["resets"] == 5
+
+
+def test_watchdog_interrupt_comes_before_the_reset() -> None:
+    machine = Machine(
+        """
+        .global __vector_6
+        __vector_6:
+          sbi PINB, 5
+          reti
+        main:
+          sbi DDRB, 5
+          ldi r24, 1 << WDCE | 1 << WDE
+          sts WDTCSR, r24
+          ldi r24, 1 << WDIE | 1 << WDE
+          sts WDTCSR, r24
+          sei
+        1: rjmp 1b
+        """
+    )
+    machine.board.advance(2 * WATCHDOG_CYCLES + 500)
+    log = machine.board.log()
+    warned, bitten = edges_of(log, 13)[1:3]
+    assert log[1].level == Level.HIGH
+    assert abs(warned - WATCHDOG_CYCLES) < 100
+    assert abs(bitten - 2 * WATCHDOG_CYCLES) < 100
+    assert machine.board.counters()["resets"] == 1
+
+
+@pytest.mark.parametrize(
+    ("cause", "flags"),
+    [(ResetCause.POWER, 1), (ResetCause.EXTERNAL, 3), (ResetCause.BROWN_OUT, 5), (ResetCause.WATCHDOG, 9)],
+)
+def test_reset_causes(cause: ResetCause, flags: int) -> None:
+    machine = Machine(
+        """
+        main:
+          in r16, MCUSR                 ; left as it is
+          lds r17, 0x0300
+          ldi r24, 0x77
+          sts 0x0300, r24
+        1: rjmp 1b
+        """
+    )
+    board = machine.board
+    board.run(1000)
+    before = board.now
+    board.reset(cause)
+    board.run(1000)
+    assert board.now == before + 1000 or before + 1000 <= board.now < before + 1008
+    status, memory = machine.avr.data(16, 2)
+    assert status == flags
+    assert (memory == 0x77) == (cause != ResetCause.POWER)
+
+
+def test_reset_loses_bytes_in_flight() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 3
+          sts UBRR0L, r24
+          ldi r24, 1 << U2X0
+          sts UCSR0A, r24
+          ldi r24, 1 << TXEN0
+          sts UCSR0B, r24
+          ldi r24, 'x'
+          sts UDR0, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(200)
+    machine.board.reset()
+    machine.board.run(1000)
+    assert [byte for _, byte in machine.board.receive()] == [ord("x")]
+
+
+# ---- independence of steps ----
+
+# Echoes bytes plus one, counts pin changes of port C on port B, captures, carries 38 kHz on pin 2, bites itself.
+BUSY = """
+.global __vector_4, __vector_7, __vector_10, __vector_11, __vector_18
+__vector_4:
+  sbi PINB, 4
+  reti
+__vector_7:
+  sbi PIND, 2
+  reti
+__vector_10:
+  lds r24, ICR1L
+  sts UDR0, r24
+  reti
+__vector_11:
+  sbi PINB, 5
+  lds r24, OCR1AL
+  lds r25, OCR1AH
+  subi r24, lo8(-1000)
+  sbci r25, hi8(-1000)
+  sts OCR1AH, r25
+  sts OCR1AL, r24
+  reti
+__vector_18:
+  lds r24, UCSR0A
+  lds r25, UDR0
+  inc r25
+  sts UDR0, r25
+  reti
+main:
+  ldi r24, 0x36
+  out DDRB, r24
+  sbi DDRD, 2
+  ldi r24, 1
+  out SMCR, r24
+  ldi r24, 3
+  sts UBRR0L, r24
+  ldi r24, 1 << U2X0
+  sts UCSR0A, r24
+  ldi r24, 1 << TXEN0 | 1 << RXEN0 | 1 << RXCIE0
+  sts UCSR0B, r24
+  ldi r24, 1 << PCIE1
+  sts PCICR, r24
+  ldi r24, 0x3f
+  sts PCMSK1, r24
+  ldi r24, 210
+  sts OCR2A, r24
+  ldi r24, 1 << WGM21
+  sts TCCR2A, r24
+  ldi r24, 1 << OCIE2A
+  sts TIMSK2, r24
+  ldi r24, 1
+  sts TCCR2B, r24
+  ldi r24, 1 << COM1B0
+  sts TCCR1A, r24
+  ldi r24, 1 << OCIE1A | 1 << ICIE1
+  sts TIMSK1, r24
+  ldi r24, 1 << ICNC1 | 1
+  sts TCCR1B, r24
+  ldi r24, 1 << WDE
+  sts WDTCSR, r24
+  sei
+1: sleep
+  rjmp 1b
+"""
+LENGTH = 300_000
+
+
+def busy_run(step: int) -> tuple[list[Edge], list[SentByte], dict[str, int]]:
+    """The same inputs each time, the run cut into steps; with input queued only just ahead of each step."""
+    board = Machine(BUSY).board
+    rng = random.Random(7)
+    inputs = sorted(
+        (rng.randrange(500, LENGTH), rng.choice((8, 14, 15, 16)), Level(rng.randrange(3))) for _ in range(400)
+    )
+    sends = sorted((rng.randrange(500, LENGTH), rng.randrange(256)) for _ in range(200))
+    board.answer(13, on=17, delay=40)
+    edges: list[Edge] = []
+    sent: list[SentByte] = []
+    while board.now < LENGTH:
+        until = min(board.now + step, LENGTH)
+        while inputs and inputs[0][0] < until + 64:
+            at, pin, level = inputs.pop(0)
+            board.drive(pin, level, at=at)
+        while sends and sends[0][0] < until + 64:
+            at, byte = sends.pop(0)
+            board.send([byte], at=at)
+        board.advance(until)
+        edges += board.log()
+        sent += board.receive()
+    board.advance(LENGTH + 5000)
+    return edges + board.log(), sent + board.receive(), board.counters()
+
+
+@pytest.fixture(scope="module")
+def one_piece() -> tuple[list[Edge], list[SentByte], dict[str, int]]:
+    return busy_run(16_000_000)
+
+
+def test_busy_run_is_busy(one_piece: tuple[list[Edge], list[SentByte], dict[str, int]]) -> None:
+    edges, sent, counters = one_piece
+    assert {edge.pin for edge in edges} >= {1, 2, 10, 12, 13}
+    assert len(edges) > 2000
+    assert len(sent) > 100
+    assert counters["resets"] == 1
+    assert min(gaps(edge.cycle for edge in edges)) >= 0
+
+
+@pytest.mark.parametrize("step", [1, 7, 100, 1000, 16_000, 65_537])
+def test_runs_do_not_depend_on_steps(
+    step: int, one_piece: tuple[list[Edge], list[SentByte], dict[str, int]]
+) -> None:
+    edges, sent, counters = busy_run(step)
+    assert edges == one_piece[0]
+    assert sent == one_piece[1]
+    assert counters == one_piece[2]

@@ -1,0 +1,298 @@
+"""Instruction and interrupt times of the emulated ATmega328P against its data sheet."""
+
+from __future__ import annotations
+
+import pytest
+
+from boebot.errors import BoardError
+from sim_bridge.boards.board import Level, ResetCause
+from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+
+# What is measured stands between two SBI that toggle pin 13; each takes effect at its end, so that the distance of
+# the edges is the time of the code between them and of one SBI.
+SBI_CYCLES = 2
+
+# Instruction set manual: (code, cycles).
+INSTRUCTIONS = [
+    ("nop", 1),
+    ("add r24, r25", 1),
+    ("adiw r24, 1", 2),
+    ("sbiw r24, 1", 2),
+    ("movw r24, r22", 1),
+    ("mul r24, r25", 2),
+    ("fmuls r20, r21", 2),
+    ("ldi r24, 1", 1),
+    ("ld r24, X", 2),
+    ("ld r24, -X", 2),
+    ("ldd r24, Y+3", 2),
+    ("lds r24, 0x0200", 2),
+    ("st X+, r24", 2),
+    ("std Z+3, r24", 2),
+    ("sts 0x0200, r24", 2),
+    ("lpm", 3),
+    ("lpm r24, Z+", 3),
+    ("in r24, GPIOR0", 1),
+    ("out GPIOR0, r24", 1),
+    ("sbi GPIOR0, 0", 2),
+    ("cbi GPIOR0, 0", 2),
+    ("push r24\n pop r24", 4),
+    ("rjmp 1f\n1:", 2),
+    ("jmp 1f\n1:", 3),
+    ("ldi r30, pm_lo8(1f)\n ldi r31, pm_hi8(1f)\n ijmp\n1:", 4),
+    ("rcall nothing", 3 + 4),
+    ("call nothing", 4 + 4),
+    ("ldi r30, pm_lo8(nothing)\n ldi r31, pm_hi8(nothing)\n icall", 2 + 3 + 4),
+    ("rcall nothing_with_reti", 3 + 4),
+    ("sez\n breq 1f\n1:", 1 + 2),
+    ("clz\n breq 1f\n1:", 1 + 1),
+    ("clr r24\n sbrc r24, 0\n nop", 1 + 2),  # skips one word
+    ("clr r24\n sbrc r24, 0\n jmp 0", 1 + 3),  # skips two words
+    ("clr r24\n sbrs r24, 0\n nop", 1 + 1 + 1),  # does not skip
+    ("cpse r24, r24\n nop", 2),
+    ("cpse r24, r24\n lds r24, 0x0200", 3),
+    ("cbi GPIOR0, 0\n sbic GPIOR0, 0\n nop", 2 + 2),
+    ("cbi GPIOR0, 0\n sbis GPIOR0, 0\n nop", 2 + 1 + 1),
+    ("bst r24, 0\n bld r24, 1", 2),
+    ("wdr", 1),
+]
+
+
+@pytest.mark.parametrize(("code", "cycles"), INSTRUCTIONS)
+def test_instruction_takes_its_cycles(code: str, cycles: int) -> None:
+    machine = Machine(
+        f"""
+        nothing: ret
+        nothing_with_reti: reti
+        main:
+          sbi DDRB, 5
+          ldi r26, 0
+          ldi r27, 2
+          ldi r28, 0
+          ldi r29, 2
+          ldi r30, 0
+          ldi r31, 2
+          sbi PINB, 5
+          {code}
+          sbi PINB, 5
+        end: rjmp end
+        """
+    )
+    machine.board.run(500)
+    _, first, second = edges_of(machine.board.log(), 13)
+    assert second - first == cycles + SBI_CYCLES
+
+
+# Timer 1 matches at a known cycle, shown by the edge of its own output pin 9; the interrupt moves pin 13.
+MATCH_INTERRUPT = """
+.global __vector_11
+__vector_11:
+  sbi PINB, 5
+  reti
+main:
+  sbi DDRB, 5
+  sbi DDRB, 1
+  ldi r24, 2000 >> 8
+  sts OCR1AH, r24
+  ldi r24, 2000 & 255
+  sts OCR1AL, r24
+  ldi r24, 1 << COM1A0
+  sts TCCR1A, r24
+  ldi r24, 1 << OCIE1A
+  sts TIMSK1, r24
+  ldi r24, 1
+  sts TCCR1B, r24
+  sei
+  {main_loop}
+"""
+ENTRY = 4
+VECTOR_JUMP = 3
+
+
+def latency(main_loop: str) -> int:
+    """Cycles from the compare edge to the end of the interrupt's first instruction, without its own time."""
+    machine = Machine(MATCH_INTERRUPT.format(main_loop=main_loop))
+    machine.board.run(20_000)
+    log = machine.board.log()
+    match = edges_of(log, 9)[1]  # the first edge is the pin becoming an output
+    reaction = edges_of(log, 13)[1]
+    return reaction - match - VECTOR_JUMP - SBI_CYCLES
+
+
+def test_interrupt_entry_takes_four_cycles() -> None:
+    assert latency(".rept 4000\n nop\n .endr\n1: rjmp 1b") == ENTRY
+
+
+def test_interrupt_entry_from_sleep_takes_eight_cycles() -> None:
+    assert latency("ldi r24, 1\n out SMCR, r24\n1: sleep\n rjmp 1b") == ENTRY + 4
+
+
+def test_instruction_is_finished_before_an_interrupt() -> None:
+    latencies = {latency(f".rept {shift}\n nop\n .endr\n1: jmp 1b") for shift in range(3)}
+    assert latencies == {ENTRY, ENTRY + 1, ENTRY + 2}
+
+
+def test_sleep_without_sleep_enable_does_nothing() -> None:
+    machine = Machine(
+        """
+        main:
+          sbi DDRB, 5
+          sbi PINB, 5
+          sleep
+          sbi PINB, 5
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(100)
+    _, first, second = edges_of(machine.board.log(), 13)
+    assert second - first == 1 + SBI_CYCLES
+
+
+def test_one_instruction_runs_between_two_interrupts() -> None:
+    # The interrupt's flag is raised again at once, so that it returns into itself: one NOP each time.
+    machine = Machine(
+        """
+        .global __vector_1
+        __vector_1:
+          sbi PINB, 5
+          reti
+        main:
+          sbi DDRB, 5
+          sbi EIMSK, 0      ; INT0 while pin 2 is low, which it is
+          sei
+        1: nop
+          rjmp 1b
+        """
+    )
+    machine.board.drive(2, Level.LOW)
+    machine.board.run(1000)
+    edges = edges_of(machine.board.log(), 13)[1:]
+    periods = set(gaps(edges))
+    around = ENTRY + VECTOR_JUMP + SBI_CYCLES + 4  # and one instruction: NOP or RJMP
+    assert periods == {around + 1, around + 2}
+
+
+def test_sei_lets_one_instruction_run() -> None:
+    machine = Machine(
+        """
+        .global __vector_1
+        __vector_1:
+          sbi PINB, 4
+          cbi EIMSK, 0
+          reti
+        main:
+          sbi DDRB, 5
+          sbi DDRB, 4
+          sbi EIMSK, 0
+          sei
+          sbi PINB, 5
+          sbi PINB, 5
+        1: rjmp 1b
+        """
+    )
+    machine.board.drive(2, Level.LOW)
+    machine.board.run(200)
+    log = machine.board.log()
+    _, first, second = edges_of(log, 13)
+    _, reaction = edges_of(log, 12)
+    assert first < reaction < second
+
+
+def test_interrupt_enabled_while_its_flag_is_set_fires() -> None:
+    machine = Machine(
+        """
+        .global __vector_14
+        __vector_14:
+          sbi PINB, 5
+          reti
+        main:
+          sbi DDRB, 5
+          ldi r24, 10
+          out OCR0A, r24
+          ldi r24, 1
+          out TCCR0B, r24
+          sei
+          .rept 50
+          nop
+          .endr
+          out TCCR0B, r1        ; stopped, with the flag set long ago
+          sbi PINB, 5
+          ldi r24, 1 << OCIE0A
+          sts TIMSK0, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(1000)
+    _, enabled, fired = edges_of(machine.board.log(), 13)
+    assert 0 < fired - enabled < 20
+
+
+def test_executed_cycles_count_no_sleep() -> None:
+    machine = Machine(
+        """
+        .global __vector_16
+        __vector_16:
+          reti
+        main:
+          ldi r24, 1
+          out SMCR, r24
+          sts TIMSK0, r24       ; overflow
+          ldi r24, 2
+          out TCCR0B, r24       ; clk/8: every 2048 cycles
+          sei
+        1: sleep
+          rjmp 1b
+        """
+    )
+    machine.board.run(100)
+    start = machine.board.counters()
+    machine.board.run(2048 * 100)
+    end = machine.board.counters()
+    assert end["interrupts"] - start["interrupts"] == 100
+    # entry, jump, RETI, RJMP, SLEEP
+    assert end["executed_cycles"] - start["executed_cycles"] == 100 * (4 + 3 + 4 + 2 + 1)
+
+
+def test_bad_opcode_is_a_crash_until_the_next_reset() -> None:
+    machine = Machine("main:\n sbi DDRB, 5\n nop\n .word 0x0001\n1: rjmp 1b")
+    with pytest.raises(BoardError, match="invalid instruction 0x0001"):
+        machine.board.run(1000)
+    assert machine.board.now < 1000
+    machine.board.reset(ResetCause.EXTERNAL)
+    with pytest.raises(BoardError, match="invalid instruction"):
+        machine.board.run(1000)
+    assert machine.board.counters()["resets"] == 1
+
+
+def test_running_off_the_flash_is_a_crash() -> None:
+    machine = Machine("main:\n ldi r30, 0x80\n ldi r31, 0x3f\n ijmp")
+    with pytest.raises(BoardError, match="ran off the end of the flash"):
+        machine.board.run(100_000)
+
+
+def test_memory_at_power_on_is_not_zero_and_always_the_same() -> None:
+    first, second = (Machine("main: rjmp main").avr.data(0x100, 0x800) for _ in range(2))
+    assert first == second
+    assert len(set(first)) > 200
+
+
+def test_eeprom_and_program_memory() -> None:
+    machine = Machine(
+        """
+        .section .eeprom, "aw", @progbits
+          .byte 0x5A
+        .text
+        main:
+          ldi r24, 0
+          out EEARH, r24
+          out EEARL, r24
+          sbi EECR, EERE
+          in r16, EEDR
+          ldi r30, lo8(table)
+          ldi r31, hi8(table)
+          lpm r17, Z
+        1: rjmp 1b
+        table: .byte 0xA5, 0
+        """
+    )
+    machine.board.run(200)
+    assert machine.avr.data(16, 2) == b"\x5a\xa5"

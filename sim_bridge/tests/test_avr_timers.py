@@ -1,0 +1,393 @@
+"""Timers of the emulated ATmega328P: counts, compare edges, captures, flags, at their true cycles."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim_bridge.boards.board import Level
+from sim_bridge.tests.avr_program import Machine, edges_of, gaps, pairs
+
+CAPTURE_PIN = 8
+INPUT_LATENCY = 3  # synchronizer and edge detector: 2.5 to 3.5 cycles
+
+
+def word(machine: Machine, address: int) -> int:
+    """A 16-bit value in RAM."""
+    return int.from_bytes(machine.avr.data(address, 2), "little")
+
+
+def words(machine: Machine, address: int, count: int) -> list[int]:
+    """16-bit values in RAM."""
+    return [word(machine, address + 2 * i) for i in range(count)]
+
+
+# ---- normal and clear-on-match ----
+
+
+@pytest.mark.parametrize("compare", [2, 300, 40_000, 65_535])
+def test_compare_edge_at_its_true_cycle(compare: int) -> None:
+    machine = Machine(
+        f"""
+        main:
+          sbi DDRB, 5
+          sbi DDRB, 1
+          ldi r24, {compare} >> 8
+          sts OCR1AH, r24
+          ldi r24, {compare} & 255
+          sts OCR1AL, r24
+          ldi r24, 1 << COM1A0
+          sts TCCR1A, r24
+          ldi r24, 1
+          sbi PINB, 5
+          sts TCCR1B, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(300_000)
+    log = machine.board.log()
+    started = edges_of(log, 13)[1] + 2
+    toggles = edges_of(log, 9)[1:]
+    # the pin moves one count after the match (16.7.1), then once a lap
+    assert toggles == [started + compare + 1 + lap * 65_536 for lap in range(len(toggles))]
+    assert len(toggles) >= 3
+
+
+@pytest.mark.parametrize(("clock_select", "divider"), [(1, 1), (2, 8), (3, 64)])
+def test_compare_edges_with_prescaler_keep_its_phase(clock_select: int, divider: int) -> None:
+    machine = Machine(
+        f"""
+        main:
+          sbi DDRD, 6
+          ldi r24, 99
+          out OCR0A, r24
+          ldi r24, 1 << COM0A0 | 1 << WGM01
+          out TCCR0A, r24
+          nop
+          ldi r24, {clock_select}
+          out TCCR0B, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(divider * 1000 + 200)
+    edges = edges_of(machine.board.log(), 6)[1:]
+    # the prescaler runs since the reset: every edge falls on a multiple of its divider
+    assert all(edge % divider == 0 for edge in edges)
+    assert set(gaps(edges)) == {100 * divider}
+    assert len(edges) >= 9
+
+
+def test_toggle_interrupt_makes_an_even_carrier() -> None:
+    # Timer 2 as the firmware uses it for infrared: clear on match, a short interrupt that toggles an output.
+    machine = Machine(
+        """
+        .global __vector_7
+        __vector_7:
+          sbi PIND, 2
+          reti
+        main:
+          sbi DDRD, 2
+          ldi r24, 1
+          out SMCR, r24
+          ldi r24, 210
+          sts OCR2A, r24
+          ldi r24, 1 << WGM21
+          sts TCCR2A, r24
+          ldi r24, 1 << OCIE2A
+          sts TIMSK2, r24
+          ldi r24, 1
+          sts TCCR2B, r24
+          sei
+        1: sleep
+          rjmp 1b
+        """
+    )
+    machine.board.run(211 * 500)
+    edges = edges_of(machine.board.log(), 2)[2:]
+    assert set(gaps(edges)) == {211}
+    assert len(edges) > 490
+
+
+def test_count_and_stopped_timer() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 1
+          sts TCCR1B, r24
+          lds r16, TCNT1L
+          lds r17, TCNT1H
+          .rept 1000
+          nop
+          .endr
+          lds r18, TCNT1L
+          lds r19, TCNT1H
+          sts TCCR1B, r1
+          lds r20, TCNT1L
+          lds r21, TCNT1H
+          .rept 100
+          nop
+          .endr
+          lds r22, TCNT1L
+          lds r23, TCNT1H
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(2000)
+    first, second, stopped, later = words(machine, 16, 4)
+    assert second - first == 1000 + 2 + 2
+    assert (
+        stopped - second == 2 + 2 + 1
+    )  # to the end of the store that stops it; a read is in its second cycle
+    assert later == stopped
+
+
+def test_sixteen_bit_reads_go_through_the_temporary_register() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 0x01
+          sts TCNT1H, r24
+          ldi r24, 0xF8
+          sts TCNT1L, r24
+          ldi r24, 1
+          sts TCCR1B, r24
+          lds r16, TCNT1L       ; 0x01F9
+          .rept 20
+          nop
+          .endr
+          lds r17, TCNT1H       ; the count is beyond 0x0200 by now
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(200)
+    assert word(machine, 16) == 0x01F9
+
+
+def test_writing_the_count_holds_the_match_off() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 5
+          out OCR0A, r24
+          out TCNT0, r24        ; equal: no match at the next count
+          ldi r24, 1
+          out TCCR0B, r24
+          nop
+          nop
+          in r16, TIFR0
+          .rept 256
+          nop
+          .endr
+          in r17, TIFR0
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(500)
+    before, after = machine.avr.data(16, 2)
+    assert not before & 2
+    assert after & 2
+
+
+def test_clear_on_match_beyond_its_top_overflows_once() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 200
+          out TCNT0, r24
+          ldi r24, 99
+          out OCR0A, r24
+          ldi r24, 1 << WGM01
+          out TCCR0A, r24
+          ldi r24, 1
+          out TCCR0B, r24
+          .rept 55
+          nop
+          .endr
+          in r16, TIFR0         ; count 255
+          in r17, TIFR0         ; 0
+          .rept 98
+          nop
+          .endr
+          in r18, TIFR0         ; count 99
+          in r19, TIFR0
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(500)
+    assert [flags & 3 for flags in machine.avr.data(16, 4)] == [0, 1, 1, 3]
+
+
+def test_one_flag_is_cleared_at_a_time() -> None:
+    machine = Machine(
+        """
+        main:
+          ldi r24, 3
+          out OCR0A, r24
+          out OCR0B, r24
+          ldi r24, 1
+          out TCCR0B, r24
+          .rept 300
+          nop
+          .endr
+          out TCCR0B, r1
+          in r16, TIFR0
+          sbi TIFR0, OCF0A
+          in r17, TIFR0
+          ldi r24, 1 << OCF0B
+          out TIFR0, r24
+          in r18, TIFR0
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(500)
+    assert list(machine.avr.data(16, 3)) == [0b111, 0b101, 0b001]
+
+
+# ---- PWM ----
+
+PWM = """
+main:
+  sbi DDRB, 1
+  sbi DDRB, 2
+  {settings}
+  ldi r24, {control_a}
+  sts TCCR1A, r24
+  ldi r24, {control_b}
+  sts TCCR1B, r24
+1: rjmp 1b
+"""
+
+
+def store(register: str, value: int) -> str:
+    """Code that writes a 16-bit register."""
+    return f"""
+      ldi r24, {value >> 8}
+      sts {register}H, r24
+      ldi r24, {value & 255}
+      sts {register}L, r24
+    """
+
+
+def high_times_and_periods(edges: list[int]) -> tuple[set[int], set[int]]:
+    """Of a pin that starts low: how long it is high, and from rise to rise."""
+    rises_and_falls = list(pairs(edges[: len(edges) // 2 * 2]))
+    rises = [rise for rise, _ in rises_and_falls]
+    highs = {fall - rise for rise, fall in rises_and_falls}
+    return highs, set(gaps(rises))
+
+
+@pytest.mark.parametrize(
+    ("mode", "settings", "top"),
+    [(5, "", 255), (7, "", 1023), (14, store("ICR1", 1999), 1999), (15, store("OCR1A", 1499), 1499)],
+)
+def test_fast_pwm(mode: int, settings: str, top: int) -> None:
+    machine = Machine(
+        PWM.format(
+            settings="ldi r24, 0x10\n sts TCCR1B, r24\n" * (mode == 14) + settings + store("OCR1B", 99),
+            control_a=0x20 | mode & 3,  # clear pin 10 on match, set it at the bottom
+            control_b=(mode & 12) << 1 | 1,
+        )
+    )
+    machine.board.run(20 * (top + 1))
+    highs, periods = high_times_and_periods(edges_of(machine.board.log(), 10)[3:])
+    assert highs == {100}
+    assert periods == {top + 1}
+
+
+def test_phase_correct_pwm() -> None:
+    machine = Machine(PWM.format(settings=store("OCR1B", 99), control_a=0x20 | 1, control_b=1))
+    machine.board.run(20 * 510)
+    highs, periods = high_times_and_periods(edges_of(machine.board.log(), 10)[3:])
+    assert highs == {2 * 99}
+    assert periods == {2 * 255}
+
+
+@pytest.mark.parametrize(("compare", "level"), [(0, Level.LOW), (255, Level.HIGH)])
+def test_phase_correct_pwm_at_its_extremes_is_steady(compare: int, level: Level) -> None:
+    machine = Machine(PWM.format(settings=store("OCR1B", compare), control_a=0x20 | 1, control_b=1))
+    machine.board.run(2000)
+    machine.board.log()
+    machine.board.run(20_000)
+    assert edges_of(machine.board.log(), 10) == []
+    assert machine.board.output(10) == level
+
+
+def test_fast_pwm_takes_a_new_compare_value_at_the_bottom() -> None:
+    machine = Machine(
+        """
+        main:
+          sbi DDRD, 6
+          ldi r24, 99
+          out OCR0A, r24
+          ldi r24, 1 << COM0A1 | 3
+          out TCCR0A, r24
+          ldi r24, 1
+          out TCCR0B, r24
+          .rept 300
+          nop
+          .endr
+          ldi r24, 49
+          out OCR0A, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.run(256 * 8)
+    edges = edges_of(machine.board.log(), 6)[1:]
+    highs = [fall - rise for rise, fall in pairs(edges[: len(edges) // 2 * 2])]
+    # the first lap is low; the second begins with 99 in force; what is written during it counts from the third on
+    assert highs == [100] + [50] * (len(highs) - 1)
+    assert len(highs) >= 5
+
+
+# ---- capture ----
+
+CAPTURE = """
+; every capture: its count and the count at which the interrupt read the timer, stored from 0x0200 on
+.global __vector_10
+__vector_10:
+  lds r24, ICR1L
+  st X+, r24
+  lds r24, ICR1H
+  st X+, r24
+  lds r24, TCCR1B
+  ldi r25, 1 << ICES1
+  eor r24, r25                  ; the other edge next
+  sts TCCR1B, r24
+  ldi r24, 1 << ICF1
+  out TIFR1, r24
+  reti
+main:
+  ldi r26, 0x00
+  ldi r27, 0x02
+  sbi DDRB, 5
+  ldi r24, 1 << ICIE1
+  sts TIMSK1, r24
+  ldi r24, 1 << ICES1 | {noise_filter} << ICNC1 | 1
+  sbi PINB, 5
+  sts TCCR1B, r24
+  sei
+1: rjmp 1b
+"""
+
+
+@pytest.mark.parametrize(("noise_filter", "delay"), [(0, 0), (1, 4)])
+def test_capture_holds_the_count_at_the_edge(noise_filter: int, delay: int) -> None:
+    machine = Machine(CAPTURE.format(noise_filter=noise_filter))
+    board = machine.board
+    board.drive(CAPTURE_PIN, Level.LOW)
+    edges = [1_003, 1_900, 30_001, 48_504, 60_000, 60_123]
+    for i, edge in enumerate(edges):
+        board.drive(CAPTURE_PIN, Level.LOW if i % 2 else Level.HIGH, at=edge)
+    board.advance(61_000)
+    zero = edges_of(board.log(), 13)[1] + 2
+    assert words(machine, 0x200, 6) == [edge + INPUT_LATENCY + delay - zero for edge in edges]
+
+
+@pytest.mark.parametrize(("noise_filter", "captures"), [(0, 1), (1, 0)])
+def test_noise_filter_drops_a_glitch(noise_filter: int, captures: int) -> None:
+    machine = Machine(CAPTURE.format(noise_filter=noise_filter))
+    machine.board.drive(CAPTURE_PIN, Level.LOW)
+    machine.board.drive(CAPTURE_PIN, Level.HIGH, at=1000)
+    machine.board.drive(CAPTURE_PIN, Level.LOW, at=1003)
+    machine.board.advance(1200)
+    # without the filter the fall comes before the interrupt has turned the edge
+    assert machine.avr.data(26)[0] == 2 * captures
