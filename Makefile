@@ -20,7 +20,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench soak fuzz wheel firmware format setup clean lock compile_commands.json
+.PHONY: help run test check bench soak fuzz wheel firmware pictures format setup clean lock compile_commands.json
 
 help:
 	@echo "make run       build everything, let the wander brain drive the emulated robot, write build/run"
@@ -31,6 +31,7 @@ help:
 	@echo "make fuzz      many more random cases for the tests that take random input"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
+	@echo "make pictures  the pictures of the documentation"
 	@echo "make format    format all sources"
 	@echo "make setup     only what run, test and check need; do no more"
 	@echo "make clean     remove everything that was built"
@@ -64,6 +65,11 @@ EXAMPLES ?= 5000
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis
+
+pictures:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(VENV)/bin/boebot run wander --on avr --seconds 90 --out build/pictures
+	@cp build/pictures/run.png docs/images/wander.png
 
 firmware: ready-firmware
 

@@ -1,0 +1,95 @@
+"""What the documentation says is run: code blocks as they stand, commands as they stand, links and options checked."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("protocol/*.md")])
+BOEBOT = [sys.executable, "-m", "boebot"]
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"`(boebot [^`]+)`")
+
+
+def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+
+
+def blocks(language: str) -> list[tuple[Path, str]]:
+    return [(page, code) for page in PAGES for name, code in BLOCK.findall(page.read_text()) if name == language]
+
+
+def names(rows: list[tuple[Path, str]]) -> list[str]:
+    return [f"{page.name}: {text.splitlines()[0][:50]}" for page, text in rows]
+
+
+@cache
+def help_of(subcommand: str) -> str:
+    shown = subprocess.run(
+        [*BOEBOT, subcommand, "--help"], capture_output=True, text=True, env={"COLUMNS": "200", "TERM": "dumb"}
+    )
+    assert shown.returncode == 0, f"there is no command boebot {subcommand}"
+    return re.sub(r"\x1b\[[0-9;]*m", "", shown.stdout)
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the pages' first comments name, as a reader would have saved them."""
+    folder = tmp_path_factory.mktemp("reader")
+    for _, code in blocks("python"):
+        if match := re.match(r"# (\w+\.py):", code):
+            (folder / match[1]).write_text(code)
+    return folder
+
+
+@pytest.mark.parametrize(("page", "code"), blocks("python"), ids=names(blocks("python")))
+def test_python_block_runs(page: Path, code: str, workspace: Path) -> None:
+    done = run([sys.executable, "-c", code], workspace)
+    assert done.returncode == 0, f"{page.name}:\n{done.stderr}"
+
+
+SHELL_LINES = [
+    (page, line)
+    for page, code in blocks("")
+    for line in code.splitlines()
+    if line.startswith("boebot ") and "/dev/" not in line
+]
+
+
+@pytest.mark.parametrize(("page", "line"), SHELL_LINES, ids=names(SHELL_LINES))
+def test_command_of_a_block_runs(page: Path, line: str, workspace: Path) -> None:
+    done = run([*BOEBOT, *shlex.split(line, comments=True)[1:]], workspace)
+    assert done.returncode == 0, f"{page.name}: {line}\n{done.stderr}"
+
+
+INLINE = sorted({(page, command) for page in PAGES for command in COMMAND.findall(page.read_text())})
+
+
+@pytest.mark.parametrize(("page", "command"), INLINE, ids=names(INLINE))
+def test_command_in_a_sentence_exists_with_its_options(page: Path, command: str) -> None:
+    words = shlex.split(command)[1:]
+    shown = help_of(words[0])
+    for option in (word for word in words[1:] if word.startswith("--") and word != "--help"):
+        assert re.search(rf"{re.escape(option)}\b", shown), f"{page.name}: {command}: no option {option}"
+
+
+TARGETS = sorted({(page, name) for page in PAGES for name in re.findall(r"make (\w+)", page.read_text())})
+
+
+@pytest.mark.parametrize(("page", "target"), TARGETS, ids=[f"{page.name}: make {name}" for page, name in TARGETS])
+def test_make_target_exists(page: Path, target: str) -> None:
+    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"{page.name}: make {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)", page.read_text()):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), f"{page.name}: {target} is not there"

@@ -1,0 +1,126 @@
+"""Who may know whom (README, "How it works"): read from the sources, so that the circle stays one."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import boebot
+from boebot.robot import Observation
+
+ROOT = Path(__file__).resolve().parents[2]
+INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
+
+
+def imported(source: Path) -> Iterator[str]:
+    """Full names of the modules that a Python file imports."""
+    for node in ast.walk(ast.parse(source.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def included(folder: str) -> Iterator[tuple[Path, str]]:
+    """Each C file below a folder with each header that it includes, our own ones as path from the repository's root."""
+    for source in sorted((ROOT / folder).rglob("*.[ch]")):
+        for name in INCLUDE.findall(source.read_text()):
+            for base in (source.parent, ROOT / "sim_bridge", ROOT / "firmware" / "src"):
+                if (base / name).is_file():
+                    yield source, str((base / name).resolve().relative_to(ROOT))
+                    break
+            else:
+                yield source, name
+
+
+def test_host_never_imports_the_simulator() -> None:
+    guilty = [
+        f"{source.relative_to(ROOT)}: {name}"
+        for source in (ROOT / "host" / "boebot").rglob("*.py")
+        for name in imported(source)
+        if name.split(".")[0] == "sim_bridge"
+    ]
+    assert not guilty
+
+
+def test_brains_touch_only_what_is_meant_for_them() -> None:
+    allowed = {"boebot.Robot", "boebot.Observation", "boebot.Command", "boebot"}
+    for source in (ROOT / "host" / "boebot" / "brains").glob("*.py"):
+        if source.name != "__init__.py":
+            own = {name for name in imported(source) if name.split(".")[0] == "boebot"}
+            assert own <= allowed, source.name
+
+
+@pytest.mark.parametrize(
+    ("folder", "forbidden"),
+    [
+        ("firmware/src", ("sim_bridge/", "sim_")),
+        ("sim_bridge/world", ("sim_bridge/boards/", "sim_bridge/parts/", "firmware/", "sim_bridge/loop")),
+        ("sim_bridge/boards", ("sim_bridge/world/", "sim_bridge/parts/", "sim_bridge/loop")),
+        ("sim_bridge/parts", ("firmware/", "sim_bridge/loop")),
+    ],
+)
+def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str, ...]) -> None:
+    if folder == "sim_bridge/boards":  # the AVR board is built on simavr's headers, which begin with sim_ too
+        forbidden = tuple(name for name in forbidden if name != "sim_")
+    guilty = [
+        f"{source.relative_to(ROOT)} includes {name}"
+        for source, name in included(folder)
+        if name.startswith(forbidden)
+    ]
+    assert not guilty
+
+
+def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
+    users = {
+        source for source, name in included("sim_bridge") if re.match(r"(sim_avr|avr_\w+|sim_\w+)\.h$", Path(name).name)
+        and not (ROOT / name).exists()
+    }
+    assert users
+    assert all(source.parent == ROOT / "sim_bridge" / "boards" / "avr" for source in users)
+    for source in users:
+        assert "GPL-3.0-or-later" in source.read_text()[:1500], source.name
+
+
+def test_simulator_knows_no_protocol() -> None:
+    for source in (ROOT / "sim_bridge").rglob("*.py"):
+        if "tests" not in source.parts:
+            assert not any(name.startswith("boebot.link.") and "transport" not in name for name in imported(source)), source
+
+
+def test_observation_leads_to_nothing_of_the_simulator() -> None:
+    """Whatever a brain can reach from its observation, by attributes however deep, is not the simulated world."""
+    reached: list[object] = []
+
+    def step(robot: boebot.Robot) -> None:
+        if not reached:
+            reached.extend(everything(robot.observation))
+
+    boebot.run(step, on="native", seconds=1)
+    assert any(isinstance(thing, Observation) for thing in reached)
+    assert not [thing for thing in reached if type(thing).__module__.startswith("sim_bridge")]
+
+
+def everything(start: object) -> list[object]:
+    """All objects that public and private attributes, items and closures lead to, outside of modules and classes."""
+    seen: dict[int, object] = {}
+    waiting = [start]
+    while waiting:
+        thing = waiting.pop()
+        if id(thing) in seen or isinstance(thing, type | str | bytes | int | float) or type(thing).__name__ == "module":
+            continue
+        seen[id(thing)] = thing
+        for name in dir(thing):
+            if not name.startswith("__") and not callable(getattr(type(thing), name, None)):
+                waiting.append(getattr(thing, name))
+        if isinstance(thing, dict):
+            waiting += list(thing.values())
+        elif isinstance(thing, list | tuple):
+            waiting += list(thing)
+        waiting += [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
+    return list(seen.values())
