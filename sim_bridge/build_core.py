@@ -29,9 +29,17 @@ HEADERS = [
     "boards/native/native_board.h",
     "loop.h",
 ]
-NATIVE_BOARD = """
+# What headers cannot say in a form that cffi reads.
+BEFORE = """
 typedef struct board board;
 board *native_board_create(const char *library_path, char *error, size_t error_size);
+"""
+AFTER = """
+typedef struct { body_state state; ...; } body;
+void body_init(body *self, const body_parameters *parameters, double reach);
+void body_place(body *self, double x, double y, double heading);
+void body_advance(body *self, const arena *where, double torque_left, double torque_right, double dt);
+int body_segment_touches(body *self, const arena *where, double x0, double y0, double x1, double y1);
 """
 SOURCES = [
     "world/*.c",
@@ -57,7 +65,7 @@ def builder(root: Path) -> FFI:
     """The extension, with its sources named from `root`."""
     here = Path(__file__).resolve().parent
     built = FFI()
-    built.cdef("\n".join([NATIVE_BOARD, *(declarations(here / name) for name in HEADERS)]))
+    built.cdef("\n".join([BEFORE, *(declarations(here / name) for name in HEADERS), AFTER]))
     built.set_source(
         "sim_bridge._core",
         "\n".join(f'#include "{name}"' for name in HEADERS),

@@ -10,6 +10,8 @@
 #define LOOK_AHEAD 0.05      /* m: how far the list of near edges stays good */
 #define CLEARANCE_LIMIT 0.75 /* m */
 #define CONTACT_ROUNDS 12
+#define SPEED_LIMIT 100.0 /* m/s: a drive that diverges stays finite */
+#define TURN_LIMIT 1000.0 /* rad/s */
 
 double body_a(const body_parameters *p) { /* (2.26) */
   const double r = p->wheel_radius;
@@ -158,11 +160,15 @@ static void move(body *self, const arena *where, double dx, double dy) {
   s->speed = s->lateral = 0.0;
 }
 
+static double limited(double value, double limit) { return value > limit ? limit : (value < -limit ? -limit : value); }
+
 void body_advance(body *self, const arena *where, double torque_left, double torque_right, double dt) {
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   s->speed += dt * (self->force_gain * (torque_left + torque_right) - self->drag * s->speed); /* (2.31), (3.16) */
   s->turn_rate += dt * (self->torque_gain * (torque_right - torque_left) - self->turn_drag * s->turn_rate); /* (2.32) */
+  s->speed = limited(s->speed, SPEED_LIMIT);
+  s->turn_rate = limited(s->turn_rate, TURN_LIMIT);
   if (s->lateral != 0.0) {
     const double grip = p->lateral_grip * GRAVITY * dt;
     s->lateral = s->lateral > grip ? s->lateral - grip : (s->lateral < -grip ? s->lateral + grip : 0.0);

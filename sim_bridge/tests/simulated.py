@@ -1,0 +1,119 @@
+"""What several tests of the simulator need: robots on script boards, torques on bodies."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from boebot.robots import RobotDescription, load_robot
+from sim_bridge._core import ffi, lib
+from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
+from sim_bridge.session import CLOCK_HZ, BoardPins, EmulatedBoard, Sim
+
+MS = CLOCK_HZ // 1000
+US = CLOCK_HZ // 1_000_000
+
+
+def square(x: float, y: float, side: float) -> list[tuple[float, float]]:
+    """Corners of a square around (x, y)."""
+    h = side / 2
+    return [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h)]
+
+
+def arena_of(
+    *obstacles: list[tuple[float, float]],
+    outline: list[tuple[float, float]] | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Arena:
+    """An arena of those obstacles, named "0", "1" and so on."""
+    return Arena(
+        ArenaDescription(
+            name="test",
+            start=Start(*start),
+            outline=[] if outline is None else [Polygon(outline, "outline")],
+            obstacle=[Polygon(corners, str(index)) for index, corners in enumerate(obstacles)],
+        )
+    )
+
+
+@dataclasses.dataclass
+class Scripted:
+    """A simulated robot whose board plays a script."""
+
+    sim: Sim
+    script: Any
+
+    @property
+    def pins(self) -> BoardPins:
+        return BoardPins(self.sim)
+
+    def run(self, seconds: float) -> None:
+        cycles = round(seconds * CLOCK_HZ)
+        self.sim.run(cycles, cycles)
+
+    def edge(self, cycle: int, pin: int, level: int) -> None:
+        """The board will do `level` to `pin` at `cycle`; call in order of time."""
+        assert lib.script_board_edge(self.script, cycle, pin, level) == 0
+
+    def pulses(self, seconds: float, widths: dict[int, float], start: float = 0.0) -> None:
+        """Servo pulses of those widths (us) by pin every 20 ms."""
+        edges = []
+        for frame in range(round(seconds / 0.02)):
+            rise = round((start + 0.02 * frame) * CLOCK_HZ) + 100
+            for pin, width in widths.items():
+                edges += [(rise, pin, 1), (rise + round(width * US), pin, 0)]
+        for edge in sorted(edges):
+            self.edge(*edge)
+
+    def burst(self, start: int, pin: int, period: int = 421, cycles: int = 38) -> None:
+        """An infra-red burst."""
+        for i in range(cycles):
+            self.edge(start + i * period, pin, 1)
+            self.edge(start + i * period + period // 2, pin, 0)
+
+    def inputs(self, pin: int) -> list[tuple[int, int]]:
+        """(cycle, level) of the changes that were driven on a pin so far."""
+        count = lib.script_board_inputs(self.script, pin, ffi.NULL, ffi.NULL, 0)
+        cycles, levels = ffi.new("uint64_t[]", count + 1), ffi.new("uint8_t[]", count + 1)
+        lib.script_board_inputs(self.script, pin, cycles, levels, count)
+        return [
+            (int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]
+        ]
+
+
+def scripted(
+    arena: Arena | None = None,
+    robot: RobotDescription | None = None,
+    pose: tuple[float, float, float] | None = None,
+    noise: bool = False,
+    seed: int = 1,
+    step_cycles: int = 16_000,
+) -> Scripted:
+    """A robot on a script board, in an empty field if no arena is given."""
+    script = lib.script_board_new()
+    address = int(lib.script_board_address(script))
+    board = EmulatedBoard(address, "script", lambda: lib.script_board_destroy(script))
+    sim = Sim(
+        board,
+        load_robot("shieldbot") if robot is None else robot,
+        arena_of() if arena is None else arena,
+        noise=noise,
+        seed=seed,
+        pose=pose,
+        step_cycles=step_cycles,
+    )
+    return Scripted(sim, script)
+
+
+def distance_to_segments(arena: Arena, x: float, y: float) -> float:
+    """Distance from a point to the arena's polygons, computed without the simulator."""
+    best = math.inf
+    for corners in arena.outlines:
+        a, b = corners, np.roll(corners, -1, axis=0)
+        along = np.clip(((np.array([x, y]) - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0, 1)
+        nearest = a + along[:, None] * (b - a)
+        best = min(best, float(np.hypot(*(nearest - (x, y)).T).min()))
+    return best

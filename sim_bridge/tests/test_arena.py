@@ -1,0 +1,214 @@
+"""Arenas: files, rays, distances, free space."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from simulated import arena_of, distance_to_segments, square
+
+from boebot.errors import ArenaError
+from sim_bridge._core import lib
+from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
+
+coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))
+angles = st.floats(-math.pi, math.pi)
+
+
+@st.composite
+def polygons(draw: st.DrawFn) -> list[tuple[float, float]]:
+    """Star-shaped, hence simple."""
+    x, y = draw(coordinates), draw(coordinates)
+    count = draw(st.integers(3, 9))
+    radii = draw(st.lists(st.floats(0.05, 1.5), min_size=count, max_size=count))
+    turn = draw(angles)
+    return [
+        (x + r * math.cos(turn + 2 * math.pi * i / count), y + r * math.sin(turn + 2 * math.pi * i / count))
+        for i, r in enumerate(radii)
+    ]
+
+
+arenas = st.lists(polygons(), min_size=1, max_size=12).map(lambda shapes: arena_of(*shapes))
+
+
+def shapely_ray(arena: Arena, x: float, y: float, angle: float, reach: float) -> float | None:
+    ray = shapely.LineString([(x, y), (x + reach * math.cos(angle), y + reach * math.sin(angle))])
+    walls = shapely.union_all([shapely.LinearRing(corners) for corners in arena.outlines])
+    hit = ray.intersection(walls)
+    return None if hit.is_empty else float(shapely.Point(x, y).distance(hit))
+
+
+@given(arenas, coordinates, coordinates, angles, st.floats(0.1, 8))
+def test_rays_agree_with_shapely(arena: Arena, x: float, y: float, angle: float, reach: float) -> None:
+    expected = shapely_ray(arena, x, y, angle, reach)
+    found = arena.ray(x, y, angle, reach)
+    if expected is None or found is None:
+        # They may differ only where the ray just grazes or just reaches something.
+        closer = shapely_ray(arena, x, y, angle, reach * (1 + 1e-9))
+        assert (
+            expected is found is None
+            or (closer is not None and closer >= reach * (1 - 1e-9))
+            or grazes(arena, x, y, angle)
+        )
+    elif abs(found - expected) > 1e-9:
+        assert grazes(arena, x, y, angle)
+
+
+def grazes(arena: Arena, x: float, y: float, angle: float) -> bool:
+    """Whether the ray passes a corner so closely that rounding decides."""
+    corners = np.concatenate(arena.outlines) - (x, y)
+    return bool((np.abs(corners @ [-math.sin(angle), math.cos(angle)]) < 1e-9).any())
+
+
+@given(arenas, coordinates, coordinates, angles)
+def test_grid_changes_no_answer(arena: Arena, x: float, y: float, angle: float) -> None:
+    def answers() -> tuple[float | None, float, bool]:
+        return arena.ray(x, y, angle, 20.0), arena.clearance(x, y, 1.0), arena.is_free(x, y, 0.07)
+
+    lib.arena_use_grid(arena.handle, 0)
+    without = answers()
+    lib.arena_use_grid(arena.handle, 1)
+    assert answers() == without
+
+
+@given(arenas, coordinates, coordinates)
+def test_clearance_is_the_distance_to_the_nearest_edge(arena: Arena, x: float, y: float) -> None:
+    assert arena.clearance(x, y, 20.0) == pytest.approx(distance_to_segments(arena, x, y), abs=1e-12)
+
+
+def test_no_ray_slips_through_a_shared_corner() -> None:
+    """One of the defects of the notes' simulator."""
+    arena = arena_of(outline=square(0, 0, 2))
+    for angle in np.linspace(-math.pi, math.pi, 20_001):
+        assert arena.ray(0, 0, angle, 5) is not None
+    for corner in square(0, 0, 2):
+        assert arena.ray(0, 0, math.atan2(corner[1], corner[0]), 5) == pytest.approx(math.sqrt(2))
+
+
+def test_ray_along_an_edge_meets_its_nearer_end() -> None:
+    """(3.8), collinear case."""
+    arena = arena_of(square(2, 0.5, 1))
+    assert arena.ray(0, 0, 0, 5) == pytest.approx(1.5)
+    assert arena.ray(0, 1, 0, 5) == pytest.approx(1.5)
+    assert arena.ray(2, 0, 0, 5) == 0
+    assert arena.ray(4, 0, 0, 5) is None
+
+
+@given(arenas, coordinates, coordinates)
+def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) -> None:
+    solid = shapely.union_all([shapely.Polygon(corners) for corners in arena.outlines])
+    point = shapely.Point(x, y)
+    if solid.boundary.distance(point) < 1e-9 or abs(solid.distance(point) - 0.07) < 1e-9:
+        return
+    edges_apart = distance_to_segments(arena, x, y) >= 0.07
+    assert arena.is_free(x, y, 0.07) == (not solid.contains(point) and edges_apart)
+
+
+def test_free_cells_of_a_room() -> None:
+    arena = arena_of(square(0.1, 0.1, 0.19), outline=square(0, 0, 1))
+    cells = arena.free_cells(0.2, 0.05)
+    # 0.2 m cells on a lattice through the origin: columns and rows -0.5..0.5 hold four whole ones each way and two halves,
+    # whose centres lie on the wall; the obstacle fills one.
+    assert len(cells) == 15
+    assert not any(np.allclose(cell, (0.1, 0.1)) for cell in cells)
+    assert len(arena_of().free_cells(0.2, 0.05)) == 0
+
+
+def test_moved_polygon_is_met_where_it_is() -> None:
+    for grid in (0, 1):
+        arena = arena_of(square(1, 0, 0.2), square(0, 3, 0.2))
+        lib.arena_use_grid(arena.handle, grid)
+        assert arena.ray(0, 0, 0, 5) == pytest.approx(0.9)
+        arena.move("0", 1.0, 0.0)
+        assert arena.ray(0, 0, 0, 5) == pytest.approx(1.9)
+        assert arena.outlines[0].min() == pytest.approx(-0.1)
+    with pytest.raises(ArenaError, match="no polygon 'nobody'"):
+        arena.move("nobody", 0, 0)
+
+
+@pytest.mark.parametrize("name", arena_names())
+def test_bundled_arenas_load_and_let_the_robot_start(name: str) -> None:
+    arena = load_arena(name)
+    x, y, _ = arena.start
+    assert arena.name == name
+    assert arena.is_free(x, y, 0.12)
+
+
+def test_the_notes_arena() -> None:
+    arena = load_arena("arsim")
+    assert [arena.ray(0, 0, k * math.pi / 2, 5) for k in range(4)] == pytest.approx([1.8] * 4)
+    assert arena.ray(0, 0, 3 * math.pi / 4, 5) == pytest.approx(math.hypot(0.7, 0.7))
+
+
+GOOD = """
+name = "mine"
+[[outline]]
+corners_m = [[0, 0], [1, 0], [1, 1], [0, 1]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("name = ", "mine.toml is no valid TOML"),
+        ("title = 'x'", "mine.toml: Object missing required field `name`"),
+        (GOOD + "colour = 'red'", "mine.toml: Object contains unknown field `colour` at `outline["),
+        (GOOD.replace("[0, 1]]", "[0, 'a']]"), "Expected `float`, got `str` at `outline["),
+        (
+            GOOD.replace("[0, 1]]", "[0, nan]]"),
+            "mine.toml: outline[0].corners_m[3] is [0.0, nan]; expected numbers",
+        ),
+        (GOOD.replace("[0, 1]]", "[0, inf]]"), "expected numbers within"),
+        (
+            GOOD.replace(", [1, 1], [0, 1]", ""),
+            "mine.toml: outline[0].corners_m has 2 corners; expected at least 3",
+        ),
+        (GOOD.replace("[0, 1]]", "[1, 1]]"), "corners_m[2] and the corner after it are the same point"),
+        (
+            GOOD.replace("[0, 1]]", "[0, 1], [0, 0]]"),
+            "corners_m[4] and the corner after it are the same point",
+        ),
+        (GOOD.replace("[1, 1], [0, 1]", "[0, 1], [1, 1]"), "edges 1 and 3 cross"),
+        (GOOD.replace("[1, 1], [0, 1]", "[0.5, 0]"), "cross; expected a polygon"),
+        ("name = 'mine'\n[start]\nx_m = 'left'", "Expected `float`, got `str` at `start.x_m`"),
+    ],
+)
+def test_wrong_file_is_told_in_one_sentence(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ArenaError) as caught:
+        load_arena(path)
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_good_file_loads(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    assert load_arena(str(path)).ray(0.5, 0.5, 0, 2) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("name", ["nowhere", "../room", "missing.toml", ""])
+def test_unknown_arena(name: str) -> None:
+    with pytest.raises(ArenaError, match="there is no arena"):
+        load_arena(name)
+
+
+@given(st.lists(st.tuples(coordinates, coordinates), min_size=3, max_size=7))
+def test_what_is_accepted_is_a_simple_polygon(corners: list[tuple[float, float]]) -> None:
+    description = ArenaDescription(name="random", obstacle=[Polygon(corners)])
+    valid = shapely.Polygon(corners).is_valid
+    try:
+        Arena(description)
+    except ArenaError:
+        # Shapely also takes polygons that touch themselves in a point and corners repeated; we take neither.
+        distinct = len(set(corners)) == len(corners)
+        ring = shapely.LinearRing(corners)
+        assert not valid or not distinct or not ring.is_simple or shapely.Polygon(corners).area < 1e-9
+    else:
+        assert valid
