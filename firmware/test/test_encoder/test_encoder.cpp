@@ -1,5 +1,4 @@
 /* Encoders: steps of two lines, counts, periods and the limit. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include <random>

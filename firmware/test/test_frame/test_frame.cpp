@@ -1,5 +1,4 @@
 /* Frames: the golden vectors, and what must not be accepted. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 /* IR pairs: the burst at the LED, the sample at its end, ages. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
+#include <initializer_list>
 
 #include "../native_bench.h"
 #include "generated/parameters.h"
@@ -8,7 +8,7 @@
 TEST_CASE("every reading is 1 ms of 38 kHz on each LED, left first, and leaves the LEDs dark") {
   native_bench bench;
   bench.run_to(bench.tick(DEFAULT_INFRARED_PERIOD) - 1);
-  for (uint8_t pin : {PIN_INFRARED_LEFT_LED, PIN_INFRARED_RIGHT_LED}) {
+  for (const uint8_t pin : std::initializer_list<uint8_t>{PIN_INFRARED_LEFT_LED, PIN_INFRARED_RIGHT_LED}) {
     const auto edges = bench.edges_of(pin);
     const uint64_t slot = bench.slot(pin == PIN_INFRARED_LEFT_LED ? 2 : 3);
     std::vector<uint64_t> rises;

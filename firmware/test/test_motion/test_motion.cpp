@@ -1,6 +1,6 @@
 /* Motor signal or speed to servo pulse. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
+#include <initializer_list>
 
 #include <cstdlib>
 

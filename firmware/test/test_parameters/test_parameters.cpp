@@ -1,5 +1,4 @@
 /* Parameters: ranges and answers. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include <vector>

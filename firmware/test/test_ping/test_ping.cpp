@@ -1,5 +1,4 @@
 /* Ping: trigger, echo, age, silence. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include "../native_bench.h"

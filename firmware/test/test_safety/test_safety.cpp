@@ -1,6 +1,6 @@
 /* When the motors may run: time to live, stop, and pulses that are whole or absent. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
+#include <initializer_list>
 
 #include <random>
 #include <set>
@@ -68,7 +68,7 @@ TEST_CASE("signal 0 holds the wheels with centre pulses") {
 }
 
 TEST_CASE("motors stop within the time to live plus one servo frame, and not before it") {
-  for (uint16_t time_to_live : {20, 100, 250, 999, 2000}) {
+  for (const uint16_t time_to_live : std::initializer_list<uint16_t>{20, 100, 250, 999, 2000}) {
     native_bench bench;
     bench.run(10 * TICK + 12345);
     bench.signal(5000, 5000, time_to_live);

@@ -1,5 +1,4 @@
 /* The tick and what the board says: telemetry each tick, hello, identity, garbage on the line, cuts of a run. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include <random>

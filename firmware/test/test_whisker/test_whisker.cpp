@@ -1,5 +1,4 @@
 /* Whiskers: debouncing alone, then at the pins of the whole firmware. */
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest.h>
 
 #include <vector>
