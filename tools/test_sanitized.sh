@@ -13,4 +13,4 @@ ubsan=$(cc -print-file-name=libubsan.so)
 # Python itself leaves memory to the end of the process, and must use malloc for its objects to be watched.
 echo "Simulator under sanitizers"
 LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc PYTHONPATH=build/sanitized/lib \
-  $python -m pytest -q -p no:cacheprovider sim_bridge/tests
+  $python -m pytest -q sim_bridge/tests
