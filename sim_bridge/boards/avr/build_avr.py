@@ -48,6 +48,13 @@ CONFIGURATION_HEADERS = {
     ),
 }
 
+# -w: simavr has warnings; ours are errors in tools/warnings.sh. The other flags let the compiler join the core's many
+# small functions: a quarter faster than -O2.
+COMPILER_FLAGS = [
+    *("-std=gnu11", "-w", "-fvisibility=hidden", "-O3"),
+    *("--param=inline-unit-growth=400", "--param=max-inline-insns-auto=200"),
+]
+
 DECLARATIONS = """
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 void avr_board_destroy(board *self);
@@ -103,8 +110,7 @@ def make_ffi() -> FFI:
         ],
         include_dirs=[str(path) for path in (HERE, simavr / "sim", simavr / "cores", CONFIGURATION)],
         depends=[str(HERE / "build_avr.py"), *(str(path.relative_to(ROOT)) for path in headers())],
-        # -w: simavr has warnings; ours are errors in tools/warnings.sh
-        extra_compile_args=["-std=gnu11", "-O2", "-w", "-fvisibility=hidden"],
+        extra_compile_args=COMPILER_FLAGS,
     )
     return builder
 
