@@ -112,8 +112,8 @@ def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) ->
 def test_free_cells_of_a_room() -> None:
     arena = arena_of(square(0.1, 0.1, 0.19), outline=square(0, 0, 1))
     cells = arena.free_cells(0.2, 0.05)
-    # 0.2 m cells on a lattice through the origin: columns and rows -0.5..0.5 hold four whole ones each way and two halves,
-    # whose centres lie on the wall; the obstacle fills one.
+    # Cells of 0.2 m on a lattice through the origin: between -0.5 and 0.5 lie four whole ones each way and two halves,
+    # whose centres are on the wall; the obstacle fills one.
     assert len(cells) == 15
     assert not any(np.allclose(cell, (0.1, 0.1)) for cell in cells)
     assert len(arena_of().free_cells(0.2, 0.05)) == 0

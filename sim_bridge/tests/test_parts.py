@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -37,7 +38,7 @@ def servo(**changes: float) -> Any:
     return parameters
 
 
-# ---- servo -----------------------------------------------------------------------------------------------------------
+# ---- servo -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -141,7 +142,7 @@ def test_units_differ_by_seed_and_keep_their_nature() -> None:
     assert spread == pytest.approx(math.hypot(0.025, 0.015), rel=0.15)
 
 
-# ---- encoder -----------------------------------------------------------------------------------------------------------
+# ---- encoder ---------------------------------------------------------------------------------------------
 
 
 def edges(robot: Scripted, pin: int) -> list[tuple[int, int]]:
@@ -162,7 +163,7 @@ def test_encoder_edges_are_the_wheels_angle(left_us: int, right_us: int) -> None
         expected = abs(math.floor(angle * 64 / (2 * math.pi) + 0.5))
         assert abs(len(edges(robot, pin)) - expected) <= 1
         levels = [level for _, level in robot.inputs(pin)]
-        assert all(a != b for a, b in zip(levels, levels[1:], strict=False))
+        assert all(a != b for a, b in itertools.pairwise(levels))
 
 
 def test_encoder_edges_come_at_exact_times() -> None:
@@ -206,7 +207,7 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
     assert (count > 50) == forward
 
 
-# ---- whisker -----------------------------------------------------------------------------------------------------------
+# ---- whisker ---------------------------------------------------------------------------------------------
 
 
 def test_whisker_grounds_its_pin_while_it_touches() -> None:
@@ -256,7 +257,7 @@ def test_whisker_can_be_held() -> None:
     assert robot.inputs(5)[-1][1] == 1
 
 
-# ---- IR pair ---------------------------------------------------------------------------------------------------------
+# ---- IR pair ---------------------------------------------------------------------------------------------
 
 
 def seen_from(
@@ -339,7 +340,7 @@ def test_infrared_false_hits_are_rare() -> None:
     assert 0 < len(robot.inputs(RECEIVER)) // 2 < 15  # 4 expected
 
 
-# ---- Ping ------------------------------------------------------------------------------------------------------------
+# ---- Ping ------------------------------------------------------------------------------------------------
 
 
 def ping_at(
@@ -447,7 +448,7 @@ def test_answers_can_be_given_in_the_worlds_place() -> None:
     assert len(robot.inputs(PING)) == 3
 
 
-# ---- battery ---------------------------------------------------------------------------------------------------------
+# ---- battery ---------------------------------------------------------------------------------------------
 
 
 def test_pack_sags_under_load_and_the_regulator_holds() -> None:

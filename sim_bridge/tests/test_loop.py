@@ -1,0 +1,354 @@
+"""The loop: when it returns, what it carries, and that a run is the same however it is cut."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from simulated import MS, US, Scripted, arena_of, scripted, square
+
+from boebot.errors import ArenaError, BoardError
+from boebot.robots import load_robot
+from sim_bridge import imperfections
+from sim_bridge._core import ffi, lib
+from sim_bridge.session import CLOCK_HZ, EmulatedBoard, Sim, SimTransport
+
+BYTE = 320  # cycles at 500,000 baud
+
+
+def message(robot: Scripted, end: int, count: int = 10) -> None:
+    """Bytes back to back, the last one's stop bit at `end`."""
+    for i in range(count):
+        assert lib.script_board_byte(robot.script, end - (count - 1 - i) * BYTE, i) == 0
+
+
+# ---- when it returns -------------------------------------------------------------------------------------
+
+
+def test_read_waits_for_the_whole_message() -> None:
+    robot = scripted()
+    transport = SimTransport(robot.sim, "script")
+    message(robot, 20 * MS + 123, count=60)
+    data = transport.read(0.1)
+    assert data == bytes(range(60))
+    idle = robot.sim.cycle - (20 * MS + 123)
+    assert 2 * BYTE <= idle <= 2 * BYTE + 4000
+
+
+def test_read_lets_quiet_time_pass() -> None:
+    robot = scripted()
+    transport = SimTransport(robot.sim, "script")
+    message(robot, 10 * MS)
+    message(robot, 20 * MS)
+    message(robot, 50 * MS)
+    assert len(transport.read(0.1, quiet_s=0.040)) == 20
+    assert transport.now() == pytest.approx(0.040)
+    assert len(transport.read(0.1)) == 10
+    assert 0.050 < transport.now() < 0.0505
+
+
+def test_read_ends_after_its_wait() -> None:
+    robot = scripted()
+    transport = SimTransport(robot.sim, "script")
+    assert transport.read(0.0123) == b""
+    assert transport.now() == pytest.approx(0.0123)
+    message(robot, robot.sim.cycle + 2 * MS, count=60)
+    assert len(transport.read(0.001)) < 60  # in the middle of it
+    assert transport.read(0.0) == b""
+    assert transport.read(0.01, quiet_s=1.0) != b""
+    assert transport.now() == pytest.approx(0.0233)
+
+
+def test_bytes_reach_the_board() -> None:
+    robot = scripted()
+    SimTransport(robot.sim, "script").write(b"hello")
+    buffer = ffi.new("uint8_t[]", 10)
+    assert lib.script_board_sent(robot.script, buffer, 10) == 5
+    assert ffi.buffer(buffer, 5)[:] == b"hello"
+
+
+def test_long_silence_of_the_reader_loses_nothing() -> None:
+    robot = scripted()
+    for i in range(200_000):
+        lib.script_board_byte(robot.script, i * BYTE, i & 0xFF)
+    robot.run(4.1)
+    assert robot.sim.receive() == bytes(i & 0xFF for i in range(200_000))
+
+
+def test_closed_transport_says_so() -> None:
+    transport = SimTransport(scripted().sim, "script")
+    transport.close()
+    for call in (lambda: transport.read(0.1), lambda: transport.write(b"x"), transport.now):
+        with pytest.raises(BoardError, match="closed"):
+            call()
+
+
+def test_paced_transport_keeps_to_the_wall_clock() -> None:
+    import time
+
+    transport = SimTransport(scripted().sim, "script", paced=True)
+    start = time.monotonic()
+    for _ in range(10):
+        transport.read(0.01)
+    assert 0.095 <= time.monotonic() - start < 0.3
+
+
+# ---- the same however it is cut --------------------------------------------------------------------------
+
+
+def lively(seed: int = 1, noise: bool = True) -> Scripted:
+    """A robot that drives, turns, hits things, blinks and pings for two seconds."""
+    arena = arena_of(square(0.33, 0.1, 0.3), outline=square(0, 0, 1.2))
+    robot = scripted(arena, noise=noise, seed=seed)
+    edges: list[tuple[int, int, int]] = []
+    for frame in range(100):
+        rise = frame * 20 * MS + 777
+        left, right = (1700, 1320) if frame < 60 else (1350, 1400)
+        edges += [
+            (rise, 13, 1),
+            (rise + left * US, 13, 0),
+            (rise + 40_000, 12, 1),
+            (rise + 40_000 + right * US, 12, 0),
+        ]
+        for i in range(20):
+            edges += [(rise + 100_000 + 421 * i, 9, 1), (rise + 100_200 + 421 * i, 9, 0)]
+        edges += [(rise + 200_000, 8, 1), (rise + 200_080, 8, 2)]
+    for edge in sorted(edges):
+        robot.edge(*edge)
+    return robot
+
+
+def outcome(robot: Scripted) -> tuple[Any, ...]:
+    return (robot.sim.hash(), [robot.inputs(pin) for pin in range(20)], robot.sim.truth()["x"].tobytes())
+
+
+def test_lively_robot_is_lively() -> None:
+    robot = lively()
+    robot.run(2.0)
+    assert lib.sim_contacts(robot.sim.handle, 0) >= 1
+    assert all(len(robot.inputs(pin)) > 2 for pin in (16, 17, 5, 7, 10, 8))
+
+
+@given(st.lists(st.integers(1, 40 * MS), min_size=1, max_size=60))
+def test_run_does_not_depend_on_how_it_is_cut(cuts: list[int]) -> None:
+    whole, pieces = lively(), lively()
+    whole.sim.run(2 * CLOCK_HZ, 2 * CLOCK_HZ)
+    for cut in cuts:
+        left = 2 * CLOCK_HZ - pieces.sim.cycle
+        pieces.sim.run(min(cut, left), min(cut, left))
+    left = 2 * CLOCK_HZ - pieces.sim.cycle
+    pieces.sim.run(left, left)
+    assert outcome(pieces) == outcome(whole)
+
+
+def test_same_seed_same_run_other_seed_other_run() -> None:
+    runs = [lively(seed) for seed in (1, 1, 2)]
+    for robot in runs:
+        robot.run(2.0)
+    assert outcome(runs[0]) == outcome(runs[1])
+    assert outcome(runs[0])[0] != outcome(runs[2])[0]
+
+
+def test_state_is_the_same_on_every_machine() -> None:
+    """The state's bits after two lively seconds. Whoever changes the world on purpose changes this number too."""
+    robot = lively(seed=42)
+    robot.run(2.0)
+    assert f"{robot.sim.hash():016x}" == "ff5e8bc8ad65e652"
+
+
+@pytest.mark.parametrize("step_us", [100, 500, 2000, 5000, 10000])
+def test_step_of_the_world_may_be_chosen(step_us: int) -> None:
+    def end(step_cycles: int) -> Any:
+        robot = scripted(step_cycles=step_cycles)
+        robot.pulses(1.0, {13: 1600, 12: 1420})
+        robot.run(1.0)
+        return robot.sim.body()
+
+    coarse, usual = end(step_us * US), end(1 * MS)
+    assert coarse.x == pytest.approx(usual.x, abs=0.003)
+    assert coarse.heading == pytest.approx(usual.heading, abs=0.03)
+
+
+@pytest.mark.parametrize("step_cycles", [0, -16_000, 15_999, 48_000, 320_000])
+def test_step_that_does_not_divide_the_tick_is_refused(step_cycles: int) -> None:
+    with pytest.raises(BoardError, match="does not divide"):
+        scripted(step_cycles=step_cycles)
+
+
+# ---- truth and logs --------------------------------------------------------------------------------------
+
+
+def test_truth_has_a_row_every_ten_milliseconds() -> None:
+    robot = lively()
+    robot.run(2.0)
+    truth = robot.sim.truth()
+    assert truth["time"] == pytest.approx(np.arange(200) * 0.01)
+    speed = np.hypot(np.diff(truth["x"]), np.diff(truth["y"])) / 0.01
+    assert speed.max() < 0.25
+    assert truth["contact"].max() == 1 and truth["contact"].min() == 0
+    assert truth["left"] == pytest.approx(truth["speed"] - 0.0525 * truth["turn_rate"])
+
+
+def test_nothing_is_recorded_unless_asked_for() -> None:
+    script = lib.script_board_new()
+    board = EmulatedBoard(
+        int(lib.script_board_address(script)), "script", lambda: lib.script_board_destroy(script)
+    )
+    sim = Sim(board, load_robot("shieldbot"), arena_of(), record=False)
+    sim.run(CLOCK_HZ, CLOCK_HZ)
+    assert len(sim.truth()["time"]) == 0
+    assert len(sim.looks()["time"]) == 0
+    sim.close()
+
+
+def test_looks_tell_where_the_sensors_looked() -> None:
+    robot = scripted(arena_of([(1.06, -3), (1.2, -3), (1.2, 3), (1.06, 3)]))
+    robot.edge(1 * MS, 8, 1)
+    robot.edge(1 * MS + 80, 8, 2)
+    robot.burst(2 * MS, 9)
+    robot.run(0.1)
+    looks = robot.sim.looks()
+    assert looks["kind"].tolist() == [1, 0]
+    assert looks["distance"] == pytest.approx([1.0, -1.0])
+    assert looks["x"] == pytest.approx([0.06, 0.05])
+    assert looks["reach"] == pytest.approx([3.0, 0.2], rel=1e-3)
+
+
+def test_pin_log_has_every_edge_in_order() -> None:
+    robot = lively()
+    robot.run(2.0)
+    log = robot.pins.pin_log()
+    assert len(log) == 100 * (4 + 40 + 2)
+    assert (np.diff(log["cycle"].astype(np.int64)) >= 0).all()
+    servo = log[log["pin"] == 13]
+    assert (np.diff(servo["cycle"].astype(np.int64))[:100:2] == 1700 * US).all()
+
+
+def test_pin_log_keeps_the_newest_million() -> None:
+    robot = scripted()
+    for i in range(1_200_000):
+        lib.script_board_edge(robot.script, 10 * i, 4, i & 1)
+    robot.run(1.0)
+    log = robot.pins.pin_log()
+    assert len(log) == 1 << 20
+    assert log["cycle"][-1] == 10 * 1_199_999
+    assert (np.diff(log["cycle"].astype(np.int64)) == 10).all()
+
+
+def test_contacts_are_counted_once_each() -> None:
+    robot = scripted(arena_of(square(0.6, 0, 0.3)))  # face at 0.45
+    robot.pulses(4.0, {13: 1700, 12: 1300})
+    robot.pulses(2.0, {13: 1300, 12: 1700}, start=4.0)
+    robot.pulses(4.0, {13: 1700, 12: 1300}, start=6.0)
+    robot.run(10.0)
+    assert lib.sim_contacts(robot.sim.handle, 0) == 2
+
+
+# ---- hands of a test -------------------------------------------------------------------------------------
+
+
+def test_driven_pin_belongs_to_the_test() -> None:
+    robot = scripted(arena_of(square(1, 0, 1)), pose=(0.41, 0, 0))  # whiskers press
+    robot.run(0.01)
+    robot.pins.drive(5, 1, 20 * MS)
+    robot.pins.drive(5, 0, 30 * MS)
+    robot.pins.drive(5, 2, 40 * MS)  # an open switch: the resistor pulls up
+    robot.run(0.1)
+    assert robot.inputs(5)[-3:] == [(20 * MS, 1), (30 * MS, 0), (40 * MS, 1)]
+
+
+def test_square_wave_has_its_edges() -> None:
+    robot = scripted()
+    robot.run(0.005)
+    robot.pins.square_wave(16, 64_000, 0.2)
+    robot.run(0.3)
+    wave = robot.inputs(16)[1:]
+    assert len(wave) == 100
+    assert {b[0] - a[0] for a, b in itertools.pairwise(wave)} == {32_000}
+    robot.pins.square_wave(16, 160, 0.5)
+    robot.run(0.6)
+    assert len(robot.inputs(16)) == 1 + 100 + 100_000
+
+
+def test_robot_is_put_only_where_it_fits() -> None:
+    robot = scripted(arena_of(square(1, 0, 1)))
+    robot.pins.place(0.3, 0.2, 1.0)
+    assert (robot.sim.body().x, robot.sim.body().y, robot.sim.body().heading) == (0.3, 0.2, 1.0)
+    for x in (0.45, 1.0):
+        with pytest.raises(ArenaError, match="no free space"):
+            robot.pins.place(x, 0, 0)
+    with pytest.raises(ArenaError, match="cannot start"):
+        scripted(arena_of(square(1, 0, 1)), pose=(1.0, 0, 0))
+
+
+@pytest.mark.parametrize(("pin", "level"), [(20, 0), (5, 3)])
+def test_unknown_pins_and_levels_are_refused(pin: int, level: int) -> None:
+    with pytest.raises(BoardError):
+        scripted().pins.drive(pin, level)
+
+
+# ---- boards ----------------------------------------------------------------------------------------------
+
+
+def test_crash_of_a_board_is_told() -> None:
+    robot = scripted()
+    robot.run(0.5)
+    lib.script_board_crash(robot.script)
+    with pytest.raises(BoardError, match=r"the script crashed at 0\.500 s: the script says so"):
+        robot.run(0.1)
+
+
+def test_board_of_another_version_is_refused() -> None:
+    script = lib.script_board_new()
+    operations = ffi.new("uint32_t[64]")
+    operations[0] = 99
+    board = ffi.new("void *[8]")
+    board[0] = operations
+    released = []
+    with pytest.raises(BoardError, match="another version"):
+        EmulatedBoard(int(ffi.cast("uintptr_t", board)), "old board", lambda: released.append(1))
+    assert released
+    lib.script_board_destroy(script)
+
+
+def test_several_robots_share_a_run_and_do_not_disturb_each_other() -> None:
+    """Two robots with their own boards; the first one's bits are the same as alone."""
+
+    def run(count: int) -> list[Any]:
+        arena = arena_of(outline=square(0, 0, 4))
+        sim = ffi.gc(lib.sim_new(arena.handle, 5, 16_000, 0, 1), lib.sim_destroy)
+        description = load_robot("shieldbot")
+        draw = imperfections.Draw(5, noise=True)
+        body = imperfections.body_parameters(description.body)
+        scripts = [lib.script_board_new() for _ in range(count)]
+        for number, script in enumerate(scripts):
+            address = int(lib.script_board_address(script))
+            assert lib.sim_add_robot(sim, address, body, 0.5 * number, 0.5 * number, 0.3) == number
+            assert lib.sim_add_battery(sim, number, 255, imperfections.battery_parameters()) == 0
+            for side, (name, pin) in enumerate((("servo_left", 13), ("servo_right", 12))):
+                servo = imperfections.servo_parameters(description.device[name], description.body, side, draw)
+                assert lib.sim_add_servo(sim, number, side, pin, servo) == 0
+                assert lib.sim_add_encoder(sim, number, side, 16 + side, 255, 64) == 0
+            for frame in range(50):
+                for pin in (12, 13):
+                    lib.script_board_edge(script, frame * 20 * MS + 100 * pin, pin, 1)
+                for pin, width in ((12, 1400 - 20 * number), (13, 1650)):
+                    lib.script_board_edge(script, frame * 20 * MS + 100 * pin + width * US, pin, 0)
+        assert lib.sim_run(sim, CLOCK_HZ, CLOCK_HZ) == 0
+        states = []
+        for number in range(count):
+            state = ffi.new("body_state *")
+            lib.sim_body(sim, number, state)
+            states.append(ffi.buffer(state)[:])
+        ffi.release(sim)
+        for script in scripts:
+            lib.script_board_destroy(script)
+        return states
+
+    alone, two = run(1), run(2)
+    assert two[0] == alone[0]
+    assert two[1] != two[0]

@@ -1,0 +1,97 @@
+"""An emulated robot on a pty and on a TCP port, as other programs meet it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from boebot.boards import BoardRequest, open_port
+from boebot.errors import BoardError
+from boebot.link import frame, messages
+from boebot.link.transport import Transport
+from boebot.robots import load_robot
+from sim_bridge.serve import serve
+
+PORTS = [0] + ([None] if os.name == "posix" else [])
+
+
+def request() -> BoardRequest:
+    return BoardRequest(robot=load_robot("shieldbot"), arena="empty", record=False)
+
+
+@contextmanager
+def served(tcp: int | None) -> Iterator[str]:
+    """The URL of a served native board."""
+    urls: list[str] = []
+    announced, stop = threading.Event(), threading.Event()
+
+    def announce(url: str) -> None:
+        urls.append(url)
+        announced.set()
+
+    def work() -> None:
+        serve("native", request(), tcp=tcp, announce=announce, running=lambda: not stop.is_set())
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        assert announced.wait(5)
+        yield urls[0]
+    finally:
+        stop.set()
+        thread.join(5)
+        assert not thread.is_alive()
+
+
+def listen(transport: Transport, seconds: float) -> list[tuple[int, int, bytes]]:
+    """The messages that come in that time."""
+    decoder, heard = frame.Decoder(), []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        heard += decoder.feed(transport.read(0.01))
+    return heard
+
+
+@pytest.mark.parametrize("tcp", PORTS)
+def test_client_meets_a_robot_that_just_started(tcp: int | None) -> None:
+    with served(tcp) as url:
+        for _ in range(2):  # a second client finds it as the first one did
+            time.sleep(0.1)
+            client = open_port(url, 500_000)
+            heard = listen(client, 0.5)
+            assert heard[0][0] == messages.Hello.ID
+            ticks = [
+                messages.Telemetry.unpack(p).tick for kind, _, p in heard if kind == messages.Telemetry.ID
+            ]
+            assert ticks[0] <= 1
+            assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+            assert 25 <= len(ticks) <= 55  # real time: 50
+            client.write(frame.encode(messages.HelloRequest.ID, 0, messages.HelloRequest(1).pack()))
+            assert any(kind == messages.Hello.ID for kind, _, _ in listen(client, 0.2))
+            client.close()
+
+
+def test_client_that_does_not_read_stops_nobody() -> None:
+    with served(0) as url:
+        host, port = url.removeprefix("socket://").split(":")
+        with socket.create_connection((host, int(port))) as silent:
+            silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+            time.sleep(0.3)
+        client = open_port(url, 500_000)
+        assert listen(client, 0.3)
+        client.close()
+
+
+def test_what_cannot_be_served_is_told() -> None:
+    with served(0) as url:
+        taken = int(url.rpartition(":")[2])
+        with pytest.raises(BoardError, match=f"TCP port {taken} cannot be opened"):
+            serve("native", request(), tcp=taken, announce=print, running=lambda: False)
+    with pytest.raises(BoardError, match="no emulated board 'toaster'"):
+        serve("toaster", request(), tcp=0, announce=print, running=lambda: False)

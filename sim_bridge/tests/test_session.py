@@ -1,0 +1,151 @@
+"""A simulated robot as the host opens it, on the native board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from simulated import MS
+
+from boebot.boards import BoardRequest
+from boebot.errors import ArenaError, BoardError
+from boebot.link import frame, messages
+from boebot.robots import load_robot
+from sim_bridge.session import SimSession, open_native
+
+
+def open_with(**wishes: Any) -> SimSession:
+    """A session in an empty field without noise, unless wished otherwise."""
+    return open_native(
+        BoardRequest(**{"robot": load_robot("shieldbot"), "arena": "empty", "noise": False, **wishes})
+    )
+
+
+@pytest.fixture
+def session() -> Iterator[SimSession]:
+    opened = open_with()
+    yield opened
+    opened.close()
+
+
+def drive(session: SimSession, left: float, right: float, seconds: float) -> bytes:
+    """Sends motor signals every 50 ms; returns what the board said."""
+    heard = b""
+    end = session.transport.now() + seconds
+    sequence = 0
+    while session.transport.now() < end - 1e-9:
+        setpoint = messages.SetpointSignal(round(left * 1e4), round(right * 1e4), 250, 0)
+        session.transport.write(frame.encode(setpoint.ID, sequence & 0xFF, setpoint.pack()))
+        heard += session.transport.read(0.05, 0.05)
+        sequence += 1
+    return heard
+
+
+def test_board_says_hello_and_sends_a_message_per_tick(session: SimSession) -> None:
+    decoder = frame.Decoder()
+    heard = decoder.feed(session.transport.read(1.0, 1.0))
+    assert heard[0][0] == messages.Hello.ID
+    ticks = [
+        messages.Telemetry.unpack(payload).tick for kind, _, payload in heard if kind == messages.Telemetry.ID
+    ]
+    assert ticks == list(range(len(ticks)))
+    assert len(ticks) in (99, 100)
+
+
+def test_each_read_brings_one_whole_message(session: SimSession) -> None:
+    session.transport.read(0.1, 0.1)
+    for _ in range(20):
+        assert len(frame.Decoder().feed(session.transport.read(0.03, 0.005))) == 1
+
+
+def test_it_drives_straight_and_records_it(session: SimSession) -> None:
+    drive(session, 0.5, 0.5, 3.0)
+    truth = session.truth()
+    assert truth is not None
+    assert truth.x[-1] == pytest.approx(3.0 * 0.15, abs=0.05)
+    assert abs(truth.y[-1]) < 0.01
+    assert truth.time[-1] == pytest.approx(3.0, abs=0.02)
+    assert not truth.contact.any()
+    counters = session.counters()
+    assert counters["distance"] == pytest.approx(
+        np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005
+    )
+    assert counters["contacts"] == 0
+    assert counters["bytes_in"] > 0 and counters["overruns"] == 0
+
+
+def test_it_turns_left_for_a_slower_left_wheel(session: SimSession) -> None:
+    drive(session, -0.5, 0.5, 1.0)
+    assert session.sim.body().heading > 1.0
+
+
+def test_same_request_same_bytes() -> None:
+    def heard(seed: int) -> tuple[bytes, int]:
+        session = open_with(arena="room", noise=True, seed=seed)
+        data = drive(session, 0.6, 0.5, 6.0)
+        result = data, session.sim.hash()
+        session.close()
+        return result
+
+    assert heard(1) == heard(1)
+    assert heard(1)[1] != heard(2)[1]
+
+
+def test_sessions_side_by_side_share_nothing() -> None:
+    one, other = open_with(), open_with()
+    drive(one, 0.5, 0.5, 0.5)
+    other.transport.read(0.5, 0.5)
+    assert one.sim.body().x > 0.02
+    assert other.sim.body().x == 0
+    one.close()
+    drive(other, 0.5, 0.5, 0.5)
+    assert other.sim.body().x > 0.02
+    other.close()
+
+
+def test_reset_starts_the_program_again(session: SimSession) -> None:
+    drive(session, 0.5, 0.5, 0.5)
+    before = session.sim.body().x
+    session.transport.read(0.0)
+    session.board.reset("external")
+    heard = frame.Decoder().feed(session.transport.read(0.2, 0.2))
+    assert heard[0][0] == messages.Hello.ID
+    assert session.board.counters()["resets"] == 1
+    assert session.board.reset_cycle == 500 * MS
+    assert session.sim.body().x > before  # the world went on
+
+
+def test_start_pose_is_heeded() -> None:
+    session = open_with(start_pose=(0.3, -0.2, 1.0))
+    body = session.sim.body()
+    assert (body.x, body.y, body.heading) == (0.3, -0.2, 1.0)
+    session.close()
+
+
+def test_close_may_come_twice(session: SimSession) -> None:
+    session.close()
+    session.close()
+
+
+def test_wrong_requests_are_told_in_a_sentence(tmp_path: Path) -> None:
+    robot = load_robot("shieldbot")
+    no_library = tmp_path / "firmware.so"
+    no_library.write_text("nothing")
+    for error, message, wishes in (
+        (ArenaError, "there is no arena 'moon'", {"arena": "moon"}),
+        (ArenaError, "cannot start", {"arena": "room", "start_pose": (9.0, 9.0, 0.0)}),
+        (BoardError, "there is no firmware image", {"image": "no.such.so"}),
+        (BoardError, "firmware.so", {"image": str(no_library)}),
+        (
+            BoardError,
+            "no firmware for this computer",
+            {"robot": msgspec.structs.replace(robot, pin_map="other")},
+        ),
+        (BoardError, "does not divide", {"options": {"world_step_s": 0.003}}),
+    ):
+        with pytest.raises(error, match=message):
+            open_with(**wishes)
