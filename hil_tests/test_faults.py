@@ -1,0 +1,91 @@
+"""Faults planted in the very image: what the robot does when its program hangs, crashes or is reset in mid-run."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from elftools.elf.elffile import ELFFile
+from rig import CYCLES_PER_S, Rig
+
+from boebot import resources
+from boebot.boards import BoardRequest, open_board
+from boebot.errors import BoebotError
+from boebot.link import messages
+from boebot.robots import load_robot
+
+LEFT, RIGHT = 13, 12
+JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
+RESERVED_OPCODE = b"\xff\x00"  # 0x00ff is no instruction of the ATmega328P
+
+
+def planted(folder: Path, function: str, code: bytes) -> str:
+    """A copy of the image in which `function` begins with `code`."""
+    image = bytearray((resources.folder("images") / "shieldbot.elf").read_bytes())
+    elf = ELFFile(io.BytesIO(bytes(image)))
+    (symbol,) = elf.get_section_by_name(".symtab").get_symbol_by_name(function)
+    text = elf.get_section_by_name(".text")
+    start = text["sh_offset"] + symbol["st_value"] - text["sh_addr"]
+    image[start : start + len(code)] = code
+    path = folder / f"{function}.elf"
+    path.write_bytes(image)
+    return str(path)
+
+
+def rig_with(image: str) -> Rig:
+    return Rig(open_board("avr", BoardRequest(robot=load_robot("shieldbot"), arena="empty", noise=False, image=image)))
+
+
+def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_path: Path) -> None:
+    """The handler of `stop` hangs: the pulses, made by interrupts, go on until the watchdog ends it."""
+    with rig_with(planted(tmp_path, "safety_stop", JUMP_TO_ITSELF)) as rig:
+        assert rig.start().reset_cause == messages.ResetCause.POWER
+        rig.drive_for(0.5, 0.5, 0.2)
+        hung_at = rig.board.cycle
+        rig.answers.clear()
+        rig.send(messages.Stop())
+        hello = rig.wait_for(
+            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None), 1.0, "a hello after the reset"
+        )
+        assert hello.reset_cause == messages.ResetCause.WATCHDOG
+        assert rig.latest().status & messages.Status.WATCHDOG_RESET
+        rig.listen(0.3)
+        last = rig.pulses(LEFT)[-1].sum()
+        assert (last - hung_at) / CYCLES_PER_S < 0.20, "the motors ran on"
+        assert rig.latest().pulse_left == 0
+        rig.drive_for(0.5, 0.5, 0.2)
+        assert rig.latest().pulse_left > 0, "after the reset a fresh set-point drives again"
+
+
+def test_program_that_crashes_is_said_so_in_one_sentence(tmp_path: Path) -> None:
+    with rig_with(planted(tmp_path, "safety_stop", RESERVED_OPCODE)) as rig:
+        rig.start()
+        rig.send(messages.Stop())
+        with pytest.raises(BoebotError, match="instruction|opcode"):
+            rig.listen(0.2)
+
+
+def test_image_that_is_none_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "image.elf"
+    path.write_bytes(b"this is no ELF file")
+    with pytest.raises(BoebotError, match=r"image\.elf"):
+        rig_with(str(path))
+
+
+def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> None:
+    for cause in ("external", "brown_out"):
+        rig.drive_for(0.5, 0.5, 0.2)
+        rig.answers.clear()
+        reset_at = rig.board.cycle
+        rig.board.reset(cause)
+        hello = rig.wait_for(
+            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None), 1.0, "a hello after the reset"
+        )
+        assert hello.reset_cause == messages.ResetCause[cause.upper()]
+        rig.listen(0.3)
+        pulses = rig.pulses(LEFT)
+        assert np.all(pulses[:, 0] <= reset_at), "a pulse after the reset"
+        assert rig.latest().tick < 60
+    assert rig.board.cycle > reset_at, "the board's clock goes on across resets"

@@ -1,0 +1,115 @@
+"""The emulated robot offered to other programs: on a pty and on TCP, driven as one would a robot on a port."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+BOEBOT = [sys.executable, "-m", "boebot"]
+
+
+@contextmanager
+def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The URL of an emulated robot that another process serves, and that process."""
+    server = subprocess.Popen(
+        [*BOEBOT, "serve", "--on", board, *where, "--arena", "room", "--json"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert server.stdout is not None
+        announced = "".join(iter(server.stdout.readline, "}\n")) + "}"
+        yield json.loads(announced)["url"], server
+    finally:
+        server.send_signal(signal.SIGINT)
+        assert server.wait(timeout=5) in (0, 130, -signal.SIGKILL)
+        server.stdout.close()
+
+
+def boebot(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, timeout=30)
+
+
+@pytest.mark.parametrize(
+    ("board", "where"), [("avr", ("--pty",)), ("native", ("--tcp", "0"))], ids=["avr-pty", "native-tcp"]
+)
+def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_path: Path) -> None:
+    with served(board, *where) as (url, _):
+        done = boebot("run", "wander", "--on", url, "--seconds", "2", "--out", str(tmp_path), "--json")
+        assert done.returncode == 0, done.stderr
+        summary = json.loads(done.stdout)
+        assert summary["lost_frames"] == 0 and summary["bad_frames"] == 0
+        assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in tmp_path.iterdir()}
+        # a second client finds the robot as the first one left it: ready
+        info = boebot("info", url, "--json")
+        assert info.returncode == 0, info.stderr
+        assert json.loads(info.stdout)["pin_map"] == "shieldbot"
+
+
+def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp_path: Path) -> None:
+    with served("native", "--pty") as (url, server):
+        client = subprocess.Popen(
+            [*BOEBOT, "run", "wander", "--on", url, "--seconds", "30", "--out", str(tmp_path)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            client.wait(timeout=1.5)
+            pytest.fail("the run ended before the port vanished")
+        except subprocess.TimeoutExpired:
+            server.kill()
+        _, errors = client.communicate(timeout=20)
+    assert client.returncode == 1
+    assert "has gone" in errors and "Traceback" not in errors
+    assert len((tmp_path / "run.csv").read_text().splitlines()) > 20
+    assert (tmp_path / "replay.html").is_file()
+
+
+def test_port_is_opened_by_one_program_only() -> None:
+    with served("native", "--pty") as (url, _):
+        import serial
+
+        with serial.Serial(url, 500_000, exclusive=True):
+            done = boebot("run", "wander", "--on", url, "--seconds", "1")
+    assert done.returncode == 1 and "busy" in done.stderr
+
+
+def test_tcp_is_loopback_only() -> None:
+    with served("native", "--tcp", "0") as (url, _):
+        port = int(url.rsplit(":", 1)[1])
+        for family, _, _, _, address in socket.getaddrinfo(socket.gethostname(), port, type=socket.SOCK_STREAM):
+            if not str(address[0]).startswith(("127.", "::1")):
+                with socket.socket(family) as probe:
+                    probe.settimeout(1)
+                    assert probe.connect_ex(address) != 0, f"{address} listens"
+        table = Path("/proc/net/tcp")
+        if table.exists():
+            listening = [line.split()[1] for line in table.read_text().splitlines()[1:] if line.split()[3] == "0A"]
+            assert f"0100007F:{port:04X}" in listening
+            assert f"00000000:{port:04X}" not in listening
+
+
+def test_taken_tcp_port_is_one_sentence() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        done = boebot("serve", "--on", "native", "--tcp", str(taken.getsockname()[1]))
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1 and "cannot be opened" in done.stderr
+
+
+def test_silent_port_is_said_to_be_silent() -> None:
+    master, slave = os.openpty()
+    try:
+        done = boebot("info", os.ttyname(slave))
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
