@@ -78,8 +78,9 @@ def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str
 
 def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
     users = {
-        source for source, name in included("sim_bridge") if re.match(r"(sim_avr|avr_\w+|sim_\w+)\.h$", Path(name).name)
-        and not (ROOT / name).exists()
+        source
+        for source, name in included("sim_bridge")
+        if re.match(r"(sim_avr|avr_\w+|sim_\w+)\.h$", Path(name).name) and not (ROOT / name).exists()
     }
     assert users
     assert all(source.parent == ROOT / "sim_bridge" / "boards" / "avr" for source in users)
@@ -90,7 +91,9 @@ def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
 def test_simulator_knows_no_protocol() -> None:
     for source in (ROOT / "sim_bridge").rglob("*.py"):
         if "tests" not in source.parts:
-            assert not any(name.startswith("boebot.link.") and "transport" not in name for name in imported(source)), source
+            assert not any(
+                name.startswith("boebot.link.") and "transport" not in name for name in imported(source)
+            ), source
 
 
 def test_observation_leads_to_nothing_of_the_simulator() -> None:
@@ -112,7 +115,11 @@ def everything(start: object) -> list[object]:
     waiting = [start]
     while waiting:
         thing = waiting.pop()
-        if id(thing) in seen or isinstance(thing, type | str | bytes | int | float) or type(thing).__name__ == "module":
+        if (
+            id(thing) in seen
+            or isinstance(thing, type | str | bytes | int | float)
+            or type(thing).__name__ == "module"
+        ):
             continue
         seen[id(thing)] = thing
         for name in dir(thing):
