@@ -10,11 +10,11 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from simulated import arena_of, distance_to_segments, square
 
 from boebot.errors import ArenaError
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
+from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))
 angles = st.floats(-math.pi, math.pi)

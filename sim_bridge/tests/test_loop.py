@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from simulated import MS, US, Scripted, arena_of, scripted, square
 
 from boebot.errors import ArenaError, BoardError
-from boebot.robots import load_robot
+from boebot.robots import ContinuousServo, load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.session import CLOCK_HZ, EmulatedBoard, Sim, SimTransport
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 BYTE = 320  # cycles at 500,000 baud
 
@@ -330,7 +330,9 @@ def test_several_robots_share_a_run_and_do_not_disturb_each_other() -> None:
             assert lib.sim_add_robot(sim, address, body, 0.5 * number, 0.5 * number, 0.3) == number
             assert lib.sim_add_battery(sim, number, 255, imperfections.battery_parameters()) == 0
             for side, (name, pin) in enumerate((("servo_left", 13), ("servo_right", 12))):
-                servo = imperfections.servo_parameters(description.device[name], description.body, side, draw)
+                device = description.device[name]
+                assert isinstance(device, ContinuousServo)
+                servo = imperfections.servo_parameters(device, description.body, side, draw)
                 assert lib.sim_add_servo(sim, number, side, pin, servo) == 0
                 assert lib.sim_add_encoder(sim, number, side, 16 + side, 255, 64) == 0
             for frame in range(50):

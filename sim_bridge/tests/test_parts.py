@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from simulated import MS, US, Scripted, arena_of, scripted, square
 
 from boebot import robots
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.session import CLOCK_HZ
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LEFT, RIGHT = 13, 12
 ENCODERS = 16, 17

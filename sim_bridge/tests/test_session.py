@@ -9,13 +9,13 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from simulated import MS
 
 from boebot.boards import BoardRequest
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.robots import load_robot
 from sim_bridge.session import SimSession, open_native
+from sim_bridge.tests.simulated import MS
 
 
 def open_with(**wishes: Any) -> SimSession:

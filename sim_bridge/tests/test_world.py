@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from simulated import arena_of, distance_to_segments, square
 
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
+from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 RADIUS = 0.07
 # Boe-Bot row of THEORY 1.2.
@@ -94,6 +94,11 @@ class Body:
         return float(0.5 * (forward * s.speed**2 + turning * s.turn_rate**2 + sideways * s.lateral**2))
 
 
+def constant(left: float, right: float) -> Callable[[float], tuple[float, float]]:
+    """The same wheel speeds at any time."""
+    return lambda t: (left, right)
+
+
 def test_a_and_b_of_the_boe_bot() -> None:
     """E04: (2.26), (2.30) with the numbers of THEORY 1.2."""
     parameters = ffi.new("body_parameters *", BOE_BOT)
@@ -139,7 +144,7 @@ def test_acceleration_by_elimination() -> None:
 def test_steady_speed_of_the_regulated_motor(gain: float, expected: float) -> None:
     """E03: (3.15) settles at V_ref 2AK / (2AK + alpha)."""
     body = Body(parameters=ARSIM)
-    body.regulate(lambda t: (0.3, 0.3), gain, 5.0, 0.01)
+    body.regulate(constant(0.3, 0.3), gain, 5.0, 0.01)
     assert body.state.speed == pytest.approx(expected, abs=1e-4)
 
 
@@ -147,7 +152,7 @@ def test_steady_speed_of_the_regulated_motor(gain: float, expected: float) -> No
 def test_regulated_motor_is_stable_up_to_the_step_of_theory(dt: float, stable: bool) -> None:
     """Delta t < 2M / (2AK + alpha) = 0.030 s for K = 10."""
     body = Body(parameters=ARSIM)
-    body.regulate(lambda t: (0.3, 0.3), 10.0, 300 * dt, dt)
+    body.regulate(constant(0.3, 0.3), 10.0, 300 * dt, dt)
     assert (abs(body.state.speed - 0.2985) < 0.01) == stable
 
 
@@ -200,7 +205,7 @@ def test_step_halved_changes_little() -> None:
 
 def test_head_on_it_stops_at_the_wall() -> None:
     body = Body(arena_of(square(1, 0, 1)))  # face at x = 0.5
-    body.regulate(lambda t: (0.17, 0.17), 1.2, 5.0, 0.001)
+    body.regulate(constant(0.17, 0.17), 1.2, 5.0, 0.001)
     assert body.state.x == pytest.approx(0.5 - RADIUS, abs=1e-9)
     assert body.state.y == pytest.approx(0, abs=1e-12)
     assert abs(body.state.speed) < 0.03
@@ -211,7 +216,7 @@ def test_head_on_it_stops_at_the_wall() -> None:
 def test_at_an_angle_it_slides_along_the_wall() -> None:
     body = Body(arena_of(square(10, 0, 20 - 1)))  # a long face at x = 0.5
     body.place(0, 0, math.radians(70))
-    body.regulate(lambda t: (0.17, 0.17), 1.2, 12.0, 0.001)
+    body.regulate(constant(0.17, 0.17), 1.2, 12.0, 0.001)
     assert body.state.x == pytest.approx(0.5 - RADIUS, abs=1e-9)
     assert body.state.y > 0.6  # it went on beside it
     assert body.state.heading == pytest.approx(math.radians(70))  # a push through its centre turns nothing
@@ -219,16 +224,16 @@ def test_at_an_angle_it_slides_along_the_wall() -> None:
 
 def test_it_comes_off_a_wall_freely() -> None:
     body = Body(arena_of(square(1, 0, 1)))
-    body.regulate(lambda t: (0.17, 0.17), 1.2, 4.0, 0.001)
-    body.regulate(lambda t: (-0.17, -0.17), 1.2, 1.0, 0.001)
+    body.regulate(constant(0.17, 0.17), 1.2, 4.0, 0.001)
+    body.regulate(constant(-0.17, -0.17), 1.2, 1.0, 0.001)
     assert not body.state.touching
     assert body.state.x < 0.5 - RADIUS - 0.1
 
 
 def test_it_can_turn_while_it_touches() -> None:
     body = Body(arena_of(square(1, 0, 1)))
-    body.regulate(lambda t: (0.17, 0.17), 1.2, 4.0, 0.001)
-    body.regulate(lambda t: (-0.1, 0.1), 1.2, 1.0, 0.001)
+    body.regulate(constant(0.17, 0.17), 1.2, 4.0, 0.001)
+    body.regulate(constant(-0.1, 0.1), 1.2, 1.0, 0.001)
     assert body.state.heading > 1.0
 
 
@@ -266,7 +271,7 @@ def test_nothing_is_sunk_into_or_passed_through(
     for left, right in references:
         before = body.state.x, body.state.y
         for _ in range(20):
-            body.regulate(lambda t, wanted=(left, right): wanted, 0.3, dt, dt)
+            body.regulate(constant(left, right), 0.3, dt, dt)
             assert body.depth < 1e-9
             # Not through: it stands in free space, and did not jump.
             assert arena.is_free(body.state.x, body.state.y, RADIUS - 1e-9)
@@ -289,11 +294,11 @@ def test_corner_and_wedge_hold_it() -> None:
     wedge = [(0.0, 0.2), (1.0, 0.05), (1.0, -0.05), (0.0, -0.2), (1.2, -0.2), (1.2, 0.2)]
     body = Body(arena_of(wedge))
     body.place(-0.2, 0.0, 0.0)
-    body.regulate(lambda t: (0.17, 0.17), 1.2, 10.0, 0.001)
+    body.regulate(constant(0.17, 0.17), 1.2, 10.0, 0.001)
     assert body.depth < 1e-9
     assert body.state.x < 1.0
     stuck = body.state.x
-    body.regulate(lambda t: (-0.17, -0.17), 1.2, 2.0, 0.001)
+    body.regulate(constant(-0.17, -0.17), 1.2, 2.0, 0.001)
     assert body.state.x < stuck - 0.2
 
 
@@ -301,9 +306,9 @@ def test_obstacle_pushed_near_is_noticed() -> None:
     """Lists of near edges are renewed when the arena changes."""
     arena = arena_of(square(5, 0, 1))
     body = Body(arena)
-    body.regulate(lambda t: (0.1, 0.1), 1.2, 0.5, 0.001)
+    body.regulate(constant(0.1, 0.1), 1.2, 0.5, 0.001)
     arena.move("0", -5 + body.state.x + 0.5 + RADIUS + 0.02, 0)
-    body.regulate(lambda t: (0.1, 0.1), 1.2, 2.0, 0.001)
+    body.regulate(constant(0.1, 0.1), 1.2, 2.0, 0.001)
     assert body.state.touching
     assert body.depth < 1e-9
 
