@@ -51,7 +51,7 @@ CONFIGURATION_HEADERS = {
 # -w: simavr has warnings; ours are errors in tools/warnings.sh. The other flags let the compiler join the core's many
 # small functions: a quarter faster than -O2.
 COMPILER_FLAGS = [
-    *("-std=gnu11", "-w", "-fvisibility=hidden", "-O3"),
+    *("-std=gnu11", "-fwrapv", "-w", "-fvisibility=hidden", "-O3"),
     *("--param=inline-unit-growth=400", "--param=max-inline-insns-auto=200"),
 ]
 
