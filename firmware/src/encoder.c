@@ -12,59 +12,90 @@
 #define SILENT_TICKS 50u      /* 0.5 s */
 
 #if ENCODER_QUADRATURE
-#define LINES 4u
+#define LINES_PER_SIDE 2u
+#define SIDE_BITS(side) (line_bit[2u * (side)] | line_bit[2u * (side) + 1u])
 #define PORT_BITS() HAL_PORT_READ(ENCODER_LEFT_A)
-static const uint8_t line_bit[LINES] = {1u << ENCODER_LEFT_A_BIT, 1u << ENCODER_LEFT_B_BIT, 1u << ENCODER_RIGHT_A_BIT,
-                                        1u << ENCODER_RIGHT_B_BIT};
+static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {1u << ENCODER_LEFT_A_BIT, 1u << ENCODER_LEFT_B_BIT,
+                                                         1u << ENCODER_RIGHT_A_BIT, 1u << ENCODER_RIGHT_B_BIT};
 _Static_assert(PIN_ENCODER_LEFT_A >= 14 && PIN_ENCODER_LEFT_B >= 14 && PIN_ENCODER_RIGHT_A >= 14 &&
                    PIN_ENCODER_RIGHT_B >= 14,
                "encoder lines share the pin-change interrupt of port C");
 #else
-#define LINES 2u
+#define LINES_PER_SIDE 1u
+#define SIDE_BITS(side) (line_bit[side])
 #define PORT_BITS() HAL_PORT_READ(ENCODER_LEFT)
-static const uint8_t line_bit[LINES] = {1u << ENCODER_LEFT_BIT, 1u << ENCODER_RIGHT_BIT};
+static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {1u << ENCODER_LEFT_BIT, 1u << ENCODER_RIGHT_BIT};
 _Static_assert(PIN_ENCODER_LEFT >= 14 && PIN_ENCODER_RIGHT >= 14,
                "encoder lines share the pin-change interrupt of port C");
 #endif
-#define LINES_PER_SIDE (LINES / SIDES)
 
-/* Shared with the interrupt. */
+#define LINES (LINES_PER_SIDE * SIDES)
+
+/* Changes of the port, stamped by the interrupt and worked off by the main loop: a ring whose indices are bytes into it,
+ * so that they wrap by themselves. When it is full, all lines are masked until it has been worked off. */
 typedef struct {
-  int16_t count;
-  schedule_moment last, previous; /* the last two edges */
-} wheel;
+  uint16_t time; /* hal_time() */
+  uint8_t bits;  /* of the port */
+  uint8_t unused;
+} change;
 
-static volatile wheel wheels[SIDES];
-static volatile uint8_t fired[LINES]; /* edges of the line in this tick */
-static volatile uint8_t limit;
-static volatile uint8_t watched; /* port bits that may interrupt */
-static uint8_t before;           /* port bits at the last interrupt */
+#define RING_CHANGES (256u / sizeof(change))
+_Static_assert(sizeof(change) == 4, "the ring's indices wrap with the ring");
+
+static change ring[RING_CHANGES];
+volatile uint8_t encoder_ring_head, encoder_ring_tail;
+static volatile bool ring_full;
 
 /* Main loop only. */
-static encoder_reading readings[SIDES];
-static int16_t counted[SIDES];
-static uint8_t silence[SIDES]; /* ticks since the last edge, at most SILENT_TICKS */
+typedef struct {
+  uint32_t last, previous; /* schedule_now() of the last two edges */
+  uint16_t edges;          /* in this tick, all lines */
+  uint8_t silence;         /* ticks since the last edge, at most SILENT_TICKS */
+  encoder_reading reading;
+  int32_t count;
+} wheel;
+
+static wheel wheels[SIDES];
+static uint8_t fired[LINES]; /* edges of the line in this tick */
+static uint8_t before;       /* port bits of the last change worked off */
+static uint8_t watched;      /* port bits of the lines that count */
+static uint8_t limit;        /* edges of a line in a tick above which it is masked */
+
+static inline volatile change *ring_at(uint8_t index) { return (volatile change *)(void *)((uint8_t *)ring + index); }
+
+HAL_INTERRUPT_PIN_CHANGE {
+  const uint8_t head = encoder_ring_head;
+  volatile change *place = ring_at(head);
+  place->time = hal_time();
+  place->bits = PORT_BITS();
+  const uint8_t next = (uint8_t)(head + sizeof(change));
+  if (next == encoder_ring_tail) {
+    ring_full = true;
+    hal_pin_change_mask(0);
+  } else {
+    encoder_ring_head = next;
+  }
+}
 
 /* Counts one edge of a line; masks the line when it fires too often. */
-static inline void count_line(uint8_t line) {
+static void count_line(uint8_t line) {
   if (fired[line] >= limit) {
-    watched &= (uint8_t)~line_bit[line];
+    watched = (uint8_t)(watched & (uint8_t)~line_bit[line]);
     hal_pin_change_mask(watched);
   }
   fired[line]++;
 }
 
-static inline void count_wheel(uint8_t side, int8_t step, schedule_moment now) {
-  wheels[side].count = (int16_t)(wheels[side].count + step);
-  wheels[side].previous.slot = wheels[side].last.slot;
-  wheels[side].previous.offset = wheels[side].last.offset;
-  wheels[side].last.slot = now.slot;
-  wheels[side].last.offset = now.offset;
+static void count_wheel(wheel *w, int8_t step, uint32_t time) {
+  w->count += step;
+  w->edges++;
+  w->previous = w->last;
+  w->last = time;
 }
 
-/* What the change of the port's bits means to one wheel. */
+/* What a change of the port means to one wheel. Inlined for each side, so that the bits are constants. */
 static inline __attribute__((always_inline)) void see_wheel(uint8_t side, uint8_t bits, uint8_t changed,
-                                                            schedule_moment now) {
+                                                            uint32_t time) {
 #if ENCODER_QUADRATURE
   const uint8_t a = line_bit[2u * side];
   const uint8_t b = line_bit[2u * side + 1u];
@@ -79,34 +110,47 @@ static inline __attribute__((always_inline)) void see_wheel(uint8_t side, uint8_
   }
   const uint8_t from = (uint8_t)(((before & a) != 0 ? 2u : 0u) | ((before & b) != 0 ? 1u : 0u));
   const uint8_t to = (uint8_t)(((bits & a) != 0 ? 2u : 0u) | ((bits & b) != 0 ? 1u : 0u));
-  count_wheel(side, encoder_quadrature_step(from, to), now);
+  count_wheel(&wheels[side], encoder_quadrature_step(from, to), time);
 #else
   (void)bits;
   if ((changed & line_bit[side]) != 0) {
     count_line(side);
-    count_wheel(side, 1, now);
+    count_wheel(&wheels[side], 1, time);
   }
 #endif
 }
 
-HAL_INTERRUPT_PIN_CHANGE {
-  const schedule_moment now = schedule_moment_at(hal_time());
-  const uint8_t bits = PORT_BITS();
+static void work_off(uint8_t bits, uint32_t time) {
   const uint8_t changed = (uint8_t)((bits ^ before) & watched);
-  see_wheel(LEFT, bits, changed, now);
-  see_wheel(RIGHT, bits, changed, now);
+  see_wheel(LEFT, bits, changed, time);
+  see_wheel(RIGHT, bits, changed, time);
   before = bits;
+}
+
+void encoder_poll(void) {
+  uint8_t tail = encoder_ring_tail;
+  const uint8_t head = encoder_ring_head; /* before the time is read: every change up to it is in the past */
+  if (tail == head) {
+    return;
+  }
+  const uint32_t now = schedule_now();
+  while (tail != head) {
+    const volatile change *oldest = ring_at(tail);
+    const uint16_t age = (uint16_t)((uint16_t)now - oldest->time);
+    const uint8_t bits = oldest->bits;
+    tail = (uint8_t)(tail + sizeof(change));
+    encoder_ring_tail = tail;
+    work_off(bits, now - age);
+  }
+  if (ring_full) {
+    ring_full = false;
+    hal_pin_change_mask(watched);
+  }
 }
 
 /* Port bits of the lines that count, none if encoders are switched off. */
 static uint8_t lines_on(void) {
-  uint8_t bits = 0;
-  if (parameters_device_on(DEVICES_ENCODERS)) {
-    for (uint8_t line = 0; line < LINES; line++) {
-      bits = (uint8_t)(bits | line_bit[line]);
-    }
-  }
-  return bits;
+  return parameters_device_on(DEVICES_ENCODERS) ? (uint8_t)(SIDE_BITS(LEFT) | SIDE_BITS(RIGHT)) : 0u;
 }
 
 void encoder_start(void) {
@@ -119,11 +163,10 @@ void encoder_start(void) {
   HAL_PIN_INPUT(ENCODER_LEFT);
   HAL_PIN_INPUT(ENCODER_RIGHT);
 #endif
+  encoder_ring_head = encoder_ring_tail = 0;
+  ring_full = false;
   for (uint8_t side = LEFT; side < SIDES; side++) {
-    wheels[side].count = 0;
-    counted[side] = 0;
-    silence[side] = SILENT_TICKS;
-    readings[side] = (encoder_reading){0, 0, false};
+    wheels[side] = (wheel){.silence = SILENT_TICKS};
   }
   for (uint8_t line = 0; line < LINES; line++) {
     fired[line] = 0;
@@ -135,61 +178,43 @@ void encoder_start(void) {
 }
 
 /* The time between two edges in 16 us, 0 if it is 0.5 s or more. */
-static uint16_t period_of(schedule_moment from, schedule_moment to) {
-  const uint32_t units = (uint32_t)schedule_between(from, to) / PERIOD_UNIT;
+static uint16_t period_of(uint32_t from, uint32_t to) {
+  const uint32_t units = (to - from) / PERIOD_UNIT;
   return units == 0 ? 1u : units >= PERIOD_LONGEST ? 0u : (uint16_t)units;
 }
 
-/* Edges of a wheel's lines in the tick that ends; whether one of them was masked. */
-static uint16_t close_tick(uint8_t side, bool *masked) {
-  uint16_t edges = 0;
-  *masked = false;
-  for (uint8_t line = (uint8_t)(side * LINES_PER_SIDE); line < (side + 1u) * LINES_PER_SIDE; line++) {
-    const uint8_t count = fired[line];
-    fired[line] = 0;
-    *masked = *masked || count > limit;
-    edges = (uint16_t)(edges + count);
-  }
-  return edges;
-}
-
-static void update_reading(uint8_t side) {
-  encoder_reading *reading = &readings[side];
-  wheel now;
-  uint16_t edges = 0;
-  HAL_ATOMIC {
-    now.count = wheels[side].count;
-    now.last.slot = wheels[side].last.slot;
-    now.last.offset = wheels[side].last.offset;
-    now.previous.slot = wheels[side].previous.slot;
-    now.previous.offset = wheels[side].previous.offset;
-    edges = close_tick(side, &reading->masked);
-  }
-  reading->count += (int16_t)(now.count - counted[side]);
-  counted[side] = now.count;
-  if (edges != 0) {
-    const bool paired = edges >= 2 || silence[side] < SILENT_TICKS;
-    reading->period = paired ? period_of(now.previous, now.last) : 0;
-    silence[side] = 0;
-  } else if (silence[side] < SILENT_TICKS) {
-    silence[side]++;
+/* Makes the reading of a wheel from the tick that ends. */
+static void close_wheel(uint8_t side) {
+  wheel *w = &wheels[side];
+  w->reading.count = w->count;
+  if (w->edges != 0) {
+    /* After a long silence the edge before the first is too old for its stamp to tell. */
+    w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->previous, w->last) : 0u;
+    w->silence = 0;
+  } else if (w->silence < SILENT_TICKS) {
+    w->silence++;
   } else {
-    reading->period = 0;
+    w->reading.period = 0;
+  }
+  w->edges = 0;
+  w->reading.masked = false;
+  for (uint8_t i = 0; i < LINES_PER_SIDE; i++) {
+    uint8_t *count = &fired[(uint8_t)(side * LINES_PER_SIDE + i)];
+    w->reading.masked = w->reading.masked || *count > limit;
+    *count = 0;
   }
 }
 
 void encoder_task(void) {
-  update_reading(LEFT);
-  update_reading(RIGHT);
+  encoder_poll();
+  close_wheel(LEFT);
+  close_wheel(RIGHT);
+  limit = (uint8_t)parameters_get(PARAMETER_ENCODER_LIMIT);
   const uint8_t lines = lines_on();
-  const uint8_t new_limit = (uint8_t)parameters_get(PARAMETER_ENCODER_LIMIT);
-  HAL_ATOMIC {
-    /* Lines that come back begin at their present level; the others may have an edge that waits to be counted. */
-    before = (uint8_t)((before & watched) | (PORT_BITS() & (uint8_t)~watched));
-    watched = lines;
-    limit = new_limit;
-    hal_pin_change_mask(lines);
-  }
+  const uint8_t back = (uint8_t)(lines & (uint8_t)~watched); /* these begin at their present level */
+  before = (uint8_t)((before & (uint8_t)~back) | (PORT_BITS() & back));
+  watched = lines;
+  hal_pin_change_mask(lines);
 }
 
-const encoder_reading *encoder_read(uint8_t side) { return &readings[side]; }
+const encoder_reading *encoder_read(uint8_t side) { return &wheels[side].reading; }

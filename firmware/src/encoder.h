@@ -21,6 +21,16 @@ typedef struct {
 
 void encoder_start(void);
 
+/* Works off the changes that the interrupt has stamped: before the clock's 16 bits roll over (4 ms), that is in every
+ * slot, and sooner when they pile up. */
+void encoder_poll(void);
+
+/* Bytes into the ring of changes: the next to stamp, the next to work off. */
+extern volatile uint8_t encoder_ring_head, encoder_ring_tail;
+
+/* Whether they have piled up to an eighth of the ring. */
+static inline bool encoder_due(void) { return (uint8_t)(encoder_ring_head - encoder_ring_tail) >= 32u; }
+
 /* Once per tick: closes the tick's readings and lifts masks. */
 void encoder_task(void);
 

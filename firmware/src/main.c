@@ -6,6 +6,6 @@ int main(void) {
   firmware_start();
   for (;;) {
     firmware_poll();
-    hal_sleep_unless(firmware_due);
+    hal_sleep_until(firmware_due);
   }
 }

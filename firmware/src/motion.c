@@ -13,12 +13,21 @@ static int32_t divide(int32_t numerator, int32_t denominator) {
   return (numerator < 0 ? numerator - half : numerator + half) / denominator;
 }
 
+/* The same for a denominator of 2^bits, without a division. */
+static inline __attribute__((always_inline)) int32_t shift(int32_t numerator, uint8_t bits) {
+  const int32_t half = (int32_t)1 << (bits - 1u);
+  return numerator < 0 ? -((half - numerator) >> bits) : (numerator + half) >> bits;
+}
+
 static int32_t clamp(int32_t value, int32_t low, int32_t high) {
   return value < low ? low : value > high ? high : value;
 }
 
 uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal) {
-  return (uint16_t)clamp(centre + divide(gain * signal, FULL), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
+  /* Two divisions would take a fifth of the time between two set-points on a full line: 26844 / 2^12 is 2^16 / 10000 to
+   * 2e-5. */
+  const int32_t part = shift((int32_t)signal * 26844, 12); /* signal in 1/65536 */
+  return (uint16_t)clamp(centre + shift(gain * part, 16), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
 }
 
 int16_t motion_signal_of_speed(int16_t speed, int16_t maximum) {

@@ -17,7 +17,7 @@ extern "C" {
 #define MOTION_PULSE_MIN 20800u /* 1300 us in cycles */
 #define MOTION_PULSE_MAX 27200u /* 1700 us */
 
-/* The pulse of one wheel in cycles. centre and gain in cycles, signal in 1/10000. */
+/* The pulse of one wheel in cycles, to 0.6 of a cycle. centre and gain (-3200..3200) in cycles, signal in 1/10000. */
 uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal);
 
 /* The signal in 1/10000 for a speed; both speeds in the same unit, maximum > 0. */

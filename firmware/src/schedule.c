@@ -31,12 +31,12 @@ enum {
 _Static_assert(TASKS <= 16, "the due tasks are bits of 16");
 
 volatile uint8_t schedule_slot;
+uint8_t schedule_next_slot;
 volatile uint16_t schedule_slot_start;
 
 static volatile uint32_t slot_cycles; /* time at which schedule_slot began */
 static volatile bool edge_is_servo;   /* whom the next edge interrupt is for */
 
-static uint8_t next_slot; /* first slot whose tasks have not run */
 static uint32_t tick;
 static uint8_t overruns;
 static bool late;    /* a slot of this tick was worked on when the next tick had begun */
@@ -47,7 +47,7 @@ void schedule_start(void) {
   schedule_slot_start = 0;
   slot_cycles = 0;
   edge_is_servo = false;
-  next_slot = 0;
+  schedule_next_slot = 0;
   tick = 0;
   overruns = 0;
   late = false;
@@ -109,18 +109,13 @@ uint8_t schedule_overruns(void) { return overruns; }
 
 bool schedule_overran(void) { return overran; }
 
-/* Slots that have begun and whose tasks have not run. */
-static uint8_t slots_waiting(void) { return (uint8_t)(schedule_slot + 1u - next_slot); }
-
-bool schedule_due(void) { return slots_waiting() != 0; }
-
 static void begin_tick(void) {
   overran = late;
   overruns = (uint8_t)(overruns + late);
   late = false;
-  while (slots_waiting() >
+  while (schedule_waiting() >
          2u * SCHEDULE_SLOTS_PER_TICK) { /* hopelessly behind: drop whole ticks, keep the time right */
-    next_slot = (uint8_t)(next_slot + SCHEDULE_SLOTS_PER_TICK);
+    schedule_next_slot = (uint8_t)(schedule_next_slot + SCHEDULE_SLOTS_PER_TICK);
     tick++;
     overruns++;
     overran = true;
@@ -141,6 +136,7 @@ static void run_tasks(uint8_t slot) {
   if ((due & (uint16_t)(1u << TASK_##name)) != 0) {   \
     name##_task();                                    \
     due &= (uint16_t) ~(uint16_t)(1u << TASK_##name); \
+    encoder_poll();                                   \
     link_poll();                                      \
   }
 #include "tasks.def"
@@ -152,20 +148,21 @@ static void run_tasks(uint8_t slot) {
 }
 
 void schedule_poll(void) {
-  if (slots_waiting() == 0) {
+  if (schedule_waiting() == 0) {
     return;
   }
-  if (next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
     begin_tick();
   }
-  run_tasks(next_slot);
-  next_slot++;
-  if (next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+  run_tasks(schedule_next_slot);
+  schedule_next_slot++;
+  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
     tick++;
   }
   /* Work of a tick that ends when a later tick has already begun has overrun. */
-  const uint8_t waiting = slots_waiting();
-  const uint8_t left = (uint8_t)(0u - next_slot) % SCHEDULE_SLOTS_PER_TICK; /* slots of this tick still to come */
+  const uint8_t waiting = schedule_waiting();
+  const uint8_t left =
+      (uint8_t)(0u - schedule_next_slot) % SCHEDULE_SLOTS_PER_TICK; /* slots of this tick still to come */
   if (waiting > left) {
     late = true;
   }

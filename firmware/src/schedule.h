@@ -19,9 +19,15 @@ extern "C" {
 
 void schedule_start(void);
 
+/* Low byte of the number of the slot that has begun, and of the first one whose tasks have not run. */
+extern volatile uint8_t schedule_slot;
+extern uint8_t schedule_next_slot;
+
+/* Slots that have begun and whose tasks have not run. */
+static inline uint8_t schedule_waiting(void) { return (uint8_t)(schedule_slot + 1u - schedule_next_slot); }
+
 /* Runs the tasks of the next slot that has begun, if any. */
 void schedule_poll(void);
-bool schedule_due(void);
 
 /* The control tick whose tasks run now. */
 uint32_t schedule_tick(void);
@@ -39,8 +45,7 @@ typedef struct {
   uint16_t offset; /* cycles since that slot began; an edge captured just before it counts from 65536 down */
 } schedule_moment;
 
-extern volatile uint8_t schedule_slot;        /* low byte of the number of the slot that has begun */
-extern volatile uint16_t schedule_slot_start; /* hal_time() at which it began */
+extern volatile uint16_t schedule_slot_start; /* hal_time() at which the slot began */
 
 /* Interrupt context: the moment at which hal_time() was `time`. */
 static inline schedule_moment schedule_moment_at(uint16_t time) {

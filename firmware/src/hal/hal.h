@@ -50,16 +50,6 @@ void hal_start_timers(void);
 void hal_start_watchdog(void);
 void hal_kick_watchdog(void);
 
-/* Sleeps until the next interrupt unless something is due. `due` is asked with interrupts off. */
-void hal_sleep_unless(bool (*due)(void));
-
-/* Takes the oldest received byte; false if there is none. */
-bool hal_serial_receive(uint8_t *byte);
-bool hal_serial_received(void);
-
-/* Whether `count` more bytes can be queued for sending now. If not, the CPU is woken when more can. */
-bool hal_serial_room(uint8_t count);
-
 /* Queues bytes for sending. The caller has asked for room. */
 void hal_serial_send(const uint8_t *bytes, uint8_t count);
 
@@ -89,6 +79,12 @@ uint32_t hal_image_hash(void);
  *   void hal_capture_falling(void)                next, capture the falling edge
  *   void hal_capture_stop(void)
  *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt
+ *   bool hal_serial_received(void)                whether a received byte waits
+ *   bool hal_serial_receive(uint8_t *byte)        takes the oldest; false if there is none
+ *   bool hal_serial_room(uint8_t count)           whether `count` more bytes can be queued for sending; if not, the CPU
+ *                                                 is woken when more can
+ *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt with
+ *                                                 interrupts off
  *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
  */
 

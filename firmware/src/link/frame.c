@@ -19,11 +19,15 @@ static inline crc21 crc_start(uint32_t seed) {
   return (crc21){(uint8_t)(aligned >> 16), (uint8_t)(aligned >> 8), (uint8_t)aligned};
 }
 
-static inline void crc_byte(crc21 *crc, uint8_t byte) {
-  const uint8_t index = crc->high ^ byte;
-  crc->high = crc->middle ^ hal_table_byte(&crc21_high[index]);
-  crc->middle = crc->low ^ hal_table_byte(&crc21_middle[index]);
-  crc->low = hal_table_byte(&crc21_low[index]);
+static crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
+  uint8_t high = crc.high, middle = crc.middle, low = crc.low;
+  for (; count > 0; count--) {
+    const uint8_t index = high ^ *bytes++;
+    high = middle ^ hal_table_byte(&crc21_high[index]);
+    middle = low ^ hal_table_byte(&crc21_middle[index]);
+    low = hal_table_byte(&crc21_low[index]);
+  }
+  return (crc21){high, middle, low};
 }
 
 /* The three bytes that follow the stuffed ones. */
@@ -34,10 +38,7 @@ static inline void crc_spread(crc21 crc, uint8_t *check) {
 }
 
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
-  crc21 crc = crc_start(seed);
-  for (uint8_t i = 0; i < count; i++) {
-    crc_byte(&crc, bytes[i]);
-  }
+  const crc21 crc = crc_bytes(crc_start(seed), bytes, count);
   return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
 }
 
@@ -57,13 +58,14 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
   uint8_t *body = wire + 2; /* after the delimiter and the first code byte */
   body[0] = id;
   body[1] = sequence;
-  memcpy(body + 2, payload, length);
+  if (length > 0) { /* a message without fields has no payload */
+    memcpy(body + 2, payload, length);
+  }
   const uint8_t size = (uint8_t)(length + 2u);
 
   /* COBS: each zero, and the place before the first byte, becomes the distance to the next. Frames are too short for a
    * second code byte. */
   wire[0] = 0;
-  crc21 crc = crc_start(seed_of(id, seed));
   uint8_t code = 1;
   for (uint8_t i = size; i-- > 0;) {
     if (body[i] == 0) {
@@ -74,10 +76,7 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
     }
   }
   wire[1] = code;
-  for (uint8_t i = 0; i <= size; i++) {
-    crc_byte(&crc, wire[1 + i]);
-  }
-  crc_spread(crc, body + size);
+  crc_spread(crc_bytes(crc_start(seed_of(id, seed)), wire + 1, (uint8_t)(size + 1u)), body + size);
   body[size + CHECK_BYTES] = 0;
   return (uint8_t)(length + FRAME_OVERHEAD);
 }
@@ -106,27 +105,14 @@ static bool accept(frame_decoder *decoder) {
   if (message_length(id) != (int16_t)(size - 3)) {
     return false;
   }
-  crc21 crc = crc_start(seed_of(id, decoder->seed));
-  for (uint8_t i = 0; i < size; i++) {
-    crc_byte(&crc, decoder->bytes[i]);
-  }
   uint8_t check[CHECK_BYTES];
-  crc_spread(crc, check);
+  crc_spread(crc_bytes(crc_start(seed_of(id, decoder->seed)), decoder->bytes, size), check);
   return memcmp(check, &decoder->bytes[size], CHECK_BYTES) == 0 && unstuff(decoder->bytes, size);
 }
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
 
-bool frame_decode(frame_decoder *decoder, uint8_t byte) {
-  if (byte != 0) {
-    if (decoder->count < FRAME_INSIDE_MAX) {
-      decoder->bytes[decoder->count] = byte;
-    }
-    if (decoder->count <= FRAME_INSIDE_MAX) {
-      decoder->count++;
-    }
-    return false;
-  }
+bool frame_decode_end(frame_decoder *decoder) {
   const bool empty = decoder->count == 0;
   const bool accepted = !empty && accept(decoder);
   if (!empty && !accepted && decoder->synchronised) {

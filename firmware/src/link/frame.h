@@ -35,14 +35,26 @@ typedef struct {
   uint8_t bad;       /* frames refused, modulo 256 */
   bool synchronised; /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
   uint8_t count;     /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
-  uint8_t bytes[FRAME_INSIDE_MAX];
+  uint8_t bytes[FRAME_INSIDE_MAX + 2u];
 } frame_decoder;
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed);
 
+/* A delimiter came: whether what was collected is a message. */
+bool frame_decode_end(frame_decoder *decoder);
+
 /* Takes one byte; true when it completes an accepted message. Until the next call its parts are in id, sequence and
  * payload below. */
-bool frame_decode(frame_decoder *decoder, uint8_t byte);
+static inline bool frame_decode(frame_decoder *decoder, uint8_t byte) {
+  if (byte == 0) {
+    return frame_decode_end(decoder);
+  }
+  decoder->bytes[decoder->count] = byte;
+  if (decoder->count <= FRAME_INSIDE_MAX) {
+    decoder->count++;
+  }
+  return false;
+}
 
 static inline uint8_t frame_id(const frame_decoder *decoder) { return decoder->bytes[1]; }
 static inline uint8_t frame_sequence(const frame_decoder *decoder) { return decoder->bytes[2]; }

@@ -19,8 +19,11 @@ void link_start(void) {
 }
 
 void link_poll(void) {
+  if (!link_due()) {
+    return;
+  }
   uint8_t byte = 0;
-  while (hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX) && hal_serial_receive(&byte)) {
+  while (hal_serial_receive(&byte)) {
     if (frame_decode(&decoder, byte)) {
       if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), frame_payload(&decoder))) {
         refused++;
@@ -29,8 +32,6 @@ void link_poll(void) {
     }
   }
 }
-
-bool link_due(void) { return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX); }
 
 bool link_send(uint8_t id, const void *payload, uint8_t length) {
   const uint8_t sequence = next_sequence++;

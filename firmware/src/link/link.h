@@ -5,6 +5,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "hal/hal.h"
+#include "link/frame.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -15,7 +18,7 @@ void link_start(void);
 /* Takes received bytes, up to the end of one frame, and does what it asks. Bytes wait while there is no room for an
  * answer. */
 void link_poll(void);
-bool link_due(void);
+static inline bool link_due(void) { return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX); }
 
 /* Sends a message; false if there is no room. A message that is not sent leaves a gap in the sequence numbers, so that
  * the host can count it. */

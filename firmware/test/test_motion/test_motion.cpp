@@ -42,12 +42,12 @@ TEST_CASE("pulses stay within 1300 to 1700 us whatever the calibration") {
   }
 }
 
-TEST_CASE("pulses rise with the signal and are rounded to the nearest cycle") {
+TEST_CASE("pulses rise with the signal and are rounded to 0.6 of a cycle") {
   uint16_t before = motion_pulse(CENTRE, GAIN, -10000);
   for (int signal = -9999; signal <= 10000; signal++) {
     const uint16_t pulse = motion_pulse(CENTRE, GAIN, static_cast<int16_t>(signal));
     CHECK(pulse >= before);
-    CHECK(2 * std::abs((pulse - CENTRE) * 10000 - GAIN * signal) <= 10000);
+    CHECK(std::abs((pulse - CENTRE) * 10000 - GAIN * signal) <= 6000); /* 0.6 of a cycle */
     before = pulse;
   }
 }

@@ -24,9 +24,9 @@
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
-/* Covers every interrupt that can stand before the edge's, and its own prologue; short enough for the two bytes that the
- * receiver holds (640 cycles). */
-#define HAL_EDGE_LEAD 400u
+/* Covers the interrupts that can stand before the edge's (one that has begun, the pin changes of four lines, a capture)
+ * and its own prologue. */
+#define HAL_EDGE_LEAD 450u
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
@@ -58,9 +58,69 @@ static inline void hal_edge_arm(uint16_t time) { hal_edge_arm_plain((uint16_t)(t
 
 static inline void hal_edge_disarm(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(OCIE1A)); }
 
-/* Returns 26 cycles after the timer has read `time`, to the cycle, whenever it was called: the coarse loop ends within
- * 256 cycles of it, the fine one takes the rest three by three, the branches after it the last 0 to 2. */
+static inline uint16_t hal_capture_time(void) { return ICR1; }
+
+static inline void hal_capture_falling(void) {
+  TCCR1B = _BV(CS10);
+  TIFR1 = _BV(ICF1);
+}
+
+static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
+
+static inline void hal_pin_change_mask(uint8_t bits) { PCMSK1 = bits; }
+
+/* The rings of serial_avr.c. Indices wrap as a byte, or by a mask; equal indices: empty. */
+#define HAL_SEND_RING 128u
+#define HAL_RECEIVE_HEAD GPIOR1
+#define HAL_SEND_TAIL GPIOR2
+extern uint8_t hal_receive_ring[256];
+extern uint8_t hal_send_ring[HAL_SEND_RING];
+extern volatile uint8_t hal_receive_tail;
+extern volatile uint8_t hal_send_head;
+
+#define HAL_LOST_BIT 2 /* of GPIOR0 */
+
+/* What the receive interrupt does, for code that keeps it waiting. */
+static inline __attribute__((always_inline)) void hal_serial_take(void) {
+  const uint8_t status = UCSR0A;
+  if ((status & _BV(RXC0)) == 0) {
+    return;
+  }
+  const uint8_t head = HAL_RECEIVE_HEAD;
+  hal_receive_ring[head] = UDR0; /* the place at the head is always free */
+  const uint8_t next = (uint8_t)(head + 1u);
+  if ((status & _BV(DOR0)) != 0 || next == hal_receive_tail) {
+    GPIOR0 |= _BV(HAL_LOST_BIT);
+  }
+  if (next != hal_receive_tail) {
+    HAL_RECEIVE_HEAD = next;
+  }
+}
+
+static inline bool hal_serial_received(void) { return HAL_RECEIVE_HEAD != hal_receive_tail; }
+
+static inline bool hal_serial_receive(uint8_t *byte) {
+  const uint8_t tail = hal_receive_tail;
+  if (HAL_RECEIVE_HEAD == tail) {
+    return false;
+  }
+  *byte = hal_receive_ring[tail];
+  hal_receive_tail = (uint8_t)(tail + 1u);
+  return true;
+}
+
+static inline bool hal_serial_room(uint8_t count) {
+  const uint8_t queued = (uint8_t)((uint8_t)(hal_send_head - HAL_SEND_TAIL) & (HAL_SEND_RING - 1u));
+  return HAL_SEND_RING - 1u - queued >= count;
+}
+
+/* Returns a fixed number of cycles after the timer has read `time`, whenever it was called. Far from it, received bytes
+ * are taken meanwhile, for the receiver holds two and no more. Then the coarse loop ends within 256 cycles of it, the
+ * fine one takes the rest three by three, the branches after it the last 0 to 2. */
 static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
+  while ((int16_t)(time - TCNT1) > 150) {
+    hal_serial_take();
+  }
   uint16_t left;
   __asm__ volatile(
       "1: movw %A[left], %A[time]       \n"
@@ -82,25 +142,14 @@ static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
       : [time] "r"(time), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)));
 }
 
-static inline uint16_t hal_capture_time(void) { return ICR1; }
-
-static inline void hal_capture_falling(void) {
-  TCCR1B = _BV(CS10);
-  TIFR1 = _BV(ICF1);
-}
-
-static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
-
-static inline void hal_pin_change_mask(uint8_t bits) { PCMSK1 = bits; }
-
-static inline __attribute__((always_inline)) void hal_sleep_unless(bool (*due)(void)) {
+static inline __attribute__((always_inline)) void hal_sleep_until(bool (*due)(void)) {
   cli();
-  if (due()) {
-    sei();
-  } else {
+  while (!due()) {
     sei(); /* takes effect after the next instruction: no interrupt slips in before the sleep */
     sleep_cpu();
+    cli();
   }
+  sei();
 }
 
 #endif

@@ -2,19 +2,14 @@
  * with entry and return, of the 320 that a byte lasts. */
 #include "hal/hal.h"
 
-#define SEND_RING 128u
 #define BAUD 500000ul
 #define SENDER_IDLE (_BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0))
 #define SENDER_BUSY (SENDER_IDLE | _BV(UDRIE0))
-#define LOST_BIT 2 /* of GPIOR0 */
 
-/* The interrupts name these; indices wrap as a byte, or by a mask. Equal indices: empty. */
 uint8_t hal_receive_ring[256];
-uint8_t hal_send_ring[SEND_RING];
+uint8_t hal_send_ring[HAL_SEND_RING];
 volatile uint8_t hal_receive_tail;
 volatile uint8_t hal_send_head;
-#define RECEIVE_HEAD GPIOR1
-#define SEND_TAIL GPIOR2
 
 void hal_start_serial(void) {
   UBRR0 = (uint16_t)(F_CPU / (8u * BAUD) - 1u);
@@ -55,8 +50,8 @@ ISR(USART_RX_vect, ISR_NAKED) {
       "rjmp 2b                           \n"
       :
       : [sreg] "I"(_SFR_IO_ADDR(SREG)), [status] "n"(_SFR_MEM_ADDR(UCSR0A)), [data] "n"(_SFR_MEM_ADDR(UDR0)),
-        [head] "I"(_SFR_IO_ADDR(RECEIVE_HEAD)), [flags] "I"(_SFR_IO_ADDR(GPIOR0)), [overrun] "I"(DOR0),
-        [lost] "I"(LOST_BIT));
+        [head] "I"(_SFR_IO_ADDR(HAL_RECEIVE_HEAD)), [flags] "I"(_SFR_IO_ADDR(GPIOR0)), [overrun] "I"(DOR0),
+        [lost] "I"(HAL_LOST_BIT));
 }
 
 ISR(USART_UDRE_vect, ISR_NAKED) {
@@ -90,31 +85,14 @@ ISR(USART_UDRE_vect, ISR_NAKED) {
       "rjmp 2b                           \n"
       :
       : [sreg] "I"(_SFR_IO_ADDR(SREG)), [data] "n"(_SFR_MEM_ADDR(UDR0)), [control] "n"(_SFR_MEM_ADDR(UCSR0B)),
-        [tail] "I"(_SFR_IO_ADDR(SEND_TAIL)), [mask] "M"(SEND_RING - 1u), [idle] "M"(SENDER_IDLE));
-}
-
-bool hal_serial_received(void) { return RECEIVE_HEAD != hal_receive_tail; }
-
-bool hal_serial_receive(uint8_t *byte) {
-  const uint8_t tail = hal_receive_tail;
-  if (RECEIVE_HEAD == tail) {
-    return false;
-  }
-  *byte = hal_receive_ring[tail];
-  hal_receive_tail = (uint8_t)(tail + 1u);
-  return true;
-}
-
-bool hal_serial_room(uint8_t count) {
-  const uint8_t queued = (uint8_t)((uint8_t)(hal_send_head - SEND_TAIL) & (SEND_RING - 1u));
-  return SEND_RING - 1u - queued >= count;
+        [tail] "I"(_SFR_IO_ADDR(HAL_SEND_TAIL)), [mask] "M"(HAL_SEND_RING - 1u), [idle] "M"(SENDER_IDLE));
 }
 
 void hal_serial_send(const uint8_t *bytes, uint8_t count) {
   uint8_t head = hal_send_head;
   for (uint8_t i = 0; i < count; i++) {
     hal_send_ring[head] = bytes[i];
-    head = (uint8_t)(head + 1u) & (SEND_RING - 1u);
+    head = (uint8_t)(head + 1u) & (HAL_SEND_RING - 1u);
   }
   hal_send_head = head;
   if (count > 0) {
@@ -123,9 +101,9 @@ void hal_serial_send(const uint8_t *bytes, uint8_t count) {
 }
 
 bool hal_serial_overrun(void) {
-  if ((GPIOR0 & _BV(LOST_BIT)) == 0) {
+  if ((GPIOR0 & _BV(HAL_LOST_BIT)) == 0) {
     return false;
   }
-  GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(LOST_BIT));
+  GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_LOST_BIT));
   return true;
 }

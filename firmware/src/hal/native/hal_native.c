@@ -207,8 +207,6 @@ uint8_t hal_reset_cause(void) { return reset_cause; }
 void hal_start_watchdog(void) {}
 void hal_kick_watchdog(void) {}
 
-void hal_sleep_unless(bool (*due)(void)) { (void)due; }
-
 uint32_t hal_image_size(void) { return 0; }
 
 uint32_t hal_image_hash(void) { return 0; }
@@ -287,6 +285,9 @@ static void advance(uint64_t until) {
         const uint8_t pin = machine->next_edge_pin;
         machine->outside[pin] = native_take_edge(machine).level;
         settle(pin);
+        if (firmware_due()) {
+          poll_firmware();
+        }
         break;
       }
       case BYTE:

@@ -54,6 +54,10 @@ void hal_capture_falling(void);
 void hal_capture_stop(void);
 void hal_pin_change_mask(uint8_t bits);
 
+bool hal_serial_received(void);
+bool hal_serial_receive(uint8_t *byte);
+bool hal_serial_room(uint8_t count);
+
 #define HAL_TABLE static const
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
