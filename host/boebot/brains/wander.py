@@ -54,12 +54,15 @@ class Brain:
                 self.state = "turn"
 
         elif self.state == "turn":
-            self.spin(robot, TURN)
+            self.turn(robot, TURN, -TURN)
             if robot.chance(STOP_TURN_CHANCE, per=0.01):
                 self.state = "straight"
 
         elif self.state == "avoid":
-            self.spin(robot, AVOID_TURN)
+            if seen_left and seen_right:  # ahead: turn on the spot
+                self.turn(robot, AVOID_TURN, -AVOID_TURN)
+            else:  # to one side: turn about the wheel on the other, and go on along the wall
+                self.turn(robot, AVOID_TURN, 0.0)
             if seen_left or seen_right:
                 self.until = robot.time + CLEAR_TIME
             elif robot.time >= self.until:
@@ -73,7 +76,7 @@ class Brain:
                 self.state = "escape"
 
         elif self.state == "escape":
-            self.spin(robot, TURN)
+            self.turn(robot, TURN, -TURN)
             if robot.time >= self.until:
                 self.state = "straight"
 
@@ -84,9 +87,9 @@ class Brain:
         else:
             self.left = on_right
 
-    def spin(self, robot: Robot, signal: float) -> None:
-        """Turn on the spot to the chosen side."""
+    def turn(self, robot: Robot, outer: float, inner: float) -> None:
+        """Turn to the chosen side, with these signals for the outer and the inner wheel."""
         if self.left:
-            robot.drive(-signal, signal)
+            robot.drive(inner, outer)
         else:
-            robot.drive(signal, -signal)
+            robot.drive(outer, inner)
