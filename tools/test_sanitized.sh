@@ -7,6 +7,8 @@ python=build/venv/bin/python
 
 BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --build-lib build/sanitized/lib \
   >build/sanitized.log 2>&1 || { cat build/sanitized.log; exit 1; }
+# The tests' helpers are found in the package under test.
+ln -sfn "$PWD/sim_bridge/tests" build/sanitized/lib/sim_bridge/tests
 
 asan=$(cc -print-file-name=libasan.so)
 ubsan=$(cc -print-file-name=libubsan.so)
