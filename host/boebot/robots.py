@@ -325,7 +325,7 @@ def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_pins(robot: RobotDescription, file: str) -> None:
-    """Refuses devices that cannot share a pin or a unit of the chip, naming both (ATmega328P data sheet, pin functions)."""
+    """Refuses devices that cannot share a pin or a unit of the chip (ATmega328P data sheet), naming both."""
     pin_owner: dict[int, str] = {}
     unit_owner: dict[str, tuple[str, str]] = {}
     for name, device in robot.device.items():
