@@ -111,7 +111,8 @@ class Sim:
         )
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self.handle = ffi.gc(handle, lib.sim_destroy)
+        # the board outlives the simulation, whichever of the two Python lets go of first
+        self.handle = ffi.gc(handle, lambda handle, board=board: lib.sim_destroy(handle))
         _done(
             lib.sim_add_robot(handle, board.address, imperfections.body_parameters(robot.body), x, y, heading)
         )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -61,6 +63,19 @@ def test_closed_board_has_no_pointer() -> None:
     machine.avr.close()
     with pytest.raises(BoardError, match="closed"):
         _ = machine.avr.pointer
+
+
+def test_session_that_nobody_closes(tmp_path: Path) -> None:
+    image = tmp_path / "program.elf"
+    image.write_bytes(assemble("main: rjmp main"))
+    program = f"""
+from boebot.boards import BoardRequest
+from boebot.robots import load_robot
+from sim_bridge.session import open_avr
+session = open_avr(BoardRequest(robot=load_robot("shieldbot"), image={str(image)!r}))
+session.transport.read(0.1)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 # ---- resets and watchdog ----
