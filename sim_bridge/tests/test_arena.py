@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from boebot.errors import ArenaError
@@ -100,6 +100,7 @@ def test_ray_along_an_edge_meets_its_nearer_end() -> None:
 
 
 @given(arenas, coordinates, coordinates)
+@example(arena_of([(1.0, 1e-277), (-0.5, 0.866), (-0.5, -0.866)]), 0.0, 0.0)
 def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) -> None:
     solid = shapely.union_all([shapely.Polygon(corners) for corners in arena.outlines])
     point = shapely.Point(x, y)

@@ -388,13 +388,13 @@ size_t arena_edges_near(const arena *self, double x, double y, double radius, ui
   return count;
 }
 
-/* Even-odd rule. */
+/* Even-odd rule. Corners are compared by their own coordinates: start plus difference may round to something else. */
 static int in_polygon(const arena *self, const polygon *p, double x, double y) {
   int inside = 0;
   for (uint32_t i = 0; i < p->count; i++) {
     const arena_edge *e = &self->edge[p->first + i];
-    const double by = e->ay + e->ey;
-    if ((e->ay > y) == (by > y)) continue;
+    const arena_edge *following = &self->edge[p->first + (i + 1 < p->count ? i + 1 : 0)];
+    if ((e->ay > y) == (following->ay > y)) continue;
     if (x < e->ax + e->ex * ((y - e->ay) / e->ey)) inside = !inside;
   }
   return inside;
