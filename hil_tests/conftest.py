@@ -13,9 +13,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from rig import Rig  # noqa: E402
-
-from boebot.boards import is_live  # noqa: E402
+from boebot.boards import is_live
+from rig import Rig
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.link import frame, messages
 from boebot.robots import load_robot
+
+_M = TypeVar("_M")  # a message
 
 CYCLES_PER_S = 16_000_000
 CYCLES_PER_US = 16
@@ -77,12 +79,15 @@ class Rig:
             else:
                 self.answers.append(message)
 
-    def ask(self, request: Any, answer: type, within_s: float = 0.1) -> Any:
+    def ask(self, request: Any, answer: type[_M], within_s: float = 0.1) -> _M:
         """Sends a request and returns the answer."""
         self.send(request)
-        return self.wait_for(
-            lambda: next((a for a in reversed(self.answers) if isinstance(a, answer)), None), within_s, answer.__name__
+        found: _M = self.wait_for(
+            lambda: next((a for a in reversed(self.answers) if isinstance(a, answer)), None),
+            within_s,
+            answer.__name__,
         )
+        return found
 
     def wait_for(self, condition: Callable[[], Any], within_s: float, what: str) -> Any:
         """Listens until `condition()` is true; fails after `within_s` of the board's time."""

@@ -16,7 +16,8 @@ def cells_visited(truth: boebot.boards.Truth, cell: float = 0.20) -> tuple[int, 
     from matplotlib.path import Path
 
     outer, *obstacles = (Path(outline) for outline in sorted(truth.outlines, key=lambda o: -np.ptp(o[:, 0])))
-    low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
+    corners = np.asarray(outer.vertices)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = (np.floor((high - low) / cell + 1e-9)).astype(int)
     centres = [
         (i, j)
@@ -25,9 +26,7 @@ def cells_visited(truth: boebot.boards.Truth, cell: float = 0.20) -> tuple[int, 
         if outer.contains_point(point := low + cell * (np.array([i, j]) + 0.5))
         and not any(obstacle.contains_point(point) for obstacle in obstacles)
     ]
-    seen = {
-        (int(i), int(j)) for i, j in zip((truth.x - low[0]) // cell, (truth.y - low[1]) // cell, strict=True)
-    }
+    seen = {(int(i), int(j)) for i, j in zip((truth.x - low[0]) // cell, (truth.y - low[1]) // cell, strict=True)}
     return len(seen & set(centres)), len(centres)
 
 

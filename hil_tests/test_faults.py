@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
-from rig import CYCLES_PER_S, Rig
+from elftools.elf.sections import SymbolTableSection
 
 from boebot import resources
 from boebot.boards import BoardRequest, open_board
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.robots import load_robot
+from rig import CYCLES_PER_S, Rig
 
 LEFT, RIGHT = 13, 12
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
@@ -25,8 +26,12 @@ def planted(folder: Path, function: str, code: bytes) -> str:
     """A copy of the image in which `function` begins with `code`."""
     image = bytearray((resources.folder("images") / "shieldbot.elf").read_bytes())
     elf = ELFFile(io.BytesIO(bytes(image)))
-    (symbol,) = elf.get_section_by_name(".symtab").get_symbol_by_name(function)
-    text = elf.get_section_by_name(".text")
+    symbols, text = elf.get_section_by_name(".symtab"), elf.get_section_by_name(".text")
+    assert isinstance(symbols, SymbolTableSection)
+    assert text is not None
+    found = symbols.get_symbol_by_name(function)
+    assert found is not None
+    (symbol,) = found
     start = text["sh_offset"] + symbol["st_value"] - text["sh_addr"]
     image[start : start + len(code)] = code
     path = folder / f"{function}.elf"
@@ -47,7 +52,9 @@ def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_pa
         rig.answers.clear()
         rig.send(messages.Stop())
         hello = rig.wait_for(
-            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None), 1.0, "a hello after the reset"
+            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
+            1.0,
+            "a hello after the reset",
         )
         assert hello.reset_cause == messages.ResetCause.WATCHDOG
         assert rig.latest().status & messages.Status.WATCHDOG_RESET
@@ -63,7 +70,7 @@ def test_program_that_crashes_is_said_so_in_one_sentence(tmp_path: Path) -> None
     with rig_with(planted(tmp_path, "safety_stop", RESERVED_OPCODE)) as rig:
         rig.start()
         rig.send(messages.Stop())
-        with pytest.raises(BoebotError, match="instruction|opcode"):
+        with pytest.raises(BoebotError, match=r"instruction|opcode"):
             rig.listen(0.2)
 
 
@@ -81,7 +88,9 @@ def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> 
         reset_at = rig.board.cycle
         rig.board.reset(cause)
         hello = rig.wait_for(
-            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None), 1.0, "a hello after the reset"
+            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
+            1.0,
+            "a hello after the reset",
         )
         assert hello.reset_cause == messages.ResetCause[cause.upper()]
         rig.listen(0.3)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import random
-
-from rig import Rig
 
 from boebot.link import frame, messages
 from boebot.robots import load_robot
+from rig import Rig
 
 
 def text(field: bytes) -> str:
@@ -33,7 +33,7 @@ def test_telemetry_comes_once_per_tick_with_board_time(rig: Rig) -> None:
     rig.latest()
     frames = rig.listen(1.0)
     assert 99 <= len(frames) <= 101
-    for before, after in zip(frames, frames[1:], strict=False):
+    for before, after in itertools.pairwise(frames):
         assert after.tick - before.tick == 1
         assert abs(after.time - before.time - 10_000) <= 1
     assert rig.decoder.bad == rig.decoder.lost == 0
@@ -66,7 +66,9 @@ def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
         rig.listen(0.01)
     # damaged set-points: one bit of each frame is wrong
     for _ in range(50):
-        damaged = bytearray(frame.encode(messages.SetpointSignal.ID, 5, messages.SetpointSignal(9000, 9000, 2000, 0).pack()))
+        damaged = bytearray(
+            frame.encode(messages.SetpointSignal.ID, 5, messages.SetpointSignal(9000, 9000, 2000, 0).pack())
+        )
         damaged[draw.randrange(1, len(damaged) - 1)] ^= 1 << draw.randrange(8)
         rig.transport.write(bytes(damaged))
         rig.listen(0.01)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
 
 from boebot.link import frame, messages
+from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
 
 LEFT, RIGHT = 13, 12
 EDGE_TOLERANCE = 4  # cycles, issue: servo edges within ±4 cycles

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
-from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 from boebot.link import messages
+from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 
 def test_edges_are_counted_and_timed(rig: Rig) -> None:
@@ -76,7 +78,7 @@ def test_bounce_of_a_millisecond_is_one_press(rig: Rig) -> None:
     for i in range(9):
         rig.board.drive(5, 2 * (i % 2), start + i * 2_000)
     shown = [bool(f.whiskers & messages.Whiskers.LEFT) for f in rig.listen(0.1)]
-    assert sum(a != b for a, b in zip(shown, shown[1:], strict=False)) == 1 and shown[-1]
+    assert sum(a != b for a, b in itertools.pairwise(shown)) == 1 and shown[-1]
 
 
 @pytest.mark.parametrize("distance", [0.10, 0.50, 1.00, 2.50])

@@ -21,10 +21,12 @@ BOEBOT = [sys.executable, "-m", "boebot"]
 def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """The URL of an emulated robot that another process serves, and that process."""
     server = subprocess.Popen(
-        [*BOEBOT, "serve", "--on", board, *where, "--arena", "room", "--json"], stdout=subprocess.PIPE, text=True
+        [*BOEBOT, "serve", "--on", board, *where, "--arena", "room", "--json"],
+        stdout=subprocess.PIPE,
+        text=True,
     )
+    assert server.stdout is not None
     try:
-        assert server.stdout is not None
         announced = "".join(iter(server.stdout.readline, "}\n")) + "}"
         yield json.loads(announced)["url"], server
     finally:

@@ -190,9 +190,7 @@ def _check_polygon(corners: list[Point], where: str) -> None:
             raise ArenaError(f"{where}[{index}] and the corner after it are the same point; expected an edge")
     crossing = _crossing(np.array(corners), np.array(following))
     if crossing is not None:
-        raise ArenaError(
-            f"{where}: edges {crossing[0]} and {crossing[1]} cross; expected a polygon that does not"
-        )
+        raise ArenaError(f"{where}: edges {crossing[0]} and {crossing[1]} cross; expected a polygon that does not")
 
 
 def _crossing(starts: Floats, ends: Floats) -> tuple[int, int] | None:
@@ -211,16 +209,10 @@ def _crossing(starts: Floats, ends: Floats) -> tuple[int, int] | None:
             continue
         a, b, c, d = starts[i], ends[i], starts[rest], ends[rest]
         apart = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
-        meet = (
-            (side(a, b, c) * side(a, b, d) <= 0) & (side(c, d, a) * side(c, d, b) <= 0) & ~apart.any(axis=1)
-        )
+        meet = (side(a, b, c) * side(a, b, d) <= 0) & (side(c, d, a) * side(c, d, b) <= 0) & ~apart.any(axis=1)
         neighbour = (rest == i + 1) | ((i == 0) & (rest == count - 1))
         along = (b - a) @ (d - c).T
-        fold = (
-            neighbour
-            & (along < 0)
-            & (np.abs((b - a)[0] * (d - c)[:, 1] - (b - a)[1] * (d - c)[:, 0]) < 1e-15)
-        )
+        fold = neighbour & (along < 0) & (np.abs((b - a)[0] * (d - c)[:, 1] - (b - a)[1] * (d - c)[:, 0]) < 1e-15)
         wrong = np.flatnonzero((meet & ~neighbour) | fold)
         if wrong.size:
             return i, int(rest[wrong[0]])

@@ -56,9 +56,7 @@ LINK = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
 
 def declarations(header: Path) -> str:
     """What a header offers to Python."""
-    return "\n".join(
-        re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", header.read_text("utf-8"), re.S)
-    )
+    return "\n".join(re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", header.read_text("utf-8"), re.S))
 
 
 def builder(root: Path) -> FFI:

@@ -118,9 +118,7 @@ class TcpPort:
 
     def wait(self, seconds: float) -> None:
         """Sleeps until a client or bytes come."""
-        select.select(
-            [self._listener] if self._client is None else [self._listener, self._client], [], [], seconds
-        )
+        select.select([self._listener] if self._client is None else [self._listener, self._client], [], [], seconds)
 
     def opened(self) -> bool:
         """Whether a client came since the last call."""
@@ -208,9 +206,7 @@ def serve(
     """
     openers = {"native": open_native, "avr": open_avr}
     if kind not in openers:
-        raise BoardError(
-            f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}"
-        )
+        raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}")
     with contextlib.ExitStack() as stack:
         session = openers[kind](request)
         stack.callback(session.close)

@@ -19,10 +19,7 @@ def entries(folder: str, *options: str) -> list[dict[str, object]]:
     """One entry for each C file below a folder of the project."""
     found = sorted((PROJECT / folder).rglob("[!_]*.c"))
     files = [str(path.relative_to(PROJECT)) for path in found]
-    return [
-        {"directory": str(PROJECT), "file": file, "arguments": [*FLAGS, *options, "-c", file]}
-        for file in files
-    ]
+    return [{"directory": str(PROJECT), "file": file, "arguments": [*FLAGS, *options, "-c", file]} for file in files]
 
 
 def main() -> None:

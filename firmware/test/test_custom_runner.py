@@ -45,9 +45,7 @@ class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
         click.echo(done.stderr, nl=False, err=True)
         report = re.search(r"<doctest .*</doctest>", done.stdout, re.DOTALL)
         if report is None:
-            raise UnitTestSuiteError(
-                f"the program ended with code {done.returncode} before its report was complete"
-            )
+            raise UnitTestSuiteError(f"the program ended with code {done.returncode} before its report was complete")
         failures = 0
         for element in ElementTree.fromstring(report[0]).iter("TestCase"):
             case = test_case(element)
@@ -55,9 +53,7 @@ class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
             self.test_suite.add_case(case)
             click.echo(case.humanize())
         if done.returncode != 0 and failures == 0:
-            raise UnitTestSuiteError(
-                f"the program ended with code {done.returncode} although no test case failed"
-            )
+            raise UnitTestSuiteError(f"the program ended with code {done.returncode} although no test case failed")
 
 
 def test_case(element: ElementTree.Element) -> TestCase:
@@ -67,9 +63,7 @@ def test_case(element: ElementTree.Element) -> TestCase:
         return TestCase(element.attrib["name"], TestStatus.SKIPPED, source=source)
     results = element.find("OverallResultsAsserts")
     passed = results is not None and results.attrib["test_case_success"] == "true"
-    problems = [
-        problem(found) for found in element.iter() if found.tag in ("Expression", "Exception", "Message")
-    ]
+    problems = [problem(found) for found in element.iter() if found.tag in ("Expression", "Exception", "Message")]
     status = TestStatus.PASSED if passed else TestStatus.FAILED
     return TestCase(element.attrib["name"], status, message="".join(problems) or None, source=source)
 

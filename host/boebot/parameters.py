@@ -39,9 +39,7 @@ DEVICE_OF_BIT = {
 
 def parameters_of(robot: RobotDescription) -> dict[str, float]:
     """The parameters that the robot's description settles, in their units."""
-    values: dict[str, float] = {
-        "devices": sum(int(bit) for bit, device in DEVICE_OF_BIT.items() if robot.has(device))
-    }
+    values: dict[str, float] = {"devices": sum(int(bit) for bit, device in DEVICE_OF_BIT.items() if robot.has(device))}
     for parameter, source in FROM_ROBOT.items():
         owner, key = source.split(".")
         if owner == "body":

@@ -135,9 +135,7 @@ class RunResult:
         """Distance of the estimate from the true place at the end (m), where somebody knows it."""
         if self.true_pose is None:
             return None
-        return float(
-            np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1])
-        )
+        return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
 
     @property
     def real_time_factor(self) -> float:

@@ -83,11 +83,7 @@ class Equipment:
 
         def infrared(key: str, bit: messages.Infrared) -> Callable[[Telemetry], Infrared] | None:
             pair = device.get(key)
-            return (
-                InfraredReader(bit, infrared_period, tick_s)
-                if isinstance(pair, robots.InfraredPair)
-                else None
-            )
+            return InfraredReader(bit, infrared_period, tick_s) if isinstance(pair, robots.InfraredPair) else None
 
         def encoder(key: str, left: bool) -> Callable[[Telemetry], Encoder] | None:
             entry = device.get(key)
@@ -109,9 +105,7 @@ class Equipment:
             else None
         )
         self.left_whisker = self._or_refuse("left_whisker", whisker("whisker_left", messages.Whiskers.LEFT))
-        self.right_whisker = self._or_refuse(
-            "right_whisker", whisker("whisker_right", messages.Whiskers.RIGHT)
-        )
+        self.right_whisker = self._or_refuse("right_whisker", whisker("whisker_right", messages.Whiskers.RIGHT))
         self.left_ir = self._or_refuse("left_ir", infrared("infrared_left", messages.Infrared.LEFT))
         self.right_ir = self._or_refuse("right_ir", infrared("infrared_right", messages.Infrared.RIGHT))
         self.ping = self._or_refuse("ping", ping)
@@ -309,9 +303,7 @@ class Robot:
             BrainError: a speed is beyond 0.5 m/s or no number.
         """
         if not (-SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT):
-            raise BrainError(
-                f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s"
-            )
+            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s")
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:

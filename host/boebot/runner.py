@@ -107,9 +107,7 @@ def execute(
         raise BrainError(
             f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
         )
-    request = BoardRequest(
-        robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime
-    )
+    request = BoardRequest(robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime)
     session = open_board(on, request)
     try:
         return _Run(session, request, loaded, on, seconds, period_s, progress).execute()
@@ -128,8 +126,7 @@ def check_time_to_live(period_s: float) -> int:
     time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000))
     if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
         raise BoebotError(
-            f"a brain period of {period_s * 1000:g} ms is too long; expected at most "
-            f"{TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
+            f"a brain period of {period_s * 1000:g} ms is too long; expected at most {TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
         )
     return time_to_live_ms
 
@@ -209,9 +206,7 @@ class _Run:
             payloads = poll(wait_s, quiet_s)
             if not payloads:
                 if transport.now() - heard_s > SILENCE_S:
-                    raise BoardError(
-                        f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s"
-                    )
+                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
                 wait_s, quiet_s = 2 * tick_s, 0.0
                 continue
             for payload in payloads:

@@ -76,9 +76,7 @@ class Peer:
                 self.parameters[message.parameter] = message.value
                 self._send(messages.Parameter(message.parameter, message.value, 0))
             elif isinstance(message, messages.GetParameter):
-                self._send(
-                    messages.Parameter(message.parameter, self.parameters.get(message.parameter, 0), 0)
-                )
+                self._send(messages.Parameter(message.parameter, self.parameters.get(message.parameter, 0), 0))
             elif isinstance(message, messages.SetpointSignal | messages.SetpointSpeed | messages.Stop):
                 self.setpoints.append(message)
                 self.setpoint_ticks.append(self.ticks)
@@ -155,9 +153,7 @@ class Peer:
     def _move(self) -> bool:
         """Advances the robot by a tick; returns whether it touches the wall."""
         left, right = (0.16 * signal * TICK_S for signal in self.command)
-        self._edges = [
-            edges + abs(way) / 0.00325 for edges, way in zip(self._edges, (left, right), strict=True)
-        ]
+        self._edges = [edges + abs(way) / 0.00325 for edges, way in zip(self._edges, (left, right), strict=True)]
         self.heading += (right - left) / 0.105
         x = self.x + (left + right) / 2 * math.cos(self.heading)
         y = self.y + (left + right) / 2 * math.sin(self.heading)

@@ -38,8 +38,11 @@ def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
     ("text", "sentence"),
     [
         ("[device.buzzer]\ntype = 'buzzer'\npin = 5", "whisker_left and buzzer cannot share pin 5"),
-        ("[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
-         "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5", "ping and ping_rear cannot share pin 8"),
+        (
+            "[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
+            "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5",
+            "ping and ping_rear cannot share pin 8",
+        ),
         ("remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6", "buzzer and horn cannot share Timer0"),
         ("[device.ping]\npin = 7", "ping.pin is pin 7, which cannot do that; expected 8"),
         ("[device.servo_left]\npin = 20", "there is no pin 20; expected 0..13 or 'A0'..'A5'"),

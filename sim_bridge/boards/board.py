@@ -70,9 +70,7 @@ class BoardAccess:
         self._owner = owner
         self._access = lib.board_access_open(pointer)
         if self._access == ffi.NULL:
-            raise BoardError(
-                "This board was built for another version of the board interface; build it again."
-            )
+            raise BoardError("This board was built for another version of the board interface; build it again.")
 
     @property
     def now(self) -> int:
@@ -122,9 +120,7 @@ class BoardAccess:
     def log(self) -> list[Edge]:
         """Takes the output edges since the last call."""
         log = self._access.log
-        edges = (
-            [Edge(int(e.cycle), e.pin, Level(e.level)) for e in log.edges[0 : log.count]] if log.count else []
-        )
+        edges = [Edge(int(e.cycle), e.pin, Level(e.level)) for e in log.edges[0 : log.count]] if log.count else []
         self._lib.board_log_clear(self._ffi.addressof(self._access, "log"))
         return edges
 

@@ -79,9 +79,7 @@ class Scripted:
         count = lib.script_board_inputs(self.script, pin, ffi.NULL, ffi.NULL, 0)
         cycles, levels = ffi.new("uint64_t[]", count + 1), ffi.new("uint8_t[]", count + 1)
         lib.script_board_inputs(self.script, pin, cycles, levels, count)
-        return [
-            (int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]
-        ]
+        return [(int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]]
 
 
 def scripted(

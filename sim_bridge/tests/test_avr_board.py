@@ -339,9 +339,7 @@ def test_busy_run_is_busy(one_piece: tuple[list[Edge], list[SentByte], dict[str,
 
 
 @pytest.mark.parametrize("step", [1, 7, 100, 1000, 16_000, 65_537])
-def test_runs_do_not_depend_on_steps(
-    step: int, one_piece: tuple[list[Edge], list[SentByte], dict[str, int]]
-) -> None:
+def test_runs_do_not_depend_on_steps(step: int, one_piece: tuple[list[Edge], list[SentByte], dict[str, int]]) -> None:
     edges, sent, counters = busy_run(step)
     assert edges == one_piece[0]
     assert sent == one_piece[1]

@@ -50,9 +50,7 @@ def test_out_is_one_cycle_and_sbi_two() -> None:
 @pytest.mark.parametrize("pin", range(20))
 def test_each_pin_is_where_the_board_has_it(pin: int) -> None:
     port, bit = ("D", pin) if pin < 8 else ("B", pin - 8) if pin < 14 else ("C", pin - 14)
-    machine = Machine(
-        f"main:\n sbi DDR{port}, {bit}\n sbi PORT{port}, {bit}\n sbic PIN{port}, {bit}\n1: rjmp 1b"
-    )
+    machine = Machine(f"main:\n sbi DDR{port}, {bit}\n sbi PORT{port}, {bit}\n sbic PIN{port}, {bit}\n1: rjmp 1b")
     machine.board.run(100)
     assert [(edge.pin, edge.level) for edge in machine.board.log()] == [(pin, Level.LOW), (pin, Level.HIGH)]
 
@@ -94,9 +92,7 @@ def test_pull_up_reads_one_and_a_floating_pin_keeps_its_level() -> None:
 
 
 def test_pull_up_rises_when_the_outside_lets_go() -> None:
-    machine = Machine(
-        "main:\n sbi PORTD, 7\n sbi DDRB, 5\n1: sbis PIND, 7\n rjmp 1b\n sbi PINB, 5\n2: rjmp 2b"
-    )
+    machine = Machine("main:\n sbi PORTD, 7\n sbi DDRB, 5\n1: sbis PIND, 7\n rjmp 1b\n sbi PINB, 5\n2: rjmp 2b")
     machine.board.drive(7, Level.LOW)
     machine.board.drive(7, Level.RELEASED, at=1000)
     machine.board.run(2000)

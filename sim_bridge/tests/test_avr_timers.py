@@ -134,9 +134,7 @@ def test_count_and_stopped_timer() -> None:
     machine.board.run(2000)
     first, second, stopped, later = words(machine, 16, 4)
     assert second - first == 1000 + 2 + 2
-    assert (
-        stopped - second == 2 + 2 + 1
-    )  # to the end of the store that stops it; a read is in its second cycle
+    assert stopped - second == 2 + 2 + 1  # to the end of the store that stops it; a read is in its second cycle
     assert later == stopped
 
 

@@ -56,9 +56,7 @@ def test_bytes_leave_at_the_end_of_their_stop_bits() -> None:
     assert machine.board.counters()["bytes_out"] == 3
 
 
-@pytest.mark.parametrize(
-    ("divisor", "double_speed", "bit"), [(16, 1, 136), (8, 0, 144), (103, 0, 1664), (0, 1, 8)]
-)
+@pytest.mark.parametrize(("divisor", "double_speed", "bit"), [(16, 1, 136), (8, 0, 144), (103, 0, 1664), (0, 1, 8)])
 def test_ten_bit_times_a_byte(divisor: int, double_speed: int, bit: int) -> None:
     setup = f"""
       ldi r24, {divisor}

@@ -195,9 +195,7 @@ def test_truth_has_a_row_every_ten_milliseconds() -> None:
 
 def test_nothing_is_recorded_unless_asked_for() -> None:
     script = lib.script_board_new()
-    board = EmulatedBoard(
-        int(lib.script_board_address(script)), "script", lambda: lib.script_board_destroy(script)
-    )
+    board = EmulatedBoard(int(lib.script_board_address(script)), "script", lambda: lib.script_board_destroy(script))
     sim = Sim(board, load_robot("shieldbot"), arena_of(), record=False)
     sim.run(CLOCK_HZ, CLOCK_HZ)
     assert len(sim.truth()["time"]) == 0

@@ -150,9 +150,7 @@ def edges(robot: Scripted, pin: int) -> list[tuple[int, int]]:
     return robot.inputs(pin)[1:]
 
 
-@given(
-    st.integers(-200, 200).filter(lambda o: abs(o) > 10), st.integers(-200, 200).filter(lambda o: abs(o) > 10)
-)
+@given(st.integers(-200, 200).filter(lambda o: abs(o) > 10), st.integers(-200, 200).filter(lambda o: abs(o) > 10))
 def test_encoder_edges_are_the_wheels_angle(left_us: int, right_us: int) -> None:
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1500 + left_us, RIGHT: 1500 - right_us})
@@ -260,9 +258,7 @@ def test_whisker_can_be_held() -> None:
 # ---- IR pair ---------------------------------------------------------------------------------------------
 
 
-def seen_from(
-    distance: float, period: int = 421, cycles: int = 38, noise: bool = False, seed: int = 1
-) -> Scripted:
+def seen_from(distance: float, period: int = 421, cycles: int = 38, noise: bool = False, seed: int = 1) -> Scripted:
     """A burst of the left LED with a wall across its beam at that distance from the pair."""
     robot = load_robot("shieldbot")
     pair = robot.device["infrared_left"]

@@ -66,9 +66,7 @@ def test_client_meets_a_robot_that_just_started(tcp: int | None) -> None:
             client = open_port(url, 500_000)
             heard = listen(client, 0.5)
             assert heard[0][0] == messages.Hello.ID
-            ticks = [
-                messages.Telemetry.unpack(p).tick for kind, _, p in heard if kind == messages.Telemetry.ID
-            ]
+            ticks = [messages.Telemetry.unpack(p).tick for kind, _, p in heard if kind == messages.Telemetry.ID]
             assert ticks[0] <= 1
             assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
             assert 25 <= len(ticks) <= 55  # real time: 50

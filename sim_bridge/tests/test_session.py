@@ -20,9 +20,7 @@ from sim_bridge.tests.simulated import MS
 
 def open_with(**wishes: Any) -> SimSession:
     """A session in an empty field without noise, unless wished otherwise."""
-    return open_native(
-        BoardRequest(**{"robot": load_robot("shieldbot"), "arena": "empty", "noise": False, **wishes})
-    )
+    return open_native(BoardRequest(**{"robot": load_robot("shieldbot"), "arena": "empty", "noise": False, **wishes}))
 
 
 @pytest.fixture
@@ -49,9 +47,7 @@ def test_board_says_hello_and_sends_a_message_per_tick(session: SimSession) -> N
     decoder = frame.Decoder()
     heard = decoder.feed(session.transport.read(1.0, 1.0))
     assert heard[0][0] == messages.Hello.ID
-    ticks = [
-        messages.Telemetry.unpack(payload).tick for kind, _, payload in heard if kind == messages.Telemetry.ID
-    ]
+    ticks = [messages.Telemetry.unpack(payload).tick for kind, _, payload in heard if kind == messages.Telemetry.ID]
     assert ticks == list(range(len(ticks)))
     assert len(ticks) in (99, 100)
 
@@ -71,9 +67,7 @@ def test_it_drives_straight_and_records_it(session: SimSession) -> None:
     assert truth.time[-1] == pytest.approx(3.0, abs=0.02)
     assert not truth.contact.any()
     counters = session.counters()
-    assert counters["distance"] == pytest.approx(
-        np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005
-    )
+    assert counters["distance"] == pytest.approx(np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005)
     assert counters["contacts"] == 0
     assert counters["bytes_in"] > 0 and counters["overruns"] == 0
 

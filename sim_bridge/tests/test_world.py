@@ -47,9 +47,7 @@ ARSIM = {
 class Body:
     """A body in an arena, moved by torques."""
 
-    def __init__(
-        self, arena: Arena | None = None, parameters: dict[str, float] = BOE_BOT, **changes: float
-    ) -> None:
+    def __init__(self, arena: Arena | None = None, parameters: dict[str, float] = BOE_BOT, **changes: float) -> None:
         self.parameters = ffi.new("body_parameters *", {**parameters, **changes})
         self.arena = arena_of() if arena is None else arena
         self.body = ffi.new("body *")
@@ -330,6 +328,4 @@ def test_default_robot_within_the_contact_guard() -> None:
     """THEORY 3.4: V dt < radius / 2 without splitting a step, for the kit's own robot and step."""
     body = load_robot("shieldbot").body
     assert body.wheel_speed_maximum_m_s * 0.001 < body.radius_m / 2
-    assert (
-        imperfections.SERVO_TOP_RPM * imperfections.RPM * body.wheel_radius_m > body.wheel_speed_maximum_m_s
-    )
+    assert imperfections.SERVO_TOP_RPM * imperfections.RPM * body.wheel_radius_m > body.wheel_speed_maximum_m_s

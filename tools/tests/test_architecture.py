@@ -69,9 +69,7 @@ def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str
     if folder == "sim_bridge/boards":  # the AVR board is built on simavr's headers, which begin with sim_ too
         forbidden = tuple(name for name in forbidden if name != "sim_")
     guilty = [
-        f"{source.relative_to(ROOT)} includes {name}"
-        for source, name in included(folder)
-        if name.startswith(forbidden)
+        f"{source.relative_to(ROOT)} includes {name}" for source, name in included(folder) if name.startswith(forbidden)
     ]
     assert not guilty
 
@@ -91,9 +89,9 @@ def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
 def test_simulator_knows_no_protocol() -> None:
     for source in (ROOT / "sim_bridge").rglob("*.py"):
         if "tests" not in source.parts:
-            assert not any(
-                name.startswith("boebot.link.") and "transport" not in name for name in imported(source)
-            ), source
+            assert not any(name.startswith("boebot.link.") and "transport" not in name for name in imported(source)), (
+                source
+            )
 
 
 def test_observation_leads_to_nothing_of_the_simulator() -> None:
@@ -115,11 +113,7 @@ def everything(start: object) -> list[object]:
     waiting = [start]
     while waiting:
         thing = waiting.pop()
-        if (
-            id(thing) in seen
-            or isinstance(thing, type | str | bytes | int | float)
-            or type(thing).__name__ == "module"
-        ):
+        if id(thing) in seen or isinstance(thing, type | str | bytes | int | float) or type(thing).__name__ == "module":
             continue
         seen[id(thing)] = thing
         for name in dir(thing):

@@ -46,9 +46,7 @@ def test_an_installed_wheel_runs_wander(installed: Path, tmp_path: Path, board: 
     command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", board, "--seconds", "5"]
     command += ["--out", str(out)]
     bare = {"PATH": str(installed / "bin"), "HOME": str(tmp_path), "LANG": os.environ.get("LANG", "C.UTF-8")}
-    done = subprocess.run(
-        without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in out.iterdir()}
     assert len((out / "run.csv").read_text(encoding="utf-8").splitlines()) > 450  # 100 ticks a second

@@ -66,12 +66,7 @@ def load_brain(source: object) -> LoadedBrain:
 
 def place(error: BaseException, path: Path | None) -> str:
     """Where in the brain's own file the error arose: "wander.py, line 12", or "" if it cannot be told."""
-    if (
-        isinstance(error, SyntaxError)
-        and error.filename
-        and path is not None
-        and Path(error.filename) == path
-    ):
+    if isinstance(error, SyntaxError) and error.filename and path is not None and Path(error.filename) == path:
         return f"{path}, line {error.lineno}"
     frames = traceback.extract_tb(error.__traceback__)
     inside = [frame for frame in frames if path is not None and frame.filename == str(path)]
@@ -179,10 +174,6 @@ def _needs(owner: object, where: str) -> tuple[str, ...]:
     needs = getattr(owner, "NEEDS", ())
     if isinstance(needs, str):
         return (needs,)
-    if not isinstance(needs, list | tuple | set | frozenset) or not all(
-        isinstance(need, str) for need in needs
-    ):
-        raise BrainError(
-            f'{where}: NEEDS is {needs!r}; expected a list of device names such as ["whiskers", "ping"]'
-        )
+    if not isinstance(needs, list | tuple | set | frozenset) or not all(isinstance(need, str) for need in needs):
+        raise BrainError(f'{where}: NEEDS is {needs!r}; expected a list of device names such as ["whiskers", "ping"]')
     return tuple(needs)

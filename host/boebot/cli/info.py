@@ -39,28 +39,20 @@ def info(
             "tick_rate_hz": hello.tick_rate,
             "reset_cause": _name(messages.ResetCause, hello.reset_cause),
             "devices": [
-                device.name.lower()
-                for device in messages.Devices
-                if hello.devices & device and device.name is not None
+                device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
             ],
         }
-        parameters = {
-            name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"
-        }
+        parameters = {name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"}
         telemetry = _latest(link)
     finally:
         session.close()
     values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)
-    values["status"] = [
-        flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name
-    ]
+    values["status"] = [flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name]
     if json:
         output.print_json(values | {"parameters": parameters})
         return
     output.print_table(values | {"status": values["status"] or "nothing to report"})
-    output.print_table(
-        {f"{name}": f"{value:g} {messages.PARAMETERS[name].unit}" for name, value in parameters.items()}
-    )
+    output.print_table({f"{name}": f"{value:g} {messages.PARAMETERS[name].unit}" for name, value in parameters.items()})
 
 
 def _latest(link: Link) -> messages.Telemetry:

@@ -16,13 +16,9 @@ RobotName = Annotated[str, typer.Option("--robot", metavar="R", help="Bundled ro
 ArenaName = Annotated[
     str | None, typer.Option("--arena", metavar="A", help="Bundled arena or .toml file (simulated runs).")
 ]
-Seed = Annotated[
-    int, typer.Option("--seed", metavar="N", help="Seed of the brain's chance and of the world's noise.")
-]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the brain's chance and of the world's noise.")]
 Period = Annotated[
     float | None,
-    typer.Option(
-        "--period", metavar="MS", help="Milliseconds from step to step; a multiple of the 10 ms tick."
-    ),
+    typer.Option("--period", metavar="MS", help="Milliseconds from step to step; a multiple of the 10 ms tick."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")]

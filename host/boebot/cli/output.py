@@ -53,9 +53,7 @@ def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
     bar = Progress(
         TextColumn(title),
         BarColumn(),
-        TextColumn(
-            "{task.completed:.0f} s" if math.isinf(seconds) else "{task.completed:.0f} of {task.total:g} s"
-        ),
+        TextColumn("{task.completed:.0f} s" if math.isinf(seconds) else "{task.completed:.0f} of {task.total:g} s"),
         TimeElapsedColumn(),
         console=Console(stderr=True),
         transient=True,

@@ -16,14 +16,10 @@ def run(
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", help="Length of the run by the board's clock.")
-    ] = 60.0,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
     seed: options.Seed = 1,
     period: options.Period = None,
-    realtime: Annotated[
-        bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")
-    ] = False,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),

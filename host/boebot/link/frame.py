@@ -125,9 +125,7 @@ class Decoder:
             self._kinds[message_id] = (length + _MINIMUM, start, _rows(length + 3))
         self._longest = max(lengths.values(), default=0) + _MINIMUM
         self._rest = b""
-        self._synchronised = (
-            False  # by a delimiter; what precedes the first is the tail of a frame we joined late
-        )
+        self._synchronised = False  # by a delimiter; what precedes the first is the tail of a frame we joined late
         self._next = -1  # sequence number expected, -1: any
 
     def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:

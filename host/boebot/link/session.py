@@ -80,9 +80,7 @@ class Link:
         """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
         self._send(
             0x11,
-            _SPEED.STRUCT.pack(
-                round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF
-            ),
+            _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
         )
 
     def send_stop(self) -> None:
@@ -140,9 +138,7 @@ class Link:
             )
         return self._parameter(messages.SetParameter(spec.id, counts), name) * spec.scale
 
-    def request(
-        self, question: messages.Message, kind: type[_M], accept: Callable[[_M], bool], what: str
-    ) -> _M:
+    def request(self, question: messages.Message, kind: type[_M], accept: Callable[[_M], bool], what: str) -> _M:
         """Sends `question`, again and again while it stays unanswered; returns the answer of type `kind` that
         `accept`s.
 
@@ -224,9 +220,7 @@ class Link:
     def _no_hello(self, heard: int, timeout_s: float) -> BoebotError:
         where = self.transport.name
         if self.decoder.good:
-            return ProtocolError(
-                f"the board at {where} sends frames but does not say hello within {timeout_s:g} s"
-            )
+            return ProtocolError(f"the board at {where} sends frames but does not say hello within {timeout_s:g} s")
         if heard:
             return ProtocolError(
                 f"what answers at {where} does not speak this kit's protocol ({heard} bytes, no valid frame): "

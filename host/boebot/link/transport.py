@@ -71,9 +71,7 @@ class SerialTransport:
         """
         self.name = port
         try:
-            self._port = serial.Serial(
-                port, baud, timeout=0, write_timeout=1.0, exclusive=True if _POSIX else None
-            )
+            self._port = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True if _POSIX else None)
         except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
             raise BoardError(_why_not(port, baud, error)) from None
 
@@ -179,9 +177,7 @@ def _why_not(port: str, baud: int, error: Exception) -> str:
     if number == errno.ENOENT or "filenotfound" in text or "no such file" in text:
         return f"there is no port {port}"
     if number == errno.EACCES or "permission" in text:
-        return (
-            f"{port} may not be opened by this user: permission denied (on Linux, join the group of {port})"
-        )
+        return f"{port} may not be opened by this user: permission denied (on Linux, join the group of {port})"
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text or "busy" in text:
         return f"{port} is busy: another program has it open"
     if "baud" in text:

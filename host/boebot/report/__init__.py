@@ -38,7 +38,5 @@ def save(result: RunResult, folder: Path) -> list[Path]:
             paths.append(picture.write(result, folder / "run.png"))
             paths.append(replay.write(result, folder / "replay.html"))
     except OSError as error:
-        raise BoebotError(
-            f"the run's files cannot be written to {folder}: {error.strerror or error}"
-        ) from None
+        raise BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}") from None
     return paths

@@ -70,9 +70,7 @@ def _draw_arena(axes: Axes, outlines: list[Floats]) -> None:
         if index == 0:  # the outer wall, around the floor
             axes.add_patch(Polygon(outline, closed=True, facecolor=FLOOR, edgecolor=WALL, lw=3.0, zorder=1))
         else:
-            axes.add_patch(
-                Polygon(outline, closed=True, facecolor="#c9ced9", edgecolor=WALL, lw=1.6, zorder=2)
-            )
+            axes.add_patch(Polygon(outline, closed=True, facecolor="#c9ced9", edgecolor=WALL, lw=1.6, zorder=2))
 
 
 def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
@@ -91,9 +89,7 @@ def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
 def _draw_ghost(axes: Axes, radius: float, estimate: Pose) -> None:
     """The odometric ghost: the robot where it believes to be at the end."""
     x, y, heading = float(estimate.x[-1]), float(estimate.y[-1]), float(estimate.heading[-1])
-    axes.add_patch(
-        Circle((x, y), radius, facecolor="none", edgecolor=ESTIMATE, lw=1.1, ls=(0, (3, 2)), zorder=6)
-    )
+    axes.add_patch(Circle((x, y), radius, facecolor="none", edgecolor=ESTIMATE, lw=1.1, ls=(0, (3, 2)), zorder=6))
     nose = (x + radius * math.cos(heading), y + radius * math.sin(heading))
     axes.plot((x, nose[0]), (y, nose[1]), color=ESTIMATE, lw=1.1, zorder=6)
 
@@ -132,9 +128,7 @@ def _draw_robot(axes: Axes, result: RunResult, path: Pose, index: int, colour: s
             )  # fmt: skip
         elif isinstance(device, robots.Whisker):
             (x0, y0), (x1, y1) = device.root_m, device.tip_m
-            axes.plot(
-                (x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round"
-            )
+            axes.plot((x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round")
     for side in (-1, 1):
         corner = (-wheel, side * body.track_width_m / 2 - 0.006)
         axes.add_patch(Rectangle(corner, 2 * wheel, 0.012, facecolor=INK, transform=place, zorder=11))
@@ -191,11 +185,7 @@ def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: flo
             lw=2.2,
             label="true path, dark to light in time" if view.known else "path by odometry",
         ),
-        *(
-            [Line2D([], [], color=ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate")]
-            if view.known
-            else []
-        ),
+        *([Line2D([], [], color=ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate")] if view.known else []),
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=START, mew=1.8, ms=8, label="start"),
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=END, mew=1.8, ms=8, label="end"),
         Line2D([], [], ls="", marker="o", mfc="none", mec="#c98a2b", mew=1.2, ms=6, label="whisker touch"),

@@ -35,9 +35,7 @@ def view(result: RunResult) -> View:
     known = result.true_pose is not None
     path = result.true_pose if result.true_pose is not None else result.odometry
     truth = result.truth
-    outlines = (
-        [np.asarray(outline, dtype=np.float64) for outline in truth.outlines] if truth is not None else []
-    )
+    outlines = [np.asarray(outline, dtype=np.float64) for outline in truth.outlines] if truth is not None else []
     outlines.sort(key=_extent, reverse=True)
     contacts = np.empty((0, 2))
     if truth is not None and known:

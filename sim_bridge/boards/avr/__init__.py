@@ -63,9 +63,7 @@ class AvrBoard:
     def data(self, address: int, size: int = 1) -> bytes:
         """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100."""
         if address < 0 or size < 0 or address + size > 0x900:
-            raise ValueError(
-                f"no data at 0x{address:X}..0x{address + size - 1:X}; the data space ends at 0x8FF"
-            )
+            raise ValueError(f"no data at 0x{address:X}..0x{address + size - 1:X}; the data space ends at 0x8FF")
         board = self._ffi.cast("board *", self.pointer)
         return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
 
