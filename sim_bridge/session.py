@@ -63,9 +63,7 @@ class EmulatedBoard:
         self._keep = keep
         if lib.board_check(address) != lib.SIM_OK:
             self.close()
-            raise BoardError(
-                f"the {description} was built for another version of the simulator; build it again"
-            )
+            raise BoardError(f"the {description} was built for another version of the simulator; build it again")
 
     def close(self) -> None:
         """Frees the board. May be called twice."""
@@ -96,26 +94,18 @@ class Sim:
             BoardError: a world step that does not divide the control tick.
         """
         if step_cycles <= 0 or TICK_CYCLES % step_cycles:
-            raise BoardError(
-                f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}"
-            )
+            raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
         self.board, self.robot, self.arena = board, robot, arena
         x, y, heading = arena.start if pose is None else pose
         if not arena.is_free(x, y, robot.body.radius_m):
-            raise ArenaError(
-                f"arena {arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
-            )
+            raise ArenaError(f"arena {arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space")
         draw = imperfections.Draw(seed, noise)
-        handle = lib.sim_new(
-            arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise
-        )
+        handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
         # the board outlives the simulation, whichever of the two Python lets go of first
         self.handle = ffi.gc(handle, lambda handle, board=board: lib.sim_destroy(handle))
-        _done(
-            lib.sim_add_robot(handle, board.address, imperfections.body_parameters(robot.body), x, y, heading)
-        )
+        _done(lib.sim_add_robot(handle, board.address, imperfections.body_parameters(robot.body), x, y, heading))
         _done(lib.sim_add_battery(handle, 0, _battery_channel(robot), imperfections.battery_parameters()))
         for name, device in robot.device.items():
             if device.on:
@@ -431,9 +421,7 @@ def native_library(pin_map: str) -> Path:
         path = folder / f"firmware-{pin_map}{suffix}"
         if path.is_file():
             return path
-    raise BoardError(
-        f"there is no firmware for this computer for pin map {pin_map!r}; build it with `make setup`"
-    )
+    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; build it with `make setup`")
 
 
 def native_board(library: Path) -> EmulatedBoard:
