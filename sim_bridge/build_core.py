@@ -26,12 +26,12 @@ HEADERS = [
     "parts/ping.h",
     "parts/battery.h",
     "boards/script_board.h",
+    "boards/board_access.h",
     "boards/native/native_board.h",
     "loop.h",
 ]
 # What headers cannot say in a form that cffi reads.
 BEFORE = """
-typedef struct board board;
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """
@@ -44,6 +44,7 @@ int body_segment_touches(body *self, const arena *where, double x0, double y0, d
 SOURCES = [
     "world/*.c",
     "parts/*.c",
+    "boards/board_access.c",
     "boards/script_board.c",
     "boards/native/*.c",
     "loop.c",
@@ -63,7 +64,8 @@ def builder(root: Path) -> FFI:
     """The extension, with its sources named from `root`."""
     here = Path(__file__).resolve().parent
     built = FFI()
-    built.cdef("\n".join([BEFORE, *(declarations(here / name) for name in HEADERS), AFTER]))
+    access = (here / "boards/board_access.cdef").read_text("utf-8")
+    built.cdef("\n".join([access, BEFORE, *(declarations(here / name) for name in HEADERS), AFTER]))
     built.set_source(
         "sim_bridge._core",
         "\n".join(f'#include "{name}"' for name in HEADERS),

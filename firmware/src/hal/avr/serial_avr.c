@@ -1,4 +1,4 @@
-/* serial_avr.c: the UART by interrupts, 500,000 baud, a ring each way. Both interrupts are written out: 47 and 45 cycles
+/* serial_avr.c: the UART by interrupts, 500,000 baud, a ring each way. Both interrupts are written out: 48 and 45 cycles
  * with entry and return, of the 320 that a byte lasts. */
 #include "hal/hal.h"
 

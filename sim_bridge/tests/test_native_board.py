@@ -1,0 +1,198 @@
+"""The emulated native board: own state for each, resets, the line, and runs that do not depend on how they are cut."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from boebot.errors import BoardError
+from boebot.link import frame, messages
+from sim_bridge import _core
+from sim_bridge._core import ffi, lib
+from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
+from sim_bridge.session import native_board, native_library
+
+MS = 16_000  # cycles
+TICK = 10 * MS
+BYTE = 320
+SERVO_LEFT, SERVO_RIGHT, WHISKER_LEFT, ENCODER_LEFT = 13, 12, 5, 16
+
+Maker = Callable[[], BoardAccess]
+
+
+@pytest.fixture
+def make() -> Iterator[Maker]:
+    """Makes boards and closes them afterwards."""
+    opened = []
+
+    def one() -> BoardAccess:
+        board = native_board(native_library("shieldbot"))
+        access = BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
+        opened.append((access, board))
+        return access
+
+    yield one
+    for access, board in opened:
+        access.close()
+        board.close()
+
+
+def setpoint(left: int, right: int, time_to_live: int = 2000, sequence: int = 0) -> bytes:
+    message = messages.SetpointSignal(left, right, time_to_live, 0)
+    return frame.encode(message.ID, sequence, message.pack())
+
+
+def said(sent: list[SentByte]) -> list[tuple[int, int, bytes]]:
+    """The messages in what left the board."""
+    return frame.Decoder().feed(b"\0" + bytes(byte.byte for byte in sent))
+
+
+def telemetry(sent: list[SentByte]) -> messages.Telemetry:
+    """The last telemetry in what left the board."""
+    return messages.Telemetry.unpack([m for m in said(sent) if m[0] == messages.Telemetry.ID][-1][2])
+
+
+def test_boards_do_not_share_state(make: Maker) -> None:
+    one, other = make(), make()
+    one.send(setpoint(5000, 5000))
+    for board in (one, other):
+        board.advance(10 * TICK)
+    assert telemetry(one.receive()).pulse_left == 1600 * 16
+    assert telemetry(other.receive()).pulse_left == 0
+
+
+def test_says_hello_after_power_on(make: Maker) -> None:
+    board = make()
+    board.advance(TICK)
+    number, sequence, payload = said(board.receive())[0]
+    assert (number, sequence) == (messages.Hello.ID, 0)
+    hello = messages.Hello.unpack(payload)
+    assert hello.reset_cause == messages.ResetCause.POWER
+    assert hello.schema_hash == messages.SCHEMA_HASH
+
+
+@pytest.mark.parametrize("cause", list(ResetCause))
+def test_reset_starts_the_program_anew_and_time_goes_on(make: Maker, cause: ResetCause) -> None:
+    board = make()
+    board.send(setpoint(5000, 5000))
+    board.drive(WHISKER_LEFT, Level.LOW)
+    board.advance(20 * TICK)
+    board.receive()
+    board.log()
+    board.reset(cause)
+    board.run(1)
+    released = {edge.pin: edge.level for edge in board.log() if edge.cycle == 20 * TICK}
+    assert released[SERVO_LEFT] == Level.LOW, "released by the reset, then made an output by the program"
+    board.advance(25 * TICK)
+    assert board.now == 25 * TICK
+    sent = board.receive()
+    assert all(byte.cycle > 20 * TICK for byte in sent)
+    hello = messages.Hello.unpack(said(sent)[0][2])
+    assert messages.ResetCause(hello.reset_cause).name == cause.name
+    now = telemetry(sent)
+    assert now.tick < 5
+    assert now.pulse_left == 0, "a set-point does not outlive a reset"
+    assert now.whiskers == messages.Whiskers.LEFT, "what drives the pins from outside outlives it"
+    assert board.counters()["resets"] == 1
+
+
+def test_many_resets(make: Maker) -> None:
+    board = make()
+    for _ in range(30):
+        board.run(7 * MS)
+        board.reset(ResetCause.EXTERNAL)
+    board.run(TICK)
+    assert board.counters()["resets"] == 30
+
+
+def test_byte_in_flight_at_a_reset_is_lost(make: Maker) -> None:
+    board = make()
+    board.advance(40_000 + 10 * BYTE + BYTE // 2)  # the first telemetry is leaving
+    board.reset()
+    board.run(20 * BYTE)
+    cycles = [byte.cycle for byte in board.receive()]
+    assert 40_000 + 11 * BYTE not in cycles
+    assert all(later - earlier >= BYTE for earlier, later in pairwise(cycles))
+
+
+def test_bytes_take_ten_bit_times(make: Maker) -> None:
+    board = make()
+    board.advance(TICK)
+    cycles = [byte.cycle for byte in board.receive()]
+    hello = messages.Hello.STRUCT.size + frame.FRAME_OVERHEAD
+    assert cycles[:hello] == [BYTE * (i + 1) for i in range(hello)]
+    data = setpoint(1000, 1000)
+    before = board.counters()["bytes_in"]
+    board.send(data, at=2 * TICK)
+    board.advance(2 * TICK + BYTE * len(data) - 1)
+    assert board.counters()["bytes_in"] == before + len(data) - 1
+    board.run(1)
+    assert board.counters()["bytes_in"] == before + len(data)
+
+
+def test_wrong_line_rate_is_framing_errors_and_garbage(make: Maker) -> None:
+    board = make()
+    board.line_rate(115_200)
+    board.send(setpoint(5000, 5000))
+    board.advance(10 * TICK)
+    counters = board.counters()
+    assert counters["framing_errors"] == counters["bytes_in"] > 0
+    assert said(board.receive()) == []
+    board.line_rate(500_000)
+    board.run(2 * TICK)
+    now = telemetry(board.receive())
+    assert now.pulse_left == 0
+
+
+def test_drive_replaces_what_was_queued_later(make: Maker) -> None:
+    board = make()
+    for at in range(2 * TICK, 4 * TICK, MS):
+        board.drive(ENCODER_LEFT, Level(at // MS % 2), at=at)
+    board.drive(ENCODER_LEFT, Level.LOW, at=2 * TICK + 5 * MS)
+    board.advance(6 * TICK)
+    assert telemetry(board.receive()).encoder_left == 4  # changes at 1, 2, 3, 4 ms, and at 5 ms none is left but low
+
+
+def test_pin_states_follow_the_firmware(make: Maker) -> None:
+    board = make()
+    assert board.output(SERVO_LEFT) == Level.RELEASED
+    board.advance(TICK)
+    assert board.output(SERVO_LEFT) == Level.LOW
+    assert board.output(WHISKER_LEFT) == Level.PULLED_UP
+    assert board.output(ENCODER_LEFT) == Level.RELEASED
+
+
+def run_in_pieces(board: BoardAccess, seed: int | None) -> tuple[list[Edge], list[SentByte]]:
+    """A run of 30 ticks with everything going on, in one go or cut at random."""
+    board.send(setpoint(5000, 2000))
+    for number in range(300):
+        board.drive(ENCODER_LEFT, Level(number % 2), at=TICK + number * 9001)
+    board.answer(pin=9, on=10, delay=100)  # the left IR receiver follows its LED
+    rng = random.Random(seed)
+    while board.now < 30 * TICK:
+        board.advance(30 * TICK if seed is None else min(30 * TICK, board.now + 1 + rng.randrange(20_000)))
+    return board.log(), board.receive()
+
+
+def test_a_run_does_not_depend_on_how_it_is_cut(make: Maker) -> None:
+    whole = run_in_pieces(make(), None)
+    assert len(whole[0]) > 400
+    assert run_in_pieces(make(), 1) == whole
+    assert run_in_pieces(make(), 2) == whole
+
+
+def test_files_that_are_no_firmware(tmp_path: Path) -> None:
+    with pytest.raises(BoardError, match="cannot open the firmware library"):
+        native_board(tmp_path / "missing.so")
+    (tmp_path / "text.so").write_text("not a library")
+    with pytest.raises(BoardError, match="cannot load the firmware library"):
+        native_board(tmp_path / "text.so")
+    (tmp_path / "empty.so").touch()
+    with pytest.raises(BoardError, match="cannot read the firmware library"):
+        native_board(tmp_path / "empty.so")
+    with pytest.raises(BoardError, match="not a boebot firmware"):
+        native_board(Path(str(_core.__file__)))
