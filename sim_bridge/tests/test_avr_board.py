@@ -78,6 +78,31 @@ session.transport.read(0.1)
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
+    # under the sanitizers this finds what a wild program could reach
+    size = 30_000
+    frame = assemble(f"main:\n .fill {size}, 1, 0x5A")
+    start = frame.index(b"\x5a" * size)
+    image = tmp_path / "image.elf"
+    crashes = 0
+    for seed in range(60):
+        program = random.Random(seed).randbytes(size)
+        image.write_bytes(frame[:start] + program + frame[start + size :])
+        machine = create(image)
+        board = machine.access()
+        board.send(range(100), at=100)
+        for pin in range(20):
+            board.drive(pin, Level.HIGH, at=100 * pin)
+        try:
+            board.advance(200_000)
+        except BoardError as error:
+            crashes += 1
+            assert "invalid instruction" in str(error) or "ran off the end" in str(error)  # noqa: PT017
+        board.close()
+        machine.close()
+    assert crashes > 10
+
+
 # ---- resets and watchdog ----
 
 WATCHDOG_CYCLES = 2048 * 125  # the shortest: 2048 cycles of 128 kHz

@@ -21,6 +21,9 @@
 #define WAKE_UP_CYCLES 4u
 #define SLEEP_ENABLED 0x01u /* SMCR.SE */
 
+#define RESERVED_RAMPZ 0x5Bu /* where larger AVRs have RAMPZ */
+#define Z_RANGE 0x10000u
+
 enum { RESET_FLAG_POWER = 1, RESET_FLAG_EXTERNAL = 2, RESET_FLAG_BROWN_OUT = 4, RESET_FLAG_WATCHDOG = 8 }; /* MCUSR */
 
 /* ---- what is due ---- */
@@ -216,9 +219,9 @@ static board_state advance(board *self, uint64_t until) {
   avr_board *b = (avr_board *)self;
   avr_t *avr = b->avr;
   while (avr->cycle < until) {
+    catch_up(b, avr->cycle);
     if (b->reset_wanted) restart(b);
     if (b->crashed) return BOARD_CRASHED;
-    catch_up(b, avr->cycle);
     if (next_of_simavr(avr) <= avr->cycle) avr_cycle_timer_process(avr);
     if (b->reset_wanted) continue;
     if (avr->sreg[S_I] && avr->interrupt_state >= 0 && enter_interrupt(b)) continue;
@@ -341,6 +344,13 @@ static void write_reset_flags(avr_t *avr, avr_io_addr_t address, uint8_t value, 
   avr->data[address] &= value;
 }
 
+static void ignore_write(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  (void)avr;
+  (void)address;
+  (void)value;
+  (void)param;
+}
+
 /* ---- construction ---- */
 
 /* WDR arrives as a request to all of simavr's modules. */
@@ -363,6 +373,7 @@ void mx8_init(struct avr_t *avr) {
   avr_register_io(avr, &b->io);
   avr_eeprom_init(avr, &chip->eeprom);
   on_write(b, REG_MCUSR, write_reset_flags, b);
+  on_write(b, RESERVED_RAMPZ, ignore_write, b);
   pins_init(b);
   timers_init(b);
   usart_init(b);
@@ -373,6 +384,15 @@ void mx8_init(struct avr_t *avr) {
 void mx8_reset(struct avr_t *avr) {
   avr_irq_register_notify(avr->irq + AVR_CORE_BAD_OPCODE, on_bad_opcode, avr->custom.data);
   avr_irq_register_notify(avr->interrupts.irq + AVR_INT_IRQ_RUNNING, on_reti, avr->custom.data);
+}
+
+/* simavr follows a program that reads or writes program memory beyond its end: with room for every address that fits
+ * into Z, and no RAMPZ, it stays within what is ours. */
+static void enlarge_flash(avr_t *avr) {
+  uint8_t *flash = realloc(avr->flash, Z_RANGE);
+  if (!flash) abort();
+  memset(flash + AVR_BOARD_FLASH_SIZE, 0xFF, Z_RANGE - AVR_BOARD_FLASH_SIZE);
+  avr->flash = flash;
 }
 
 static void destroy(board *self) {
@@ -468,7 +488,9 @@ board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t err
   for (int i = 0; i < DUE_COUNT; i++) b->due[i] = NEVER;
   avr->custom.data = b;
   avr->frequency = BOARD_CLOCK_HZ;
+  avr->rampz = RESERVED_RAMPZ;
   avr_init(avr);
+  enlarge_flash(avr);
   memset(avr->serial, 0, sizeof avr->serial); /* simavr's is another one each time */
   if (!image_load(b, elf, size, error, error_size)) {
     destroy(&b->base);

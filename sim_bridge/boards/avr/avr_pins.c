@@ -67,10 +67,11 @@ static void insert(change_queue *q, pin_change change) {
 
 /* Takes out what is queued for a pin from `at` on. */
 static void remove_from(change_queue *q, uint8_t pin, uint64_t at) {
-  size_t kept = q->first;
-  for (size_t i = q->first; i < q->end; i++) {
-    if (q->items[i].pin == pin && q->items[i].at >= at) continue;
-    q->items[kept++] = q->items[i];
+  size_t i = q->end;
+  while (i > q->first && q->items[i - 1].at >= at) i--;
+  size_t kept = i;
+  for (; i < q->end; i++) {
+    if (q->items[i].pin != pin) q->items[kept++] = q->items[i];
   }
   q->end = kept;
 }
