@@ -224,10 +224,10 @@ class _Run:
                     telemetry_log.append(payload)
                     times.append(tick * tick_s + time_zero)
             heard_s = transport.now()
+            time_s = times[-1] if times else 0.0
+            if time_s >= end_s:
+                break
             if last >= due:
-                time_s = times[-1]
-                if time_s >= end_s:
-                    break
                 if last - due >= n:
                     self.late_steps += (last - due) // n
                 if paced:
@@ -251,7 +251,7 @@ class _Run:
                 if self.progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + _PROGRESS_S
                     self.progress(time_s)
-            ahead_ticks = due - last
+            ahead_ticks = min(due - last, (self.seconds - time_s) / tick_s)
             wait_s, quiet_s = (ahead_ticks + 2) * tick_s, (ahead_ticks - 0.5) * tick_s
 
     def _again_after_reset(self) -> None:

@@ -10,7 +10,6 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, NoReturn
 
-import click
 import typer
 
 from boebot.cli import info, new, run, serve, teleop
@@ -62,18 +61,22 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, _interrupt)  # motors are stopped and the record is written then, too
     try:
         code = app(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
     except BoebotError as error:
         print(f"boebot: {error}", file=sys.stderr)
         code = EXIT_ERROR
-    except (KeyboardInterrupt, click.Abort):
-        print("boebot: interrupted", file=sys.stderr)
+    except (KeyboardInterrupt, typer.Abort):
         code = EXIT_INTERRUPTED
     except BrokenPipeError:  # what reads our output has closed it, as `head` does
         sys.stderr.close()
         code = EXIT_ERROR
+    except Exception as error:
+        # wrong usage; its class is click's, which some releases of typer carry inside
+        show, code = getattr(error, "show", None), getattr(error, "exit_code", None)
+        if show is None:
+            raise
+        show()
+    if code == EXIT_INTERRUPTED:
+        print("boebot: interrupted", file=sys.stderr)
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -6,7 +6,6 @@ import contextlib
 import os
 from typing import Annotated
 
-import click
 import typer
 
 from boebot.boards import BoardRequest, board_kinds, find_server
@@ -29,7 +28,7 @@ def serve(
 ) -> None:
     """Offer the emulated robot to other programs, until Ctrl-C."""
     if pty == (tcp is not None):
-        raise click.UsageError("give one of --pty and --tcp PORT")
+        raise typer.BadParameter("give one of --pty and --tcp PORT")
     if pty and os.name != "posix":
         raise BoardError("there are no pseudo-terminals on this system; use --tcp PORT")
     if on not in board_kinds():

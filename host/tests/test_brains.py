@@ -1,0 +1,88 @@
+"""Brains: how they are found and loaded, and what is said of those that cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from boebot.brains import bundled, load_brain
+from boebot.errors import BrainError
+from boebot.robot import Robot
+
+
+def write(folder: Path, text: str, name: str = "mine.py") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_bundled_brain() -> None:
+    assert "wander" in bundled()
+    brain = load_brain("wander")
+    assert brain.name == "wander" and set(brain.needs) == {"whiskers", "infrared"}
+
+
+def test_function_in_a_file(tmp_path: Path) -> None:
+    brain = load_brain(write(tmp_path, "PERIOD = 0.1\nNEEDS = ['ping']\ndef step(robot):\n    robot.stop()\n"))
+    assert (brain.name, brain.period, brain.needs) == ("mine", 0.1, ("ping",))
+
+
+def test_class_in_a_file_is_made_afresh_each_time(tmp_path: Path) -> None:
+    path = write(tmp_path, "class Brain:\n    NEEDS = 'ping'\n    n = 0\n    def step(self, robot): self.n += 1\n")
+    first, second = load_brain(path), load_brain(str(path))
+    assert first.needs == ("ping",)
+    first.step(None)  # type: ignore[arg-type]
+    assert second.step.__self__.n == 0  # type: ignore[attr-defined]
+
+
+def test_function_class_and_object_themselves() -> None:
+    class Mine:
+        PERIOD = 0.02
+
+        def step(self, robot: Robot) -> None: ...
+
+    def drive(robot: Robot) -> None: ...
+
+    assert load_brain(drive).name == "drive"
+    assert load_brain(Mine).period == 0.02
+    assert load_brain(Mine()).name == "Mine"
+
+
+def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
+    write(tmp_path, "SPEED = 0.25\n", "beside_it.py")
+    brain = load_brain(write(tmp_path, "from beside_it import SPEED\ndef step(robot): return SPEED\n"))
+    assert brain.step(None) == 0.25  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("def step(robot):\n    robot.drive(1, 1\n", r"mine\.py, line 2: '\(' was never closed"),
+        ("import nowhere_to_be_found\n", r"mine\.py, line 1: ModuleNotFoundError"),
+        ("x = 1\n\ny = x / 0\n", r"mine\.py, line 3: ZeroDivisionError: division by zero"),
+        ("x = 1\n", r"mine\.py has neither a function step\(robot\) nor a class Brain"),
+        ("class Brain:\n    pass\n", r"mine\.py: class Brain has no method step"),
+        ("class Brain:\n    def __init__(self):\n        oops\n", r"mine\.py, line 3: NameError"),
+        ("PERIOD = 'fast'\ndef step(robot): ...\n", r"mine\.py: PERIOD is 'fast'; expected seconds"),
+        ("NEEDS = 3\ndef step(robot): ...\n", r"mine\.py: NEEDS is 3; expected a list of device names"),
+        ("import sys\nsys.exit(3)\n", r"mine\.py, line 2: SystemExit"),
+    ],
+)
+def test_brain_that_cannot_be_loaded_is_one_sentence_with_its_place(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(BrainError, match=sentence) as caught:
+        load_brain(write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_brain_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(BrainError, match=r"there is no brain 'wonder'; expected a bundled one \(.*wander"):
+        load_brain("wonder")
+    with pytest.raises(BrainError, match=r"there is no brain file .*none\.py"):
+        load_brain(tmp_path / "none.py")
+    write(tmp_path, "def step(robot): ...\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BrainError, match=r"did you mean mine\.py\?"):
+        load_brain("mine")
+    with pytest.raises(BrainError, match="42 is no brain"):
+        load_brain(42)

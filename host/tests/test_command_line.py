@@ -1,0 +1,241 @@
+"""The command: its output, its exit codes, and one sentence for each mistake."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from boebot import cli, runner
+from boebot.cli import teleop
+from boebot.robot import Robot
+from peer import InProcess, Peer, Pty, pty
+
+
+def boebot(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Runs the command in this process; returns exit code, standard output and standard error."""
+    before = signal.getsignal(signal.SIGTERM)
+    sys.argv = ["boebot", *arguments]
+    try:
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    captured = capsys.readouterr()
+    return int(end.value.code or 0), captured.out, captured.err
+
+
+@pytest.fixture
+def peer(monkeypatch: pytest.MonkeyPatch) -> Peer:
+    peer = Peer()
+    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+    return peer
+
+
+def test_run_prints_a_table(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, "run", "wander", "--seconds", "3")
+    assert (code, err) == (0, "")
+    for name in ("distance", "contacts", "ticks", "lost frames", "overruns", "dead man stops", "real time factor"):
+        assert name in out
+
+
+def test_run_prints_json_and_writes_files(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    code, out, _ = boebot(capsys, "run", "wander", "--seconds", "3", "--seed", "7", "--json", "--out", str(folder))
+    values = json.loads(out)
+    assert code == 0
+    assert (values["seed"], values["ticks"], values["ended"]) == (7, 301, "complete")
+    assert {Path(name).name for name in values["files"]} == {path.name for path in folder.iterdir()}
+
+
+def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = boebot(capsys, "run", "wander", "--seconds", "1", "--period", "20", "--json")
+    assert json.loads(out)["steps"] == 50
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (("run", "wonder"), 1, "there is no brain 'wonder'"),
+        (("run", "none.py"), 1, "there is no brain file none.py"),
+        (("run", "wander", "--robot", "r2d2"), 1, "there is no robot 'r2d2'"),
+        (("run", "wander", "--period", "15"), 1, "does not fit; expected a multiple of 10 ms"),
+        (("run", "wander", "--seconds", "0"), 1, "a run cannot last 0 s"),
+        (("run", "wander", "--seconds", "ten"), 2, "--seconds"),
+        (("run",), 2, "BRAIN"),
+        (("run", "wander", "--sedes", "1"), 2, "No such option"),
+        (("fly",), 2, "No such command"),
+        (("info", "/dev/does-not-exist"), 1, "there is no port /dev/does-not-exist"),
+        (("info", "toaster"), 1, "there is no board 'toaster'"),
+        (("serve", "--on", "avr"), 2, "give one of --pty and --tcp PORT"),
+        (("serve", "--pty", "--tcp", "0"), 2, "give one of --pty and --tcp PORT"),
+        (("serve", "--pty", "--on", "toaster"), 1, "there is no emulated board 'toaster' to serve"),
+        (("new", "my brain"), 1, "'my brain' cannot be a brain's name"),
+        (("new", "nowhere/brain"), 1, "cannot be written"),
+    ],
+)
+def test_mistakes_end_in_one_sentence(
+    peer: Peer,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    code: int,
+    sentence: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    got, out, err = boebot(capsys, *arguments)
+    assert got == code
+    assert sentence in err and "Traceback" not in err
+    assert out == ""
+    if code == 1:
+        assert err.startswith("boebot: ") and err.count("\n") == 1
+
+
+def test_error_in_a_brain_comes_after_the_table(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    brain = tmp_path / "wrong.py"
+    brain.write_text("def step(robot):\n    if robot.time > 0.5:\n        robot.fly()\n")
+    code, out, err = boebot(capsys, "run", str(brain), "--json")
+    assert code == 1
+    assert json.loads(out)["run_time_s"] == 0.55
+    assert err == f"boebot: {brain}, line 3: AttributeError: 'Robot' object has no attribute 'fly'\n"
+
+
+def test_new_brain_runs_and_is_never_overwritten(
+    peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert boebot(capsys, "new", "first")[0] == 0
+    code, out, _ = boebot(capsys, "run", "first.py", "--seconds", "20", "--json")
+    assert code == 0 and json.loads(out)["distance_m"] > 0.5
+    (tmp_path / "first.py").write_text("# precious\n")
+    code, _, err = boebot(capsys, "new", "first")
+    assert code == 1 and "first.py exists already" in err
+    assert (tmp_path / "first.py").read_text() == "# precious\n"
+
+
+def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = boebot(capsys, "--version")
+    assert code == 0 and out.startswith("boebot ") and "protocol 1" in out
+    code, out, _ = boebot(capsys, "--help")
+    assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
+
+
+def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
+    with pty(Peer()) as served:
+        code, out, _ = boebot(capsys, "info", served.path, "--json")
+        values = json.loads(out)
+        assert code == 0
+        assert (values["firmware"], values["pin_map"], values["tick_rate_hz"]) == ("0.1.0", "shieldbot", 100)
+        assert "infrared" in values["devices"]
+        code, out, _ = boebot(capsys, "info", served.path)
+        assert code == 0 and "compiler" in out and "servo left centre" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals, tmp_path: Path) -> None:
+    with pty(Peer()) as served:
+        command = [sys.executable, "-m", "boebot", "run", "wander", "--on", served.path, "--out", str(tmp_path / "out")]
+        process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            # a shell may have told this process, and so its children, to ignore Ctrl-C
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )
+        until = time.monotonic() + 20
+        while served.peer.command == (0.0, 0.0) and time.monotonic() < until:
+            time.sleep(0.02)
+        time.sleep(0.3)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=20)
+        assert served.peer.command == (0.0, 0.0)
+        assert served.peer.status.name == "STOPPED", "by the stop message, not by the dead-man"
+    assert process.returncode == 130
+    assert err == "boebot: interrupted\n"
+    assert "interrupted" in out
+    assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 20
+
+
+def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    served = Pty(Peer())
+
+    def unplug(robot: Robot) -> None:
+        robot.drive(0.5, 0.5)
+
+    brain = tmp_path / "brain.py"
+    brain.write_text("def step(robot):\n    robot.drive(0.5, 0.5)\n")
+    import threading
+
+    threading.Timer(0.6, served.unplug).start()
+    code, _, err = boebot(capsys, "run", str(brain), "--on", served.path, "--out", str(tmp_path / "out"))
+    assert code == 1
+    assert err == f"boebot: {served.path} has gone: unplugged, or closed by the other side\n"
+    assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 10
+
+
+# ---- teleop ----------------------------------------------------------------------------------------------------------
+
+
+def test_keys_are_told_apart() -> None:
+    assert list(teleop.keys("w\x1b[A\x1b[D\x1bOC 5Q\x03")) == ["w", "w", "a", "d", " ", "5", "q", "q"]
+
+
+def test_keyboard_drives_while_keys_are_held(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("boebot.cli.teleop.time.monotonic", lambda: clock[0])
+    typed = iter(["w", "", "9w", "d", " ", "w", "", "q"])
+    shown: list[str] = []
+    commands: list[tuple[float, float]] = []
+
+    class Watched(teleop.Keyboard):
+        def step(self, robot: Robot) -> None:
+            clock[0] += 0.35
+            super().step(robot)
+            commands.append((robot.command.left, robot.command.right))
+
+    result = runner.execute(Watched(lambda: next(typed), shown.append), seconds=10)
+    assert isinstance(result.error, KeyboardInterrupt)
+    turn = teleop.TURN
+    assert commands == [(0.5, 0.5), (0.5, 0.5), (1, 1), (turn, -turn), (0, 0), (1, 1), (1, 1)]
+    assert "encoders" in shown[-1] and "whiskers" in shown[-1]
+
+
+def test_teleop_needs_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", open(os.devnull))  # noqa: PTH123, SIM115
+    code, _, err = boebot(capsys, "teleop")
+    assert code == 1 and "its input is not a terminal" in err
+
+
+def test_teleop_in_a_terminal() -> None:
+    """Over two pseudo-terminals: one for the keyboard, one for the robot."""
+    keyboard, slave = os.openpty()
+    with pty(Peer()) as served:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "boebot", "teleop", "--on", served.path],
+            stdin=slave,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        until = time.monotonic() + 20
+        while served.peer.command != (0.5, 0.5) and time.monotonic() < until:
+            os.write(keyboard, b"\x1b[A")
+            time.sleep(0.05)
+        drove = served.peer.command
+        time.sleep(1.0)
+        let_go = served.peer.command
+        os.write(keyboard, b"q")
+        out, _ = process.communicate(timeout=20)
+    os.close(keyboard)
+    os.close(slave)
+    assert (drove, let_go) == ((0.5, 0.5), (0.0, 0.0))
+    assert process.returncode == 0
+    assert "distance" in out

@@ -1,0 +1,179 @@
+"""The files that a run leaves behind."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import boebot
+from boebot import runner
+from boebot.errors import BoebotError
+from boebot.link import frame
+from boebot.report import replay
+from boebot.result import RunResult
+from peer import InProcess, Peer
+
+
+@pytest.fixture(scope="module")
+def result() -> RunResult:
+    """Half a minute: into the wall, and back a little."""
+    peer = Peer()
+
+    def step(robot: boebot.Robot) -> None:
+        if robot.time < 8:
+            robot.drive(0.8, 0.8)
+        elif robot.time < 10:
+            robot.drive(-0.2, -0.2)
+        else:
+            robot.drive(-0.2, 0.2)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+        return boebot.run(step, seconds=30)
+
+
+@pytest.fixture(scope="module")
+def folder(result: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "deep" / "run"
+    assert {path.name for path in result.save(folder)} == {path.name for path in folder.iterdir()}
+    return folder
+
+
+def test_table_counts_what_happened(result: RunResult) -> None:
+    table = result.table()
+    assert table["contacts"] == 1 and table["whisker_touches"] == 2
+    assert table["ticks"] == 3001 and table["steps"] == 600
+    assert table["ended"] == "complete"
+
+
+def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
+    with (folder / "run.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == result.ticks
+    middle = rows[1500]
+    assert float(middle["time_s"]) == 15.0
+    assert int(middle["tick"]) == result.series.raw["tick"][1500]
+    assert float(middle["true_x_m"]) == pytest.approx(result.true_pose.x[1500], abs=1e-4)  # type: ignore[union-attr]
+    assert {row["command"] for row in rows} == {"signal"}
+    assert sum(int(row["contact"]) for row in rows) > 10
+    assert all(set(row) == set(rows[0]) and None not in row.values() for row in rows)
+
+
+def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> None:
+    received = (folder / "to_host.bin").read_bytes()
+    decoder = frame.Decoder()
+    telemetry = [payload for message_id, _, payload in decoder.feed(received) if message_id == 0x90]
+    assert telemetry[-result.ticks - 5 :][: len(result.record.telemetry)][-1] in result.record.telemetry
+    assert (decoder.bad, decoder.lost) == (0, 0)
+    with (folder / "wire.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name in ("to_board", "to_host"):
+        mine = [row for row in rows if row["file"] == name]
+        ends = [int(row["first_byte"]) + int(row["bytes"]) for row in mine]
+        assert [int(row["first_byte"]) for row in mine] == [0, *ends[:-1]]
+        assert ends[-1] == (folder / f"{name}.bin").stat().st_size
+    stamps = [float(row["time_s"]) for row in rows]
+    assert stamps == sorted(stamps)
+
+
+def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
+    assert json.loads((folder / "summary.json").read_text()) == result.table() | {"counters": {}}
+
+
+def test_picture_shows_something(folder: Path) -> None:
+    picture = matplotlib.image.imread(folder / "run.png")
+    assert picture.shape[0] > 600 and picture.shape[1] > 600
+    assert len(np.unique((picture[:, :, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 100
+
+
+class Loads(HTMLParser):
+    """Notes everything that a page would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[tuple[str, str | None]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.fetched += [(tag, value) for name, value in attrs if name in ("src", "href", "data", "srcset", "action")]
+
+
+def data_of(page: str) -> dict[str, Any]:
+    match = re.search(r"const run = (\{.*\});\n", page)
+    assert match
+    data: dict[str, Any] = json.loads(match[1].replace("<\\/", "</"))
+    return data
+
+
+def test_replay_page_needs_nothing_from_outside(folder: Path) -> None:
+    page = (folder / "replay.html").read_text()
+    parser = Loads()
+    parser.feed(page)
+    assert parser.fetched == []
+    assert not re.search(r"https?:|@import|url\(|fetch\(|XMLHttpRequest|import\(", page)
+    assert "default-src 'none'" in page
+
+
+def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
+    data = data_of((folder / "replay.html").read_text())
+    time, x = (np.frombuffer(base64.b64decode(text), "<f4") for text in (data["time"], data["path"][0]))
+    flags = np.frombuffer(base64.b64decode(data["flags"]), np.uint8)
+    assert len(time) == len(x) == len(flags) == result.ticks
+    assert time[-1] == 30.0
+    assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
+    assert np.array_equal(flags & replay.LEFT_WHISKER != 0, result.series.left_whisker)
+    assert len(data["contacts"]) == 1 and data["known"]
+
+
+def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replay, "FRAMES_AT_MOST", 1000)
+    data = replay.page_data(result)
+    count = len(base64.b64decode(data["time"])) // 4
+    assert 700 < count <= 1001
+    assert len(base64.b64decode(data["flags"])) == count
+
+
+def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) -> None:
+    result.brain, brain = "</script><b>", result.brain
+    try:
+        page = replay.write(result, tmp_path / "page.html").read_text()
+    finally:
+        result.brain = brain
+    assert page.count("</script>") == 1
+    assert data_of(page)["table"]["brain"] == "</script><b>"
+
+
+def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = InProcess(Peer())
+    session.truth = lambda: None  # type: ignore[method-assign]
+    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    result = boebot.run("wander", seconds=5, out=tmp_path)
+    assert result.odometry_error is None
+    data = data_of((tmp_path / "replay.html").read_text())
+    assert not data["known"] and data["estimate"] is None and data["outlines"] == []
+    header = (tmp_path / "run.csv").read_text().splitlines()[0]
+    assert "odometry_x_m" in header and "true_x_m" not in header
+
+
+def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = InProcess(Peer())
+    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    monkeypatch.setattr(runner, "configure", lambda link, robot: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        boebot.run("wander", seconds=5, out=tmp_path)
+    assert (tmp_path / "run.csv").read_text().count("\n") == 1
+    assert json.loads((tmp_path / "summary.json").read_text())["ended"] == "interrupted"
+
+
+def test_folder_that_cannot_be_written_is_one_sentence(result: RunResult, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(BoebotError, match=r"cannot be written to .*file: (File exists|Not a directory)"):
+        result.save(tmp_path / "file")

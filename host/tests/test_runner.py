@@ -1,0 +1,265 @@
+"""Runs of a brain: timing of steps, set-points, every kind of end, and what the record keeps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import boebot
+from boebot import runner
+from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
+from boebot.link import messages
+from boebot.result import RunResult
+from boebot.robot import Robot
+from boebot.robots import load_robot
+from peer import InProcess, Peer
+
+
+@pytest.fixture
+def session(monkeypatch: pytest.MonkeyPatch) -> InProcess:
+    """What `--on native` opens in these tests."""
+    session = InProcess(Peer())
+    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    return session
+
+
+def straight(robot: Robot) -> None:
+    robot.drive(0.5, 0.5)
+
+
+def run_on(peer: Peer, brain: object, monkeypatch: pytest.MonkeyPatch, **options: object) -> RunResult:
+    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+    return boebot.run(brain, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 5, 7])
+def test_brain_steps_at_every_multiple_of_its_period(session: InProcess, ticks: int) -> None:
+    seen: list[tuple[int, float]] = []
+    result = boebot.run(lambda robot: seen.append((robot.tick, robot.time)), seconds=1, period=ticks / 100)
+    assert len(seen) == math.ceil(100 / ticks) == result.steps
+    assert all(tick % ticks == 0 for tick, _ in seen)
+    assert [time for _, time in seen] == pytest.approx([ticks / 100 * n for n in range(len(seen))])
+    assert np.array_equal(np.diff(result.series.raw["tick"]), np.ones(result.ticks - 1))
+    assert result.run_time == pytest.approx(1.0)
+    assert result.late_steps == 0
+
+
+def test_set_point_answers_the_observation_at_once(session: InProcess) -> None:
+    boebot.run(straight, seconds=0.5)
+    sent = [
+        (message, tick)
+        for message, tick in zip(session.peer.setpoints, session.peer.setpoint_ticks, strict=True)
+        if isinstance(message, messages.SetpointSignal)
+    ]
+    assert len(sent) == 10
+    for message, tick in sent:
+        assert (message.left, message.right, message.time_to_live) == (5000, 5000, 250)
+        assert message.answers_tick == tick - 1, "the set-point is out before the next tick begins"
+
+
+@pytest.mark.parametrize(("period_ms", "time_to_live_ms"), [(10, 250), (100, 250), (200, 500), (800, 2000)])
+def test_time_to_live_outlasts_the_period(session: InProcess, period_ms: int, time_to_live_ms: int) -> None:
+    boebot.run(straight, seconds=2, period=period_ms / 1000)
+    first = session.peer.setpoints[0]
+    assert isinstance(first, messages.SetpointSignal) and first.time_to_live == time_to_live_ms
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"period": 0.81}, "period of 810 ms is too long; expected at most 800 ms"),
+        ({"period": 0.015}, "period of 15 ms does not fit; expected a multiple of 10 ms"),
+        ({"period": 0}, "period of 0 ms is none"),
+        ({"period": math.nan}, "expected more than 0"),
+        ({"seconds": 0}, "cannot last 0 s"),
+        ({"seconds": math.nan}, "cannot last nan s"),
+        ({"robot": "r2d2"}, "there is no robot 'r2d2'"),
+        ({"brain": "wonder"}, "there is no brain 'wonder'"),
+    ],
+)
+def test_bad_input_moves_nothing(session: InProcess, options: dict[str, object], sentence: str) -> None:
+    with pytest.raises(BoebotError, match=sentence):
+        boebot.run(**({"brain": straight} | options))  # type: ignore[arg-type]
+    assert session.peer.setpoints == []
+
+
+def test_brain_that_needs_what_the_robot_lacks_is_refused(session: InProcess) -> None:
+    def step(robot: Robot) -> None: ...
+
+    step.NEEDS = ["whiskers", "ping"]  # type: ignore[attr-defined]
+    whole = load_robot("shieldbot")
+    blind = type(whole)(
+        whole.name, whole.title, whole.board, whole.pin_map, whole.body,
+        {name: device for name, device in whole.device.items() if name != "ping"},
+    )  # fmt: skip
+    with pytest.raises(BrainError, match="brain 'step' needs ping, which robot 'shieldbot' does not have"):
+        boebot.run(step, robot=blind)
+    assert session.peer.starts == 1 and session.peer.setpoints == []
+
+
+def test_brains_own_period_yields_to_the_callers(session: InProcess) -> None:
+    class Slow:
+        PERIOD = 0.2
+
+        def step(self, robot: Robot) -> None:
+            robot.drive(0, 0)
+
+    assert boebot.run(Slow, seconds=1).steps == 5
+    session.closed = False
+    assert boebot.run(Slow, seconds=1, period=0.1).steps == 10
+
+
+def test_same_seed_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = [run_on(Peer(), "wander", monkeypatch, seconds=20, seed=seed) for seed in (3, 3, 4)]
+    assert runs[0].bytes_from_board == runs[1].bytes_from_board
+    assert runs[0].bytes_to_board == runs[1].bytes_to_board
+    assert runs[0].bytes_to_board != runs[2].bytes_to_board
+
+
+def fails_after(seconds: float, error: BaseException) -> Callable[[Robot], None]:
+    def step(robot: Robot) -> None:
+        robot.drive(0.5, 0.5)
+        if robot.time >= seconds:
+            raise error
+
+    return step
+
+
+@pytest.mark.parametrize(
+    ("error", "caught", "sentence"),
+    [
+        (ZeroDivisionError("division by zero"), BrainError, r"test_runner\.py, line \d+: ZeroDivisionError: division"),
+        (SystemExit(1), BrainError, r"test_runner\.py, line \d+: SystemExit"),
+        (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
+    ],
+)
+def test_run_that_ends_early_stops_the_motors_and_keeps_its_record(
+    session: InProcess, tmp_path: Path, error: BaseException, caught: type[BaseException], sentence: str
+) -> None:
+    with pytest.raises(caught, match=sentence):
+        boebot.run(fails_after(0.5, error), seconds=10, out=tmp_path)
+    assert isinstance(session.peer.setpoints[-1], messages.Stop)
+    assert session.peer.command == (0.0, 0.0) and session.closed
+    rows = (tmp_path / "run.csv").read_text().splitlines()
+    assert rows[-1].startswith("0.5000,")
+    assert (tmp_path / "replay.html").exists()
+    assert '"ended"' in (tmp_path / "summary.json").read_text()
+
+
+def test_brain_that_names_a_missing_device_is_told_where(session: InProcess, tmp_path: Path) -> None:
+    path = tmp_path / "blind.py"
+    path.write_text("def step(robot):\n    robot.drive(1.5, 0)\n")
+    with pytest.raises(BrainError, match=r"blind\.py, line 2: drive\(1\.5, 0\): motor signals go from -1 to 1"):
+        boebot.run(path)
+
+
+def test_board_that_vanishes_ends_the_run_with_a_whole_record(session: InProcess) -> None:
+    def unplug(tick: int) -> None:
+        if tick == 100:
+            session.closed = True
+            raise BoardError("peer has gone")
+
+    session.before_tick = unplug
+    result = runner.execute(straight, seconds=10)
+    assert isinstance(result.error, BoardError)
+    assert result.series.raw["tick"][-1] == 99
+    assert result.table()["ended"] == "peer has gone"
+
+
+def test_board_that_falls_silent_ends_the_run(session: InProcess) -> None:
+    def fall_silent(tick: int) -> None:
+        if tick >= 100:
+            session.peer.tick = lambda: b""  # type: ignore[method-assign]
+
+    session.before_tick = fall_silent
+    result = runner.execute(straight, seconds=10)
+    assert str(result.error) == "the board at peer fell silent: no telemetry for 1 s"
+    assert session.now() < 2.6
+
+
+def test_board_with_another_pin_map_is_refused(session: InProcess) -> None:
+    with pytest.raises(ProtocolError, match="runs firmware for pin map 'shieldbot', but robot 'shieldbot-quad' needs"):
+        boebot.run(straight, robot="shieldbot-quad")
+    assert session.peer.setpoints == []
+
+
+def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> None:
+    peer = session.peer
+    told: list[int] = []
+
+    def reset(tick: int) -> None:
+        if tick == 57 and peer.starts == 1:
+            peer.parameters.clear()
+            peer.reset()
+        told.append(len(peer.parameters))
+
+    session.before_tick = reset
+    times: list[float] = []
+
+    def step(robot: Robot) -> None:
+        times.append(robot.time)
+        robot.drive(0.5, 0.5)
+
+    result = boebot.run(step, seconds=2)
+    assert result.resets == 1
+    assert result.lost_frames == 0
+    assert len(peer.parameters) == told[0], "the parameters were set again"
+    assert (np.diff(times) > 0).all() and times[-1] < 2.0, "the run's clock goes on"
+    assert abs(result.odometry.x[-1] - result.odometry.x[0]) < 0.4, "counts that begin afresh are no motion"
+
+
+def test_lost_and_damaged_frames_are_counted(session: InProcess) -> None:
+    whole = session.peer.tick
+    drop = iter([False] * 40 + [True] + [False] * 40 + [None])
+
+    def lossy() -> bytes:
+        data = whole()
+        fate = next(drop, False)
+        return b"" if fate else data[:5] + b"\xff" + data[6:] if fate is None else data
+
+    session.peer.tick = lossy  # type: ignore[method-assign]
+    result = boebot.run(straight, seconds=2)
+    assert (result.lost_frames, result.bad_frames) == (2, 1)
+    assert result.steps == 40, "the brain stepped on"
+
+
+def test_dead_man_stops_are_counted(session: InProcess) -> None:
+    whole = session.peer.receive
+    session.peer.receive = lambda data: None if 20 < session.peer.ticks < 80 else whole(data)  # type: ignore[method-assign]
+    result = boebot.run(straight, seconds=1.5)
+    assert result.dead_man_stops == 1
+
+
+def test_nothing_commanded_means_motors_off(session: InProcess) -> None:
+    result = boebot.run(lambda robot: None, seconds=1)
+    assert all(isinstance(message, messages.Stop) for message in session.peer.setpoints)
+    assert result.distance == 0.0
+
+
+def test_speeds_are_sent_as_speeds(session: InProcess) -> None:
+    boebot.run(lambda robot: robot.drive_speed(0.1, -0.05), seconds=0.2)
+    first = session.peer.setpoints[0]
+    assert isinstance(first, messages.SetpointSpeed) and (first.left, first.right) == (1000, -500)
+
+
+def test_odometry_follows_the_truth(session: InProcess) -> None:
+    result = boebot.run(lambda robot: robot.drive(0.4, 0.5), seconds=6)
+    assert result.true_pose is not None and result.odometry_error is not None
+    assert result.distance > 0.3
+    assert result.odometry_error < 0.02
+    assert abs(result.odometry.heading[-1] - result.true_pose.heading[-1]) < 0.1
+
+
+def test_progress_is_reported(session: InProcess) -> None:
+    reported: list[float] = []
+    boebot.run(straight, seconds=1, progress=reported.append)
+    assert reported and all(0 <= passed <= 1 for passed in reported)
+
+
+def test_realtime_run_takes_its_time(session: InProcess) -> None:
+    result = boebot.run(straight, seconds=0.4, realtime=True)
+    assert 0.35 < result.wall_time < 0.8
