@@ -7,8 +7,9 @@ python=build/venv/bin/python
 
 BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --build-lib build/sanitized/lib \
   >build/sanitized.log 2>&1 || { cat build/sanitized.log; exit 1; }
-# The tests' helpers are found in the package under test.
-ln -sfn "$PWD/sim_bridge/tests" build/sanitized/lib/sim_bridge/tests
+# The tests go beside the libraries that they are to test, or pytest would take those of the checkout.
+rm -rf build/sanitized/lib/sim_bridge/tests
+cp -R sim_bridge/tests build/sanitized/lib/sim_bridge/tests
 
 # What a run gives must not depend on how the C was compiled: the usual build leaves its bits for the other to compare.
 export BOEBOT_STATE_FILE="$PWD/build/state-bits"
@@ -20,5 +21,7 @@ asan=$(cc -print-file-name=libasan.so)
 ubsan=$(cc -print-file-name=libubsan.so)
 # Python itself leaves memory to the end of the process, and must use malloc for its objects to be watched.
 echo "Simulator under sanitizers"
-LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc PYTHONPATH=build/sanitized/lib \
-  $python -m pytest -q sim_bridge/tests
+root=$PWD
+cd build/sanitized/lib
+LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc BOEBOT_SANITIZED=1 \
+  "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" sim_bridge/tests

@@ -155,6 +155,13 @@ def test_same_seed_same_run_other_seed_other_run() -> None:
     assert outcome(runs[0])[0] != outcome(runs[2])[0]
 
 
+def test_libraries_under_test_are_the_sanitized_ones_when_that_is_meant() -> None:
+    import sim_bridge._core
+
+    sanitized = b"__asan_init" in Path(str(sim_bridge._core.__file__)).read_bytes()
+    assert sanitized == ("BOEBOT_SANITIZED" in os.environ)
+
+
 def test_state_is_the_same_however_it_was_compiled() -> None:
     """The state's bits after two lively seconds. tools/test_sanitized.sh runs this first with the usual build, which
     leaves its bits in the file that BOEBOT_STATE_FILE names, then with the sanitizers' unoptimised build."""
