@@ -167,7 +167,9 @@ class RunResult:
             "real_time_factor": round(self.real_time_factor, 2),
             "firmware": None if self.identity is None else text(self.identity.firmware_version),
             "compiler": None if self.identity is None else text(self.identity.compiler),
-            "image_hash": None if self.identity is None else f"{self.identity.image_hash:08x}",
+            "image_hash": None
+            if self.identity is None or self.identity.image_size == 0
+            else f"{self.identity.image_hash:08x}",
             "ended": "complete" if self.error is None else _why(self.error),
         }
 

@@ -60,8 +60,8 @@ def test_echo_becomes_distance(distance: float) -> None:
     ("echo_us", "ticks", "distance_known", "valid"),
     [
         (0, 2, False, True),
-        (18_000, 2, True, True),
-        (60_000, 2, False, True),
+        (17_600, 2, True, True),
+        (18_500, 2, False, True),
         (5000, 255, False, False),
         (5000, 90, True, False),
     ],

@@ -57,8 +57,8 @@ def write(result: RunResult, path: Path) -> Path:
         axes.plot(view.estimate.x, view.estimate.y, color=ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=4)
         _draw_ghost(axes, result.robot.body.radius_m, view.estimate)
     _draw_contacts(axes, view)
-    _draw_robot(axes, result, view.path, 0, START)
-    _draw_robot(axes, result, view.path, -1, END)
+    _draw_robot(axes, result, view, 0, START)
+    _draw_robot(axes, result, view, -1, END)
     _draw_scale(axes, low, high)
     _draw_texts(figure, result, view, total)
     figure.savefig(path, facecolor=PAPER)
@@ -103,9 +103,10 @@ def _draw_contacts(axes: Axes, view: scene.View) -> None:
         axes.scatter(x, y, s=46, marker="x", color=CONTACT, lw=1.8, zorder=8)
 
 
-def _draw_robot(axes: Axes, result: RunResult, path: Pose, index: int, colour: str) -> None:
-    """The robot with its wheels, whiskers and sensor cones."""
-    robot = result.robot
+def _draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, colour: str) -> None:
+    """The robot with its wheels, whiskers and sensor cones; walls cut the cones off."""
+    robot, path = result.robot, view.path
+    floor = Polygon(view.outlines[0], closed=True).get_path() if view.outlines else None
     place = (
         Affine2D().rotate(float(path.heading[index])).translate(float(path.x[index]), float(path.y[index]))
         + axes.transData
@@ -120,12 +121,13 @@ def _draw_robot(axes: Axes, result: RunResult, path: Pose, index: int, colour: s
             turn = math.degrees(device.heading_rad)
             half = math.degrees(device.beam_rad) / 2
             alpha = 0.16 if isinstance(device, robots.InfraredPair) else 0.07
-            axes.add_patch(
-                Wedge(
-                    device.position_m, reach, turn - half, turn + half,
-                    facecolor=colour, edgecolor="none", alpha=alpha, transform=place, zorder=9,
-                )
+            cone = Wedge(
+                device.position_m, reach, turn - half, turn + half,
+                facecolor=colour, edgecolor="none", alpha=alpha, transform=place, zorder=3,
             )  # fmt: skip
+            axes.add_patch(cone)
+            if floor is not None:
+                cone.set_clip_path(floor, axes.transData)
         elif isinstance(device, robots.Whisker):
             (x0, y0), (x1, y1) = device.root_m, device.tip_m
             axes.plot((x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round")
@@ -189,12 +191,10 @@ def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: flo
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=START, mew=1.8, ms=8, label="start"),
         Line2D([], [], ls="", marker="o", mfc=BODY, mec=END, mew=1.8, ms=8, label="end"),
         Line2D([], [], ls="", marker="o", mfc="none", mec="#c98a2b", mew=1.2, ms=6, label="whisker touch"),
-        *(
-            [Line2D([], [], ls="", marker="x", color=CONTACT, mew=1.8, ms=7, label="body contact")]
-            if view.known
-            else []
-        ),
+        Line2D([], [], ls="", marker="x", color=CONTACT, mew=1.8, ms=7, label="body contact"),
     ]
+    if not view.known:
+        handles = [handle for handle in handles if handle.get_label() not in ("odometric estimate", "body contact")]
     figure.legend(
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8.5,
         labelcolor=INK, bbox_to_anchor=(0.5, 0.06 / height), handletextpad=0.5, columnspacing=1.6,
