@@ -26,8 +26,10 @@ class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
     PlatformIO's own reader wants every passed assertion printed and may lose the end of what a program prints.
     """
 
-    if FOLDER is not None:
-        EXTRA_LIB_DEPS = None
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        if FOLDER is not None or self.platform.is_embedded():
+            self.EXTRA_LIB_DEPS = None  # nothing to fetch: it is there, or no test is built
 
     def configure_build_env(self, env: Any) -> None:
         """Makes `#include <doctest.h>` find the system's header."""
