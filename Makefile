@@ -41,6 +41,7 @@ help:
 run:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds 60 --out build/run
+	@echo "Look at build/run/run.png, and open build/run/replay.html in a browser to watch the run."
 
 test:
 	@$(SIDE_BY_SIDE) ready-test
