@@ -217,7 +217,7 @@ class _Run:
                     self.clock_offset_s = transport.now() - _AIR_S + (due - tick) * tick_s
                 elif tick <= last:  # the board was reset: its ticks begin afresh
                     due = tick + -tick % n
-                    time_zero = (times[-1] if times else 0.0) + tick_s - tick * tick_s
+                    time_zero = self._time_after_reset(times, transport.now()) - tick * tick_s
                     self._again_after_reset()
                 last = tick
                 if tick >= due or times:
@@ -253,6 +253,11 @@ class _Run:
                     self.progress(time_s)
             ahead_ticks = min(due - last, (self.seconds - time_s) / tick_s)
             wait_s, quiet_s = (ahead_ticks + 2) * tick_s, (ahead_ticks - 0.5) * tick_s
+
+    def _time_after_reset(self, times: list[float], now_s: float) -> float:
+        """The run's time of a tick just received: whole ticks; the board's outage by the transport's clock."""
+        passed_s = round((now_s - _AIR_S - self.clock_offset_s) / self.tick_s) * self.tick_s
+        return max(passed_s, times[-1] + self.tick_s) if times else 0.0
 
     def _again_after_reset(self) -> None:
         """The board restarted: its parameters are its defaults again."""

@@ -209,6 +209,7 @@ def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> 
     assert result.lost_frames == 0
     assert len(peer.parameters) == told[0], "the parameters were set again"
     assert (np.diff(times) > 0).all() and times[-1] < 2.0, "the run's clock goes on"
+    assert session.now() == pytest.approx(2.0 + result.clock_offset, abs=0.05)
     assert abs(result.odometry.x[-1] - result.odometry.x[0]) < 0.4, "counts that begin afresh are no motion"
 
 
