@@ -54,7 +54,7 @@ check:
 	@echo "check: all passed"
 
 bench:
-	@$(SIDE_BY_SIDE) ready-test
+	@$(SIDE_BY_SIDE) ready-bench
 	@$(PYTHON_VENV) -m tools.bench
 
 SECONDS ?= 3600
@@ -101,7 +101,7 @@ clean:
 lock:
 	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
 	@build/lock-venv/bin/pip install --quiet \
-		$$(build/lock-venv/bin/python tools/requirements.py build run firmware test check)
+		$$(build/lock-venv/bin/python tools/requirements.py build run firmware test bench check)
 	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
 	@mv build/requirements.lock requirements.lock
 
@@ -126,9 +126,10 @@ check-images: $(IMAGES)
 
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
-.PHONY: ready-run ready-test ready-check ready-firmware
+.PHONY: ready-run ready-test ready-bench ready-check ready-firmware
 ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
+ready-bench: ready-test $(VENV)/.done-bench
 ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 
@@ -158,6 +159,9 @@ $(VENV)/.done-run: $(VENV)/.done-firmware $(DECLARED)
 $(VENV)/.done-test: $(DECLARED) | $(VENV)/.done-boebot
 	@echo "Installing Python packages for tests"
 	@$(call INSTALL,test)
+$(VENV)/.done-bench: $(DECLARED) | $(VENV)/.done-test
+	@echo "Installing what the bench compares with"
+	@$(call INSTALL,bench)
 $(VENV)/.done-check: $(DECLARED) | $(VENV)/.done-test
 	@echo "Installing Python packages for checks"
 	@$(call INSTALL,check)

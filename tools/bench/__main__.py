@@ -30,6 +30,7 @@ def number(value: float) -> str:
 
 def row(figure: Figure, value: float) -> dict[str, Any]:
     """A figure as bench.json holds it."""
+    peer_value = figure.peer.measure() if figure.peer else None
     return {
         "name": figure.name,
         "value": value,
@@ -38,8 +39,8 @@ def row(figure: Figure, value: float) -> dict[str, Any]:
         "better": figure.better,
         "met": figure.is_met_by(value),
         "peer": figure.peer.name if figure.peer else None,
-        "peer_value": figure.peer.value if figure.peer else None,
-        "ratio": value / figure.peer.value if figure.peer and figure.peer.value else None,
+        "peer_value": peer_value,
+        "ratio": value / peer_value if peer_value else None,
     }
 
 

@@ -9,10 +9,13 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Peer:
-    """Somebody else's figure for the same thing, in the same unit."""
+    """Somebody else's figure for the same thing, in the same unit: measured in the same run, or a published one."""
 
     name: str
-    value: float
+    value: float | Callable[[], float]
+
+    def measure(self) -> float:
+        return self.value() if callable(self.value) else self.value
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import time
 from boebot.boards import BoardRequest, open_board
 from boebot.robots import load_robot
 from boebot.runner import execute
+from tools.bench import peers
 from tools.bench.figures import Peer, figure
 
 ARENA = "room"
@@ -24,7 +25,7 @@ def times_real_time(on: str, seconds: float, period: float) -> float:
     "AVR image in the closed loop, wander at 50 ms, IR at 20 Hz",
     "× real time",
     at_least=30,
-    peer=Peer("avr8js, board alone", 1.5),
+    peer=Peer("simavr as published, board alone", peers.plain_simavr),
 )
 def avr_closed_loop() -> float:
     return times_real_time("avr", 30.0, 0.05)
@@ -34,7 +35,7 @@ def avr_closed_loop() -> float:
     "native board and world, no brain",
     "× real time",
     at_least=1000,
-    peer=Peer("Enki, 488,873 steps/s of 1 ms", 488.9),
+    peer=Peer("ir-sim, steps of 10 ms", peers.ir_sim),
 )
 def native_without_a_brain() -> float:
     session = open_board("native", BoardRequest(robot=load_robot("shieldbot"), arena=ARENA, record=False))
@@ -51,7 +52,7 @@ def native_without_a_brain() -> float:
     "native board and world, wander at every 10 ms tick",
     "× real time",
     at_least=300,
-    peer=Peer("ir-sim 2.12, 1,511 steps/s of 10 ms", 15.1),
+    peer=Peer("ir-sim without a brain, steps of 10 ms", peers.ir_sim),
 )
 def native_with_wander() -> float:
     return times_real_time("native", 60.0, 0.01)
