@@ -14,10 +14,15 @@ import json
 import random
 import sys
 from pathlib import Path
+from types import ModuleType
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(ROOT / "host"), str(HERE)]
+sys.path.insert(0, str(HERE))
+# The package `boebot` without its __init__, which needs the module that is made here.
+bare = ModuleType("boebot")
+bare.__path__ = [str(ROOT / "host" / "boebot")]
+sys.modules["boebot"] = bare
 
 import reference_frame  # noqa: E402
 import schema  # noqa: E402
@@ -145,25 +150,9 @@ def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
     return "\n".join(lines)
 
 
-# bit of the devices flags -> the device that must be on in the robot
-DEVICE_OF_BIT = {
-    "servos": "servo_left",
-    "encoders": "encoder_left",
-    "whiskers": "whisker_left",
-    "infrared": "infrared_left",
-    "ping": "ping",
-    "battery": "battery",
-    "light": "light_left",
-    "analog_infrared": "analog_infrared",
-    "compass": "compass",
-    "turret": "turret",
-    "buzzer": "buzzer",
-}
-
-
 def devices_default(spec: schema.Schema, robot: RobotDescription) -> int:
     """The devices bits of what the robot has switched on."""
-    return sum(1 << i for i, bit in enumerate(spec.flags["devices"].bits) if robot.has(DEVICE_OF_BIT[bit]))
+    return sum(1 << i for i, device in enumerate(spec.flags["devices"].device) if robot.has(device))
 
 
 def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
@@ -212,6 +201,10 @@ def python_module(spec: schema.Schema) -> str:
     for name, flags in spec.flags.items():
         lines += ["", "", f"class {class_name(name)}(IntFlag):", f'    """{flags.doc}"""', ""]
         lines += [f"    {bit.upper()} = 1 << {i}" for i, bit in enumerate(flags.bits)]
+    devices = spec.flags["devices"]
+    lines += ["", "", "# The robot's device behind each bit.", "DEVICE_OF_BIT: dict[Devices, str] = {"]
+    lines += [f'    Devices.{bit.upper()}: "{name}",' for bit, name in zip(devices.bits, devices.device, strict=True)]
+    lines += ["}"]
     for name, enum in spec.enum.items():
         lines += ["", "", f"class {class_name(name)}(IntEnum):", f'    """{enum.doc}"""', ""]
         lines += [f"    {value.upper()} = {i}" for i, value in enumerate(enum.values)]
@@ -226,9 +219,16 @@ def python_module(spec: schema.Schema) -> str:
     lines += ["}"]
     lines += ["", "", "class ParameterSpec(NamedTuple):", '    """A run-time parameter of the firmware."""', ""]
     lines += ["    id: int", "    unit: str", "    scale: float  # unit per count", "    minimum: int  # counts"]
-    lines += ["    maximum: int  # counts", "    doc: str", "", "", "PARAMETERS: dict[str, ParameterSpec] = {"]
+    lines += ["    maximum: int  # counts", "    doc: str"]
+    lines += [
+        '    default_from: str = ""  # key of the robot description that gives the default',
+        "",
+        "",
+        "PARAMETERS: dict[str, ParameterSpec] = {",
+    ]
     for p in spec.parameter:
         row = f'{p.id}, "{p.unit}", {p.scale!r}, {p.min}, {p.max}, "{p.doc}"'
+        row += f', "{p.default_from}"' if p.default_from else ""
         lines.append(f'    "{p.name}": ParameterSpec({row}),')
     lines += ["}", ""]
     return "\n".join(lines)

@@ -84,6 +84,7 @@ class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     doc: str
     type: str
     bits: list[str]
+    device: list[str] = []  # of the devices flags: the robot's device behind each bit
 
 
 class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -141,6 +142,8 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
     _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])
     if [p.id for p in schema.parameter] != list(range(len(schema.parameter))):
         raise ValueError("parameter ids must count from 0 without gaps, in order")
+    if len(schema.flags["devices"].device) != len(schema.flags["devices"].bits):
+        raise ValueError("flags devices: expected one device for each bit")
     for message in schema.message:
         if (message.id >= 0x80) != (message.direction == "to_host"):
             raise ValueError(f"message {message.name}: ids from 0x80 on are for messages to the host")

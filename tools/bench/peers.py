@@ -26,9 +26,10 @@ def plain_simavr(seconds: float = 10.0) -> float:
     program = ROOT / "build" / "plain_simavr"
     if not program.exists():
         sources = [path for path in (simavr / "sim").glob("*.c") if path.stem not in LEFT_OUT]
+        sources += [simavr / build_avr.CHIP_SOURCE, simavr / "cores/sim_megax8.c"]
         includes = [f"-I{folder}" for folder in (simavr / "sim", simavr / "cores", ROOT / build_avr.CONFIGURATION)]
         command = ["cc", "-O2", "-w", *includes, str(ROOT / "tools/bench/plain_simavr.c")]
-        command += [*map(str, sources), str(simavr / build_avr.CHIP_SOURCE), str(simavr / "cores/sim_megax8.c"), "-o", str(program), "-lutil", "-lpthread"]
+        command += [*map(str, sources), "-o", str(program), "-lutil", "-lpthread"]
         subprocess.run(command, check=True)
     image = resources.folder("images") / "shieldbot.hex"
     done = subprocess.run([str(program), str(image), str(seconds)], check=True, capture_output=True, text=True)
@@ -43,7 +44,8 @@ def ir_sim(steps: int = 1500, step_s: float = 0.01) -> float:
     outline = [*room.outline[0].corners_m, room.outline[0].corners_m[0]]
     shapes = [("linestring", outline), *(("polygon", corners) for corners in polygons)]
     lines = [
-        "world: {height: 3, width: 3, offset: [-1.5, -1.5], step_time: %g, sample_time: %g}" % (step_s, step_s),
+        "world:",
+        f"  {{height: 3, width: 3, offset: [-1.5, -1.5], step_time: {step_s:g}, sample_time: {step_s:g}}}",
         "robot:",
         "  - kinematics: {name: diff}",
         "    shape: {name: circle, radius: 0.07}",

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 1u
-#define SCHEMA_HASH 0x649CBEA8ul
+#define SCHEMA_HASH 0xAE513ACDul
 #define MESSAGE_PAYLOAD_MAX 44u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 8u /* bytes */
 

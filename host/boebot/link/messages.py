@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 1
-SCHEMA_HASH = 0x649CBEA8
+SCHEMA_HASH = 0xAE513ACD
 
 
 class Whiskers(IntFlag):
@@ -57,6 +57,22 @@ class Devices(IntFlag):
     COMPASS = 1 << 8
     TURRET = 1 << 9
     BUZZER = 1 << 10
+
+
+# The robot's device behind each bit.
+DEVICE_OF_BIT: dict[Devices, str] = {
+    Devices.SERVOS: "servo_left",
+    Devices.ENCODERS: "encoder_left",
+    Devices.WHISKERS: "whisker_left",
+    Devices.INFRARED: "infrared_left",
+    Devices.PING: "ping",
+    Devices.BATTERY: "battery",
+    Devices.LIGHT: "light_left",
+    Devices.ANALOG_INFRARED: "analog_infrared",
+    Devices.COMPASS: "compass",
+    Devices.TURRET: "turret",
+    Devices.BUZZER: "buzzer",
+}
 
 
 class ResetCause(IntEnum):
@@ -405,17 +421,18 @@ class ParameterSpec(NamedTuple):
     minimum: int  # counts
     maximum: int  # counts
     doc: str
+    default_from: str = ""  # key of the robot description that gives the default
 
 
 PARAMETERS: dict[str, ParameterSpec] = {
     "devices": ParameterSpec(0, "flags", 1.0, 0, 2047, "devices switched on, bits as in the devices flags"),
     "time_to_live_default": ParameterSpec(1, "ms", 1.0, 20, 2000, "time to live of a set-point that names none; also the longest silence at start"),
-    "servo_left_centre": ParameterSpec(2, "us", 0.0625, 22400, 25600, "pulse at which the left servo stands still"),
-    "servo_right_centre": ParameterSpec(3, "us", 0.0625, 22400, 25600, "pulse at which the right servo stands still"),
-    "servo_left_gain": ParameterSpec(4, "us", 0.0625, -3200, 3200, "pulse offset at full forward signal, left; negative for a mirrored servo"),
-    "servo_right_gain": ParameterSpec(5, "us", 0.0625, -3200, 3200, "pulse offset at full forward signal, right; negative for a mirrored servo"),
-    "wheel_speed_maximum": ParameterSpec(6, "m/s", 0.0001, 100, 5000, "ground speed at full signal, for set-points in m/s"),
-    "infrared_period": ParameterSpec(7, "ticks", 1.0, 2, 250, "ticks between two IR readings"),
-    "ping_period": ParameterSpec(8, "ticks", 1.0, 4, 250, "ticks between two Ping triggers"),
+    "servo_left_centre": ParameterSpec(2, "us", 0.0625, 22400, 25600, "pulse at which the left servo stands still", "servo_left.centre_us"),
+    "servo_right_centre": ParameterSpec(3, "us", 0.0625, 22400, 25600, "pulse at which the right servo stands still", "servo_right.centre_us"),
+    "servo_left_gain": ParameterSpec(4, "us", 0.0625, -3200, 3200, "pulse offset at full forward signal, left; negative for a mirrored servo", "servo_left.gain_us"),
+    "servo_right_gain": ParameterSpec(5, "us", 0.0625, -3200, 3200, "pulse offset at full forward signal, right; negative for a mirrored servo", "servo_right.gain_us"),
+    "wheel_speed_maximum": ParameterSpec(6, "m/s", 0.0001, 100, 5000, "ground speed at full signal, for set-points in m/s", "body.wheel_speed_maximum_m_s"),
+    "infrared_period": ParameterSpec(7, "ticks", 1.0, 2, 250, "ticks between two IR readings", "infrared.period_ticks"),
+    "ping_period": ParameterSpec(8, "ticks", 1.0, 4, 250, "ticks between two Ping triggers", "ping.period_ticks"),
     "encoder_limit": ParameterSpec(9, "edges per tick", 1.0, 4, 200, "edges of one encoder line in one tick above which the line is masked until the tick ends"),
 }
