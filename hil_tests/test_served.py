@@ -27,7 +27,11 @@ def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]
     )
     assert server.stdout is not None
     try:
-        announced = "".join(iter(server.stdout.readline, "}\n")) + "}"
+        announced = ""
+        for line in server.stdout:
+            announced += line
+            if line == "}\n":
+                break
         yield json.loads(announced)["url"], server
     finally:
         server.send_signal(signal.SIGINT)

@@ -18,8 +18,8 @@ _UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes)$")
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """One JSON object on standard output."""
-    print(json.dumps(values, indent=1))
+    """One JSON object on standard output, at once: a program may be waiting for it."""
+    print(json.dumps(values, indent=1), flush=True)
 
 
 def print_table(values: Mapping[str, Any]) -> None:
