@@ -114,6 +114,18 @@ class Rig:
             self.drive(left, right)
             self.listen(min(0.05, end - self.transport.now()))
 
+    def flood(self, setpoint: messages.SetpointSignal, seconds: float) -> None:
+        """Saturates the line both ways for that long: set-points and requests without a gap, 50,000 bytes/s, so that
+        answers and telemetry fill the other direction too."""
+        request = messages.GetParameter(0)
+        for _ in range(round(seconds / TICK_S)):
+            wire = bytearray()
+            while len(wire) < 500:
+                wire += frame.encode(setpoint.ID, 0, setpoint.pack())
+                wire += frame.encode(request.ID, 0, request.pack()) * 3
+            self.transport.write(bytes(wire[:500]))  # the last frame is cut, and so refused
+            self.listen(TICK_S)
+
     def start(self) -> messages.Hello:
         """Waits for the board to be up."""
         return self.ask(messages.HelloRequest(messages.PROTOCOL_VERSION), messages.Hello, within_s=1.0)

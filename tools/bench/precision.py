@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from boebot.devices.servo import PULSE_SCALE_US
-from boebot.link import frame, messages
+from boebot.link import messages
 from boebot.runner import execute
 from tools.bench.figures import figure
 
@@ -24,21 +23,17 @@ def servo_width() -> float:
     worst = 0.0
     with Rig.open("avr") as rig:
         rig.start()
-        for sequence, signal in enumerate(np.linspace(-1.0, 1.0, 9)):
+        for signal in np.linspace(-1.0, 1.0, 9):
             counts = round(float(signal) * 1e4)
             setpoint = messages.SetpointSignal(counts, counts, 250, 0)
-            for _ in range(10):
-                # 50 bytes a millisecond is the line's rate: 100 ms of frames without a gap
-                wire = frame.encode(setpoint.ID, sequence, setpoint.pack())
-                rig.transport.write((wire * (5000 // len(wire) + 1))[:5000])
-                telemetry = rig.listen(0.1)
-            settled = rig.session.transport.now() - 0.5
-            in_force = {SERVO_LEFT: telemetry[-1].pulse_left, SERVO_RIGHT: telemetry[-1].pulse_right}
-            for pin, pulse in in_force.items():
+            rig.flood(setpoint, 0.1)  # the pulses that are under way when the set-point changes
+            begun = rig.board.cycle
+            rig.flood(setpoint, 1.0)
+            for pin, mirror in ((SERVO_LEFT, 1), (SERVO_RIGHT, -1)):
                 pulses = rig.pulses(pin)
-                recent = pulses[pulses[:, 0] > settled * 1e6 * CYCLES_PER_US]
-                expected = pulse * PULSE_SCALE_US * CYCLES_PER_US
-                worst = max(worst, float(np.abs(recent[:, 1] - expected).max()))
+                widths = pulses[pulses[:, 0] > begun, 1]
+                expected = (1500 + mirror * 200 * float(signal)) * CYCLES_PER_US
+                worst = max(worst, float(np.abs(widths - expected).max()))
     return worst
 
 
