@@ -242,8 +242,10 @@ static inline double ray_edge(const arena_edge *e, double x, double y, double c,
   }
   if (den * den > 1e-24 * e->length_squared) {
     const double slack = CRACK * den;
-    if (t < 0.0 || t >= best * den || u < -slack || u > den + slack) return best;
-    return t / den;
+    /* Clearly behind what was found, by more than rounding: so the nearest does not depend on the order of the edges. */
+    if (t < 0.0 || t > best * den * (1.0 + CRACK) || u < -slack || u > den + slack) return best;
+    const double d = t / den;
+    return d < best ? d : best;
   }
   if (u * u > 1e-24) return best;      /* parallel beside it */
   const double a = -(wx * c + wy * s); /* collinear: the nearer of what lies ahead */
