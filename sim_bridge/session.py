@@ -21,24 +21,11 @@ from boebot.errors import ArenaError, BoardError
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena, load_arena
+from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, ResetCause
 
-CLOCK_HZ = 16_000_000
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
-LOW, HIGH, RELEASED = 0, 1, 2
-RESETS = {"power": 0, "external": 1, "brown_out": 2, "watchdog": 3}
-COUNTERS = (
-    "executed_cycles",
-    "instructions",
-    "interrupts",
-    "bytes_in",
-    "bytes_out",
-    "overruns",
-    "framing_errors",
-    "resets",
-    "edges_out",
-)
 EDGE = np.dtype(  # sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
 )
@@ -338,7 +325,7 @@ class BoardPins:
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
         self.reset_cycle = self._sim.cycle
-        lib.board_reset(self._sim.board.address, RESETS[cause])
+        lib.board_reset(self._sim.board.address, ResetCause[cause.upper()])
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""

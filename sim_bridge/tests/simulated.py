@@ -11,7 +11,8 @@ import numpy as np
 from boebot.robots import RobotDescription, load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
-from sim_bridge.session import CLOCK_HZ, BoardPins, EmulatedBoard, Sim
+from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.session import BoardPins, EmulatedBoard, Sim
 
 MS = CLOCK_HZ // 1000
 US = CLOCK_HZ // 1_000_000

@@ -16,7 +16,7 @@ from boebot import robots
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
-from sim_bridge.session import CLOCK_HZ
+from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LEFT, RIGHT = 13, 12

@@ -5,8 +5,8 @@
 
 #include "generated/messages.h"
 #include "link/identity.h"
-#include "link/link.h"
 #include "link/parameters.h"
+#include "link/send.h"
 #include "motion.h"
 #include "safety.h"
 
@@ -46,7 +46,7 @@ static bool setpoint_speed(uint8_t sequence, const uint8_t *payload) {
 
 static void answer_parameter(uint8_t parameter, uint8_t status) {
   const msg_parameter answer = {.parameter = parameter, .value = parameters_get(parameter), .status = status};
-  link_send(MSG_PARAMETER_ID, &answer, sizeof answer);
+  send_message(MSG_PARAMETER_ID, &answer, sizeof answer);
 }
 
 static void get_parameter(const uint8_t *payload) {

@@ -6,8 +6,8 @@
 #include "firmware.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
-#include "link/link.h"
 #include "link/parameters.h"
+#include "link/send.h"
 #include "pins.h"
 #include "schedule.h"
 
@@ -43,12 +43,12 @@ void identity_send_hello(void) {
       .reset_cause = hal_reset_cause(),
   };
   put_text(hello.pin_map, sizeof hello.pin_map, pin_map, sizeof pin_map);
-  link_send(MSG_HELLO_ID, &hello, sizeof hello);
+  send_message(MSG_HELLO_ID, &hello, sizeof hello);
 }
 
 void identity_send(void) {
   msg_identity identity = {.image_size = hal_image_size(), .image_hash = image_hash};
   put_text(identity.firmware_version, sizeof identity.firmware_version, firmware_version, sizeof firmware_version);
   put_text(identity.compiler, sizeof identity.compiler, compiler, sizeof compiler);
-  link_send(MSG_IDENTITY_ID, &identity, sizeof identity);
+  send_message(MSG_IDENTITY_ID, &identity, sizeof identity);
 }

@@ -5,15 +5,15 @@
 #include "link/dispatch.h"
 #include "link/frame.h"
 #include "link/identity.h"
+#include "link/send.h"
 
 static frame_decoder decoder;
-static uint8_t next_sequence;
 static uint8_t refused; /* frames that were whole but asked for what cannot be */
 
 void link_start(void) {
   frame_decoder_start(&decoder, FRAME_SEED);
-  next_sequence = 0;
   refused = 0;
+  send_start();
   dispatch_start();
   identity_send_hello();
 }
@@ -31,16 +31,6 @@ void link_poll(void) {
       return;
     }
   }
-}
-
-bool link_send(uint8_t id, const void *payload, uint8_t length) {
-  const uint8_t sequence = next_sequence++;
-  if (!hal_serial_room((uint8_t)(length + FRAME_OVERHEAD))) {
-    return false;
-  }
-  uint8_t wire[FRAME_SIZE_MAX];
-  hal_serial_send(wire, frame_encode(wire, id, sequence, payload, length, decoder.seed));
-  return true;
 }
 
 uint8_t link_frames_bad(void) { return (uint8_t)(decoder.bad + refused); }

@@ -1,4 +1,4 @@
-/* link.h: messages to and from the host over the serial line. */
+/* link.h: what comes over the serial line: bytes into frames, frames to dispatch. Sending is in send.h. */
 #ifndef LINK_H
 #define LINK_H
 
@@ -19,10 +19,6 @@ void link_start(void);
  * answer. */
 void link_poll(void);
 static inline bool link_due(void) { return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX); }
-
-/* Sends a message; false if there is no room. A message that is not sent leaves a gap in the sequence numbers, so that
- * the host can count it. */
-bool link_send(uint8_t id, const void *payload, uint8_t length);
 
 /* Frames refused since reset, modulo 256. */
 uint8_t link_frames_bad(void);

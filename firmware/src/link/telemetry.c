@@ -7,6 +7,7 @@
 #include "infrared.h"
 #include "link/dispatch.h"
 #include "link/link.h"
+#include "link/send.h"
 #include "ping.h"
 #include "pins.h"
 #include "safety.h"
@@ -57,5 +58,5 @@ void telemetry_task(void) {
       .frames_bad = link_frames_bad(),
       .overruns = schedule_overruns(),
   };
-  link_send(MSG_TELEMETRY_ID, &telemetry, sizeof telemetry);
+  send_message(MSG_TELEMETRY_ID, &telemetry, sizeof telemetry);
 }
