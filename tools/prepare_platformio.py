@@ -60,6 +60,9 @@ def prepare(core: Path) -> None:
     scons = add_tool(core, "tool-scons", platformio_version_of_scons(), "SCons from PyPI")
     (scons / "scons.py").write_text(SCONS, encoding="utf-8")
     add_tool(core, "tool-avrdude", "1.0.0+path", "Whatever avrdude is on PATH")
+    cppcheck = add_tool(core, "tool-cppcheck", "1.21100.0+path", "Whatever cppcheck is on PATH") / "cppcheck"
+    cppcheck.write_text('#!/bin/sh\nexec cppcheck "$@"\n', encoding="utf-8")
+    cppcheck.chmod(0o755)
 
     for source in sorted(path for path in PLATFORMS.iterdir() if path.is_dir()):
         folder = core / "platforms" / source.name
