@@ -570,7 +570,9 @@ int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t 
   robot *r = find(self, number);
   if (r == NULL || bad_pin(pin) || half_cycles == 0) return SIM_BAD_ARGUMENT;
   take_pin(r, pin);
-  int i = 0;
+  int i = 0; /* the place of this pin's wave, or of one that is over, or a new one */
+  while (i < r->waves && r->wave[i].pin != pin) i++;
+  if (i == r->waves) i = 0;
   while (i < r->waves && r->wave[i].pin != pin && r->wave[i].next <= r->wave[i].end) i++;
   if (i == WAVES_MAXIMUM) return SIM_BAD_ARGUMENT;
   if (i == r->waves) r->waves++;

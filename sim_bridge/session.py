@@ -196,6 +196,11 @@ def _battery_channel(robot: robots.RobotDescription) -> int:
     return 255
 
 
+def _cycles(seconds: float) -> int:
+    """As many cycles, but at least one of any time at all: a wait that lets no time pass would be repeated for ever."""
+    return max(1, round(seconds * CLOCK_HZ)) if seconds > 0 else 0
+
+
 class SimTransport:
     """The board's serial line, in this process. Time passes only while `read` waits."""
 
@@ -213,7 +218,7 @@ class SimTransport:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        self._sim.run(max(0, round(wait_s * CLOCK_HZ)), max(0, round(quiet_s * CLOCK_HZ)))
+        self._sim.run(_cycles(wait_s), _cycles(quiet_s))
         if self._pace is not None:
             self._pace.wait()
         return self._sim.receive()

@@ -1,4 +1,4 @@
-"""Where the robot believes it is: dead reckoning from wheel encoders (THEORY 1.4 and 2.2).
+"""Where the robot believes it is: dead reckoning from wheel encoders (notes, equations 2.7 to 2.9).
 
     ds = (ds_L + ds_R) / 2,   dphi = (ds_R - ds_L) / (2 R)
     x += ds cos(phi + dphi/2),   y += ds sin(phi + dphi/2),   phi += dphi      (midpoint rule; 2 R = track width)
@@ -6,8 +6,7 @@
 A single-channel encoder knows no direction. Its sign is that of the commanded signal; when the command
 reverses, the old sign stays until the new command has been beyond the dead band for 60 ms. A wheel whose
 speed follows the command with a time constant of 65 ms passes through standstill 65 ms ln 2 = 45 ms after the
-servo has noticed the new pulse, which takes it half a 20 ms frame on average. (THEORY proposes 100 ms; on the
-simulated shieldbot the heading error of 2-minute wanders is 0.45 rad rms with 100 ms, 0.17 rad with 60 ms.)
+servo has noticed the new pulse, which takes it half a 20 ms frame on average (docs/decisions/0002-sign-hold.md).
 """
 
 from __future__ import annotations

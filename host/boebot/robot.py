@@ -7,7 +7,7 @@ the friendly face of both.
         else:
             robot.drive(0.5, 0.5)
 
-A brain sees what the robot's own sensors, motors and clock give, and nothing else (THEORY 7.3): here is no
+A brain sees what the robot's own sensors, motors and clock give, and nothing else: here is no
 way to the simulated world, to the board or to the link.
 """
 
@@ -319,7 +319,7 @@ class Robot:
             probability: 0..1, of happening within `per` seconds.
             per: seconds that the probability is meant for. A brain that asks once per step then behaves alike
             at every
-                brain period: p' = 1 - (1 - p)^(period / per) (THEORY 4.1). None: the probability is meant as
+                brain period: p' = 1 - (1 - p)^(period / per). None: the probability is meant as
                 it stands.
         """
         if per is not None:

@@ -1,4 +1,4 @@
-"""Dead reckoning: the midpoint rule against THEORY's figures, and the sign rule of single-channel encoders."""
+"""Dead reckoning: the midpoint rule against known figures, and the sign rule of single-channel encoders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TRACK_M = 0.105
 
 
 def reckon(step_s: float, seconds: float = 20.0) -> tuple[float, float]:
-    """THEORY 2.2's test: wheel speeds 0.1 + 0.05 sin t and 0.1 + 0.05 cos 0.7 t."""
+    """A test with changing wheel speeds: 0.1 + 0.05 sin t and 0.1 + 0.05 cos 0.7 t."""
     estimate = Odometry(TRACK_M)
     times = np.arange(0, seconds, step_s)
     left = (0.1 * step_s) + 0.05 * (np.cos(times) - np.cos(times + step_s))

@@ -275,6 +275,25 @@ def test_driven_pin_belongs_to_the_test() -> None:
     assert robot.inputs(5)[-3:] == [(20 * MS, 1), (30 * MS, 0), (40 * MS, 1)]
 
 
+def test_new_square_wave_replaces_the_one_on_its_pin() -> None:
+    robot = scripted()
+    robot.pins.square_wave(16, 16_000, 0.02)
+    robot.pins.square_wave(17, 160_000, 1.0)
+    robot.run(0.1)  # the first wave is over
+    before = len(robot.inputs(17))
+    robot.pins.square_wave(17, 320_000, 0.5)
+    robot.run(0.6)
+    assert len(robot.inputs(17)) - before in (50, 51)  # one of the old wave may have been queued already
+
+
+def test_shortest_wait_lets_time_pass() -> None:
+    robot = scripted()
+    transport = SimTransport(robot.sim, "script")
+    before = robot.sim.cycle
+    transport.read(1e-9, 1e-9)
+    assert robot.sim.cycle > before
+
+
 def test_square_wave_has_its_edges() -> None:
     robot = scripted()
     robot.run(0.005)

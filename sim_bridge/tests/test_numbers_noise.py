@@ -48,7 +48,7 @@ def test_wrapped_angle_is_the_same_direction(angle: float) -> None:
 
 
 def test_normal_draws_have_the_moments_of_3_1() -> None:
-    """E11: S = 0.5, sigma = 0.01, 10,000 draws."""
+    """Noise (3.1): S = 0.5, sigma = 0.01, 10,000 draws."""
     draws = np.array([lib.noise_normal(7, 0, 5, step) for step in range(10_000)])
     readings = 0.5 * (1 + 0.01 * draws)
     assert readings.mean() == pytest.approx(0.5, abs=0.0002)

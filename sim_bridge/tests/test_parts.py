@@ -46,7 +46,7 @@ def servo(**changes: float) -> Any:
     [(-200, -50), (-100, -45), (-52, -30), (-30, -15), (0, 0), (26, 15), (50, 30), (100, 45), (200, 50)],
 )
 def test_servo_follows_the_measured_curve(offset_us: float, rpm: float) -> None:
-    """Unit A of HARDWARE §3; the fit is within 4 rpm of every measured point."""
+    """The first of two measured servos; the fit is within 4 rpm of every measured point."""
     speed = lib.servo_curve(servo(), 1500 + offset_us)
     assert speed / WHEEL / RPM == pytest.approx(rpm, abs=4)
     assert speed / WHEEL / RPM == pytest.approx(51.25 * math.tanh(offset_us / 78.5), abs=1e-6)
@@ -413,7 +413,7 @@ def test_flat_surfaces_send_nothing_back() -> None:
 
 
 def test_missed_echoes_and_spread() -> None:
-    """E14 in small: p = 0.98, and readings spread by (3.1)."""
+    """p = 0.98, and readings spread by (3.1)."""
     arena = arena_of([(1.06, -3), (1.2, -3), (1.2, 3), (1.06, 3)])
     robot = scripted(arena, noise=True, seed=3)
     count = 3000

@@ -17,7 +17,7 @@ from sim_bridge.arena import Arena
 from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 RADIUS = 0.07
-# Boe-Bot row of THEORY 1.2.
+# A Boe-Bot of 0.6 kg.
 BOE_BOT = {
     "mass": 0.60,
     "inertia": 1.2e-3,
@@ -98,7 +98,7 @@ def constant(left: float, right: float) -> Callable[[float], tuple[float, float]
 
 
 def test_a_and_b_of_the_boe_bot() -> None:
-    """E04: (2.26), (2.30) with the numbers of THEORY 1.2."""
+    """Equations (2.26), (2.30) with the numbers of a Boe-Bot."""
     parameters = ffi.new("body_parameters *", BOE_BOT)
     assert lib.body_a(parameters) == pytest.approx(26.09, abs=0.005)
     assert lib.body_b(parameters) == pytest.approx(1.305, abs=0.0005)
@@ -140,7 +140,7 @@ def test_acceleration_by_elimination() -> None:
 
 @pytest.mark.parametrize(("gain", "expected"), [(0.5, 0.2727), (2.0, 0.2927), (10.0, 0.2985)])
 def test_steady_speed_of_the_regulated_motor(gain: float, expected: float) -> None:
-    """E03: (3.15) settles at V_ref 2AK / (2AK + alpha)."""
+    """The regulated motor (3.15) settles at V_ref 2AK / (2AK + alpha)."""
     body = Body(parameters=ARSIM)
     body.regulate(constant(0.3, 0.3), gain, 5.0, 0.01)
     assert body.state.speed == pytest.approx(expected, abs=1e-4)
@@ -155,7 +155,7 @@ def test_regulated_motor_is_stable_up_to_the_step_of_theory(dt: float, stable: b
 
 
 def test_circle_closes_around_its_centre_of_rotation() -> None:
-    """E07: v = 0.08, 0.12 m/s with R = 0.0525 m turn about a point 0.2625 m to the left."""
+    """v = 0.08, 0.12 m/s with R = 0.0525 m turn about a point 0.2625 m to the left."""
     body = Body(linear_damping=0.0, angular_damping=0.0)
     rate = 0.04 / 0.105
     body.place(0, 0, 0, speed=0.10, turn_rate=rate)
@@ -325,7 +325,7 @@ def test_segment_on_the_body_touches_what_it_crosses() -> None:
 
 
 def test_default_robot_within_the_contact_guard() -> None:
-    """THEORY 3.4: V dt < radius / 2 without splitting a step, for the kit's own robot and step."""
+    """V dt < radius / 2 without splitting a step, for the kit's own robot and step."""
     body = load_robot("shieldbot").body
     assert body.wheel_speed_maximum_m_s * 0.001 < body.radius_m / 2
     assert imperfections.SERVO_TOP_RPM * imperfections.RPM * body.wheel_radius_m > body.wheel_speed_maximum_m_s

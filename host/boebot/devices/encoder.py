@@ -1,4 +1,4 @@
-"""Wheel encoders: edges of a slotted disc, counted and timed by the firmware (THEORY 1.4).
+"""Wheel encoders: edges of a slotted disc, counted and timed by the firmware.
 
     distance = 2 pi r n / N,   speed = 2 pi r / (N t_edge)
 A single-channel encoder knows no direction: its count only grows, its speed is never negative.

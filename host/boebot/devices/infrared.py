@@ -1,5 +1,4 @@
-"""Infra-red pairs: an LED flashes at 38 kHz, a receiver says whether something reflects it (HARDWARE sheet,
-section 5).
+"""Infra-red pairs: an LED flashes at 38 kHz, a receiver says whether something reflects it.
 
 The firmware reads both pairs every few ticks; between two readings the last one stands, with its age.
 """

@@ -1,6 +1,6 @@
 """Ping))): an ultrasonic range finder. The echo pulse lasts as long as sound takes to the obstacle and back.
 
-distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature     (HARDWARE sheet, section 6)
+distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature
 """
 
 from __future__ import annotations
