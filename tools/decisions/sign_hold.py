@@ -18,14 +18,15 @@ def main() -> None:
     print("hold (ms)   heading error at the end (rad rms)   position error at the end (m rms)")
     for hold_ms in (0, 20, 40, 60, 80, 100, 150):
         odometry.HOLD_S = hold_ms / 1000
-        heading, position = [], []
+        heading: list[float] = []
+        position: list[float] = []
         for seed in SEEDS:
             result = boebot.run("wander", arena="room", seconds=120, seed=seed)
-            truth, estimate = result.true_pose, result.odometry
-            assert truth is not None
+            truth, estimate, off_by = result.true_pose, result.odometry, result.odometry_error
+            assert truth is not None and off_by is not None
             error = estimate.heading[-1] - truth.heading[-1]
-            heading.append(np.arctan2(np.sin(error), np.cos(error)))
-            position.append(result.odometry_error)
+            heading.append(float(np.arctan2(np.sin(error), np.cos(error))))
+            position.append(off_by)
         print(f"{hold_ms:9d}   {rms(heading):34.2f}   {rms(position):33.2f}")
 
 
