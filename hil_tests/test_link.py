@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import itertools
 import random
+from typing import Any
+
+import pytest
 
 from boebot.link import frame, messages
 from boebot.robots import load_robot
 from rig import Rig
+
+
+def type_name(value: Any) -> str:
+    return type(value).__name__
 
 
 def text(field: bytes) -> str:
@@ -78,3 +85,22 @@ def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
     sequence = rig.drive(0.0, 0.0)
     assert rig.latest().setpoint_sequence == sequence, "the board no longer listens"
     assert rig.decoder.bad == 0
+
+
+@pytest.mark.parametrize("requests_per_tick", [1, 2, 5, 10, 20])
+@pytest.mark.parametrize(
+    "request_message", [messages.HelloRequest(1), messages.Identify(), messages.GetParameter(1)], ids=type_name
+)
+def test_requests_do_not_silence_telemetry(rig: Rig, request_message: Any, requests_per_tick: int) -> None:
+    """Telemetry comes every tick, however many requests and wherever in the tick they fall."""
+    wire = frame.encode(request_message.ID, 0, request_message.pack()) * requests_per_tick
+    rig.latest()
+    for phase in range(5):
+        before = len(rig.telemetry)
+        for _ in range(20):
+            rig.transport.write(wire)
+            rig.listen(0.010)
+        assert len(rig.telemetry) - before >= 19, f"phase {phase}"
+        rig.listen(0.102)  # the answers that still wait; and the next phase
+    for earlier, later in itertools.pairwise(rig.telemetry):
+        assert later.tick - earlier.tick == 1

@@ -16,9 +16,11 @@ extern "C" {
 void link_start(void);
 
 /* Takes received bytes, up to the end of one frame, and does what it asks. Bytes wait while there is no room for an
- * answer. */
+ * answer and, after it, for the next telemetry, which is never left out for the sake of answers. */
 void link_poll(void);
-static inline bool link_due(void) { return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX); }
+static inline bool link_due(void) {
+  return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX + MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD);
+}
 
 /* Frames refused since reset, modulo 256. */
 uint8_t link_frames_bad(void);
