@@ -6,7 +6,6 @@ Lengths in m, angles in rad. A wrong file gets one sentence that names the file,
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot import resources
+from boebot import toml_files
 from boebot.errors import ArenaError
 from sim_bridge._core import ffi, lib
 
@@ -136,7 +135,7 @@ class Arena:
 
 def arena_names() -> list[str]:
     """The bundled arenas."""
-    return sorted(path.stem for path in resources.folder("arenas").glob("*.toml"))
+    return toml_files.bundled_names("arenas")
 
 
 def load_arena(arena: str | Path | None) -> Arena:
@@ -145,36 +144,9 @@ def load_arena(arena: str | Path | None) -> Arena:
     Raises:
         ArenaError: unknown arena, unreadable file, wrong key or value, or no polygon.
     """
-    path = _find("room" if arena is None else arena)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ArenaError(f"{path.name} cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ArenaError(f"{path.name} is no valid TOML: {error}") from None
-    try:
-        description = msgspec.convert(table, ArenaDescription)
-    except msgspec.ValidationError as error:
-        raise ArenaError(f"{path.name}: {_readable(str(error))}") from None
-    return Arena(description, path.name)
-
-
-def _find(arena: str | Path) -> Path:
-    path = Path(arena)
-    if path.suffix == ".toml":
-        if path.is_file():
-            return path
-        raise ArenaError(f"there is no arena file {path}")
-    bundled = resources.folder("arenas") / f"{path.name}.toml"
-    if str(path) != path.name or not bundled.is_file():
-        known = ", ".join(arena_names())
-        raise ArenaError(f"there is no arena {str(arena)!r}; expected one of {known}, or a .toml file")
-    return bundled
-
-
-def _readable(message: str) -> str:
-    """msgspec's sentence with the key as the file writes it."""
-    return message.replace(" - at `$.", " at `").replace(" - at `$", " at `")
+    path = toml_files.find("arenas", "room" if arena is None else arena, ArenaError)
+    table = toml_files.read(path, ArenaError)
+    return Arena(toml_files.convert(table, ArenaDescription, path.name, ArenaError), path.name)
 
 
 def _check_polygon(corners: list[Point], where: str) -> None:

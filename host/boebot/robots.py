@@ -7,13 +7,12 @@ keys' names; lengths are in the robot's frame, x forward, y left, origin at the 
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import msgspec
 
-from boebot import resources
+from boebot import toml_files
 from boebot.errors import RobotError
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -259,7 +258,7 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 def robot_names() -> list[str]:
     """The bundled robots."""
-    return sorted(path.stem for path in resources.folder("robots").glob("*.toml"))
+    return toml_files.bundled_names("robots")
 
 
 def load_robot(robot: str | Path) -> RobotDescription:
@@ -268,41 +267,20 @@ def load_robot(robot: str | Path) -> RobotDescription:
     Raises:
         RobotError: unknown robot, unreadable file, wrong key or value, or devices that cannot live on one board.
     """
-    path = _find(robot)
-    table = _read(path, seen=())
-    try:
-        description = msgspec.convert(table, RobotDescription, strict=True)
-    except msgspec.ValidationError as error:
-        raise RobotError(f"{path.name}: {error}") from None
+    path = toml_files.find("robots", robot, RobotError)
+    description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
     _check_pins(description, path.name)
     return description
 
 
-def _find(robot: str | Path) -> Path:
-    path = Path(robot)
-    if path.suffix == ".toml":
-        if path.is_file():
-            return path
-        raise RobotError(f"there is no robot file {path}")
-    bundled = resources.folder("robots") / f"{robot}.toml"
-    if bundled.is_file():
-        return bundled
-    raise RobotError(f"there is no robot {str(robot)!r}; expected one of {', '.join(robot_names())}, or a .toml file")
-
-
 def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     """The file's table, laid over the robot that it extends."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path.name} cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise RobotError(f"{path.name} is no valid TOML: {error}") from None
+    table = toml_files.read(path, RobotError)
     base_name = table.pop("extends", None)
     removed = table.pop("remove", [])
     if base_name is None:
         return table
-    base_path = _find(base_name)
+    base_path = toml_files.find("robots", base_name, RobotError)
     if base_path in seen:
         raise RobotError(f"{path.name} extends itself by way of {base_name!r}")
     base = _read(base_path, (*seen, path))

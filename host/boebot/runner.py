@@ -18,7 +18,7 @@ import time as wall
 from collections.abc import Callable
 from pathlib import Path
 
-from boebot import brains
+from boebot import brains, report
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.brains import LoadedBrain
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
@@ -71,6 +71,8 @@ def run(
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
+    if out is not None:
+        report.make_folder(Path(out))
     result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
     if out is not None:
         result.save(out)

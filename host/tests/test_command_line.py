@@ -54,6 +54,15 @@ def test_run_prints_json_and_writes_files(peer: Peer, capsys: pytest.CaptureFixt
     assert {Path(name).name for name in values["files"]} == {path.name for path in folder.iterdir()}
 
 
+def test_folder_that_cannot_be_written_is_said_before_the_run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(runner, "open_board", lambda url, request: pytest.fail("the run began"))
+    (tmp_path / "file").touch()
+    code, _, err = boebot(capsys, "run", "wander", "--out", str(tmp_path / "file"))
+    assert code == 1 and "cannot be written to" in err
+
+
 def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = boebot(capsys, "run", "wander", "--seconds", "1", "--period", "20", "--json")
     assert json.loads(out)["steps"] == 50

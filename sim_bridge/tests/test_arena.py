@@ -157,9 +157,9 @@ corners_m = [[0, 0], [1, 0], [1, 1], [0, 1]]
     ("text", "expected"),
     [
         ("name = ", "mine.toml is no valid TOML"),
-        ("title = 'x'", "mine.toml: Object missing required field `name`"),
-        (GOOD + "colour = 'red'", "mine.toml: Object contains unknown field `colour` at `outline["),
-        (GOOD.replace("[0, 1]]", "[0, 'a']]"), "Expected `float`, got `str` at `outline["),
+        ("title = 'x'", "mine.toml: the key 'name' is missing"),
+        (GOOD + "colour = 'red'", "mine.toml: outline[0]: there is no key 'colour' here; expected corners_m, name"),
+        (GOOD.replace("[0, 1]]", "[0, 'a']]"), "mine.toml: outline[0].corners_m[3][1]: expected float, got str"),
         (
             GOOD.replace("[0, 1]]", "[0, nan]]"),
             "mine.toml: outline[0].corners_m[3] is [0.0, nan]; expected numbers",
@@ -176,7 +176,7 @@ corners_m = [[0, 0], [1, 0], [1, 1], [0, 1]]
         ),
         (GOOD.replace("[1, 1], [0, 1]", "[0, 1], [1, 1]"), "edges 1 and 3 cross"),
         (GOOD.replace("[1, 1], [0, 1]", "[0.5, 0]"), "cross; expected a polygon"),
-        ("name = 'mine'\n[start]\nx_m = 'left'", "Expected `float`, got `str` at `start.x_m`"),
+        ("name = 'mine'\n[start]\nx_m = 'left'", "mine.toml: start.x_m: expected float, got str"),
     ],
 )
 def test_wrong_file_is_told_in_one_sentence(tmp_path: Path, text: str, expected: str) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from boebot import report
 from boebot.cli import options, output
 from boebot.runner import execute
 
@@ -27,6 +28,8 @@ def run(
     json: options.Json = False,
 ) -> None:
     """Let a brain drive a robot, and say what happened."""
+    if out is not None:
+        report.make_folder(out)
     with output.progress_bar(f"{brain} on {on}", seconds) as progress:
         result = execute(
             brain,

@@ -10,6 +10,8 @@ replay.html    a page that plays it; needs no network
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +19,24 @@ from boebot.errors import BoebotError
 
 if TYPE_CHECKING:
     from boebot.result import RunResult
+
+
+def make_folder(folder: Path) -> None:
+    """Makes the folder of a run's files; called before the run too, so that no run is lost for want of one.
+
+    Raises:
+        BoebotError: it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> BoebotError:
+    return BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}")
 
 
 def save(result: RunResult, folder: Path) -> list[Path]:
@@ -27,8 +47,8 @@ def save(result: RunResult, folder: Path) -> list[Path]:
     """
     from boebot.report import picture, replay, tables
 
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         paths = [
             tables.write_summary(result, folder / "summary.json"),
             tables.write_run(result, folder / "run.csv"),
@@ -38,5 +58,5 @@ def save(result: RunResult, folder: Path) -> list[Path]:
             paths.append(picture.write(result, folder / "run.png"))
             paths.append(replay.write(result, folder / "replay.html"))
     except OSError as error:
-        raise BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}") from None
+        raise _unwritable(folder, error) from None
     return paths
