@@ -37,6 +37,7 @@ class Peer:
         self.protocol_version = messages.PROTOCOL_VERSION
         self.schema_hash = messages.SCHEMA_HASH
         self.pin_map = self.robot.pin_map
+        self.tick_rate = 100
         self.answers = True
         self.parameters: dict[int, int] = {}
         self.setpoints: list[messages.SetpointSignal | messages.SetpointSpeed | messages.Stop] = []
@@ -165,7 +166,7 @@ class Peer:
             messages.Hello(
                 self.protocol_version,
                 self.schema_hash,
-                100,
+                self.tick_rate,
                 31,
                 messages.ResetCause.POWER,
                 self.pin_map.encode(),

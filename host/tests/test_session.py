@@ -50,6 +50,14 @@ def test_other_schema_is_refused_and_both_are_named() -> None:
         link_to(peer).handshake()
 
 
+def test_board_without_control_ticks_is_refused() -> None:
+    peer = Peer()
+    peer.tick_rate = 0
+    peer.reset()
+    with pytest.raises(ProtocolError, match="makes 0 control ticks in a second; expected more"):
+        link_to(peer).handshake()
+
+
 class Noise(InProcess):
     """Something that sends bytes of another kind."""
 
@@ -154,13 +162,16 @@ def test_parameter_travels_in_its_unit() -> None:
     assert link.get_parameter("servo_left_centre") == 1499.5
 
 
-def test_board_that_refuses_a_parameter_is_believed() -> None:
+@pytest.mark.parametrize(
+    ("status", "reason"), [(messages.ParameterStatus.OUT_OF_RANGE, "out of range"), (99, "status 99")]
+)
+def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) -> None:
     peer = Peer()
     link = link_to(peer)
     link.handshake()
-    refusal = messages.Parameter(messages.PARAMETERS["devices"].id, 0, messages.ParameterStatus.OUT_OF_RANGE)
+    refusal = messages.Parameter(messages.PARAMETERS["devices"].id, 0, status)
     peer.receive = lambda data: peer._send(refusal)  # type: ignore[method-assign]
-    with pytest.raises(BoardError, match="refuses parameter devices: out of range"):
+    with pytest.raises(BoardError, match=f"refuses parameter devices: {reason}"):
         link.set_parameter("devices", 3)
 
 

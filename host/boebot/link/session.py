@@ -72,20 +72,20 @@ class Link:
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
         """Motor signals -1..1, in answer to the observation of `tick`."""
         self._send(
-            0x10,
+            _SIGNAL.ID,
             _SIGNAL.STRUCT.pack(round(left * 10000), round(right * 10000), time_to_live_ms, tick & 0xFFFF),
         )
 
     def send_speed(self, left_m_s: float, right_m_s: float, time_to_live_ms: int, tick: int) -> None:
         """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
         self._send(
-            0x11,
+            _SPEED.ID,
             _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
         )
 
     def send_stop(self) -> None:
         """Stops the motors at once, until the next set-point."""
-        self._send(0x12, b"")
+        self._send(messages.Stop.ID, b"")
 
     # ---- handshake and requests ----------------------------------------------------------------------------
 
@@ -166,8 +166,7 @@ class Link:
             f"answer for parameter {name}",
         )
         if answer.status != messages.ParameterStatus.OK:
-            reason = messages.ParameterStatus(answer.status).name.lower().replace("_", " ")
-            raise BoardError(f"the board at {self.transport.name} refuses parameter {name}: {reason}")
+            raise BoardError(f"the board at {self.transport.name} refuses parameter {name}: {_reason(answer.status)}")
         return answer.value
 
     def _send(self, message_id: int, payload: bytes) -> None:
@@ -216,6 +215,8 @@ class Link:
                 f"the board at {where} was built with message schema {hello.schema_hash:08x}, this kit with "
                 f"{messages.SCHEMA_HASH:08x}; flash the firmware that came with this kit"
             )
+        if hello.tick_rate == 0:
+            raise ProtocolError(f"the board at {where} says that it makes 0 control ticks in a second; expected more")
 
     def _no_hello(self, heard: int, timeout_s: float) -> BoebotError:
         where = self.transport.name
@@ -227,6 +228,14 @@ class Link:
                 "other firmware, or another baud rate"
             )
         return BoardError(f"nothing answers at {where} within {timeout_s:g} s: is the robot on and flashed?")
+
+
+def _reason(status: int) -> str:
+    """Why a board refuses a parameter; a status that this kit does not know is told by its number."""
+    try:
+        return messages.ParameterStatus(status).name.lower().replace("_", " ")
+    except ValueError:
+        return f"status {status}"
 
 
 def parameter_spec(name: str) -> messages.ParameterSpec:
