@@ -13,6 +13,7 @@ _Static_assert(PIN_PING == 8, "the timer captures on pin 8");
 
 #define GIVE_UP_TICKS 2u /* 20 ms after the trigger */
 #define AGE_NEVER 255u
+#define ECHO_MIN 100u /* us; the sensor's shortest echo is 115 us, what is shorter is noise */
 
 enum { IDLE, RISING, FALLING, ENDED }; /* what is awaited */
 
@@ -54,6 +55,9 @@ void ping_collect(void) {
   if (state == ENDED) {
     state = IDLE;
     echo = (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
+    if (echo < ECHO_MIN) {
+      echo = 0;
+    }
     /* Whole ticks between the tick in which it ended and this one. */
     age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
   }

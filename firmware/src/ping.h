@@ -1,6 +1,6 @@
 /* ping.h: the Ping))) distance sensor on the input-capture pin. Every ping_period ticks a 5 us trigger; after 750 us the
  * sensor raises the same pin for as long as the sound travels, 115 us to 18.5 ms. Both edges are captured by the timer;
- * without an echo the reading is given up 20 ms after the trigger. */
+ * without an echo the reading is given up 20 ms after the trigger. What is shorter than any echo counts as none. */
 #ifndef PING_H
 #define PING_H
 

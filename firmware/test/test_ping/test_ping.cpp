@@ -82,6 +82,16 @@ TEST_CASE("no echo: given up after 20 ms, reported as 0") {
   CHECK(bench.telemetry().ping_age <= DEFAULT_PING_PERIOD);
 }
 
+TEST_CASE("shorter than the sensor's shortest echo: noise, no echo") {
+  for (uint64_t us : {1u, 50u, 99u, 100u}) {
+    native_bench bench;
+    bench.run_to(bench.tick(2));
+    echo(bench, us * 16);
+    CHECK(bench.telemetry().ping_echo == (us < 100 ? 0 : us));
+    CHECK(bench.telemetry().ping_age == 1);
+  }
+}
+
 TEST_CASE("a pin stuck high neither stops the tick nor the next reading") {
   native_bench bench;
   bench.run_to(bench.tick(2));
