@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
-from boebot.link import messages
-from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot.link import frame, messages
+from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 
 
 def test_edges_are_counted_and_timed(rig: Rig) -> None:
@@ -50,13 +52,105 @@ def test_quadrature_counts_both_directions(board_url: str) -> None:
 
 def test_noise_line_is_masked_and_the_tick_goes_on(rig: Rig) -> None:
     rig.board.square_wave(16, period=160, seconds=0.5)  # 100 kHz
-    frames = rig.listen(0.4)
-    assert len(frames) >= 39, "the tick stopped"
+    rig.board.square_wave(17, period=2 * CYCLES_PER_S // 500, seconds=0.5)  # a wheel that turns
+    before = rig.latest()
+    frames = rig.listen(0.3)
+    assert len(frames) >= 29, "the tick stopped"
     assert frames[-1].overruns == frames[0].overruns
-    assert any(f.status & messages.Status.ENCODER_LEFT_MASKED for f in frames)
+    assert all(f.status & messages.Status.ENCODER_LEFT_MASKED for f in frames[1:])
     assert not any(f.status & messages.Status.ENCODER_RIGHT_MASKED for f in frames)
+    assert not any(f.edge_period_left for f in frames[1:]), "noise is no speed"
+    seconds = (frames[-1].tick - before.tick) * 0.010
+    assert abs(frames[-1].encoder_right - before.encoder_right - 500 * seconds) <= 1, "the other wheel counts on"
     rig.listen(0.3)
     assert not rig.latest().status & messages.Status.ENCODER_LEFT_MASKED
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What a bad line does: a rise every `period` cycles, a fall `high` cycles later; on every line of `pins`."""
+
+    period: int
+    high: int
+    pins: tuple[int, ...] = (16,)
+    robot: str = "shieldbot"
+
+    def __str__(self) -> str:
+        return f"{self.robot}-{len(self.pins)}x{self.high}of{self.period}"
+
+    def drive(self, rig: Rig, seconds: float) -> None:
+        start = rig.board.cycle + 100
+        for i, pin in enumerate(self.pins):
+            for rise in range(start + 3 * i, start + round(seconds * CYCLES_PER_S), self.period):
+                rig.board.drive(pin, 1, rise)
+                rig.board.drive(pin, 0, rise + self.high)
+
+
+SQUARE = [Noise(2 * half, half) for half in (30, 40, 56, 72, 80, 100, 150, 200)]
+SPIKES = [Noise(period, high) for period in (80, 110, 160, 200, 240, 266) for high in (8, 16, 24)]
+MANY = [Noise(p, h, (16, 17)) for p, h in ((160, 80), (200, 8), (400, 200))]
+QUAD = [Noise(p, h, (14, 15, 16, 17), "shieldbot-quad") for p, h in ((160, 80), (266, 8), (400, 200))]
+
+
+@pytest.mark.parametrize("noise", SQUARE + SPIKES + MANY + QUAD, ids=str)
+def test_noise_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, noise: Noise) -> None:
+    """With the UART saturated both ways: no tick missed, pulses exact, not a byte lost, and the noise reported."""
+    with Rig.open(board_url, robot=noise.robot) as rig:
+        rig.start()
+        setpoint = messages.SetpointSignal(3000, -3000, 250, 0)
+        request = messages.GetParameter(0)
+        block = frame.encode(setpoint.ID, 0, setpoint.pack()) + frame.encode(request.ID, 0, request.pack()) * 2
+        full = block * 14  # in a tick: 476 of 500 bytes come in, 435 go out
+
+        def saturate() -> None:
+            rig.transport.write(full)
+            rig.listen(TICK_S)
+
+        for _ in range(5):
+            saturate()
+        first = len(rig.telemetry) + 2
+        before = rig.board.counters()
+        for _ in range(12):
+            noise.drive(rig, TICK_S)
+            saturate()
+        frames = rig.telemetry[first:]
+        assert [f.tick - frames[0].tick for f in frames] == list(range(len(frames)))
+        assert len(frames) >= 9
+        assert frames[-1].overruns == 0
+        assert all(f.status & messages.Status.ENCODER_LEFT_MASKED for f in frames)
+        assert not any(f.status & messages.Status.RECEIVE_OVERRUN for f in frames)
+        after = rig.board.counters()
+        assert after["overruns"] == before["overruns"], "bytes were lost"
+        assert after["resets"] == before["resets"]
+        for pin in (13, 12):
+            pulses = rig.pulses(pin)[1:]
+            assert len(pulses) >= 5
+            assert np.all(np.abs(pulses[:, 1] - 1560 * CYCLES_PER_US) <= 4)
+            assert np.all(np.abs(np.diff(pulses[:, 0]) - FRAME_CYCLES) <= 4)
+
+
+def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: Rig) -> None:
+    """Switched off and on, and after noise: the first period is that of two edges that were both seen."""
+    devices = messages.PARAMETERS["devices"]
+    expected = 13_000  # us between edges
+    rig.board.square_wave(16, period=2 * expected * CYCLES_PER_US, seconds=1.0)
+    rig.listen(0.1)
+    everything = int(rig.ask(messages.GetParameter(devices.id), messages.Parameter).value)
+    rig.send(messages.SetParameter(devices.id, everything & ~int(messages.Devices.ENCODERS)))
+    rig.listen(0.1)
+    assert rig.latest().edge_period_left == 0
+    rig.send(messages.SetParameter(devices.id, everything))
+    periods = {f.edge_period_left * 16 for f in rig.listen(0.2)}
+    assert all(period == 0 or abs(period - expected) <= 16 for period in periods), periods
+    assert max(periods) > 0
+
+    rig.board.square_wave(16, period=160, seconds=0.05)
+    rig.listen(0.06)
+    rig.board.square_wave(16, period=2 * expected * CYCLES_PER_US, seconds=1.0)
+    rig.latest()
+    periods = {f.edge_period_left * 16 for f in rig.listen(0.2)}
+    assert all(period == 0 or abs(period - expected) <= 16 for period in periods), periods
+    assert max(periods) > 0
 
 
 @pytest.mark.parametrize(("pin", "bit"), [(5, messages.Whiskers.LEFT), (7, messages.Whiskers.RIGHT)])
@@ -79,6 +173,11 @@ def test_bounce_of_a_millisecond_is_one_press(rig: Rig) -> None:
         rig.board.drive(5, 2 * (i % 2), start + i * 2_000)
     shown = [bool(f.whiskers & messages.Whiskers.LEFT) for f in rig.listen(0.1)]
     assert sum(a != b for a, b in itertools.pairwise(shown)) == 1 and shown[-1]
+
+
+def test_noise_on_the_ping_pin_is_no_echo(rig: Rig) -> None:
+    rig.board.square_wave(8, period=160, seconds=0.5)
+    assert {f.ping_echo for f in rig.listen(0.5)} == {0}
 
 
 @pytest.mark.parametrize("distance", [0.10, 0.50, 1.00, 2.50])

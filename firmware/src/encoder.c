@@ -31,20 +31,9 @@ _Static_assert(PIN_ENCODER_LEFT >= 14 && PIN_ENCODER_RIGHT >= 14,
 
 #define LINES (LINES_PER_SIDE * SIDES)
 
-/* Changes of the port, stamped by the interrupt and worked off by the main loop: a ring whose indices are bytes into it,
- * so that they wrap by themselves. When it is full, all lines are masked until it has been worked off. */
-typedef struct {
-  uint16_t time; /* hal_time() */
-  uint8_t bits;  /* of the port */
-  uint8_t unused;
-} change;
-
-#define RING_CHANGES (256u / sizeof(change))
-_Static_assert(sizeof(change) == 4, "the ring's indices wrap with the ring");
-
-static change ring[RING_CHANGES];
-volatile uint8_t encoder_ring_head, encoder_ring_tail;
-static volatile bool ring_full;
+/* Noise is blamed on the lines that did this much of it. */
+#define SHARE_OF_STORM 2u /* of at least HAL_CHANGES_STORM changes in 0.05 ms */
+#define SHARE_OF_RING 8u  /* of the ring's changes */
 
 /* Main loop only. */
 typedef struct {
@@ -60,28 +49,26 @@ static uint8_t fired[LINES]; /* edges of the line in this tick */
 static uint8_t before;       /* port bits of the last change worked off */
 static uint8_t watched;      /* port bits of the lines that count */
 static uint8_t limit;        /* edges of a line in a tick above which it is masked */
+static uint8_t phantoms;     /* interrupts of this tick without a change to be seen: pulses too short */
 
-static inline volatile change *ring_at(uint8_t index) { return (volatile change *)(void *)((uint8_t *)ring + index); }
-
-HAL_INTERRUPT_PIN_CHANGE {
-  const uint8_t head = encoder_ring_head;
-  volatile change *place = ring_at(head);
-  place->time = hal_time();
-  place->bits = PORT_BITS();
-  const uint8_t next = (uint8_t)(head + sizeof(change));
-  if (next == encoder_ring_tail) {
-    ring_full = true;
-    hal_pin_change_mask(0);
-  } else {
-    encoder_ring_head = next;
+/* Lets the lines that count interrupt, unless the interrupt has just masked them. */
+static void listen(void) {
+  HAL_ATOMIC {
+    if (!hal_changes_stopped()) {
+      hal_pin_change_mask(watched);
+    }
   }
 }
 
+static __attribute__((noinline)) void mask_line(uint8_t line) {
+  watched = (uint8_t)(watched & (uint8_t)~line_bit[line]);
+  listen();
+}
+
 /* Counts one edge of a line; masks the line when it fires too often. */
-static void count_line(uint8_t line) {
+static inline __attribute__((always_inline)) void count_line(uint8_t line) {
   if (fired[line] >= limit) {
-    watched = (uint8_t)(watched & (uint8_t)~line_bit[line]);
-    hal_pin_change_mask(watched);
+    mask_line(line);
   }
   fired[line]++;
 }
@@ -120,31 +107,82 @@ static inline __attribute__((always_inline)) void see_wheel(uint8_t side, uint8_
 #endif
 }
 
-static void work_off(uint8_t bits, uint32_t time) {
+/* In line in the loop that takes every change. */
+static inline __attribute__((always_inline)) void work_off(uint8_t bits, uint32_t time) {
   const uint8_t changed = (uint8_t)((bits ^ before) & watched);
-  see_wheel(LEFT, bits, changed, time);
-  see_wheel(RIGHT, bits, changed, time);
+  if (changed == 0) {
+    phantoms = (uint8_t)(phantoms + (bits == before && phantoms < 255u));
+  } else {
+    see_wheel(LEFT, bits, changed, time);
+    see_wheel(RIGHT, bits, changed, time);
+  }
   before = bits;
 }
 
+/* Masks lines until the next tick and has them reported. */
+static void convict(uint8_t lines) {
+  for (uint8_t line = 0; line < LINES; line++) {
+    if ((lines & line_bit[line]) != 0) {
+      fired[line] = (uint8_t)(limit + 1u);
+    }
+  }
+  watched = (uint8_t)(watched & (uint8_t)~lines);
+  listen();
+}
+
+/* The lines whose noise stopped the interrupt, from the changes up to `head`. */
+static uint8_t noisy_lines(uint8_t head) {
+  uint8_t at = (uint8_t)(head - HAL_CHANGE_BYTES);
+  const uint8_t run = hal_change_after(at)->close;
+  const bool storm = run >= HAL_CHANGES_STORM;
+  const uint8_t share = storm ? SHARE_OF_STORM : SHARE_OF_RING;
+  uint8_t left = storm && run < HAL_CHANGES - 2u ? run : HAL_CHANGES - 2u;
+  uint8_t edges[LINES] = {0};
+  uint8_t lines = 0;
+  uint8_t bits = hal_change_after(at)->bits;
+  for (; left > 0; left--) {
+    at = (uint8_t)(at - HAL_CHANGE_BYTES);
+    const uint8_t earlier = hal_change_after(at)->bits;
+    for (uint8_t line = 0; line < LINES; line++) {
+      if (((bits ^ earlier) & line_bit[line]) != 0 && ++edges[line] >= share) {
+        lines |= line_bit[line];
+      }
+    }
+    bits = earlier;
+  }
+  lines &= watched;
+  return lines != 0 ? lines : watched;
+}
+
+/* After a stop: masks the noise and listens to the rest. */
+static __attribute__((noinline)) void go_on(uint8_t head) {
+  const uint8_t lines = noisy_lines(head);
+  hal_changes_resume();
+  convict(lines);
+  work_off(PORT_BITS(), schedule_now()); /* what the others did meanwhile */
+}
+
 void encoder_poll(void) {
-  uint8_t tail = encoder_ring_tail;
-  const uint8_t head = encoder_ring_head; /* before the time is read: every change up to it is in the past */
-  if (tail == head) {
-    return;
+  const bool stopped = hal_changes_stopped(); /* before the head is read: no change comes after it */
+  uint8_t tail = hal_changes_tail;
+  const uint8_t head = hal_changes_head; /* before the time is read: every change up to it is in the past */
+  if (tail != head) {
+    const uint32_t now = schedule_now();
+    do {
+      const volatile hal_change *oldest = hal_change_after(tail);
+      const uint16_t age = (uint16_t)((uint16_t)now - oldest->time);
+      const uint8_t bits = oldest->bits;
+      tail = (uint8_t)(tail + HAL_CHANGE_BYTES);
+      hal_changes_tail = tail;
+      work_off(bits, now - age);
+    } while (tail != head);
+    if (phantoms > limit) { /* nobody knows whose */
+      convict(watched);
+      phantoms = 0;
+    }
   }
-  const uint32_t now = schedule_now();
-  while (tail != head) {
-    const volatile change *oldest = ring_at(tail);
-    const uint16_t age = (uint16_t)((uint16_t)now - oldest->time);
-    const uint8_t bits = oldest->bits;
-    tail = (uint8_t)(tail + sizeof(change));
-    encoder_ring_tail = tail;
-    work_off(bits, now - age);
-  }
-  if (ring_full) {
-    ring_full = false;
-    hal_pin_change_mask(watched);
+  if (stopped) {
+    go_on(head);
   }
 }
 
@@ -163,8 +201,9 @@ void encoder_start(void) {
   HAL_PIN_INPUT(ENCODER_LEFT);
   HAL_PIN_INPUT(ENCODER_RIGHT);
 #endif
-  encoder_ring_head = encoder_ring_tail = 0;
-  ring_full = false;
+  hal_changes_head = hal_changes_tail = 0;
+  hal_changes_resume();
+  phantoms = 0;
   for (uint8_t side = LEFT; side < SIDES; side++) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
   }
@@ -174,7 +213,7 @@ void encoder_start(void) {
   limit = (uint8_t)parameters_get(PARAMETER_ENCODER_LIMIT);
   before = PORT_BITS();
   watched = lines_on();
-  hal_pin_change_mask(watched);
+  listen();
 }
 
 /* The time between two edges in 16 us, 0 if it is 0.5 s or more. */
@@ -203,6 +242,16 @@ static void close_wheel(uint8_t side) {
     w->reading.masked = w->reading.masked || *count > limit;
     *count = 0;
   }
+  if (w->reading.masked) {
+    w->reading.period = 0;
+  }
+}
+
+/* What a line does that did not count says nothing about the time to its next edge. */
+static void forget_gap(uint8_t side, uint8_t back, uint8_t lines) {
+  if ((back & SIDE_BITS(side)) != 0 || (lines & SIDE_BITS(side)) == 0) {
+    wheels[side].silence = SILENT_TICKS;
+  }
 }
 
 void encoder_task(void) {
@@ -214,7 +263,10 @@ void encoder_task(void) {
   const uint8_t back = (uint8_t)(lines & (uint8_t)~watched); /* these begin at their present level */
   before = (uint8_t)((before & (uint8_t)~back) | (PORT_BITS() & back));
   watched = lines;
-  hal_pin_change_mask(lines);
+  forget_gap(LEFT, back, lines);
+  forget_gap(RIGHT, back, lines);
+  phantoms = 0;
+  listen();
 }
 
 const encoder_reading *encoder_read(uint8_t side) { return &wheels[side].reading; }

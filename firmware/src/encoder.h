@@ -2,12 +2,16 @@
  *
  * One line per wheel counts up whatever the direction; two lines (ENCODER_QUADRATURE) count down when the wheel turns
  * backward. Forward is A leading B: (A, B) runs 00, 10, 11, 01. The pin map says which it is.
- * A line that fires more often in a tick than the parameter encoder_limit allows is masked until the next tick. */
+ * A line that fires more often in a tick than the parameter encoder_limit allows, or whose changes come back to back
+ * (hal.h), is masked until the next tick; so are all lines when the noise cannot be told to be one line's. What a masked
+ * line did is not known: it gives no period, neither then nor across the gap. */
 #ifndef ENCODER_H
 #define ENCODER_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#include "hal/hal.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -25,11 +29,10 @@ void encoder_start(void);
  * slot, and sooner when they pile up. */
 void encoder_poll(void);
 
-/* Bytes into the ring of changes: the next to stamp, the next to work off. */
-extern volatile uint8_t encoder_ring_head, encoder_ring_tail;
-
-/* Whether they have piled up to an eighth of the ring. */
-static inline bool encoder_due(void) { return (uint8_t)(encoder_ring_head - encoder_ring_tail) >= 32u; }
+/* Not 0 if they have piled up to an eighth of the ring, or were stopped. */
+static inline __attribute__((always_inline)) uint8_t encoder_due(void) {
+  return (uint8_t)(hal_changes_stopped() | ((uint8_t)(hal_changes_head - hal_changes_tail) & 0xE0u));
+}
 
 /* Once per tick: closes the tick's readings and lifts masks. */
 void encoder_task(void);

@@ -30,11 +30,11 @@ void firmware_start(void) {
 }
 
 void firmware_poll(void) {
-  if (encoder_due()) {
+  if (encoder_due() != 0) {
     encoder_poll();
   }
   link_poll();
   schedule_poll();
 }
 
-bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() || link_due(); }
+bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() != 0 || link_due(); }

@@ -24,7 +24,9 @@ extern volatile uint8_t schedule_slot;
 extern uint8_t schedule_next_slot;
 
 /* Slots that have begun and whose tasks have not run. */
-static inline uint8_t schedule_waiting(void) { return (uint8_t)(schedule_slot + 1u - schedule_next_slot); }
+static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
+  return (uint8_t)(schedule_slot + 1u - schedule_next_slot);
+}
 
 /* Runs the tasks of the next slot that has begun, if any. */
 void schedule_poll(void);

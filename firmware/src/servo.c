@@ -65,6 +65,6 @@ void servo_edge(void) {
     return;
   }
   high = true;
-  edge_time = (uint16_t)(edge_time + in_force[active]);
+  edge_time = (uint16_t)(edge_time + hal_edge_delay(edge_time) + in_force[active]); /* a late pulse keeps its width */
   hal_edge_arm(edge_time);
 }

@@ -7,7 +7,6 @@
  *   HAL_INTERRUPT_SLOT        a new slot has begun                                  schedule.c
  *   HAL_INTERRUPT_EDGE        the time given to hal_edge_arm() is HAL_EDGE_LEAD off  schedule.c
  *   HAL_INTERRUPT_CAPTURE     an edge on the Ping pin; hal_capture_time() has when  ping.c
- *   HAL_INTERRUPT_PIN_CHANGE  an encoder line in the mask has changed               encoder.c
  * They stamp and store. What they share with the rest is read and written inside HAL_ATOMIC { ... }, the only way that
  * this firmware turns interrupts off outside an interrupt.
  *
@@ -27,6 +26,23 @@
 #define HAL_CARRIER_CYCLES 211u /* half a period of 37.9 kHz */
 #define HAL_CYCLES_PER_US 16u
 
+/* Changes of the encoders' port, stamped by the pin-change interrupt and worked off by the main loop: a ring whose
+ * indices are bytes into it, so that they wrap by themselves. Its first place is also its last, so that the change
+ * before a place is always next to it: the change after index i is at hal_changes[i / HAL_CHANGE_BYTES + 1].
+ *
+ * The interrupt outranks all others but the carrier, so it must not come back to back for long. When HAL_CHANGES_STORM
+ * changes in a row were closer to the one before than HAL_CHANGES_CLOSE cycles, or when the ring is full, it masks all
+ * lines, which hal_changes_stopped() tells. Turning wheels never do: each of four lines can change once within that time. */
+#define HAL_CHANGES_CLOSE 256u
+#define HAL_CHANGES_STORM 4u
+#define HAL_CHANGES 64u
+typedef struct {
+  uint16_t time; /* hal_time() */
+  uint8_t bits;  /* of the port */
+  uint8_t close; /* changes up to this one that were close to the one before */
+} hal_change;
+#define HAL_CHANGE_BYTES 4u /* the size of one; its index is a multiple */
+
 #ifdef __AVR__
 #include "hal/avr/hal_avr.h"
 #else
@@ -36,6 +52,14 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+extern hal_change hal_changes[HAL_CHANGES + 1u];
+extern volatile uint8_t hal_changes_head; /* the last change stamped */
+extern volatile uint8_t hal_changes_tail; /* the last change worked off */
+
+static inline volatile hal_change *hal_change_after(uint8_t index) {
+  return (volatile hal_change *)(void *)((uint8_t *)hal_changes + HAL_CHANGE_BYTES + index);
+}
 
 /* Saves why the chip started, before anything else can lose it. */
 uint8_t hal_reset_cause(void); /* RESET_CAUSE_... of generated/messages.h */
@@ -75,11 +99,19 @@ uint32_t hal_image_hash(void);
  *   void hal_edge_arm_plain(uint16_t time)        the same without a lead: for what needs no cycle-exact time
  *   void hal_edge_disarm(void)
  *   void hal_edge_wait(uint16_t time)             in the edge interrupt: returns at a fixed distance from `time`
+ *   uint16_t hal_edge_delay(uint16_t time)        right after hal_edge_wait() and the edge: by how much it came too late;
+ *                                                 0 unless other interrupts took longer than HAL_EDGE_LEAD
  *   uint16_t hal_capture_time(void)               when the captured edge came
  *   void hal_capture_falling(void)                next, capture the falling edge
  *   void hal_capture_stop(void)
- *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt
+ *   uint8_t hal_changes_stopped(void)             not 0 if the pin-change interrupt has masked all lines, and
+ *   void hal_changes_resume(void)                 forgets it
+ *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt; changes of lines
+ *                                                 that were all masked are forgotten
  *   bool hal_serial_received(void)                whether a received byte waits
+ *   uint8_t hal_serial_due(void)                  not 0 if a zero byte (the end of a frame) or a quarter of the ring waits
+ *   void hal_serial_seen(void)                    zero bytes that wait now make it due no more,
+ *   void hal_serial_again(void)                   or do again
  *   bool hal_serial_receive(uint8_t *byte)        takes the oldest; false if there is none
  *   bool hal_serial_room(uint8_t count)           whether `count` more bytes can be queued for sending; if not, the CPU
  *                                                 is woken when more can

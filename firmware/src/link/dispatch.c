@@ -60,6 +60,11 @@ static void set_parameter(const uint8_t *payload) {
   answer_parameter(message.parameter, parameters_set(message.parameter, message.value));
 }
 
+bool dispatch_answers(uint8_t id) {
+  return id == MSG_HELLO_REQUEST_ID || id == MSG_IDENTIFY_ID || id == MSG_GET_PARAMETER_ID ||
+         id == MSG_SET_PARAMETER_ID;
+}
+
 bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload) {
   switch (id) {
     case MSG_HELLO_REQUEST_ID:

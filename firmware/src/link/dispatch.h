@@ -15,6 +15,9 @@ void dispatch_start(void);
  * to the board, or a value out of range. */
 bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload);
 
+/* Whether a message of that id is answered. */
+bool dispatch_answers(uint8_t id);
+
 /* Sequence number of the last set-point that was accepted. */
 uint8_t dispatch_setpoint_sequence(void);
 

@@ -15,11 +15,16 @@ extern "C" {
 /* Forgets everything and queues the hello. */
 void link_start(void);
 
-/* Takes received bytes, up to the end of one frame, and does what it asks. Bytes wait while there is no room for an
- * answer and, after it, for the next telemetry, which is never left out for the sake of answers. */
+/* Takes received bytes, up to the end of one frame, and does what it asks. A request, and all that follows it, waits
+ * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of
+ * answers. */
 void link_poll(void);
-static inline bool link_due(void) {
-  return hal_serial_received() && hal_serial_room(FRAME_SIZE_MAX + MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD);
+
+extern bool link_request_waits;
+
+static inline __attribute__((always_inline)) bool link_due(void) {
+  return hal_serial_due() != 0 &&
+         (!link_request_waits || hal_serial_room(FRAME_SIZE_MAX + MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD));
 }
 
 /* Frames refused since reset, modulo 256. */

@@ -133,6 +133,64 @@ TEST_CASE("a line that fires above its limit is masked until the tick ends, and 
   CHECK(bench.telemetry().overruns == 0);
 }
 
+TEST_CASE("changes back to back are a storm: masked at once, the other wheel counts on") {
+  native_bench bench;
+  const uint64_t start = bench.tick(2);
+  toggle(bench, LEFT_LINE, start + 1000, 200, 750);  /* 80 kHz until the tick ends */
+  toggle(bench, RIGHT_LINE, start + 1001, 3000, 50); /* a wheel that turns, in step with it */
+  const uint64_t before = bench.machine.interrupts;
+  bench.run_to(bench.tick(3) + 1);
+  CHECK((bench.telemetry().status & STATUS_ENCODER_LEFT_MASKED) != 0);
+  CHECK((bench.telemetry().status & STATUS_ENCODER_RIGHT_MASKED) == 0);
+  CHECK(bench.telemetry().edge_period_left == 0);
+  CHECK(bench.telemetry().edge_period_right == 3000 / 256);
+  CHECK(bench.machine.interrupts - before < 300);
+#if !ENCODER_QUADRATURE
+  CHECK(bench.telemetry().encoder_left <= 8);
+  CHECK(bench.telemetry().encoder_right == 50);
+#endif
+}
+
+TEST_CASE("all lines changing at once is no storm") {
+  native_bench bench;
+  for (uint64_t i = 0; i < 600; i++) {
+    for (uint8_t pin = 14; pin < 18; pin++) {
+      bench.drive(bench.tick(2) + 3000 * i + 60 * pin, pin, i % 2 == 0 ? NATIVE_HIGH : NATIVE_LOW);
+    }
+  }
+  for (int tick = 3; tick < 13; tick++) {
+    bench.run_to(bench.tick(static_cast<uint64_t>(tick)) + 1);
+    CHECK(bench.telemetry().status == 0);
+  }
+}
+
+TEST_CASE("the time across a gap is no period: switched off and on, and masked") {
+  native_bench bench;
+  toggle(bench, LEFT_LINE, bench.tick(1), 200000, 40);
+  bench.run_to(bench.tick(6));
+  CHECK(bench.telemetry().edge_period_left == 200000 / 256);
+  bench.set(PARAMETER_DEVICES, 0);
+  bench.run_to(bench.tick(18));
+  CHECK(bench.telemetry().edge_period_left == 0);
+  bench.set(PARAMETER_DEVICES, DEFAULT_DEVICES);
+  for (uint64_t tick = 19; tick < 30; tick++) {
+    bench.run_to(bench.tick(tick) + 1);
+    const auto period = bench.telemetry().edge_period_left;
+    CHECK((period == 0 || period == 200000 / 256));
+  }
+  CHECK(bench.telemetry().edge_period_left == 200000 / 256);
+
+  native_bench noisy;
+  toggle(noisy, LEFT_LINE, noisy.tick(2) + 1000, 160, 500);
+  toggle(noisy, LEFT_LINE, noisy.tick(5), 400000, 3);
+  for (uint64_t tick = 3; tick < 10; tick++) {
+    noisy.run_to(noisy.tick(tick) + 1);
+    CHECK(noisy.telemetry().edge_period_left == (tick < 8 ? 0 : 400000 / 256));
+  }
+  noisy.run_to(noisy.tick(11));
+  CHECK(noisy.telemetry().edge_period_left == 400000 / 256);
+}
+
 TEST_CASE("a line at its limit is not masked") {
   native_bench bench;
   bench.set(PARAMETER_ENCODER_LIMIT, 20);

@@ -100,6 +100,39 @@ TEST_CASE("more requests than the line can answer wait; none is lost") {
   CHECK((bench.telemetry().status & STATUS_RECEIVE_OVERRUN) == 0);
 }
 
+TEST_CASE("requests beyond what the line can carry do not silence telemetry, nor hold up a set-point before them") {
+  native_bench bench;
+  bench.run_to(bench.tick(5));
+  bench.messages.clear();
+  for (uint64_t tick = 5; tick < 25; tick++) {
+    bench.signal(static_cast<int16_t>(tick), 0, 250);
+    for (int i = 0; i < 20; i++) { /* 20 x 52 bytes out: twice the line */
+      bench.send(MSG_IDENTIFY_ID);
+    }
+    bench.run_to(bench.tick(tick + 1));
+  }
+  uint32_t expected = 6;
+  for (const message &m : bench.messages) {
+    if (m.id == MSG_TELEMETRY_ID) {
+      CHECK(m.as<msg_telemetry>().tick == expected++);
+    }
+  }
+  CHECK(expected >= 24);
+}
+
+TEST_CASE("bytes without an end of frame never block the line") {
+  native_bench bench;
+  for (int i = 0; i < 20; i++) {
+    bench.send_bytes(std::vector<uint8_t>(200, 0x55));
+    bench.run(TICK);
+  }
+  CHECK((bench.telemetry().status & STATUS_RECEIVE_OVERRUN) == 0);
+  bench.send_bytes({0});
+  bench.signal(5000, 5000, 500);
+  bench.run(4 * TICK);
+  CHECK(bench.telemetry().status == STATUS_MOTORS_ENABLED);
+}
+
 TEST_CASE("messages meant for the host are refused") {
   native_bench bench;
   const msg_parameter wrong{1, 2, 0};

@@ -3,7 +3,8 @@
  *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots
  *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier
  *   Timer0  free for the buzzer
- *   GPIOR0  bit 0, 1: the carrier toggles the left, right LED; bit 2: received bytes were lost
+ *   GPIOR0  bit 0, 1: the carrier toggles the left, right LED; bit 2: received bytes were lost; bit 3: pin
+ *           changes were stopped; bit 4: a zero byte was received
  *   GPIOR1  head of the receive ring      GPIOR2  tail of the send ring      (one-cycle access in the interrupts)
  */
 #ifndef HAL_AVR_H
@@ -20,13 +21,13 @@
 #define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect)
 #define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect)
 #define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect)
-#define HAL_INTERRUPT_PIN_CHANGE ISR(PCINT1_vect)
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
-/* Covers the interrupts that can stand before the edge's (one that has begun, the pin changes of four lines, a capture)
- * and its own prologue. */
-#define HAL_EDGE_LEAD 450u
+/* Covers what can stand before the edge's interrupt (one that has begun, 110 cycles; a storm of pin changes, 5 x 75; a
+ * capture, 110) and its own prologue. */
+#define HAL_EDGE_LEAD 640u
+#define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
@@ -67,7 +68,16 @@ static inline void hal_capture_falling(void) {
 
 static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
 
-static inline void hal_pin_change_mask(uint8_t bits) { PCMSK1 = bits; }
+#define HAL_STOPPED_BIT 3 /* of GPIOR0 */
+static inline uint8_t hal_changes_stopped(void) { return GPIOR0 & _BV(HAL_STOPPED_BIT); }
+static inline void hal_changes_resume(void) { GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_STOPPED_BIT)); }
+
+static inline void hal_pin_change_mask(uint8_t bits) {
+  if (PCMSK1 == 0) {
+    PCIFR = _BV(PCIF1);
+  }
+  PCMSK1 = bits;
+}
 
 /* The rings of serial_avr.c. Indices wrap as a byte, or by a mask; equal indices: empty. */
 #define HAL_SEND_RING 128u
@@ -79,6 +89,7 @@ extern volatile uint8_t hal_receive_tail;
 extern volatile uint8_t hal_send_head;
 
 #define HAL_LOST_BIT 2 /* of GPIOR0 */
+#define HAL_ZERO_BIT 4
 
 /* What the receive interrupt does, for code that keeps it waiting. */
 static inline __attribute__((always_inline)) void hal_serial_take(void) {
@@ -87,7 +98,11 @@ static inline __attribute__((always_inline)) void hal_serial_take(void) {
     return;
   }
   const uint8_t head = HAL_RECEIVE_HEAD;
-  hal_receive_ring[head] = UDR0; /* the place at the head is always free */
+  const uint8_t byte = UDR0;
+  hal_receive_ring[head] = byte; /* the place at the head is always free */
+  if (byte == 0) {
+    GPIOR0 |= _BV(HAL_ZERO_BIT);
+  }
   const uint8_t next = (uint8_t)(head + 1u);
   if ((status & _BV(DOR0)) != 0 || next == hal_receive_tail) {
     GPIOR0 |= _BV(HAL_LOST_BIT);
@@ -96,6 +111,14 @@ static inline __attribute__((always_inline)) void hal_serial_take(void) {
     HAL_RECEIVE_HEAD = next;
   }
 }
+
+static inline uint8_t hal_serial_due(void) {
+  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) | ((uint8_t)(HAL_RECEIVE_HEAD - hal_receive_tail) & 0xC0u));
+}
+
+static inline void hal_serial_seen(void) { GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_ZERO_BIT)); }
+
+static inline void hal_serial_again(void) { GPIOR0 |= _BV(HAL_ZERO_BIT); }
 
 static inline bool hal_serial_received(void) { return HAL_RECEIVE_HEAD != hal_receive_tail; }
 
@@ -140,6 +163,11 @@ static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
       "5:                               \n"
       : [left] "=&d"(left)
       : [time] "r"(time), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)));
+}
+
+static inline uint16_t hal_edge_delay(uint16_t time) {
+  const uint16_t delay = (uint16_t)(TCNT1 - time - HAL_EDGE_TAKES);
+  return delay < 0x8000u && delay > 4u ? delay : 0u;
 }
 
 static inline __attribute__((always_inline)) void hal_sleep_until(bool (*due)(void)) {

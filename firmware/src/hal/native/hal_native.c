@@ -35,6 +35,7 @@ static uint16_t capture_time;
 static uint8_t receive_ring[RECEIVE_RING];
 static uint16_t receive_first, receive_count;
 static bool overrun;
+static bool zero_received;
 static uint64_t sender_free; /* cycle at which the last queued byte has left */
 
 /* ---- pins ---- */
@@ -44,6 +45,35 @@ static uint8_t *port_of(uint8_t pin) {
 }
 
 static uint8_t bit_of(uint8_t pin) { return (uint8_t)(1u << (pin < 8 ? pin : pin < 14 ? pin - 8 : pin - 14)); }
+
+hal_change hal_changes[HAL_CHANGES + 1u];
+volatile uint8_t hal_changes_head, hal_changes_tail;
+static bool changes_stopped;
+
+uint8_t hal_changes_stopped(void) { return changes_stopped; }
+
+void hal_changes_resume(void) { changes_stopped = false; }
+
+/* The pin-change interrupt. */
+static void pin_change(void) {
+  volatile hal_change *place = hal_change_after(hal_changes_head);
+  const volatile hal_change *previous = place - 1;
+  place->time = hal_time();
+  place->bits = PINC;
+  place->close = (uint16_t)(place->time - previous->time) < HAL_CHANGES_CLOSE ? (uint8_t)(previous->close + 1u) : 0u;
+  const uint8_t next = (uint8_t)(hal_changes_head + HAL_CHANGE_BYTES);
+  const bool full = next == hal_changes_tail;
+  if (full || place->close >= HAL_CHANGES_STORM) {
+    hal_pin_change_mask(0);
+    changes_stopped = true;
+  }
+  if (!full) {
+    hal_changes_head = next;
+    if (next == 0) { /* the last place is also the first */
+      hal_changes[0] = *place;
+    }
+  }
+}
 
 /* Works out the level on a pin; interrupts if it has changed. */
 static void settle(uint8_t pin) {
@@ -63,7 +93,7 @@ static void settle(uint8_t pin) {
   *port = (uint8_t)(*port ^ bit);
   if (port == &hal_native_port_c && (pin_change_bits & bit) != 0) {
     machine->interrupts++;
-    hal_native_pin_change();
+    pin_change();
   }
   if (pin == PIN_PING && capture == (high ? CAPTURE_RISING : CAPTURE_FALLING)) {
     capture_time = hal_time();
@@ -161,6 +191,12 @@ bool hal_serial_receive(uint8_t *byte) {
   return true;
 }
 
+uint8_t hal_serial_due(void) { return zero_received || receive_count >= RECEIVE_RING / 4u; }
+
+void hal_serial_seen(void) { zero_received = false; }
+
+void hal_serial_again(void) { zero_received = true; }
+
 bool hal_serial_received(void) { return receive_count != 0; }
 
 bool hal_serial_overrun(void) {
@@ -197,6 +233,7 @@ static void byte_arrived(void) {
   } else {
     receive_ring[(receive_first + receive_count) % RECEIVE_RING] = byte.byte;
     receive_count++;
+    zero_received = zero_received || byte.byte == 0;
   }
 }
 
@@ -229,7 +266,7 @@ static void start(native_machine *owner, uint8_t cause) {
   pin_change_bits = 0;
   capture = CAPTURE_OFF;
   receive_first = receive_count = 0;
-  overrun = false;
+  overrun = zero_received = false;
   for (uint8_t pin = 0; pin < NATIVE_PINS; pin++) {
     show(pin); /* a reset releases every pin */
     settle(pin);

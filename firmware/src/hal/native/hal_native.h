@@ -13,11 +13,9 @@ extern "C" {
 #define HAL_INTERRUPT_SLOT void hal_native_slot(void)
 #define HAL_INTERRUPT_EDGE void hal_native_edge(void)
 #define HAL_INTERRUPT_CAPTURE void hal_native_capture(void)
-#define HAL_INTERRUPT_PIN_CHANGE void hal_native_pin_change(void)
 HAL_INTERRUPT_SLOT;
 HAL_INTERRUPT_EDGE;
 HAL_INTERRUPT_CAPTURE;
-HAL_INTERRUPT_PIN_CHANGE;
 
 /* Interrupts come between calls, never inside one. */
 #define HAL_ATOMIC
@@ -49,12 +47,21 @@ void hal_edge_arm(uint16_t time);
 #define hal_edge_arm_plain hal_edge_arm
 void hal_edge_disarm(void);
 static inline void hal_edge_wait(uint16_t time) { (void)time; /* the event comes at its very cycle */ }
+static inline uint16_t hal_edge_delay(uint16_t time) {
+  (void)time;
+  return 0;
+}
 uint16_t hal_capture_time(void);
 void hal_capture_falling(void);
 void hal_capture_stop(void);
+uint8_t hal_changes_stopped(void);
+void hal_changes_resume(void);
 void hal_pin_change_mask(uint8_t bits);
 
 bool hal_serial_received(void);
+uint8_t hal_serial_due(void);
+void hal_serial_seen(void);
+void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
 bool hal_serial_room(uint8_t count);
 
