@@ -15,10 +15,11 @@ from boebot.boards import BoardRequest, open_board
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.robots import load_robot
-from rig import CYCLES_PER_S, Rig
+from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 LEFT, RIGHT = 13, 12
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
+RETURN, CLI, SEI = b"\x08\x95", b"\xf8\x94", b"\x78\x94"
 RESERVED_OPCODE = b"\xff\x00"  # 0x00ff is no instruction of the ATmega328P
 
 
@@ -64,6 +65,53 @@ def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_pa
         assert rig.latest().pulse_left == 0
         rig.drive_for(0.5, 0.5, 0.2)
         assert rig.latest().pulse_left > 0, "after the reset a fresh set-point drives again"
+
+
+def delay(cycles: int) -> bytes:
+    """Code that takes that long: ldi r24; ldi r25; sbiw r24, 1; brne .-4."""
+    count = cycles // 4
+
+    def load(register: int, value: int) -> int:
+        return 0xE000 | (value & 0xF0) << 4 | (register - 16) << 4 | (value & 0x0F)
+
+    code = [load(24, count & 0xFF), load(25, count >> 8), 0x9701, 0xF7F1]
+    return b"".join(word.to_bytes(2, "little") for word in code)
+
+
+def test_board_that_never_catches_up_is_reset_by_the_watchdog(tmp_path: Path) -> None:
+    """A task that takes longer than its slot: the interrupts and the main loop go on, but ticks are dropped for good."""
+    with rig_with(planted(tmp_path, "whisker_task", delay(60_000) + RETURN)) as rig:
+        hello = rig.wait_for(
+            lambda: next(
+                (
+                    a
+                    for a in rig.answers
+                    if isinstance(a, messages.Hello) and a.reset_cause != messages.ResetCause.POWER
+                ),
+                None,
+            ),
+            2.0,
+            "a hello after the reset",
+        )
+        assert hello.reset_cause == messages.ResetCause.WATCHDOG
+
+
+def test_board_that_is_late_within_its_tick_is_not_reset(tmp_path: Path) -> None:
+    with rig_with(planted(tmp_path, "whisker_task", delay(25_000) + RETURN)) as rig:
+        rig.start()
+        rig.listen(1.0)
+        assert rig.board.counters()["resets"] == 0
+
+
+def test_pulse_that_begins_late_keeps_its_width(tmp_path: Path) -> None:
+    """Interrupts are off when the left pulse should begin: it begins late, and is as long as it should be."""
+    with rig_with(planted(tmp_path, "whisker_task", CLI + delay(12_000) + SEI + RETURN)) as rig:
+        rig.start()
+        rig.drive_for(0.5, 0.5, 0.2)
+        for pin, width in ((LEFT, 1600), (RIGHT, 1400)):
+            pulses = rig.pulses(pin)
+            assert len(pulses) >= 5
+            assert np.all(np.abs(pulses[:, 1] - width * CYCLES_PER_US) <= 4), pulses[:, 1] - width * CYCLES_PER_US
 
 
 def test_program_that_crashes_is_said_so_in_one_sentence(tmp_path: Path) -> None:

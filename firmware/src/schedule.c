@@ -12,6 +12,7 @@
 #include "whisker.h"
 
 #define SLOTS_PER_FRAME 8u
+#define OVERLOAD_TICKS 10u /* ticks in a row that overran: the watchdog ends it */
 
 enum {
 #define TASK(name, period, phase, budget) TASK_##name,
@@ -39,8 +40,9 @@ static volatile bool edge_is_servo;   /* whom the next edge interrupt is for */
 
 static uint32_t tick;
 static uint8_t overruns;
-static bool late;    /* a slot of this tick was worked on when the next tick had begun */
-static bool overran; /* so it was in the previous tick */
+static bool late;           /* a slot of this tick was worked on when the next tick had begun */
+static bool overran;        /* so it was in the previous tick, or ticks were dropped */
+static uint8_t overrun_row; /* ticks in a row that overran, at most OVERLOAD_TICKS */
 
 void schedule_start(void) {
   schedule_slot = 0xFF;
@@ -52,6 +54,7 @@ void schedule_start(void) {
   overruns = 0;
   late = false;
   overran = false;
+  overrun_row = 0;
 }
 
 HAL_INTERRUPT_SLOT {
@@ -120,9 +123,11 @@ static void begin_tick(void) {
     overruns++;
     overran = true;
   }
+  overrun_row = !overran ? 0u : overrun_row < OVERLOAD_TICKS ? (uint8_t)(overrun_row + 1u) : OVERLOAD_TICKS;
 }
 
-/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run. */
+/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run, and not in
+ * a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
   uint16_t due = 0;
 #define RESERVED(name, period, phase, budget)
@@ -142,7 +147,7 @@ static void run_tasks(uint8_t slot) {
 #include "tasks.def"
 #undef TASK
 #undef RESERVED
-  if (due == 0) {
+  if (due == 0 && overrun_row < OVERLOAD_TICKS) {
     hal_kick_watchdog();
   }
 }
