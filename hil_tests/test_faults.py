@@ -79,7 +79,7 @@ def delay(cycles: int) -> bytes:
 
 
 def test_board_that_never_catches_up_is_reset_by_the_watchdog(tmp_path: Path) -> None:
-    """A task that takes longer than its slot: the interrupts and the main loop go on, but ticks are dropped for good."""
+    """A task takes longer than its slot: interrupts and main loop go on, but ticks are dropped for good."""
     with rig_with(planted(tmp_path, "whisker_task", delay(60_000) + RETURN)) as rig:
         hello = rig.wait_for(
             lambda: next(
