@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 import msgspec
 
-from boebot import toml_files
+from boebot import resources, toml_files
 from boebot.errors import RobotError
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -60,6 +60,7 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
 
     on: bool = True
 
+    BUILT: ClassVar[bool] = True  # False: the firmware has no driver yet, only the pins are reserved
     PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # field of the pin -> the pins that can do it
@@ -89,6 +90,7 @@ class PositionServo(Device, tag="position_servo", frozen=True, kw_only=True):
 
     pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
@@ -168,6 +170,7 @@ class Battery(Device, tag="battery", frozen=True, kw_only=True):
 
     pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
@@ -178,6 +181,7 @@ class AnalogInfrared(Device, tag="analog_infrared", frozen=True, kw_only=True):
 
     pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
@@ -188,6 +192,7 @@ class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
 
     pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
 
 
@@ -197,6 +202,7 @@ class Compass(Device, tag="compass", frozen=True, kw_only=True):
     sda_pin: int | str
     scl_pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
@@ -207,6 +213,7 @@ class Buzzer(Device, tag="buzzer", frozen=True, kw_only=True):
 
     pin: int | str
 
+    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
 
@@ -270,6 +277,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
     path = toml_files.find("robots", robot, RobotError)
     description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
     _check_pins(description, path.name)
+    _check_image(description, path)
     return description
 
 
@@ -278,8 +286,14 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     table = toml_files.read(path, RobotError)
     base_name = table.pop("extends", None)
     removed = table.pop("remove", [])
+    if not isinstance(table.get("device", {}), dict):
+        raise RobotError(f"{path.name}: device: expected a table of devices")
     if base_name is None:
         return table
+    if not isinstance(base_name, str):
+        raise RobotError(f"{path.name}: extends: expected the name of a robot, got {base_name!r}")
+    if not (isinstance(removed, list) and all(isinstance(name, str) for name in removed)):
+        raise RobotError(f"{path.name}: remove: expected a list of devices, got {removed!r}")
     base_path = toml_files.find("robots", base_name, RobotError)
     if base_path in seen:
         raise RobotError(f"{path.name} extends itself by way of {base_name!r}")
@@ -325,3 +339,34 @@ def _check_pins(robot: RobotDescription, file: str) -> None:
             owner, owner_group = unit_owner.setdefault(unit, (name, group))
             if owner != name and (group == "" or group != owner_group):
                 raise RobotError(f"{file}: {owner} and {name} cannot share {unit}")
+
+
+_ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without
+
+
+def _check_image(robot: RobotDescription, path: Path) -> None:
+    """Refuses what the firmware of the robot's pin map cannot do: other pins or devices than it was built with."""
+    file = path.name
+    for name in _ALWAYS:
+        if not robot.has(name):
+            raise RobotError(f"{file}: device.{name} is missing or off; every robot needs it")
+    for name, device in robot.device.items():
+        if device.on and not device.BUILT:
+            raise RobotError(f"{file}: device.{name} is on, but the firmware has no driver for it; expected on = false")
+    owner = resources.folder("robots") / f"{robot.pin_map}.toml"
+    if not owner.is_file() or owner.samefile(path):
+        return  # a map of its own, with an image of its own
+    image = load_robot(owner)
+    for name, device in robot.device.items():
+        built = image.device.get(name)
+        if type(built) is not type(device) or (built is not None and built.pins() != device.pins()):
+            there = "not there" if built is None else f"{built.__struct_config__.tag} on {_pins_text(built)}"
+            raise RobotError(
+                f"{file}: device.{name} is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
+                f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own"
+            )
+
+
+def _pins_text(device: Device) -> str:
+    pins = [pin_name(pin) for pin in device.pins().values()]
+    return f"pin {pins[0]}" if len(pins) == 1 else f"pins {', '.join(pins)}"

@@ -5,6 +5,7 @@ What is wrong is said with the file, the full key and what was expected there.
 
 from __future__ import annotations
 
+import math
 import tomllib
 import types
 import typing
@@ -48,11 +49,24 @@ def read(path: Path, error: type[BoebotError]) -> dict[str, Any]:
 
 
 def convert(table: dict[str, Any], kind: type[_T], file: str, error: type[BoebotError]) -> _T:
-    """The table as a `kind`. Raises `error`, which names file, key and what was expected."""
+    """The table as a `kind`, all of its numbers finite. Raises `error`, which names file, key and what was expected."""
+    if place := _not_finite(table, ""):
+        raise error(f"{file}: {place}: expected a finite number")
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as cause:
         raise error(f"{file}: {_fault(table, kind, '') or cause}") from None
+
+
+def _not_finite(value: Any, key: str) -> str | None:
+    """The key of the first number in `value` that is infinite or none."""
+    if isinstance(value, dict):
+        places = ((f"{key}.{name}" if key else name, entry) for name, entry in value.items())
+    elif isinstance(value, list):
+        places = ((f"{key}[{index}]", entry) for index, entry in enumerate(value))
+    else:
+        return key if isinstance(value, float) and not math.isfinite(value) else None
+    return next((found for place, entry in places if (found := _not_finite(entry, place))), None)
 
 
 def _fault(value: Any, kind: Any, key: str) -> str | None:

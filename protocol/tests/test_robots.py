@@ -54,11 +54,35 @@ def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
         ("[body]\nmass_kg = 'heavy'", "body.mass_kg: expected float, got str"),
         ("remove = ['wings']", "removes device 'wings'"),
         ("[body", "no valid TOML"),
+        ("[body]\nmass_kg = inf", "body.mass_kg: expected a finite number"),
+        ("[device.infrared_left]\nheading_rad = nan", "device.infrared_left.heading_rad: expected a finite number"),
+        ("remove = 'ping'", "remove: expected a list of devices, got 'ping'"),
+        ("remove = ['uart']", "device.uart is missing or off; every robot needs it"),
+        ("[device.servo_left]\non = false", "device.servo_left is missing or off"),
+        ("[device.buzzer]\non = true", "device.buzzer is on, but the firmware has no driver for it"),
+        (
+            "remove = ['light_right']\n[device.whisker_left]\npin = 6",
+            "device.whisker_left is whisker on pin 6, but in the firmware for pin map 'shieldbot' it is whisker on pin 5",
+        ),
+        ("pin_map = 'shieldbot-quad'", "device.encoder_left is encoder on pin A2, but in the firmware"),
     ],
 )
 def test_wrong_description_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
     with pytest.raises(RobotError, match=sentence):
         load_robot(variant(tmp_path, text))
+
+
+@pytest.mark.parametrize("text", ["extends = 5", "device = 5", "extends = 'shieldbot'\ndevice = 5"])
+def test_wrong_type_at_the_top_is_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "odd.toml"
+    file.write_text(text)
+    with pytest.raises(RobotError, match=r"odd\.toml: (extends|device): expected"):
+        load_robot(file)
+
+
+def test_device_may_be_switched_off(tmp_path: Path) -> None:
+    robot = load_robot(variant(tmp_path, "[device.ping]\non = false"))
+    assert not robot.has("ping") and robot.has("infrared_left")
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
