@@ -1,6 +1,7 @@
 """One suite for every board: `pytest hil_tests --on native --on avr` (the default: both), or `--on /dev/ttyACM0`.
 
-Tests that reach for the board's pins say so by the fixture `rig_with_pins`; on a real board they are not collected.
+Tests that reach for the board's pins or for the true path carry the mark `emulated`; on a board behind a port they are
+left out and counted as deselected.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--on", action="append", help="board under test: native, avr, or a port; may be given again")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "emulated: needs the pins or the true path that only an emulated board gives")
+
+
 def boards(config: pytest.Config) -> list[str]:
     return config.getoption("--on") or ["native", "avr"]
 
@@ -31,14 +36,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leaves out, and counts as deselected, what needs the pins of a board whose pins nobody can reach."""
+    """Leaves out what only an emulated board can be asked, where all boards under test are behind ports."""
 
-    def unreachable(item: pytest.Item) -> bool:
+    def out_of_reach(item: pytest.Item) -> bool:
         spec = getattr(item, "callspec", None)
-        url = spec.params.get("board_url", "") if spec else ""
-        return is_live(url) and "rig" not in getattr(item, "fixturenames", ())
+        under_test = [spec.params["board_url"]] if spec and "board_url" in spec.params else boards(config)
+        return all(map(is_live, under_test)) and item.get_closest_marker("emulated") is not None
 
-    left_out = [item for item in items if unreachable(item)]
+    left_out = [item for item in items if out_of_reach(item)]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]

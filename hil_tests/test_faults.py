@@ -17,6 +17,8 @@ from boebot.link import messages
 from boebot.robots import load_robot
 from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
+pytestmark = pytest.mark.emulated
+
 LEFT, RIGHT = 13, 12
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 RETURN, CLI, SEI = b"\x08\x95", b"\xf8\x94", b"\x78\x94"

@@ -8,6 +8,8 @@ import pytest
 from boebot.link import messages
 from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
 
+pytestmark = pytest.mark.emulated
+
 LEFT, RIGHT = 13, 12
 BYTES_PER_S = 50_000
 EDGE_TOLERANCE = 4  # cycles, issue: servo edges within ±4 cycles

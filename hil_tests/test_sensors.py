@@ -11,6 +11,8 @@ import pytest
 from boebot.link import frame, messages
 from rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 
+pytestmark = pytest.mark.emulated
+
 
 def test_edges_are_counted_and_timed(rig: Rig) -> None:
     before = rig.latest()

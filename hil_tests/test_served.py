@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.emulated
+
 BOEBOT = [sys.executable, "-m", "boebot"]
 
 
@@ -77,6 +79,31 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
     assert "has gone" in errors and "Traceback" not in errors
     assert len((tmp_path / "run.csv").read_text().splitlines()) > 20
     assert (tmp_path / "replay.html").is_file()
+
+
+def test_suite_runs_on_a_board_behind_a_port() -> None:
+    """Some of what needs no pins, here against a served robot; what needs them is left out."""
+    root = Path(__file__).resolve().parents[1]
+    with served("native", "--pty") as (url, _):
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-q",
+                "hil_tests",
+                "--on",
+                url,
+                "-k",
+                "handshake or telemetry_comes or parameter",
+            ],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    assert done.returncode == 0, done.stdout
+    assert " deselected" in done.stdout and " passed" in done.stdout
 
 
 def test_port_is_opened_by_one_program_only() -> None:
