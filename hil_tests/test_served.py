@@ -95,7 +95,7 @@ def test_suite_runs_on_a_board_behind_a_port() -> None:
                 "--on",
                 url,
                 "-k",
-                "handshake or telemetry_comes or parameter",
+                "handshake or telemetry_comes",
             ],
             cwd=root,
             capture_output=True,

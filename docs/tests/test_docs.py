@@ -43,8 +43,8 @@ def help_of(subcommand: str) -> str:
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the pages' first comments name, as a reader would have saved them."""
     folder = tmp_path_factory.mktemp("reader")
-    for _, code in blocks("python"):
-        if match := re.match(r"# (\w+\.py):", code):
+    for _, code in [*blocks("python"), *blocks("toml")]:
+        if match := re.match(r"# (\w+\.(?:py|toml)):", code):
             (folder / match[1]).write_text(code)
     return folder
 
