@@ -30,9 +30,11 @@
  * indices are bytes into it, so that they wrap by themselves. Its first place is also its last, so that the change
  * before a place is always next to it: the change after index i is at hal_changes[i / HAL_CHANGE_BYTES + 1].
  *
- * The interrupt outranks all others but the carrier, so it must not come back to back for long. When HAL_CHANGES_STORM
- * changes in a row were closer to the one before than HAL_CHANGES_CLOSE cycles, or when the ring is full, it masks all
- * lines, which hal_changes_stopped() tells. Turning wheels never do: each of four lines can change once within that time. */
+ * The interrupt outranks all others, so it must not come back to back for long. When HAL_CHANGES_STORM changes in a row
+ * were closer to the one before than HAL_CHANGES_CLOSE cycles, or when the ring is full, it masks all lines, which
+ * hal_changes_stopped() tells. Wheels that turn never do that: among four lines of which each changes once in 1664 cycles
+ * or slower (96 edges in a tick), four gaps add up to more than four close ones, even if other interrupts took 640 cycles
+ * of them. */
 #define HAL_CHANGES_CLOSE 256u
 #define HAL_CHANGES_STORM 4u
 #define HAL_CHANGES 64u

@@ -1,4 +1,5 @@
-/* changes_avr.c: the pin-change interrupt of the encoders, written out: 75 cycles with entry and return. */
+/* changes_avr.c: the pin-change interrupt of the encoders, written out: 75 cycles with entry and return, 79 for a close
+ * change. */
 #include "hal/hal.h"
 #include "pins.h"
 

@@ -24,8 +24,8 @@
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
-/* Covers what can stand before the edge's interrupt (one that has begun, 110 cycles; a storm of pin changes, 5 x 75; a
- * capture, 110) and its own prologue. */
+/* Covers what can stand before the edge's interrupt (one that has begun, 51 cycles; a storm of pin changes, 5 x 79 and 16
+ * to stop it; a capture, 110) and its own prologue, 50. */
 #define HAL_EDGE_LEAD 640u
 #define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
