@@ -10,11 +10,40 @@ def step(robot):
 result = boebot.run(step, on="native", seconds=10)
 """
 
-from boebot import boards
-from boebot.errors import BoebotError
-from boebot.result import RunResult
-from boebot.robot import Command, Observation, Robot
-from boebot.robots import load_robot
-from boebot.runner import run
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from boebot import boards
+    from boebot.errors import BoebotError
+    from boebot.result import RunResult
+    from boebot.robot import Command, Observation, Robot
+    from boebot.robots import load_robot
+    from boebot.runner import run
 
 __all__ = ["BoebotError", "Command", "Observation", "Robot", "RunResult", "boards", "load_robot", "run"]
+
+# Loaded when first asked for: the command catches Ctrl-C before numpy and the rest take their time.
+_HOMES = {
+    "BoebotError": "errors",
+    "Command": "robot",
+    "Observation": "robot",
+    "Robot": "robot",
+    "RunResult": "result",
+    "load_robot": "robots",
+    "run": "runner",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "boards":
+        return import_module("boebot.boards")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'boebot' has no attribute {name!r}")
+    value = getattr(import_module(f"boebot.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -18,7 +18,7 @@ import time as wall
 from collections.abc import Callable
 from pathlib import Path
 
-from boebot import brains, report
+from boebot import brains, interrupts, report
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.brains import LoadedBrain
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
@@ -75,7 +75,13 @@ def run(
         report.make_folder(Path(out))
     result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
     if out is not None:
-        result.save(out)
+        try:
+            with interrupts.ignored():
+                result.save(out)
+        except BoebotError as unsaved:
+            if result.error is None:
+                raise
+            result.error.add_note(str(unsaved))
     if result.error is not None:
         raise result.error
     return result
@@ -186,7 +192,8 @@ class _Run:
             error = caught
         finally:
             elapsed = wall.perf_counter() - started
-            self._stop_motors()
+            with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
+                self._stop_motors()
         return self._result(error, elapsed)
 
     def _loop(self) -> None:
@@ -236,6 +243,9 @@ class _Run:
                     ahead = (heard_s - started_s) - (wall.perf_counter() - started)
                     if ahead > 0:
                         wall.sleep(ahead)
+                if self.progress is not None and wall.perf_counter() >= next_progress:
+                    next_progress = wall.perf_counter() + _PROGRESS_S
+                    self.progress(time_s)
                 robot.observation = Observation(_Telemetry._make(unpack(payload)), equipment, time_s)
                 try:
                     step(robot)
@@ -250,9 +260,6 @@ class _Run:
                     link.send_stop()
                 steps.append((len(times) - 1, kind, left, right))
                 due = last - last % n + n
-                if self.progress is not None and wall.perf_counter() >= next_progress:
-                    next_progress = wall.perf_counter() + _PROGRESS_S
-                    self.progress(time_s)
             ahead_ticks = min(due - last, (self.seconds - time_s) / tick_s)
             wait_s, quiet_s = (ahead_ticks + 2) * tick_s, (ahead_ticks - 0.5) * tick_s
 

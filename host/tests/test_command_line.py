@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -14,21 +15,29 @@ import pytest
 
 from boebot import cli, runner
 from boebot.cli import teleop
+from boebot.interrupts import SIGNALS
 from boebot.robot import Robot
 from peer import InProcess, Peer, Pty, pty
 
 
 def boebot(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
     """Runs the command in this process; returns exit code, standard output and standard error."""
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in SIGNALS}
     sys.argv = ["boebot", *arguments]
     try:
         with pytest.raises(SystemExit) as end:
             cli.main()
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     captured = capsys.readouterr()
     return int(end.value.code or 0), captured.out, captured.err
+
+
+def heed_signals() -> None:
+    """A shell may have told this process, and so its children, to ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture
@@ -147,7 +156,7 @@ def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
         assert code == 0 and "compiler" in out and "servo left centre" in out
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals, tmp_path: Path) -> None:
     with pty(Peer()) as served:
         command = [sys.executable, "-m", "boebot", "run", "wander", "--on", served.path, "--out", str(tmp_path / "out")]
@@ -156,14 +165,16 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            # a shell may have told this process, and so its children, to ignore Ctrl-C
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+            preexec_fn=heed_signals,
         )
         until = time.monotonic() + 20
         while served.peer.command == (0.0, 0.0) and time.monotonic() < until:
             time.sleep(0.02)
         time.sleep(0.3)
         process.send_signal(number)
+        for _ in range(5):  # an impatient user: none of these may cost the record
+            time.sleep(0.03)
+            process.send_signal(number)
         out, err = process.communicate(timeout=20)
         assert served.peer.command == (0.0, 0.0)
         assert served.peer.status.name == "STOPPED", "by the stop message, not by the dead-man"
@@ -171,6 +182,106 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
     assert err == "boebot: interrupted\n"
     assert "interrupted" in out
     assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 20
+
+
+@pytest.mark.parametrize("after_s", [0.04, 0.1, 0.2, 0.3])
+def test_interrupt_while_the_command_starts_is_no_traceback(after_s: float) -> None:
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "from boebot.cli import main; print('up', flush=True); main()",
+            "run",
+            "wander",
+            "--seconds",
+            "1e5",
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heed_signals,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "up\n"
+    time.sleep(after_s)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert (process.returncode, err) == (130, "boebot: interrupted\n")
+
+
+def test_heavy_modules_wait_until_ctrl_c_is_caught() -> None:
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import boebot.cli, sys; print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert not {"numpy", "typer", "rich"} & set(loaded)
+
+
+def test_hang_up_that_was_to_be_ignored_stays_ignored(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        monkeypatch.setattr(cli, "_run", lambda: signal.getsignal(signal.SIGHUP) == signal.SIG_IGN and 42)
+        assert boebot(capsys)[0] == 42
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def fails(*_: object) -> None:
+    raise RuntimeError("no ink\nat all")
+
+
+@pytest.mark.parametrize("writer", ["boebot.report.picture.write", "boebot.report.replay.write"])
+def test_picture_that_fails_costs_no_other_file(
+    peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writer: str
+) -> None:
+    monkeypatch.setattr(writer, fails)
+    code, out, err = boebot(capsys, "run", "wander", "--seconds", "1", "--json", "--out", str(tmp_path))
+    missing = "run.png" if "picture" in writer else "replay.html"
+    assert code == 1
+    assert err == f"boebot: {missing} cannot be made: RuntimeError: no ink; the run's other files are in {tmp_path}\n"
+    there = {path.name for path in tmp_path.iterdir()}
+    assert {"run.csv", "wire.csv", "run.png", "replay.html"} - there == {missing}
+    assert {Path(name).name for name in json.loads(out)["files"]} == there
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "sentence"),
+    [("robot.fly()", 1, "has no attribute 'fly'"), ("raise KeyboardInterrupt", 130, "interrupted")],
+)
+def test_error_of_the_brain_comes_before_that_of_its_files(
+    peer: Peer,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    line: str,
+    code: int,
+    sentence: str,
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("boebot.report.tables.write_run", full)
+    brain = tmp_path / "wrong.py"
+    brain.write_text(f"def step(robot):\n    {line}\n")
+    got, out, err = boebot(capsys, "run", str(brain), "--out", str(tmp_path / "out"))
+    first, second = err.splitlines()
+    assert got == code and "distance" in out
+    assert sentence in first and "No space left on device" in second
+
+
+def test_files_are_written_even_if_nobody_reads_the_table(
+    peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr("boebot.cli.output.print_table", gone)
+    monkeypatch.setattr("sys.stderr", io.StringIO())
+    code, _, _ = boebot(capsys, "run", "wander", "--seconds", "1", "--out", str(tmp_path))
+    assert code == 1 and (tmp_path / "replay.html").is_file()
 
 
 def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

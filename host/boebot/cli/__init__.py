@@ -5,80 +5,80 @@ Exit codes: 0 done; 1 something the user can mend, said in one sentence; 2 wrong
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import signal
 import sys
-from importlib.metadata import PackageNotFoundError, version
-from typing import Annotated, NoReturn
+import time
+from typing import NoReturn
 
-import typer
-
-from boebot.cli import info, new, run, serve, teleop
 from boebot.errors import BoebotError
-from boebot.link import messages
+from boebot.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
+_ONE_PRESS_S = 0.5  # signals that follow one another faster than this are one wish
 
-app = typer.Typer(
-    name="boebot",
-    help="Drive a Boe-Bot class robot, or its emulated twin, by a brain written in Python.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command("run")(run.run)
-app.command("serve")(serve.serve)
-app.command("info")(info.info)
-app.command("teleop")(teleop.teleop)
-app.command("new")(new.new)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        try:
-            installed = version("boebot")
-        except PackageNotFoundError:
-            installed = "not installed"
-        print(
-            f"boebot {installed} (protocol {messages.PROTOCOL_VERSION}, schema {messages.SCHEMA_HASH:08x}, "
-            f"Python {sys.version.split()[0]})"
-        )
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
-    ] = False,
-) -> None:
-    del version
+_last_signal = float("-inf")
 
 
 def main() -> NoReturn:
     """Runs the command; every error that people can make ends as one sentence."""
-    signal.signal(signal.SIGTERM, _interrupt)  # motors are stopped and the record is written then, too
+    code: object
     try:
-        code = app(standalone_mode=False)
-    except BoebotError as error:
-        print(f"boebot: {error}", file=sys.stderr)
-        code = EXIT_ERROR
-    except (KeyboardInterrupt, typer.Abort):
+        for number in SIGNALS:  # motors are stopped and the record is written, whichever of them comes
+            if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
+                signal.signal(number, _interrupt)
+        code = _run()
+    except KeyboardInterrupt as error:
         code = EXIT_INTERRUPTED
-    except BrokenPipeError:  # what reads our output has closed it, as `head` does
-        sys.stderr.close()
-        code = EXIT_ERROR
-    except Exception as error:
-        # wrong usage; its class is click's, which some releases of typer carry inside
-        show, code = getattr(error, "show", None), getattr(error, "exit_code", None)
-        if show is None:
-            raise
-        show()
-    if code == EXIT_INTERRUPTED:
-        print("boebot: interrupted", file=sys.stderr)
+        _say("interrupted", error)
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _interrupt(*_: object) -> NoReturn:
-    raise KeyboardInterrupt
+def _run() -> object:
+    """The exit code of the command."""
+    # imported only here, so that Ctrl-C meanwhile is no traceback
+    import typer
+
+    from boebot.cli.app import app
+    from boebot.cli.ending import InterruptedRunError
+
+    try:
+        code = app(standalone_mode=False)
+    except InterruptedRunError as error:
+        _say(str(error), error)
+        return EXIT_INTERRUPTED
+    except BoebotError as error:
+        _say(str(error), error)
+        return EXIT_ERROR
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.EIO):
+            raise
+        sys.stderr.close()  # what reads our output has closed it, as `head` does, or the terminal has gone
+        return EXIT_ERROR
+    except Exception as error:
+        # wrong usage; its class is click's, which some releases of typer carry inside
+        show = getattr(error, "show", None)
+        if show is None:
+            raise
+        show()
+        return getattr(error, "exit_code", None)
+    if code == EXIT_INTERRUPTED:  # some releases of typer make this of a KeyboardInterrupt
+        raise KeyboardInterrupt
+    return code
+
+
+def _say(sentence: str, error: BaseException) -> None:
+    """The sentence, and what else went wrong, on standard error; the terminal may have gone."""
+    with contextlib.suppress(OSError, ValueError):
+        for text in (sentence, *getattr(error, "__notes__", ())):
+            print(f"boebot: {text}", file=sys.stderr)
+
+
+def _interrupt(*_: object) -> None:
+    global _last_signal
+    before, _last_signal = _last_signal, time.monotonic()
+    if _last_signal - before > _ONE_PRESS_S:
+        raise KeyboardInterrupt

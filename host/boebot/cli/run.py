@@ -9,6 +9,7 @@ import typer
 
 from boebot import report
 from boebot.cli import options, output
+from boebot.cli.ending import end
 from boebot.runner import execute
 
 
@@ -42,12 +43,4 @@ def run(
             period=None if period is None else period / 1000,
             progress=progress,
         )
-    files = [] if out is None else result.save(out)
-    if json:
-        output.print_json(result.table() | {"files": [str(path) for path in files]})
-    else:
-        output.print_table(result.table())
-        if files:
-            print(f"files in {out}: {', '.join(path.name for path in files)}")
-    if result.error is not None:
-        raise result.error
+    end(result, out, json)

@@ -21,6 +21,14 @@ if TYPE_CHECKING:
     from boebot.result import RunResult
 
 
+class IncompleteError(BoebotError):
+    """Some files of a run could not be made; `files` are those that were."""
+
+    def __init__(self, sentence: str, files: list[Path]) -> None:
+        super().__init__(sentence)
+        self.files = files
+
+
 def make_folder(folder: Path) -> None:
     """Makes the folder of a run's files; called before the run too, so that no run is lost for want of one.
 
@@ -44,8 +52,9 @@ def save(result: RunResult, folder: Path) -> list[Path]:
 
     Raises:
         BoebotError: the folder cannot be written to.
+        IncompleteError: picture or page cannot be made; all other files are there.
     """
-    from boebot.report import picture, replay, tables
+    from boebot.report import tables
 
     make_folder(folder)
     try:
@@ -54,9 +63,31 @@ def save(result: RunResult, folder: Path) -> list[Path]:
             tables.write_run(result, folder / "run.csv"),
             *tables.write_wire(result, folder),
         ]
-        if result.ticks:
-            paths.append(picture.write(result, folder / "run.png"))
-            paths.append(replay.write(result, folder / "replay.html"))
     except OSError as error:
         raise _unwritable(folder, error) from None
+    if not result.ticks:
+        return paths
+    failed = []
+    for name, write in (("run.png", _write_picture), ("replay.html", _write_page)):
+        try:
+            paths.append(write(result, folder / name))
+        except OSError as error:
+            raise _unwritable(folder, error) from None
+        except Exception as error:  # whatever drawing meets: the run is worth more than its picture
+            what = str(error).strip().partition("\n")[0]
+            failed.append(f"{name} cannot be made: {type(error).__name__}" + (f": {what}" if what else ""))
+    if failed:
+        raise IncompleteError(f"{'; '.join(failed)}; the run's other files are in {folder}", paths)
     return paths
+
+
+def _write_picture(result: RunResult, path: Path) -> Path:
+    from boebot.report import picture
+
+    return picture.write(result, path)
+
+
+def _write_page(result: RunResult, path: Path) -> Path:
+    from boebot.report import replay
+
+    return replay.write(result, path)

@@ -1,0 +1,49 @@
+"""What the `boebot` command consists of."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated
+
+import typer
+
+from boebot.cli import info, new, run, serve, teleop
+from boebot.link import messages
+
+app = typer.Typer(
+    name="boebot",
+    help="Drive a Boe-Bot class robot, or its emulated twin, by a brain written in Python.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(run.run)
+app.command("serve")(serve.serve)
+app.command("info")(info.info)
+app.command("teleop")(teleop.teleop)
+app.command("new")(new.new)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        try:
+            installed = version("boebot")
+        except PackageNotFoundError:
+            installed = "not installed"
+        print(
+            f"boebot {installed} (protocol {messages.PROTOCOL_VERSION}, schema {messages.SCHEMA_HASH:08x}, "
+            f"Python {sys.version.split()[0]})"
+        )
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    del version
