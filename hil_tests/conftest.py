@@ -6,16 +6,12 @@ left out and counted as deselected.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 from boebot.boards import is_live
-from rig import Rig
+from hil_tests.rig import Rig
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -15,7 +15,7 @@ from boebot.boards import BoardRequest, open_board
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.robots import load_robot
-from rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 pytestmark = pytest.mark.emulated
 

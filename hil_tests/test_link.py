@@ -10,7 +10,7 @@ import pytest
 
 from boebot.link import frame, messages
 from boebot.robots import load_robot
-from rig import Rig
+from hil_tests.rig import Rig
 
 
 def type_name(value: Any) -> str:

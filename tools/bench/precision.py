@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from boebot.link import messages
 from boebot.runner import execute
+from hil_tests.rig import CYCLES_PER_US, Rig
 from tools.bench.figures import figure
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hil_tests"))
-
-from rig import CYCLES_PER_US, Rig
 
 SERVO_LEFT, SERVO_RIGHT = 13, 12
 

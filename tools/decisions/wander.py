@@ -5,18 +5,13 @@ Prints the table of docs/decisions/0001-wander.md: `python -m tools.decisions.wa
 
 from __future__ import annotations
 
-import sys
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
 import boebot
 from boebot.brains import wander
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hil_tests"))
-
-from test_circle import cells_visited, windows_moved
+from hil_tests.paths import cells_visited, windows_moved
 
 SEEDS = range(1, 7)
 
