@@ -66,6 +66,11 @@ def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
         ("class Brain:\n    def __init__(self):\n        oops\n", r"mine\.py, line 3: NameError"),
         ("PERIOD = 'fast'\ndef step(robot): ...\n", r"mine\.py: PERIOD is 'fast'; expected seconds"),
         ("NEEDS = 3\ndef step(robot): ...\n", r"mine\.py: NEEDS is 3; expected a list of device names"),
+        ("async def step(robot): ...\n", r"mine\.py: step is an async function; expected a plain one"),
+        ("def step(robot):\n    yield\n", r"mine\.py: step contains yield; expected a function that returns"),
+        ("async def step(robot):\n    yield\n", r"mine\.py: step contains yield"),
+        ("class Brain:\n    async def step(self, robot): ...\n", r"mine\.py: step is an async function"),
+        ("raise ValueError('first\\nsecond')\n", r"mine\.py, line 1: ValueError: first$"),
         ("import sys\nsys.exit(3)\n", r"mine\.py, line 2: SystemExit"),
     ],
 )
@@ -86,3 +91,14 @@ def test_brain_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         load_brain("mine")
     with pytest.raises(BrainError, match="42 is no brain"):
         load_brain(42)
+
+
+def test_function_that_would_never_run_is_refused() -> None:
+    async def later(robot: Robot) -> None: ...
+
+    class Callable:
+        async def __call__(self, robot: Robot) -> None: ...
+
+    for brain in (later, Callable()):
+        with pytest.raises(BrainError, match="step is an async function"):
+            load_brain(brain)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import inspect
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -60,6 +61,7 @@ def load_brain(source: object) -> LoadedBrain:
         return _from_object(source, type(source).__name__, None)
     if callable(source):
         name = getattr(source, "__name__", "brain")
+        _check_step(source, name)
         return LoadedBrain(name, source, _period(source, name), _needs(source, name))
     raise BrainError(f"{source!r} is no brain; expected a name, a Python file, or something with step(robot)")
 
@@ -77,13 +79,11 @@ def place(error: BaseException, path: Path | None) -> str:
 
 
 def explain(error: BaseException, path: Path | None) -> str:
-    """One sentence: the place in the brain's file, what kind of error, and its text."""
+    """One sentence: the place in the brain's file, what kind of error, and the first line of its text."""
     where = place(error, path) or str(path or "the brain")
-    if isinstance(error, SyntaxError):
-        return f"{where}: {error.msg}"
-    if isinstance(error, BrainError):
-        return f"{where}: {error}"
-    what = str(error).strip()
+    what = str(error.msg if isinstance(error, SyntaxError) else error).strip().partition("\n")[0]
+    if isinstance(error, SyntaxError | BrainError):
+        return f"{where}: {what}"
     return f"{where}: {type(error).__name__}" + (f": {what}" if what else "")
 
 
@@ -143,6 +143,7 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
         return LoadedBrain(name, made.step, period or made.period, needs or made.needs, path)
     step = getattr(module, "step", None)
     if callable(step):
+        _check_step(step, where)
         return LoadedBrain(name, step, period, needs, path)
     raise BrainError(f"{where} has neither a function step(robot) nor a class Brain with step(self, robot)")
 
@@ -151,7 +152,17 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
     step = getattr(brain, "step", None)
     if not callable(step):
         raise BrainError(f"{name}: class {type(brain).__name__} has no method step(self, robot)")
+    _check_step(step, name)
     return LoadedBrain(name, step, _period(brain, name), _needs(brain, name), path)
+
+
+def _check_step(step: Callable[..., object], where: str) -> None:
+    """Refuses a step whose body would never run, for a call of it only makes a coroutine or a generator."""
+    whole = (step, getattr(step, "__call__", step))  # noqa: B004
+    if any(inspect.iscoroutinefunction(part) for part in whole):
+        raise BrainError(f"{where}: step is an async function; expected a plain one, def step(robot)")
+    if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
+        raise BrainError(f"{where}: step contains yield; expected a function that returns, def step(robot)")
 
 
 def _construct(kind: type, path: Path | None) -> Any:
