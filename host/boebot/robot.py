@@ -291,7 +291,11 @@ class Robot:
         Raises:
             BrainError: a signal is out of range or no number.
         """
-        if not (-1.0 <= left <= 1.0 and -1.0 <= right <= 1.0):
+        try:
+            within = -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0
+        except (TypeError, ValueError):
+            raise _no_numbers("drive", left, right) from None
+        if not within:
             raise BrainError(f"drive({left}, {right}): motor signals go from -1 to 1")
         self.command = Command("signal", left, right)
 
@@ -302,7 +306,11 @@ class Robot:
         Raises:
             BrainError: a speed is beyond 0.5 m/s or no number.
         """
-        if not (-SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT):
+        try:
+            within = -SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT
+        except (TypeError, ValueError):
+            raise _no_numbers("drive_speed", left, right) from None
+        if not within:
             raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s")
         self.command = Command("speed", left, right)
 
@@ -328,3 +336,7 @@ class Robot:
                 self._chances[key] = 1.0 - (1.0 - probability) ** (self._period / per)
             probability = self._chances[key]
         return self.random.random() < probability
+
+
+def _no_numbers(call: str, left: object, right: object) -> BrainError:
+    return BrainError(f"{call}({left!r}, {right!r}) expects two numbers")

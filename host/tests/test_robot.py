@@ -144,6 +144,16 @@ def test_command_out_of_range_is_refused(wrong: float) -> None:
     assert robot.command.kind == "stop"
 
 
+@pytest.mark.parametrize("wrong", [("a", None), (0.1, None), ("0.1", 0.1), (0.1, [0.1])])
+def test_command_that_is_no_number_is_refused(wrong: tuple[float, float]) -> None:
+    robot = robot_seeing(observe())
+    for call in (robot.drive, robot.drive_speed):
+        with pytest.raises(BrainError) as caught:
+            call(*wrong)
+        assert str(caught.value) == f"{call.__name__}({wrong[0]!r}, {wrong[1]!r}) expects two numbers"
+    assert robot.command.kind == "stop"
+
+
 def test_clock_and_tick() -> None:
     robot = robot_seeing(observe(tick=70_000), period=0.02)
     assert (robot.time, robot.tick, robot.period) == (1.0, 70_000, 0.02)
