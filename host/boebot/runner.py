@@ -16,6 +16,7 @@ import contextlib
 import math
 import time as wall
 from collections.abc import Callable
+from numbers import Integral, Real
 from pathlib import Path
 
 from boebot import brains, interrupts, report
@@ -72,6 +73,7 @@ def run(
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
     if out is not None:
+        _expect("out", out, "a folder or None", str, Path)
         report.make_folder(Path(out))
     result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
     if out is not None:
@@ -104,6 +106,12 @@ def execute(
     Raises:
         BoebotError: the run could not begin.
     """
+    _expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
+    _expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
+    _expect("on", on, "the name of a board or a port", str)
+    _expect("seconds", seconds, "a number", Real)
+    _expect("seed", seed, "a whole number", Integral)
+    _expect("period", period, "seconds or None", Real, type(None))
     if not seconds > 0:
         raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
     description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
@@ -121,6 +129,12 @@ def execute(
         return _Run(session, request, loaded, on, seconds, period_s, progress).execute()
     finally:
         session.close()
+
+
+def _expect(name: str, value: object, expected: str, *kinds: type) -> None:
+    """Raises a BoebotError if an argument of `run` is of no such kind."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise BoebotError(f"{name} is {value!r}; expected {expected}")
 
 
 def check_time_to_live(period_s: float) -> int:

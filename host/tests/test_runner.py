@@ -77,6 +77,15 @@ def test_time_to_live_outlasts_the_period(session: InProcess, period_ms: int, ti
         ({"period": math.nan}, "expected more than 0"),
         ({"seconds": 0}, "cannot last 0 s"),
         ({"seconds": math.nan}, "cannot last nan s"),
+        ({"seconds": "5"}, "seconds is '5'; expected a number"),
+        ({"seconds": None}, "seconds is None; expected a number"),
+        ({"seed": "x"}, "seed is 'x'; expected a whole number"),
+        ({"seed": 1.5}, "seed is 1.5; expected a whole number"),
+        ({"period": "50"}, "period is '50'; expected seconds or None"),
+        ({"robot": None}, "robot is None; expected a name, a .toml file or a description"),
+        ({"on": None}, "on is None; expected the name of a board or a port"),
+        ({"arena": 3}, "arena is 3; expected a name, a .toml file or None"),
+        ({"out": 3}, "out is 3; expected a folder or None"),
         ({"robot": "r2d2"}, "there is no robot 'r2d2'"),
         ({"brain": "wonder"}, "there is no brain 'wonder'"),
     ],
@@ -127,6 +136,21 @@ def fails_after(seconds: float, error: BaseException) -> Callable[[Robot], None]
             raise error
 
     return step
+
+
+def test_error_of_the_brain_is_not_hidden_by_that_of_its_files(
+    session: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("boebot.report.tables.write_run", full)
+    with pytest.raises(BrainError, match="division") as caught:
+        boebot.run(fails_after(0.5, ZeroDivisionError("division")), seconds=10, out=tmp_path)
+    assert "No space left on device" in caught.value.__notes__[0]
+    session.closed = False
+    with pytest.raises(BoebotError, match="No space left on device"):
+        boebot.run(straight, seconds=1, out=tmp_path)
 
 
 @pytest.mark.parametrize(
