@@ -642,11 +642,11 @@ const char *board_fault(uintptr_t address) {
   return b->op->fault(b);
 }
 
-void board_read_counters(uintptr_t address, uint64_t counters[9]) {
+void board_read_counters(uintptr_t address, uint64_t counters[8]) {
   const board *b = (const board *)address;
   board_counters c = {0};
   b->op->counters(b, &c);
-  const uint64_t values[9] = {c.executed_cycles, c.instructions,   c.interrupts, c.bytes_in, c.bytes_out,
-                              c.overruns,        c.framing_errors, c.resets,     c.edges_out};
+  const uint64_t values[8] = {c.executed_cycles, c.interrupts,     c.bytes_in, c.bytes_out,
+                              c.overruns,        c.framing_errors, c.resets,   c.edges_out};
   memcpy(counters, values, sizeof values);
 }

@@ -116,8 +116,8 @@ const char *board_pin_map(uintptr_t board); /* that its firmware was built for, 
 void board_reset(uintptr_t board, int cause);
 void board_line_rate(uintptr_t board, uint32_t baud);
 const char *board_fault(uintptr_t board);
-/* executed_cycles, instructions, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
-void board_read_counters(uintptr_t board, uint64_t counters[9]);
+/* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
+void board_read_counters(uintptr_t board, uint64_t counters[8]);
 /* python: end */
 
 #define SIM_EDGES_KEPT (1u << 20)

@@ -62,7 +62,7 @@ def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
         ("[device.buzzer]\non = true", "device.buzzer is on, but the firmware has no driver for it"),
         (
             "remove = ['light_right']\n[device.whisker_left]\npin = 6",
-            "device.whisker_left is whisker on pin 6, but in the firmware for pin map 'shieldbot' it is whisker on pin 5",
+            "whisker_left is whisker on pin 6, but in the firmware for pin map 'shieldbot' it is whisker on pin 5",
         ),
         ("pin_map = 'shieldbot-quad'", "device.encoder_left is encoder on pin A2, but in the firmware"),
     ],

@@ -29,7 +29,6 @@ typedef enum {
 
 typedef struct {
   uint64_t executed_cycles; /* cycles in which the CPU executed instructions or entered interrupts; 0 if not known */
-  uint64_t instructions;    /* 0 if not known */
   uint64_t interrupts;
   uint64_t bytes_in;  /* bytes whose stop bit reached the board */
   uint64_t bytes_out; /* bytes whose stop bit left the board */

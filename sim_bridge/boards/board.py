@@ -49,7 +49,6 @@ class SentByte(NamedTuple):
 
 COUNTERS = (
     "executed_cycles",
-    "instructions",
     "interrupts",
     "bytes_in",
     "bytes_out",

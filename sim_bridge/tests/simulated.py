@@ -12,7 +12,9 @@ from boebot.robots import RobotDescription, load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.session import BoardPins, EmulatedBoard, Sim
+from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.pins import BoardPins
+from sim_bridge.sim import Sim
 
 MS = CLOCK_HZ // 1000
 US = CLOCK_HZ // 1_000_000

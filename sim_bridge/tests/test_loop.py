@@ -17,7 +17,9 @@ from boebot.robots import ContinuousServo, load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.session import EmulatedBoard, Sim, SimTransport
+from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.session import SimTransport
+from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 BYTE = 320  # cycles at 500,000 baud

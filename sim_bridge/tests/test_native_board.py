@@ -14,7 +14,7 @@ from boebot.link import frame, messages
 from sim_bridge import _core
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
-from sim_bridge.session import native_board, native_library
+from sim_bridge.boards.emulated import native_board, native_library
 
 MS = 16_000  # cycles
 TICK = 10 * MS

@@ -1,0 +1,95 @@
+"""Emulated boards by kind, and the firmware that they load: the native library or the AVR image of a pin map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from boebot import resources
+from boebot.errors import BoardError
+from sim_bridge._core import ffi, lib
+
+
+class EmulatedBoard:
+    """A board by its address, and whatever must live as long as it does."""
+
+    def __init__(self, address: int, description: str, release: Callable[[], None], keep: Any = None) -> None:
+        """`release` frees the board.
+
+        Raises:
+            BoardError: the board was built for another version of this package.
+        """
+        self.address = address
+        self.description = description
+        self._release: Callable[[], None] | None = release
+        self._keep = keep
+        if lib.board_check(address) != lib.SIM_OK:
+            self.close()
+            raise BoardError(f"the {description} was built for another version of the simulator; build it again")
+
+    def close(self) -> None:
+        """Frees the board. May be called twice."""
+        release, self._release = self._release, None
+        if release is not None:
+            release()
+
+
+def native_library(pin_map: str) -> Path:
+    """The firmware for this computer.
+
+    Raises:
+        BoardError: it was not built.
+    """
+    folder = Path(__file__).resolve().parents[1] / "images"
+    for suffix in (".so", ".dll"):
+        path = folder / f"firmware-{pin_map}{suffix}"
+        if path.is_file():
+            return path
+    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; build it with `make setup`")
+
+
+def native_board(library: Path) -> EmulatedBoard:
+    """A native board that runs that firmware library.
+
+    Raises:
+        BoardError: it is no firmware library.
+    """
+    error = ffi.new("char[]", 512)
+    board = lib.native_board_create(str(library).encode(), error, 512)
+    if board == ffi.NULL:
+        raise BoardError(f"{library.name}: {ffi.string(error).decode(errors='replace')}")
+    address = int(ffi.cast("uintptr_t", board))
+    return EmulatedBoard(address, "emulated native board", lambda: lib.board_destroy(address))
+
+
+def avr_board(image: Path) -> EmulatedBoard:
+    """An emulated ATmega328P that runs that ELF file.
+
+    Raises:
+        BoardError: the emulator is not installed, or the file is no such image.
+    """
+    from sim_bridge.boards import avr
+
+    board = avr.create(image)
+    return EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board)
+
+
+def avr_image(pin_map: str) -> Path:
+    """The image that would be flashed.
+
+    Raises:
+        BoardError: it was not built.
+    """
+    image = resources.folder("images") / f"{pin_map}.elf"
+    if not image.is_file():
+        raise BoardError(f"there is no firmware image {image.name}; build it with `make firmware`")
+    return image
+
+
+def image_file(image: str) -> Path:
+    """The firmware that the user named. Raises BoardError if it is not there."""
+    path = Path(image)
+    if not path.is_file():
+        raise BoardError(f"there is no firmware image {image}")
+    return path
