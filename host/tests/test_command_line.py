@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -9,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -334,28 +336,57 @@ def test_teleop_needs_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch
     assert code == 1 and "its input is not a terminal" in err
 
 
-def test_teleop_in_a_terminal() -> None:
-    """Over two pseudo-terminals: one for the keyboard, one for the robot."""
+@contextlib.contextmanager
+def teleop_at(served: Pty, *arguments: str) -> Iterator[tuple[int, subprocess.Popen[str]]]:
+    """`boebot teleop` with a keyboard, whose keys are written to the number given; ends when it has driven."""
     keyboard, slave = os.openpty()
-    with pty(Peer()) as served:
+    try:
         process = subprocess.Popen(
-            [sys.executable, "-m", "boebot", "teleop", "--on", served.path],
+            [sys.executable, "-m", "boebot", "teleop", "--on", served.path, *arguments],
             stdin=slave,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=subprocess.PIPE,
             text=True,
+            preexec_fn=heed_signals,
         )
         until = time.monotonic() + 20
         while served.peer.command != (0.5, 0.5) and time.monotonic() < until:
             os.write(keyboard, b"\x1b[A")
             time.sleep(0.05)
-        drove = served.peer.command
+        assert served.peer.command == (0.5, 0.5)
+        yield keyboard, process
+    finally:
+        os.close(keyboard)
+        os.close(slave)
+
+
+def test_teleop_in_a_terminal(tmp_path: Path) -> None:
+    """Over two pseudo-terminals: one for the keyboard, one for the robot."""
+    with pty(Peer()) as served, teleop_at(served, "--out", str(tmp_path)) as (keyboard, process):
         time.sleep(1.0)
         let_go = served.peer.command
         os.write(keyboard, b"q")
-        out, _ = process.communicate(timeout=20)
-    os.close(keyboard)
-    os.close(slave)
-    assert (drove, let_go) == ((0.5, 0.5), (0.0, 0.0))
-    assert process.returncode == 0
-    assert "distance" in out
+        out, err = process.communicate(timeout=20)
+    assert let_go == (0.0, 0.0)
+    assert (process.returncode, err) == (0, "")
+    assert teleop.HELP in out and "distance" in out and "complete" in out
+    assert f"files in {tmp_path}: " in out and (tmp_path / "replay.html").is_file()
+
+
+def test_teleop_prints_json_alone(tmp_path: Path) -> None:
+    with pty(Peer()) as served, teleop_at(served, "--json", "--out", str(tmp_path)) as (keyboard, process):
+        os.write(keyboard, b"q")
+        out, err = process.communicate(timeout=20)
+    values = json.loads(out)
+    assert (values["brain"], values["ended"]) == ("keyboard", "complete")
+    assert {Path(name).name for name in values["files"]} == {path.name for path in tmp_path.iterdir()}
+    assert teleop.HELP in err and "whiskers" in err
+
+
+def test_teleop_that_is_interrupted_says_so() -> None:
+    with pty(Peer()) as served, teleop_at(served, "--json") as (_, process):
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+        assert served.peer.command == (0.0, 0.0)
+    assert process.returncode == 130 and err.endswith("\nboebot: interrupted\n")
+    assert json.loads(out)["ended"] == "interrupted"

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import functools
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
-from boebot.cli import options, output
+from boebot import report
+from boebot.cli import options
+from boebot.cli.ending import end
 from boebot.errors import BoebotError
 from boebot.robot import Robot
 from boebot.runner import execute
@@ -35,11 +39,13 @@ class Keyboard:
         self._speed = 0.5
         self._move = (0.0, 0.0)
         self._until = 0.0
+        self.ended = False  # by Q
 
     def step(self, robot: Robot) -> None:
         """One look at the keys."""
         for key in keys(self._read_keys()):
             if key == "q":
+                self.ended = True
                 raise KeyboardInterrupt
             if key in _MOVES:
                 self._move = _MOVES[key]
@@ -99,24 +105,21 @@ def teleop(
     """Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."""
     if not sys.stdin.isatty():
         raise BoebotError("teleop needs a keyboard, but its input is not a terminal")
-    print(HELP)
-    with raw_keyboard() as read_keys:
-        brain = Keyboard(read_keys, _show)
-        result = execute(brain, robot=robot, arena=arena, on=on, seconds=seconds, seed=seed, realtime=True)
-    print()
     if out is not None:
-        result.save(out)
-    if json:
-        output.print_json(result.table())
-    else:
-        output.print_table(result.table())
-    if result.error is not None and not isinstance(result.error, KeyboardInterrupt):
-        raise result.error
+        report.make_folder(out)
+    screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
+    print(HELP, file=screen, flush=True)
+    with raw_keyboard() as read_keys:
+        brain = Keyboard(read_keys, functools.partial(_show, screen))
+        result = execute(brain, robot=robot, arena=arena, on=on, seconds=seconds, seed=seed, realtime=True)
+    with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
+        print(file=screen, flush=True)
+    end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)
 
 
-def _show(line: str) -> None:
-    width = max(20, os.get_terminal_size().columns - 1) if sys.stdout.isatty() else 200
-    print("\r" + line[:width].ljust(width), end="", flush=True)
+def _show(screen: TextIO, line: str) -> None:
+    width = max(20, os.get_terminal_size(screen.fileno()).columns - 1) if screen.isatty() else 200
+    print("\r" + line[:width].ljust(width), end="", file=screen, flush=True)
 
 
 @contextlib.contextmanager
@@ -151,4 +154,5 @@ def raw_keyboard() -> Iterator[Callable[[], str]]:
         tty.setcbreak(file)
         yield read_terminal
     finally:
-        termios.tcsetattr(file, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):  # the terminal has gone
+            termios.tcsetattr(file, termios.TCSADRAIN, before)
