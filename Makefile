@@ -69,7 +69,7 @@ fuzz:
 
 pictures:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(VENV)/bin/boebot run wander --on avr --seconds 90 --out build/pictures
+	@$(VENV)/bin/boebot run wander --on native --seconds 90 --out build/pictures
 	@cp build/pictures/run.png docs/images/wander.png
 
 firmware: ready-firmware

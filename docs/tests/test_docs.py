@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("protocol/*.md")])
@@ -86,6 +87,15 @@ TARGETS = sorted({(page, name) for page in PAGES for name in re.findall(r"make (
 @pytest.mark.parametrize(("page", "target"), TARGETS, ids=[f"{page.name}: make {name}" for page, name in TARGETS])
 def test_make_target_exists(page: Path, target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"{page.name}: make {target}"
+
+
+def test_picture_is_of_this_kit(tmp_path: Path) -> None:
+    """The README's picture says what the same run gives now; `make pictures` renews it."""
+    recipe = next(line for line in (ROOT / "Makefile").read_text().splitlines() if "--out build/pictures" in line)
+    command = shlex.split(recipe.split("boebot", 1)[1].replace("build/pictures", str(tmp_path)))
+    assert run([*BOEBOT, *command], ROOT).returncode == 0
+    shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / "wander.png", tmp_path / "run.png"))
+    assert (shown["Title"], shown["Description"]) == (now["Title"], now["Description"])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

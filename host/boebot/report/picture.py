@@ -61,7 +61,7 @@ def write(result: RunResult, path: Path) -> Path:
     _draw_robot(axes, result, view, -1, END)
     _draw_scale(axes, low, high)
     _draw_texts(figure, result, view, total)
-    figure.savefig(path, facecolor=PAPER)
+    figure.savefig(path, facecolor=PAPER, metadata={"Title": _title(result, view), "Description": _caption(result)})
     return path
 
 
@@ -159,26 +159,32 @@ def _draw_scale(axes: Axes, low: Floats, high: Floats) -> None:
     axes.text(x + length, y, f"  {length:g} m", va="center", fontsize=8.5, color=INK)
 
 
-def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: float) -> None:
-    table = result.table()
-    where = f" in {table['arena']}" if view.known else ""
-    figure.text(
-        0.03, 1 - 0.32 / height, f"{result.brain} on {result.board}{where}",
-        fontsize=15, weight="bold", color=INK, va="center",
-    )  # fmt: skip
-    error = table["odometry_error_m"]
+def _title(result: RunResult, view: scene.View) -> str:
+    where = f" in {result.table()['arena']}" if view.known else ""
+    return f"{result.brain} on {result.board}{where}"
+
+
+def _caption(result: RunResult) -> str:
+    error = result.table()["odometry_error_m"]
     parts = [
         f"{result.run_time:.1f} s",
         f"{result.distance:.2f} m",
-        f"{result.contacts} contacts",
-        f"{result.whisker_touches} whisker touches",
+        _counted(result.contacts, "contact", "contacts"),
+        _counted(result.whisker_touches, "whisker touch", "whisker touches"),
     ]
     if error is not None:
         parts.append(f"odometry off by {error:.2f} m at the end")
     parts.append(f"seed {result.seed}")
     if result.error is not None:
         parts.append("ended early")
-    figure.text(0.03, 1 - 0.62 / height, "   ·   ".join(parts), fontsize=9.5, color=FAINT, va="center")
+    return "   ·   ".join(parts)
+
+
+def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: float) -> None:
+    figure.text(
+        0.03, 1 - 0.32 / height, _title(result, view), fontsize=15, weight="bold", color=INK, va="center"
+    )  # fmt: skip
+    figure.text(0.03, 1 - 0.62 / height, _caption(result), fontsize=9.5, color=FAINT, va="center")
     handles = [
         Line2D(
             [],
@@ -199,3 +205,7 @@ def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: flo
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8.5,
         labelcolor=INK, bbox_to_anchor=(0.5, 0.06 / height), handletextpad=0.5, columnspacing=1.6,
     )  # fmt: skip
+
+
+def _counted(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
