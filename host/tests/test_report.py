@@ -13,12 +13,13 @@ from typing import Any
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import boebot
 from boebot import runner
 from boebot.errors import BoebotError
 from boebot.link import frame
-from boebot.report import replay
+from boebot.report import picture, replay
 from boebot.result import RunResult
 from peer import InProcess, Peer
 
@@ -53,6 +54,7 @@ def test_table_counts_what_happened(result: RunResult) -> None:
     assert table["contacts"] == 1 and table["whisker_touches"] == 2
     assert table["ticks"] == 3001 and table["steps"] == 600
     assert table["ended"] == "complete"
+    assert table["image_hash"] is None, "a board without flash has no image"
 
 
 def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
@@ -93,6 +95,13 @@ def test_picture_shows_something(folder: Path) -> None:
     picture = matplotlib.image.imread(folder / "run.png")
     assert picture.shape[0] > 600 and picture.shape[1] > 600
     assert len(np.unique((picture[:, :, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 100
+
+
+def test_picture_counts_in_words_that_agree(result: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
+    picture.write(result, tmp_path / "run.png")
+    assert "   ·   1 contact   ·   2 whisker touches   ·   " in texts[1]
 
 
 class Loads(HTMLParser):
