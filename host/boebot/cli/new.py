@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from boebot.brains import bundled
 from boebot.errors import BrainError
 
 FIRST_BRAIN = '''"""{name}: backs away from what its whiskers touch and turns away from what infra-red sees.
@@ -41,14 +42,17 @@ def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Letters, digits and underscores.")],
 ) -> None:
     """Write a first brain, NAME.py, to start from."""
-    path = Path(name if name.endswith(".py") else f"{name}.py")
-    if not path.stem.isidentifier():
-        raise BrainError(f"{path.stem!r} cannot be a brain's name; expected letters, digits and underscores")
+    stem = name.removesuffix(".py")
+    if not stem.isidentifier():
+        raise BrainError(f"{stem!r} cannot be a brain's name; expected letters, digits and underscores")
+    if stem in bundled():
+        raise BrainError(f"{stem!r} is the name of a bundled brain; expected another one")
+    path = Path(f"{stem}.py")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(FIRST_BRAIN.format(name=path.stem, file=path, stem=path.stem))
+            file.write(FIRST_BRAIN.format(name=stem, file=path, stem=stem))
     except FileExistsError:
         raise BrainError(f"{path} exists already; it was left as it is") from None
     except OSError as error:
         raise BrainError(f"{path} cannot be written: {error.strerror}") from None
-    print(f"wrote {path}; now: boebot run {path} --out {path.stem}")
+    print(f"wrote {path}; now: boebot run {path} --out {stem}")
