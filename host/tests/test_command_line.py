@@ -97,7 +97,9 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
         (("serve", "--pty", "--tcp", "0"), 2, "give one of --pty and --tcp PORT"),
         (("serve", "--pty", "--on", "toaster"), 1, "there is no emulated board 'toaster' to serve"),
         (("new", "my brain"), 1, "'my brain' cannot be a brain's name"),
-        (("new", "nowhere/brain"), 1, "cannot be written"),
+        (("new", "nowhere/brain"), 1, "'nowhere/brain' cannot be a brain's name"),
+        (("new", "../brain"), 1, "'../brain' cannot be a brain's name; expected letters, digits and underscores"),
+        (("new", "wander"), 1, "'wander' is the name of a bundled brain"),
     ],
 )
 def test_mistakes_end_in_one_sentence(
@@ -229,6 +231,32 @@ def test_hang_up_that_was_to_be_ignored_stays_ignored(
         assert boebot(capsys)[0] == 42
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize(("pause_s", "spoken"), [(0.6, 1), (0.01, 0)])
+def test_step_that_does_not_return_is_spoken_of_once(
+    peer: Peer,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    pause_s: float,
+    spoken: int,
+) -> None:
+    monkeypatch.setattr("boebot.cli.output.STEP_S", 0.3)
+    brain = tmp_path / "slow.py"
+    brain.write_text(f"import time\ndef step(robot):\n    time.sleep({pause_s})\n")
+    seconds = 0.1 if spoken else 2
+    code, _, err = boebot(capsys, "run", str(brain), "--seconds", str(seconds))
+    assert (code, err) == (0, "boebot: the brain has been in its step for 0.3 s; Ctrl-C ends it\n" * spoken)
+
+
+def test_new_brain_that_cannot_be_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
+    code, _, err = boebot(capsys, "new", "first")
+    assert code == 1 and err.startswith("boebot: first.py cannot be written: ")
 
 
 def fails(*_: object) -> None:

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 from boebot.runner import Progress
 
 BAR_AFTER_S = 2.0
+STEP_S = 5.0  # a step of a brain that takes longer is spoken of
 _UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes)$")
 
 
@@ -74,6 +76,31 @@ def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
     finally:
         if shown:
             bar.stop()
+
+
+@contextlib.contextmanager
+def step_watch(progress: Progress) -> Iterator[Progress]:
+    """Gives a function to call in place of `progress`; says so once if it is not called again for 5 s."""
+    called_at = math.inf  # the run has not begun
+    ended = threading.Event()
+
+    def report(passed: float) -> None:
+        nonlocal called_at
+        called_at = time.monotonic()
+        progress(passed)
+
+    def watch() -> None:
+        while not ended.wait(0.1):
+            if time.monotonic() - called_at > STEP_S:
+                sentence = f"the brain has been in its step for {STEP_S:g} s; Ctrl-C ends it"
+                print(f"boebot: {sentence}", file=sys.stderr, flush=True)
+                return
+
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield report
+    finally:
+        ended.set()
 
 
 def _text(value: Any) -> str:

@@ -31,7 +31,7 @@ def run(
     """Let a brain drive a robot, and say what happened."""
     if out is not None:
         report.make_folder(out)
-    with output.progress_bar(f"{brain} on {on}", seconds) as progress:
+    with output.progress_bar(f"{brain} on {on}", seconds) as bar, output.step_watch(bar) as progress:
         result = execute(
             brain,
             robot=robot,
