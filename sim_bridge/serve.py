@@ -7,6 +7,7 @@ on a real Uno, the board is reset when a client opens the port. Pseudo-terminals
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import select
 import socket
@@ -101,6 +102,13 @@ class PtyPort:
         os.close(self._master)
 
 
+def _reason(error: OSError | OverflowError) -> str:
+    """Why a port cannot be opened; Python's own text of it would name the call's arguments."""
+    if isinstance(error, OverflowError) or error.errno is None:
+        return "expected 0 to 65535"
+    return "it is in use" if error.errno == errno.EADDRINUSE else os.strerror(error.errno)
+
+
 class TcpPort:
     """A port of loopback for one client at a time; a new client takes the place of the old one."""
 
@@ -109,7 +117,7 @@ class TcpPort:
         try:
             self._listener = socket.create_server(("127.0.0.1", port))
         except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or "expected 0 to 65535"
+            reason = _reason(error)
             raise BoardError(f"TCP port {port} cannot be opened: {reason}") from None
         self._listener.setblocking(False)
         self.url = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"

@@ -18,7 +18,7 @@ from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
 
 
 def test_missing_image(tmp_path: Path) -> None:
-    with pytest.raises(BoardError, match=r"Cannot read the firmware image .*nothing\.elf: No such file"):
+    with pytest.raises(BoardError, match=r"the firmware image .*nothing\.elf cannot be read: No such file"):
         create(tmp_path / "nothing.elf")
 
 

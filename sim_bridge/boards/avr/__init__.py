@@ -20,9 +20,9 @@ def _extension() -> Any:
         return import_module("sim_bridge.boards.avr._avr")
     except ImportError as error:
         if any(Path(__file__).parent.glob("_avr.*.so")):
-            raise BoardError(f"The AVR emulator cannot be loaded: {error}.") from error
+            raise BoardError(f"the AVR emulator cannot be loaded: {error}") from error
         raise BoardError(
-            "The AVR emulator is not built; run `make setup` in a checkout, or choose the native board (--on native)."
+            "the AVR emulator is not built; run `make setup` in a checkout, or choose the native board (--on native)"
         ) from error
 
 
@@ -47,13 +47,13 @@ class AvrBoard:
         error = self._ffi.new("char[]", ERROR_SIZE)
         self._board = self._lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
         if self._board == self._ffi.NULL:
-            raise BoardError(f"Cannot load the firmware image {name}: {self._ffi.string(error).decode()}.")
+            raise BoardError(f"the firmware image {name} cannot be loaded: {self._ffi.string(error).decode()}")
 
     @property
     def pointer(self) -> int:
         """The address of the board."""
         if self._board == self._ffi.NULL:
-            raise BoardError("This board is closed.")
+            raise BoardError("this board is closed")
         return int(self._ffi.cast("uintptr_t", self._board))
 
     def access(self) -> BoardAccess:
@@ -83,5 +83,5 @@ def create(elf: Path) -> AvrBoard:
     try:
         image = elf.read_bytes()
     except OSError as error:
-        raise BoardError(f"Cannot read the firmware image {elf}: {error.strerror}.") from error
+        raise BoardError(f"the firmware image {elf} cannot be read: {error.strerror}") from error
     return AvrBoard(image, str(elf))
