@@ -29,6 +29,7 @@ import schema  # noqa: E402
 
 from boebot.robots import RobotDescription, load_robot, robot_names  # noqa: E402
 
+DIRECTIONS = ("to_board", "to_host")
 STATUS_NOTE = "Made by protocol/generate.py; do not edit."
 
 
@@ -48,14 +49,15 @@ def messages_header(spec: schema.Schema) -> str:
         "#ifndef GENERATED_MESSAGES_H",
         "#define GENERATED_MESSAGES_H",
         "",
+        "#include <stdbool.h>",
         "#include <stdint.h>",
         "",
         f"#define PROTOCOL_VERSION {spec.version}u",
         f"#define SCHEMA_HASH 0x{spec.hash:08X}ul",
-        f"#define MESSAGE_PAYLOAD_MAX {max(m.length for m in spec.message)}u /* bytes */",
-        "#define MESSAGE_PAYLOAD_MAX_TO_BOARD "
-        f"{max(m.length for m in spec.message if m.direction == 'to_board')}u /* bytes */",
     ]
+    for direction in DIRECTIONS:
+        longest = max(m.length for m in spec.of_direction(direction))
+        lines.append(f"#define MESSAGE_PAYLOAD_MAX_{direction.upper()} {longest}u /* bytes */")
     for name, flags in spec.flags.items():
         lines += ["", f"/* {flags.doc} */"]
         lines += [f"#define {name.upper()}_{bit.upper()} (1u << {i})" for i, bit in enumerate(flags.bits)]
@@ -79,16 +81,40 @@ def messages_header(spec: schema.Schema) -> str:
             if field.min is not None or field.max is not None:
                 lines.append(f"#define MSG_{upper}_{field.name.upper()}_MIN ({field.least})")
                 lines.append(f"#define MSG_{upper}_{field.name.upper()}_MAX ({field.greatest})")
+    for direction in DIRECTIONS:
+        lines += [
+            "",
+            f"/* Payload bytes of a message {direction.replace('_', ' the ')}, or -1 if there is no such message. */",
+            f"static inline int16_t message_length_{direction}(uint8_t id) {{",
+            "  switch (id) {",
+        ]
+        for message in spec.of_direction(direction):
+            lines += [f"    case MSG_{message.name.upper()}_ID:", f"      return MSG_{message.name.upper()}_LENGTH;"]
+        lines += ["    default:", "      return -1;", "  }", "}"]
     lines += [
         "",
-        "/* Payload bytes of the message, or -1 if there is no such message. */",
-        "static inline int16_t message_length(uint8_t id) {",
+        "/* Whether the message belongs to the handshake, whose checksums start from the constant seed. */",
+        "static inline bool message_is_handshake(uint8_t id) {",
         "  switch (id) {",
+        *[f"    case MSG_{m.name.upper()}_ID:" for m in spec.message if m.delivery == "handshake"],
+        "      return true;",
+        "    default:",
+        "      return false;",
+        "  }",
+        "}",
+        "",
+        "/* X(id, payload bytes, hash) for each message, in order of ids. */",
+        f"#define MESSAGE_COUNT {len(spec.message)}u",
     ]
-    for message in spec.message:
-        lines += [f"    case MSG_{message.name.upper()}_ID:", f"      return MSG_{message.name.upper()}_LENGTH;"]
-    lines += ["    default:", "      return -1;", "  }", "}", "", "#endif", ""]
+    rows = [f"  X(0x{m.id:02X}, {m.length}, 0x{m.hash:04X})" for m in sorted(spec.message, key=lambda m: m.id)]
+    lines += [*continued("#define MESSAGE_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
+
+
+def continued(head: str, rows: list[str]) -> list[str]:
+    """The lines of a macro, each but the last continued."""
+    width = max(len(row) for row in [*rows, head]) + 1
+    return [*[row.ljust(width) + "\\" for row in [head, *rows[:-1]]], rows[-1]]
 
 
 def field_comment(field: schema.Field) -> str:
@@ -110,14 +136,12 @@ def parameters_header(spec: schema.Schema) -> str:
         unit = p.unit if p.scale == 1.0 else f"{number(p.scale)} {p.unit}"
         lines.append(f"#define PARAMETER_{p.name.upper()} {p.id}u /* {unit}: {p.doc} */")
     lines += [f"#define PARAMETER_COUNT {len(spec.parameter)}u", ""]
-    lines += ["/* X(NAME, id, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]
+    lines += ["/* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]
     rows = []
     for p in spec.parameter:
         default = str(p.default) if p.default is not None else f"DEFAULT_{p.name.upper()}"
-        rows.append(f"  X({p.name.upper()}, {p.id}, {p.min}, {p.max}, {default})")
-    width = max(len(row) for row in [*rows, "#define PARAMETER_LIST(X)"]) + 1
-    lines += [row.ljust(width) + "\\" for row in ["#define PARAMETER_LIST(X)", *rows[:-1]]]
-    lines += [rows[-1], "", "#endif", ""]
+        rows.append(f"  X({p.name.upper()}, {p.type}, {p.min}, {p.max}, {default})")
+    lines += [*continued("#define PARAMETER_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
 
 
@@ -130,6 +154,7 @@ def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
+        f'#define ROBOT_NAME "{robot.name}"',
         f'#define PIN_MAP_NAME "{robot.pin_map}"',
     ]
     for name, device in robot.device.items():
@@ -214,8 +239,8 @@ def python_module(spec: schema.Schema) -> str:
     lines += [f"    {'' if i == 0 else '| '}{class_name(m.name)}" for i, m in enumerate(spec.message)]
     lines += [")", "", "MESSAGES: dict[int, type[Message]] = {"]
     lines += [f"    0x{m.id:02X}: {class_name(m.name)}," for m in spec.message]
-    lines += ["}", "", "# id -> payload bytes", "LENGTHS: dict[int, int] = {"]
-    lines += [f"    0x{m.id:02X}: {m.length}," for m in spec.message]
+    lines += ["}", "", "# id -> 16 bits of a hash of the message's layout", "HASHES: dict[int, int] = {"]
+    lines += [f"    0x{m.id:02X}: 0x{m.hash:04X}," for m in spec.message]
     lines += ["}"]
     lines += ["", "", "class ParameterSpec(NamedTuple):", '    """A run-time parameter of the firmware."""', ""]
     lines += ["    id: int", "    unit: str", "    scale: float  # unit per count", "    minimum: int  # counts"]
@@ -254,6 +279,8 @@ def python_message(message: schema.Message) -> list[str]:
         "",
         "    __slots__ = ()",
         f"    ID: ClassVar[int] = 0x{message.id:02X}",
+        f'    NAME: ClassVar[str] = "{message.name}"',
+        f'    DELIVERY: ClassVar[str] = "{message.delivery}"',
         f"    LENGTH: ClassVar[int] = {message.length}",
         f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{code}")',
         "",
@@ -290,6 +317,7 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
             )
         for row in rows if message.fields else rows[:1]:
             sequence = draw.randrange(256)
+            seed = reference_frame.SEED if message.delivery == "handshake" else draw.randrange(1 << 21)
             payload = b"".join(
                 value.ljust(f.text_length, b"\0")
                 if isinstance(value, bytes)
@@ -301,12 +329,13 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
                     "message": message.name,
                     "id": message.id,
                     "sequence": sequence,
+                    "seed": seed,
                     "fields": {
                         f.name: value.decode() if isinstance(value, bytes) else value
                         for f, value in zip(message.fields, row, strict=True)
                     },
                     "payload": payload.hex(),
-                    "frame": reference_frame.frame(message.id, sequence, payload).hex(),
+                    "frame": reference_frame.frame(message.id, sequence, payload, seed).hex(),
                 }
             )
     return out
@@ -326,6 +355,7 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
         "  const char *message;",
         "  uint8_t id;",
         "  uint8_t sequence;",
+        "  uint32_t seed;",
         "  const char *payload; /* hexadecimal */",
         "  const char *frame;   /* hexadecimal, with both delimiters */",
         "} golden_frame;",
@@ -333,7 +363,8 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
         "static const golden_frame GOLDEN_FRAMES[] = {",
     ]
     for row in rows:
-        lines.append(f'    {{"{row["message"]}", {row["id"]}, {row["sequence"]}, "{row["payload"]}",')
+        head = f'{row["id"]}, {row["sequence"]}, {row["seed"]}'
+        lines.append(f'    {{"{row["message"]}", {head}, "{row["payload"]}",')
         lines.append(f'     "{row["frame"]}"}},')
     lines += ["};", "", "#endif", ""]
     return "\n".join(lines)

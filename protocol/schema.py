@@ -12,6 +12,9 @@ import msgspec
 
 HERE = Path(__file__).resolve().parent
 
+DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
+PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
+
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
 INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
     "u8": (1, "uint8_t", "B", 0, 2**8 - 1),
@@ -77,6 +80,11 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         """Payload bytes."""
         return sum(field.size for field in self.fields)
 
+    @property
+    def hash(self) -> int:
+        """16 bits of the CRC-32 of the message without its explanations."""
+        return _crc32(self) & 0xFFFF
+
 
 class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A set of named bits."""
@@ -99,6 +107,7 @@ class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     name: str
     id: int
+    type: str
     unit: str
     doc: str
     min: int
@@ -120,7 +129,15 @@ class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     @property
     def hash(self) -> int:
         """CRC-32 of what both ends must agree on: everything but the explanations."""
-        return zlib.crc32(json.dumps(_without_docs(msgspec.to_builtins(self)), sort_keys=True).encode())
+        return _crc32(self)
+
+    def of_direction(self, direction: str) -> list[Message]:
+        """The messages to one side."""
+        return [message for message in self.message if message.direction == direction]
+
+
+def _crc32(part: Schema | Message) -> int:
+    return zlib.crc32(json.dumps(_without_docs(msgspec.to_builtins(part)), sort_keys=True).encode())
 
 
 def _without_docs(node: Any) -> Any:
@@ -147,8 +164,13 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
     for message in schema.message:
         if (message.id >= 0x80) != (message.direction == "to_host"):
             raise ValueError(f"message {message.name}: ids from 0x80 on are for messages to the host")
-        if message.delivery not in ("telemetry", "set_point", "request"):
+        if message.delivery not in DELIVERIES:
             raise ValueError(f"message {message.name}: unknown delivery {message.delivery!r}")
+        names = [field.name for field in message.fields]
+        if message.delivery == "exactly_once" and names[:1] != ["number"]:
+            raise ValueError(f"message {message.name}: delivered exactly once, so its first field must be number")
+        if message.delivery == "set_point" and names[-2:] != ["time_to_live", "answers_tick"]:
+            raise ValueError(f"message {message.name}: a set-point, so it must end with time_to_live and answers_tick")
         for field in message.fields:
             if not field.text_length and field.type not in INTEGERS:
                 raise ValueError(f"message {message.name}: field {field.name} has unknown type {field.type!r}")
@@ -156,6 +178,12 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown flags {field.flags!r}")
             if field.enum and field.enum not in schema.enum:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown enum {field.enum!r}")
+    for parameter in schema.parameter:
+        if parameter.type not in PARAMETER_TYPES:
+            raise ValueError(f"parameter {parameter.name}: type {parameter.type!r} is none of {PARAMETER_TYPES}")
+        _, _, _, least, greatest = INTEGERS[parameter.type]
+        if not least <= parameter.min < parameter.max <= greatest:
+            raise ValueError(f"parameter {parameter.name}: {parameter.min} to {parameter.max} is no range of its type")
     return schema
 
 

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cobs import cobs
@@ -29,14 +30,14 @@ def test_every_message_has_golden_frames() -> None:
 
 
 @pytest.mark.parametrize("row", GOLDEN, ids=lambda row: f"{row['message']}-{row['sequence']}")
-def test_golden_frame_unpacks_with_an_independent_cobs_and_polynomial_division(row: dict[str, str]) -> None:
+def test_golden_frame_unpacks_with_an_independent_cobs_and_polynomial_division(row: dict[str, Any]) -> None:
     frame = bytes.fromhex(row["frame"])
     assert frame[0] == frame[-1] == 0 and 0 not in frame[1:-1]
     stuffed, check = frame[1:-4], frame[-4:-1]
     assert cobs.decode(stuffed) == bytes([int(row["id"]), int(row["sequence"])]) + bytes.fromhex(row["payload"])
     # The CRC is the remainder of (seed·x^(8n) + data)·x^21 over GF(2): long division with Python's integers.
     bits = 8 * len(stuffed)
-    dividend = (int.from_bytes(stuffed, "big") << 21) ^ (reference_frame.SEED << bits)
+    dividend = (int.from_bytes(stuffed, "big") << 21) ^ (int(row["seed"]) << bits)
     divisor = 1 << 21 | reference_frame.POLYNOMIAL
     while dividend.bit_length() > 21:
         dividend ^= divisor << (dividend.bit_length() - 22)
@@ -54,7 +55,7 @@ def test_schema_refuses_a_number_used_twice(tmp_path: Path) -> None:
 def test_hash_ignores_explanations_and_sees_layout(tmp_path: Path) -> None:
     original = (PROTOCOL / "messages.toml").read_text()
     file = tmp_path / "messages.toml"
-    file.write_text(original.replace('doc = "Asks the board to say hello."', 'doc = "Asks for a hello."'))
+    file.write_text(original.replace('doc = "Asks for the identity."', 'doc = "Asks who it is."'))
     assert schema.load(file).hash == schema.load().hash
     file.write_text(original.replace('name = "answers_tick", type = "u16"', 'name = "answers_tick", type = "u32"', 1))
     assert schema.load(file).hash != schema.load().hash

@@ -3,12 +3,13 @@
 #ifndef GENERATED_MESSAGES_H
 #define GENERATED_MESSAGES_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 1u
-#define SCHEMA_HASH 0xAE513ACDul
-#define MESSAGE_PAYLOAD_MAX 44u /* bytes */
-#define MESSAGE_PAYLOAD_MAX_TO_BOARD 8u /* bytes */
+#define PROTOCOL_VERSION 2u
+#define SCHEMA_HASH 0x79744B46ul
+#define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
+#define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
 /* Whiskers, debounced: a set bit is a pressed whisker. */
 #define WHISKERS_LEFT (1u << 0)
@@ -21,12 +22,14 @@
 /* State and faults of the board. */
 #define STATUS_MOTORS_ENABLED (1u << 0)
 #define STATUS_DEAD_MAN (1u << 1)
-#define STATUS_STOPPED (1u << 2)
+#define STATUS_LATCHED (1u << 2)
 #define STATUS_ENCODER_LEFT_MASKED (1u << 3)
 #define STATUS_ENCODER_RIGHT_MASKED (1u << 4)
 #define STATUS_TICK_OVERRUN (1u << 5)
 #define STATUS_RECEIVE_OVERRUN (1u << 6)
 #define STATUS_WATCHDOG_RESET (1u << 7)
+#define STATUS_SUPPLY_LOW (1u << 8)
+#define STATUS_SAVING (1u << 9)
 
 /* Devices switched on. */
 #define DEVICES_SERVOS (1u << 0)
@@ -50,38 +53,120 @@ enum {
   RESET_CAUSE_WATCHDOG = 4,
 };
 
-/* How a parameter request ended. */
+/* Why the motors are latched off. */
 enum {
-  PARAMETER_STATUS_OK = 0,
-  PARAMETER_STATUS_UNKNOWN_PARAMETER = 1,
-  PARAMETER_STATUS_OUT_OF_RANGE = 2,
+  LATCH_NONE = 0,
+  LATCH_START = 1,
+  LATCH_STOP_COMMAND = 2,
+  LATCH_SESSION_ENDED = 3,
+  LATCH_SUPPLY_LOW = 4,
 };
 
-/* Asks the board to say hello. */
-#define MSG_HELLO_REQUEST_ID 0x01u
-#define MSG_HELLO_REQUEST_LENGTH 1u
+/* How a numbered request ended. */
+enum {
+  ANSWER_STATUS_OK = 0,
+  ANSWER_STATUS_UNKNOWN_PARAMETER = 1,
+  ANSWER_STATUS_OUT_OF_RANGE = 2,
+  ANSWER_STATUS_SUPPLY_LOW = 3,
+  ANSWER_STATUS_STORAGE_FAILED = 4,
+};
+
+/* What happened, and what `value` is. */
+enum {
+  EVENT_KIND_WHISKERS = 0,
+  EVENT_KIND_ARMED = 1,
+  EVENT_KIND_LATCHED = 2,
+  EVENT_KIND_DEAD_MAN = 3,
+};
+
+/* Opens a session with the seed (board_nonce XOR host_nonce), or confirms the one that has it. */
+#define MSG_OPEN_ID 0x01u
+#define MSG_OPEN_LENGTH 9u
 typedef struct __attribute__((packed)) {
   uint8_t protocol_version; /* version that the host speaks */
-} msg_hello_request;
+  uint32_t board_nonce; /* as in the hello that this answers; another one is refused */
+  uint32_t host_nonce; /* drawn by the host for each session */
+} msg_open;
+#define MSG_OPEN_BOARD_NONCE_MIN (0)
+#define MSG_OPEN_BOARD_NONCE_MAX (2097151)
+#define MSG_OPEN_HOST_NONCE_MIN (0)
+#define MSG_OPEN_HOST_NONCE_MAX (2097151)
 
-/* Asks for the identity message. */
+/* Asks for the identity. */
 #define MSG_IDENTIFY_ID 0x02u
 #define MSG_IDENTIFY_LENGTH 0u
 
-/* Motor signals: -1 full backward, 0 stop, +1 full forward. */
+/* Asks how the board understands one message, to name what differs when the schema hashes do. */
+#define MSG_DESCRIBE_ID 0x03u
+#define MSG_DESCRIBE_LENGTH 1u
+typedef struct __attribute__((packed)) {
+  uint8_t index; /* 0, 1, ... in order of ids */
+} msg_describe;
+
+/* Who speaks, which contract, which session. Sent on its own (see Session) and in answer to open. */
+#define MSG_HELLO_ID 0x80u
+#define MSG_HELLO_LENGTH 42u
+typedef struct __attribute__((packed)) {
+  uint8_t protocol_version;
+  uint32_t schema_hash; /* CRC-32 of the normalised messages.toml */
+  uint32_t board_nonce; /* another one after every reset */
+  uint32_t session; /* seed of the session that is open; 0: none */
+  uint16_t tick_rate; /* Hz */
+  uint8_t telemetry_period; /* ticks; ticks between two telemetry messages, as the baud rate allows */
+  uint32_t boot_counter; /* starts of this board, this one included, that ran for 10 s; 0: not known */
+  uint8_t reset_cause; /* reset_cause */
+  uint8_t parameters_saved; /* 1: the parameters in force at start came from the EEPROM; 0: they are the image's defaults */
+  uint32_t devices; /* devices */
+  char robot[16]; /* name of the robot that the image was built for */
+} msg_hello;
+#define MSG_HELLO_BOARD_NONCE_MIN (0)
+#define MSG_HELLO_BOARD_NONCE_MAX (2097151)
+#define MSG_HELLO_SESSION_MIN (0)
+#define MSG_HELLO_SESSION_MAX (2097151)
+
+/* Which image runs. */
+#define MSG_IDENTITY_ID 0x81u
+#define MSG_IDENTITY_LENGTH 60u
+typedef struct __attribute__((packed)) {
+  char firmware_version[12];
+  char compiler[24];
+  char pin_map[16]; /* name of the pin map that the image was built for */
+  uint32_t image_size; /* B; bytes of flash that the image fills; 0 where there is no flash */
+  uint32_t image_hash; /* CRC-32 of those bytes as read back from flash; 0 where there is no flash */
+} msg_identity;
+
+/* How the board understands one message. An index beyond the last gives id 0. */
+#define MSG_DESCRIPTION_ID 0x82u
+#define MSG_DESCRIPTION_LENGTH 6u
+typedef struct __attribute__((packed)) {
+  uint8_t index;
+  uint8_t count; /* messages that the board knows */
+  uint8_t id;
+  uint8_t length; /* B; of the payload */
+  uint16_t hash; /* low half of the CRC-32 of the normalised message */
+} msg_description;
+
+/* Stops the motors at once and latches them off until armed again. */
+#define MSG_STOP_ID 0x08u
+#define MSG_STOP_LENGTH 1u
+typedef struct __attribute__((packed)) {
+  uint8_t token; /* comes back in stopped */
+} msg_stop;
+
+/* Motor signals: -1 full backward, 0 hold still, +1 full forward. */
 #define MSG_SETPOINT_SIGNAL_ID 0x10u
 #define MSG_SETPOINT_SIGNAL_LENGTH 8u
 typedef struct __attribute__((packed)) {
   int16_t left; /* 0.0001 1 */
   int16_t right; /* 0.0001 1 */
-  uint16_t time_to_live; /* ms; motors stop when no newer set-point came within this time */
+  uint16_t time_to_live; /* ms; from the start of the answered tick; 0: the parameter time_to_live */
   uint16_t answers_tick; /* low 16 bits of the tick whose observation this answers */
 } msg_setpoint_signal;
 #define MSG_SETPOINT_SIGNAL_LEFT_MIN (-10000)
 #define MSG_SETPOINT_SIGNAL_LEFT_MAX (10000)
 #define MSG_SETPOINT_SIGNAL_RIGHT_MIN (-10000)
 #define MSG_SETPOINT_SIGNAL_RIGHT_MAX (10000)
-#define MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MIN (1)
+#define MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MIN (0)
 #define MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MAX (2000)
 
 /* Wheel speeds along the ground, forward positive; the board turns them into pulses by its stored curve. */
@@ -90,69 +175,88 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   int16_t left; /* 0.0001 m/s */
   int16_t right; /* 0.0001 m/s */
-  uint16_t time_to_live; /* ms */
+  uint16_t time_to_live; /* ms; from the start of the answered tick; 0: the parameter time_to_live */
   uint16_t answers_tick; /* low 16 bits of the tick whose observation this answers */
 } msg_setpoint_speed;
 #define MSG_SETPOINT_SPEED_LEFT_MIN (-5000)
 #define MSG_SETPOINT_SPEED_LEFT_MAX (5000)
 #define MSG_SETPOINT_SPEED_RIGHT_MIN (-5000)
 #define MSG_SETPOINT_SPEED_RIGHT_MAX (5000)
-#define MSG_SETPOINT_SPEED_TIME_TO_LIVE_MIN (1)
+#define MSG_SETPOINT_SPEED_TIME_TO_LIVE_MIN (0)
 #define MSG_SETPOINT_SPEED_TIME_TO_LIVE_MAX (2000)
 
-/* Stops the motors at once, until the next set-point. */
-#define MSG_STOP_ID 0x12u
-#define MSG_STOP_LENGTH 0u
+/* No pulses: the servos free-wheel. Nothing is latched. */
+#define MSG_SETPOINT_COAST_ID 0x12u
+#define MSG_SETPOINT_COAST_LENGTH 4u
+typedef struct __attribute__((packed)) {
+  uint16_t time_to_live; /* ms; from the start of the answered tick; 0: the parameter time_to_live */
+  uint16_t answers_tick; /* low 16 bits of the tick whose observation this answers */
+} msg_setpoint_coast;
+#define MSG_SETPOINT_COAST_TIME_TO_LIVE_MIN (0)
+#define MSG_SETPOINT_COAST_TIME_TO_LIVE_MAX (2000)
 
 /* Asks for one parameter. */
 #define MSG_GET_PARAMETER_ID 0x20u
-#define MSG_GET_PARAMETER_LENGTH 1u
+#define MSG_GET_PARAMETER_LENGTH 2u
 typedef struct __attribute__((packed)) {
+  uint8_t number; /* of the request: 1 for the first of a session, then one more each */
   uint8_t parameter; /* number of the parameter */
 } msg_get_parameter;
 
 /* Sets one parameter until the next reset. */
 #define MSG_SET_PARAMETER_ID 0x21u
-#define MSG_SET_PARAMETER_LENGTH 5u
+#define MSG_SET_PARAMETER_LENGTH 6u
 typedef struct __attribute__((packed)) {
+  uint8_t number; /* of the request */
   uint8_t parameter; /* number of the parameter */
   int32_t value; /* in counts of the parameter's scale */
 } msg_set_parameter;
 
-/* Sent after every reset and on request: who speaks, and which contract. */
-#define MSG_HELLO_ID 0x80u
-#define MSG_HELLO_LENGTH 28u
+/* Writes all parameters to the EEPROM; answered when they are written and read back. */
+#define MSG_SAVE_PARAMETERS_ID 0x22u
+#define MSG_SAVE_PARAMETERS_LENGTH 1u
 typedef struct __attribute__((packed)) {
-  uint8_t protocol_version;
-  uint32_t schema_hash; /* CRC-32 of the normalised messages.toml */
-  uint16_t tick_rate; /* Hz */
-  uint32_t devices; /* devices */
-  uint8_t reset_cause; /* reset_cause */
-  char pin_map[16]; /* name of the pin map that the image was built for */
-} msg_hello;
+  uint8_t number; /* of the request */
+} msg_save_parameters;
 
-/* Which image runs. */
-#define MSG_IDENTITY_ID 0x81u
-#define MSG_IDENTITY_LENGTH 44u
+/* All parameters to the image's defaults; what is saved stays until save_parameters. */
+#define MSG_RESET_PARAMETERS_ID 0x23u
+#define MSG_RESET_PARAMETERS_LENGTH 1u
 typedef struct __attribute__((packed)) {
-  char firmware_version[12];
-  char compiler[24];
-  uint32_t image_size; /* B; bytes of flash that the image fills; 0 where there is no flash */
-  uint32_t image_hash; /* CRC-32 of those bytes as read back from flash; 0 where there is no flash */
-} msg_identity;
+  uint8_t number; /* of the request */
+} msg_reset_parameters;
 
-/* Answer to get_parameter and set_parameter: the value now in force. */
-#define MSG_PARAMETER_ID 0x82u
-#define MSG_PARAMETER_LENGTH 6u
+/* Ends the latch: from now on fresh set-points move the motors. Refused while the supply is low. */
+#define MSG_ARM_ID 0x24u
+#define MSG_ARM_LENGTH 1u
 typedef struct __attribute__((packed)) {
-  uint8_t parameter; /* number of the parameter */
-  int32_t value; /* in counts of the parameter's scale */
-  uint8_t status; /* parameter_status */
-} msg_parameter;
+  uint8_t number; /* of the request */
+} msg_arm;
 
-/* Everything the board knows, once per control tick. */
+/* All events up to this number have arrived. */
+#define MSG_ACKNOWLEDGE_ID 0x28u
+#define MSG_ACKNOWLEDGE_LENGTH 1u
+typedef struct __attribute__((packed)) {
+  uint8_t number; /* of the event */
+} msg_acknowledge;
+
+/* Asks for the board's time, at once. Also keeps the session open. */
+#define MSG_CLOCK_PROBE_ID 0x30u
+#define MSG_CLOCK_PROBE_LENGTH 2u
+typedef struct __attribute__((packed)) {
+  uint16_t token; /* comes back in clock_answer */
+} msg_clock_probe;
+
+/* Answer to stop: the motors are latched off. */
+#define MSG_STOPPED_ID 0x88u
+#define MSG_STOPPED_LENGTH 1u
+typedef struct __attribute__((packed)) {
+  uint8_t token; /* of the stop */
+} msg_stopped;
+
+/* Everything the board knows, once per control tick or less often where the line is slow. */
 #define MSG_TELEMETRY_ID 0x90u
-#define MSG_TELEMETRY_LENGTH 35u
+#define MSG_TELEMETRY_LENGTH 37u
 typedef struct __attribute__((packed)) {
   uint32_t tick; /* control ticks since reset */
   uint32_t time; /* us; board time at the start of this tick since reset; rolls over after 71.6 min */
@@ -167,40 +271,158 @@ typedef struct __attribute__((packed)) {
   uint8_t ping_age; /* ticks; ticks since that echo ended or was given up; 255: never or older */
   uint16_t pulse_left; /* 0.0625 us; servo pulse in force; 0: no pulses */
   uint16_t pulse_right; /* 0.0625 us */
+  uint16_t supply; /* 0.001 V; supply voltage against the bandgap; 0: not yet measured */
   uint16_t status; /* status */
+  uint8_t latch; /* latch */
   uint8_t setpoint_sequence; /* sequence number of the last set-point that was accepted */
-  uint8_t frames_bad; /* frames refused since reset, modulo 256 */
   uint8_t overruns; /* control ticks overrun since reset, modulo 256 */
 } msg_telemetry;
 
-/* Payload bytes of the message, or -1 if there is no such message. */
-static inline int16_t message_length(uint8_t id) {
+/* What the board's end of the link has counted since reset, modulo 65536; sent every 64 ticks or less often. */
+#define MSG_COUNTERS_ID 0x91u
+#define MSG_COUNTERS_LENGTH 20u
+typedef struct __attribute__((packed)) {
+  uint16_t good; /* frames accepted */
+  uint16_t bad; /* frames refused: length, checksum, stuffing or seed */
+  uint16_t resynchronised; /* times that a good frame followed bad ones */
+  uint16_t retransmitted; /* events sent again */
+  uint16_t duplicate; /* requests that came again and were only answered */
+  uint16_t overrun; /* ticks in which received bytes were lost */
+  uint16_t dropped; /* messages not sent for want of room on the line */
+  uint16_t late; /* set-points refused because newer ones had come or their observation was too old */
+  uint16_t refused; /* whole messages refused for what they ask: out of range, out of order, while latched */
+  uint16_t deferred; /* events that had to wait for room in the queue, where changes of the same kind merge */
+} msg_counters;
+
+/* Answer to a numbered request. */
+#define MSG_ANSWER_ID 0xA0u
+#define MSG_ANSWER_LENGTH 6u
+typedef struct __attribute__((packed)) {
+  uint8_t number; /* of the request */
+  uint8_t status; /* answer_status */
+  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale */
+} msg_answer;
+
+/* Something happened. Sent again until acknowledged. */
+#define MSG_EVENT_ID 0xA1u
+#define MSG_EVENT_LENGTH 8u
+typedef struct __attribute__((packed)) {
+  uint8_t number; /* of the event: 1 for the first of a session, then one more each */
+  uint8_t kind; /* event_kind */
+  uint16_t value; /* see event_kind */
+  uint32_t time; /* us; board time since reset */
+} msg_event;
+
+/* Answer to clock_probe. */
+#define MSG_CLOCK_ANSWER_ID 0xB0u
+#define MSG_CLOCK_ANSWER_LENGTH 6u
+typedef struct __attribute__((packed)) {
+  uint16_t token; /* of the probe */
+  uint32_t time; /* us; board time since reset at which the probe was worked on */
+} msg_clock_answer;
+
+/* Payload bytes of a message to the board, or -1 if there is no such message. */
+static inline int16_t message_length_to_board(uint8_t id) {
   switch (id) {
-    case MSG_HELLO_REQUEST_ID:
-      return MSG_HELLO_REQUEST_LENGTH;
+    case MSG_OPEN_ID:
+      return MSG_OPEN_LENGTH;
     case MSG_IDENTIFY_ID:
       return MSG_IDENTIFY_LENGTH;
+    case MSG_DESCRIBE_ID:
+      return MSG_DESCRIBE_LENGTH;
+    case MSG_STOP_ID:
+      return MSG_STOP_LENGTH;
     case MSG_SETPOINT_SIGNAL_ID:
       return MSG_SETPOINT_SIGNAL_LENGTH;
     case MSG_SETPOINT_SPEED_ID:
       return MSG_SETPOINT_SPEED_LENGTH;
-    case MSG_STOP_ID:
-      return MSG_STOP_LENGTH;
+    case MSG_SETPOINT_COAST_ID:
+      return MSG_SETPOINT_COAST_LENGTH;
     case MSG_GET_PARAMETER_ID:
       return MSG_GET_PARAMETER_LENGTH;
     case MSG_SET_PARAMETER_ID:
       return MSG_SET_PARAMETER_LENGTH;
-    case MSG_HELLO_ID:
-      return MSG_HELLO_LENGTH;
-    case MSG_IDENTITY_ID:
-      return MSG_IDENTITY_LENGTH;
-    case MSG_PARAMETER_ID:
-      return MSG_PARAMETER_LENGTH;
-    case MSG_TELEMETRY_ID:
-      return MSG_TELEMETRY_LENGTH;
+    case MSG_SAVE_PARAMETERS_ID:
+      return MSG_SAVE_PARAMETERS_LENGTH;
+    case MSG_RESET_PARAMETERS_ID:
+      return MSG_RESET_PARAMETERS_LENGTH;
+    case MSG_ARM_ID:
+      return MSG_ARM_LENGTH;
+    case MSG_ACKNOWLEDGE_ID:
+      return MSG_ACKNOWLEDGE_LENGTH;
+    case MSG_CLOCK_PROBE_ID:
+      return MSG_CLOCK_PROBE_LENGTH;
     default:
       return -1;
   }
 }
+
+/* Payload bytes of a message to the host, or -1 if there is no such message. */
+static inline int16_t message_length_to_host(uint8_t id) {
+  switch (id) {
+    case MSG_HELLO_ID:
+      return MSG_HELLO_LENGTH;
+    case MSG_IDENTITY_ID:
+      return MSG_IDENTITY_LENGTH;
+    case MSG_DESCRIPTION_ID:
+      return MSG_DESCRIPTION_LENGTH;
+    case MSG_STOPPED_ID:
+      return MSG_STOPPED_LENGTH;
+    case MSG_TELEMETRY_ID:
+      return MSG_TELEMETRY_LENGTH;
+    case MSG_COUNTERS_ID:
+      return MSG_COUNTERS_LENGTH;
+    case MSG_ANSWER_ID:
+      return MSG_ANSWER_LENGTH;
+    case MSG_EVENT_ID:
+      return MSG_EVENT_LENGTH;
+    case MSG_CLOCK_ANSWER_ID:
+      return MSG_CLOCK_ANSWER_LENGTH;
+    default:
+      return -1;
+  }
+}
+
+/* Whether the message belongs to the handshake, whose checksums start from the constant seed. */
+static inline bool message_is_handshake(uint8_t id) {
+  switch (id) {
+    case MSG_OPEN_ID:
+    case MSG_IDENTIFY_ID:
+    case MSG_DESCRIBE_ID:
+    case MSG_HELLO_ID:
+    case MSG_IDENTITY_ID:
+    case MSG_DESCRIPTION_ID:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/* X(id, payload bytes, hash) for each message, in order of ids. */
+#define MESSAGE_COUNT 23u
+#define MESSAGE_LIST(X) \
+  X(0x01, 9, 0xE033)    \
+  X(0x02, 0, 0xA6BC)    \
+  X(0x03, 1, 0x7A4D)    \
+  X(0x08, 1, 0xC8D0)    \
+  X(0x10, 8, 0x757B)    \
+  X(0x11, 8, 0x0B21)    \
+  X(0x12, 4, 0x6AC3)    \
+  X(0x20, 2, 0x4D41)    \
+  X(0x21, 6, 0x7659)    \
+  X(0x22, 1, 0x99A5)    \
+  X(0x23, 1, 0x308B)    \
+  X(0x24, 1, 0xC080)    \
+  X(0x28, 1, 0x7BE0)    \
+  X(0x30, 2, 0x2C2C)    \
+  X(0x80, 42, 0x4FA2)   \
+  X(0x81, 60, 0x9530)   \
+  X(0x82, 6, 0x5DF1)    \
+  X(0x88, 1, 0x9252)    \
+  X(0x90, 37, 0x879F)   \
+  X(0x91, 20, 0x71D0)   \
+  X(0xA0, 6, 0x9FE2)    \
+  X(0xA1, 8, 0xC475)    \
+  X(0xB0, 6, 0x6A0E)
 
 #endif

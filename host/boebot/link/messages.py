@@ -12,8 +12,8 @@ import struct
 from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
-PROTOCOL_VERSION = 1
-SCHEMA_HASH = 0xAE513ACD
+PROTOCOL_VERSION = 2
+SCHEMA_HASH = 0x79744B46
 
 
 class Whiskers(IntFlag):
@@ -35,12 +35,14 @@ class Status(IntFlag):
 
     MOTORS_ENABLED = 1 << 0
     DEAD_MAN = 1 << 1
-    STOPPED = 1 << 2
+    LATCHED = 1 << 2
     ENCODER_LEFT_MASKED = 1 << 3
     ENCODER_RIGHT_MASKED = 1 << 4
     TICK_OVERRUN = 1 << 5
     RECEIVE_OVERRUN = 1 << 6
     WATCHDOG_RESET = 1 << 7
+    SUPPLY_LOW = 1 << 8
+    SAVING = 1 << 9
 
 
 class Devices(IntFlag):
@@ -85,25 +87,50 @@ class ResetCause(IntEnum):
     WATCHDOG = 4
 
 
-class ParameterStatus(IntEnum):
-    """How a parameter request ended."""
+class Latch(IntEnum):
+    """Why the motors are latched off."""
+
+    NONE = 0
+    START = 1
+    STOP_COMMAND = 2
+    SESSION_ENDED = 3
+    SUPPLY_LOW = 4
+
+
+class AnswerStatus(IntEnum):
+    """How a numbered request ended."""
 
     OK = 0
     UNKNOWN_PARAMETER = 1
     OUT_OF_RANGE = 2
+    SUPPLY_LOW = 3
+    STORAGE_FAILED = 4
 
 
-class _HelloRequestFields(NamedTuple):
+class EventKind(IntEnum):
+    """What happened, and what `value` is."""
+
+    WHISKERS = 0
+    ARMED = 1
+    LATCHED = 2
+    DEAD_MAN = 3
+
+
+class _OpenFields(NamedTuple):
     protocol_version: int  # version that the host speaks
+    board_nonce: int  # as in the hello that this answers; another one is refused
+    host_nonce: int  # drawn by the host for each session
 
 
-class HelloRequest(_HelloRequestFields):
-    """Asks the board to say hello."""
+class Open(_OpenFields):
+    """Opens a session with the seed (board_nonce XOR host_nonce), or confirms the one that has it."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x01
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    NAME: ClassVar[str] = "open"
+    DELIVERY: ClassVar[str] = "handshake"
+    LENGTH: ClassVar[int] = 9
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BII")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -120,12 +147,152 @@ class _IdentifyFields(NamedTuple):
 
 
 class Identify(_IdentifyFields):
-    """Asks for the identity message."""
+    """Asks for the identity."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x02
+    NAME: ClassVar[str] = "identify"
+    DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 0
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _DescribeFields(NamedTuple):
+    index: int  # 0, 1, ... in order of ids
+
+
+class Describe(_DescribeFields):
+    """Asks how the board understands one message, to name what differs when the schema hashes do."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x03
+    NAME: ClassVar[str] = "describe"
+    DELIVERY: ClassVar[str] = "handshake"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _HelloFields(NamedTuple):
+    protocol_version: int
+    schema_hash: int  # CRC-32 of the normalised messages.toml
+    board_nonce: int  # another one after every reset
+    session: int  # seed of the session that is open; 0: none
+    tick_rate: int  # Hz
+    telemetry_period: int  # ticks; ticks between two telemetry messages, as the baud rate allows
+    boot_counter: int  # starts of this board, this one included, that ran for 10 s; 0: not known
+    reset_cause: int  # reset_cause
+    parameters_saved: int  # 1: the parameters in force at start came from the EEPROM; 0: they are the image's defaults
+    devices: int  # devices
+    robot: bytes  # name of the robot that the image was built for
+
+
+class Hello(_HelloFields):
+    """Who speaks, which contract, which session. Sent on its own (see Session) and in answer to open."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x80
+    NAME: ClassVar[str] = "hello"
+    DELIVERY: ClassVar[str] = "handshake"
+    LENGTH: ClassVar[int] = 42
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIIIHBIBBI16s")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _IdentityFields(NamedTuple):
+    firmware_version: bytes
+    compiler: bytes
+    pin_map: bytes  # name of the pin map that the image was built for
+    image_size: int  # B; bytes of flash that the image fills; 0 where there is no flash
+    image_hash: int  # CRC-32 of those bytes as read back from flash; 0 where there is no flash
+
+
+class Identity(_IdentityFields):
+    """Which image runs."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x81
+    NAME: ClassVar[str] = "identity"
+    DELIVERY: ClassVar[str] = "handshake"
+    LENGTH: ClassVar[int] = 60
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<12s24s16sII")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _DescriptionFields(NamedTuple):
+    index: int
+    count: int  # messages that the board knows
+    id: int
+    length: int  # B; of the payload
+    hash: int  # low half of the CRC-32 of the normalised message
+
+
+class Description(_DescriptionFields):
+    """How the board understands one message. An index beyond the last gives id 0."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x82
+    NAME: ClassVar[str] = "description"
+    DELIVERY: ClassVar[str] = "handshake"
+    LENGTH: ClassVar[int] = 6
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBBH")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _StopFields(NamedTuple):
+    token: int  # comes back in stopped
+
+
+class Stop(_StopFields):
+    """Stops the motors at once and latches them off until armed again."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x08
+    NAME: ClassVar[str] = "stop"
+    DELIVERY: ClassVar[str] = "stop"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -140,15 +307,17 @@ class Identify(_IdentifyFields):
 class _SetpointSignalFields(NamedTuple):
     left: int  # 0.0001 1
     right: int  # 0.0001 1
-    time_to_live: int  # ms; motors stop when no newer set-point came within this time
+    time_to_live: int  # ms; from the start of the answered tick; 0: the parameter time_to_live
     answers_tick: int  # low 16 bits of the tick whose observation this answers
 
 
 class SetpointSignal(_SetpointSignalFields):
-    """Motor signals: -1 full backward, 0 stop, +1 full forward."""
+    """Motor signals: -1 full backward, 0 hold still, +1 full forward."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x10
+    NAME: ClassVar[str] = "setpoint_signal"
+    DELIVERY: ClassVar[str] = "set_point"
     LENGTH: ClassVar[int] = 8
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<hhHH")
 
@@ -165,7 +334,7 @@ class SetpointSignal(_SetpointSignalFields):
 class _SetpointSpeedFields(NamedTuple):
     left: int  # 0.0001 m/s
     right: int  # 0.0001 m/s
-    time_to_live: int  # ms
+    time_to_live: int  # ms; from the start of the answered tick; 0: the parameter time_to_live
     answers_tick: int  # low 16 bits of the tick whose observation this answers
 
 
@@ -174,6 +343,8 @@ class SetpointSpeed(_SetpointSpeedFields):
 
     __slots__ = ()
     ID: ClassVar[int] = 0x11
+    NAME: ClassVar[str] = "setpoint_speed"
+    DELIVERY: ClassVar[str] = "set_point"
     LENGTH: ClassVar[int] = 8
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<hhHH")
 
@@ -187,17 +358,20 @@ class SetpointSpeed(_SetpointSpeedFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _StopFields(NamedTuple):
-    pass
+class _SetpointCoastFields(NamedTuple):
+    time_to_live: int  # ms; from the start of the answered tick; 0: the parameter time_to_live
+    answers_tick: int  # low 16 bits of the tick whose observation this answers
 
 
-class Stop(_StopFields):
-    """Stops the motors at once, until the next set-point."""
+class SetpointCoast(_SetpointCoastFields):
+    """No pulses: the servos free-wheel. Nothing is latched."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x12
-    LENGTH: ClassVar[int] = 0
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<")
+    NAME: ClassVar[str] = "setpoint_coast"
+    DELIVERY: ClassVar[str] = "set_point"
+    LENGTH: ClassVar[int] = 4
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HH")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -210,6 +384,7 @@ class Stop(_StopFields):
 
 
 class _GetParameterFields(NamedTuple):
+    number: int  # of the request: 1 for the first of a session, then one more each
     parameter: int  # number of the parameter
 
 
@@ -218,6 +393,58 @@ class GetParameter(_GetParameterFields):
 
     __slots__ = ()
     ID: ClassVar[int] = 0x20
+    NAME: ClassVar[str] = "get_parameter"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _SetParameterFields(NamedTuple):
+    number: int  # of the request
+    parameter: int  # number of the parameter
+    value: int  # in counts of the parameter's scale
+
+
+class SetParameter(_SetParameterFields):
+    """Sets one parameter until the next reset."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x21
+    NAME: ClassVar[str] = "set_parameter"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 6
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBi")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _SaveParametersFields(NamedTuple):
+    number: int  # of the request
+
+
+class SaveParameters(_SaveParametersFields):
+    """Writes all parameters to the EEPROM; answered when they are written and read back."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x22
+    NAME: ClassVar[str] = "save_parameters"
+    DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 1
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
@@ -231,18 +458,19 @@ class GetParameter(_GetParameterFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _SetParameterFields(NamedTuple):
-    parameter: int  # number of the parameter
-    value: int  # in counts of the parameter's scale
+class _ResetParametersFields(NamedTuple):
+    number: int  # of the request
 
 
-class SetParameter(_SetParameterFields):
-    """Sets one parameter until the next reset."""
+class ResetParameters(_ResetParametersFields):
+    """All parameters to the image's defaults; what is saved stays until save_parameters."""
 
     __slots__ = ()
-    ID: ClassVar[int] = 0x21
-    LENGTH: ClassVar[int] = 5
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<Bi")
+    ID: ClassVar[int] = 0x23
+    NAME: ClassVar[str] = "reset_parameters"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -254,22 +482,19 @@ class SetParameter(_SetParameterFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _HelloFields(NamedTuple):
-    protocol_version: int
-    schema_hash: int  # CRC-32 of the normalised messages.toml
-    tick_rate: int  # Hz
-    devices: int  # devices
-    reset_cause: int  # reset_cause
-    pin_map: bytes  # name of the pin map that the image was built for
+class _ArmFields(NamedTuple):
+    number: int  # of the request
 
 
-class Hello(_HelloFields):
-    """Sent after every reset and on request: who speaks, and which contract."""
+class Arm(_ArmFields):
+    """Ends the latch: from now on fresh set-points move the motors. Refused while the supply is low."""
 
     __slots__ = ()
-    ID: ClassVar[int] = 0x80
-    LENGTH: ClassVar[int] = 28
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIHIB16s")
+    ID: ClassVar[int] = 0x24
+    NAME: ClassVar[str] = "arm"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -281,20 +506,19 @@ class Hello(_HelloFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _IdentityFields(NamedTuple):
-    firmware_version: bytes
-    compiler: bytes
-    image_size: int  # B; bytes of flash that the image fills; 0 where there is no flash
-    image_hash: int  # CRC-32 of those bytes as read back from flash; 0 where there is no flash
+class _AcknowledgeFields(NamedTuple):
+    number: int  # of the event
 
 
-class Identity(_IdentityFields):
-    """Which image runs."""
+class Acknowledge(_AcknowledgeFields):
+    """All events up to this number have arrived."""
 
     __slots__ = ()
-    ID: ClassVar[int] = 0x81
-    LENGTH: ClassVar[int] = 44
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<12s24sII")
+    ID: ClassVar[int] = 0x28
+    NAME: ClassVar[str] = "acknowledge"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -306,19 +530,43 @@ class Identity(_IdentityFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _ParameterFields(NamedTuple):
-    parameter: int  # number of the parameter
-    value: int  # in counts of the parameter's scale
-    status: int  # parameter_status
+class _ClockProbeFields(NamedTuple):
+    token: int  # comes back in clock_answer
 
 
-class Parameter(_ParameterFields):
-    """Answer to get_parameter and set_parameter: the value now in force."""
+class ClockProbe(_ClockProbeFields):
+    """Asks for the board's time, at once. Also keeps the session open."""
 
     __slots__ = ()
-    ID: ClassVar[int] = 0x82
-    LENGTH: ClassVar[int] = 6
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BiB")
+    ID: ClassVar[int] = 0x30
+    NAME: ClassVar[str] = "clock_probe"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _StoppedFields(NamedTuple):
+    token: int  # of the stop
+
+
+class Stopped(_StoppedFields):
+    """Answer to stop: the motors are latched off."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x88
+    NAME: ClassVar[str] = "stopped"
+    DELIVERY: ClassVar[str] = "stop"
+    LENGTH: ClassVar[int] = 1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -344,19 +592,133 @@ class _TelemetryFields(NamedTuple):
     ping_age: int  # ticks; ticks since that echo ended or was given up; 255: never or older
     pulse_left: int  # 0.0625 us; servo pulse in force; 0: no pulses
     pulse_right: int  # 0.0625 us
+    supply: int  # 0.001 V; supply voltage against the bandgap; 0: not yet measured
     status: int  # status
+    latch: int  # latch
     setpoint_sequence: int  # sequence number of the last set-point that was accepted
-    frames_bad: int  # frames refused since reset, modulo 256
     overruns: int  # control ticks overrun since reset, modulo 256
 
 
 class Telemetry(_TelemetryFields):
-    """Everything the board knows, once per control tick."""
+    """Everything the board knows, once per control tick or less often where the line is slow."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x90
-    LENGTH: ClassVar[int] = 35
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBHHHBBB")
+    NAME: ClassVar[str] = "telemetry"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 37
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBHHHHBBB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _CountersFields(NamedTuple):
+    good: int  # frames accepted
+    bad: int  # frames refused: length, checksum, stuffing or seed
+    resynchronised: int  # times that a good frame followed bad ones
+    retransmitted: int  # events sent again
+    duplicate: int  # requests that came again and were only answered
+    overrun: int  # ticks in which received bytes were lost
+    dropped: int  # messages not sent for want of room on the line
+    late: int  # set-points refused because newer ones had come or their observation was too old
+    refused: int  # whole messages refused for what they ask: out of range, out of order, while latched
+    deferred: int  # events that had to wait for room in the queue, where changes of the same kind merge
+
+
+class Counters(_CountersFields):
+    """What the board's end of the link has counted since reset, modulo 65536; sent every 64 ticks or less often."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x91
+    NAME: ClassVar[str] = "counters"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 20
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HHHHHHHHHH")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _AnswerFields(NamedTuple):
+    number: int  # of the request
+    status: int  # answer_status
+    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale
+
+
+class Answer(_AnswerFields):
+    """Answer to a numbered request."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0xA0
+    NAME: ClassVar[str] = "answer"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 6
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBi")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _EventFields(NamedTuple):
+    number: int  # of the event: 1 for the first of a session, then one more each
+    kind: int  # event_kind
+    value: int  # see event_kind
+    time: int  # us; board time since reset
+
+
+class Event(_EventFields):
+    """Something happened. Sent again until acknowledged."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0xA1
+    NAME: ClassVar[str] = "event"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 8
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBHI")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _ClockAnswerFields(NamedTuple):
+    token: int  # of the probe
+    time: int  # us; board time since reset at which the probe was worked on
+
+
+class ClockAnswer(_ClockAnswerFields):
+    """Answer to clock_probe."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0xB0
+    NAME: ClassVar[str] = "clock_answer"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 6
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HI")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -369,46 +731,82 @@ class Telemetry(_TelemetryFields):
 
 
 Message = (
-    HelloRequest
+    Open
     | Identify
-    | SetpointSignal
-    | SetpointSpeed
-    | Stop
-    | GetParameter
-    | SetParameter
+    | Describe
     | Hello
     | Identity
-    | Parameter
+    | Description
+    | Stop
+    | SetpointSignal
+    | SetpointSpeed
+    | SetpointCoast
+    | GetParameter
+    | SetParameter
+    | SaveParameters
+    | ResetParameters
+    | Arm
+    | Acknowledge
+    | ClockProbe
+    | Stopped
     | Telemetry
+    | Counters
+    | Answer
+    | Event
+    | ClockAnswer
 )
 
 MESSAGES: dict[int, type[Message]] = {
-    0x01: HelloRequest,
+    0x01: Open,
     0x02: Identify,
-    0x10: SetpointSignal,
-    0x11: SetpointSpeed,
-    0x12: Stop,
-    0x20: GetParameter,
-    0x21: SetParameter,
+    0x03: Describe,
     0x80: Hello,
     0x81: Identity,
-    0x82: Parameter,
+    0x82: Description,
+    0x08: Stop,
+    0x10: SetpointSignal,
+    0x11: SetpointSpeed,
+    0x12: SetpointCoast,
+    0x20: GetParameter,
+    0x21: SetParameter,
+    0x22: SaveParameters,
+    0x23: ResetParameters,
+    0x24: Arm,
+    0x28: Acknowledge,
+    0x30: ClockProbe,
+    0x88: Stopped,
     0x90: Telemetry,
+    0x91: Counters,
+    0xA0: Answer,
+    0xA1: Event,
+    0xB0: ClockAnswer,
 }
 
-# id -> payload bytes
-LENGTHS: dict[int, int] = {
-    0x01: 1,
-    0x02: 0,
-    0x10: 8,
-    0x11: 8,
-    0x12: 0,
-    0x20: 1,
-    0x21: 5,
-    0x80: 28,
-    0x81: 44,
-    0x82: 6,
-    0x90: 35,
+# id -> 16 bits of a hash of the message's layout
+HASHES: dict[int, int] = {
+    0x01: 0xE033,
+    0x02: 0xA6BC,
+    0x03: 0x7A4D,
+    0x80: 0x4FA2,
+    0x81: 0x9530,
+    0x82: 0x5DF1,
+    0x08: 0xC8D0,
+    0x10: 0x757B,
+    0x11: 0x0B21,
+    0x12: 0x6AC3,
+    0x20: 0x4D41,
+    0x21: 0x7659,
+    0x22: 0x99A5,
+    0x23: 0x308B,
+    0x24: 0xC080,
+    0x28: 0x7BE0,
+    0x30: 0x2C2C,
+    0x88: 0x9252,
+    0x90: 0x879F,
+    0x91: 0x71D0,
+    0xA0: 0x9FE2,
+    0xA1: 0xC475,
+    0xB0: 0x6A0E,
 }
 
 
@@ -426,7 +824,7 @@ class ParameterSpec(NamedTuple):
 
 PARAMETERS: dict[str, ParameterSpec] = {
     "devices": ParameterSpec(0, "flags", 1.0, 0, 2047, "devices switched on, bits as in the devices flags"),
-    "time_to_live_default": ParameterSpec(1, "ms", 1.0, 20, 2000, "time to live of a set-point that names none; also the longest silence at start"),
+    "time_to_live": ParameterSpec(1, "ms", 1.0, 20, 2000, "time to live of a set-point that names none"),
     "servo_left_centre": ParameterSpec(2, "us", 0.0625, 22400, 25600, "pulse at which the left servo stands still", "servo_left.centre_us"),
     "servo_right_centre": ParameterSpec(3, "us", 0.0625, 22400, 25600, "pulse at which the right servo stands still", "servo_right.centre_us"),
     "servo_left_gain": ParameterSpec(4, "us", 0.0625, -3200, 3200, "pulse offset at full forward signal, left; negative for a mirrored servo", "servo_left.gain_us"),
@@ -435,4 +833,13 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "infrared_period": ParameterSpec(7, "ticks", 1.0, 2, 250, "ticks between two IR readings", "infrared.period_ticks"),
     "ping_period": ParameterSpec(8, "ticks", 1.0, 4, 250, "ticks between two Ping triggers", "ping.period_ticks"),
     "encoder_limit": ParameterSpec(9, "edges per tick", 1.0, 4, 200, "edges of one encoder line in one tick above which the line is masked until the tick ends"),
+    "encoder_counts": ParameterSpec(10, "edges", 1.0, 1, 4096, "edges of one encoder line in a turn of its wheel", "encoder_left.edges_per_turn"),
+    "wheel_radius": ParameterSpec(11, "m", 1e-05, 500, 20000, "radius of the wheels; the board only keeps it", "body.wheel_radius_m"),
+    "track_width": ParameterSpec(12, "m", 1e-05, 2000, 60000, "distance between the wheels; the board only keeps it", "body.track_width_m"),
+    "telemetry_period": ParameterSpec(13, "ticks", 1.0, 1, 100, "ticks between two telemetry messages, where the baud rate allows it"),
+    "session_time_out": ParameterSpec(14, "ms", 1.0, 200, 10000, "silence of the host after which the session ends and the motors are latched off"),
+    "retry_time": ParameterSpec(15, "ms", 1.0, 0, 2000, "time after which an unacknowledged event is sent again; 0: follows from tick and baud rate"),
+    "supply_minimum": ParameterSpec(16, "V", 0.001, 0, 5500, "supply below which motors and EEPROM writes are refused; 0: never"),
+    "bandgap": ParameterSpec(17, "V", 0.001, 1000, 1200, "this chip's bandgap voltage, against which the supply is measured"),
+    "baud_rate": ParameterSpec(18, "bit/s", 100.0, 96, 10000, "rate of the serial line after the next reset: 9600, 19200, 38400, 57600, 115200, 250000, 500000 or 1000000", "uart.baud"),
 }
