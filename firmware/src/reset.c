@@ -1,0 +1,68 @@
+/* reset.c: see reset.h. */
+#include "reset.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "storage.h"
+
+#define MAGIC 0x626Fu
+#define NONCE_MASK 0x1FFFFFul
+#define WATCHDOG_MARK 0xB17Eu
+#define BOOT_STEP 0x0E3779ul /* how far apart the nonces' counts of two boot counters lie */
+
+/* In memory that a reset leaves alone; `check` tells it from what RAM holds when the power comes. */
+typedef struct {
+  uint16_t magic;
+  uint16_t mark;  /* WATCHDOG_MARK: the watchdog is about to reset the chip */
+  uint32_t count; /* one more each start; begins anywhere */
+  uint32_t check;
+} reset_record;
+
+_Static_assert(sizeof(reset_record) <= HAL_NOINIT_SIZE, "the record fits");
+
+static uint8_t cause;
+
+static reset_record *record(void) { return (reset_record *)hal_noinit(); }
+
+static uint32_t check_of(const reset_record *of) { return of->count ^ ((uint32_t)MAGIC << 16 | MAGIC) ^ 0x5A0FF05Aul; }
+
+static bool is_whole(const reset_record *of) { return of->magic == MAGIC && of->check == check_of(of); }
+
+void reset_start(void) {
+  reset_record *own = record();
+  const bool whole = is_whole(own);
+  cause = hal_reset_cause();
+  if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
+    cause = RESET_CAUSE_WATCHDOG;
+  }
+  own->count = whole ? own->count + 1u : hal_memory_noise();
+  own->magic = MAGIC;
+  own->mark = 0;
+  own->check = check_of(own);
+}
+
+HAL_INTERRUPT_WATCHDOG {
+  record()->mark = WATCHDOG_MARK;
+  hal_watchdog_reset();
+}
+
+uint8_t reset_cause(void) { return cause; }
+
+/* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
+ * undone. Close numbers come out far apart. */
+static uint32_t mixed(uint32_t x) {
+  x = (x ^ x >> 11) * 0x0B352Dul & NONCE_MASK;
+  x = (x ^ x >> 9) * 0x16A6B5ul & NONCE_MASK;
+  return x ^ x >> 11;
+}
+
+uint32_t reset_nonce(void) {
+  uint32_t count = (record()->count + storage_boot_counter() * BOOT_STEP) & NONCE_MASK;
+  if (count == 0) {
+    count = NONCE_MASK / 2u; /* far from the counts of the starts before and after */
+  }
+  return mixed(count);
+}
