@@ -65,6 +65,7 @@ typedef enum {
   DUE_TIMER1,
   DUE_TIMER2,
   DUE_TRANSMITTER,
+  DUE_OUTSIDE, /* has read a byte */
   DUE_RECEIVER,
   DUE_CONVERTER,
   DUE_WATCHDOG,
@@ -186,9 +187,16 @@ typedef struct {
 
 typedef struct {
   uint64_t start;    /* of the start bit, in cycles << 16 */
-  uint32_t bit_time; /* in cycles << 16 */
+  uint64_t bit_time; /* in cycles << 16 */
+  uint8_t bits;      /* with start and stop bits */
   uint8_t byte;
 } line_frame;
+
+/* What stands on one direction of the line, in the order of time. */
+typedef struct {
+  line_frame *frames;
+  size_t first, end, capacity;
+} line_queue;
 
 typedef struct {
   uint8_t byte;
@@ -210,9 +218,7 @@ typedef struct {
   /* transmitter */
   bool sending;
   bool holding; /* a byte waits in UDR0 */
-  uint8_t shifting_byte, holding_byte;
-  uint8_t shifting_bits;
-  uint32_t shifting_bit_time;
+  uint8_t holding_byte;
   /* receiver */
   enum { RECEIVER_OFF, RECEIVER_SEARCHING, RECEIVER_SAMPLING } receiver;
   uint64_t from;         /* searching: since when; sampling: start of the frame; cycles << 16 */
@@ -224,9 +230,11 @@ typedef struct {
   /* the outside */
   uint32_t line_bit_time; /* in cycles << 16 */
   uint64_t line_free;     /* when the line's last byte ends, cycles << 16 */
-  line_frame *line;       /* bytes on their way to the board */
-  size_t line_first, line_end, line_capacity;
-  sent_byte *out; /* bytes that left the board */
+  line_queue to_board;
+  line_queue from_board;
+  uint64_t outside_from;  /* since when the outside looks for a start bit, cycles << 16 */
+  uint64_t outside_start; /* of the byte that it reads, or NEVER */
+  sent_byte *out;         /* bytes that the outside has read */
   size_t out_first, out_end, out_capacity;
 } usart_state;
 
@@ -346,6 +354,7 @@ void usart_reset(avr_board *b);
 void usart_free(avr_board *b);
 void usart_due_transmitter(avr_board *b, uint64_t cycle);
 void usart_due_receiver(avr_board *b, uint64_t cycle);
+void usart_due_outside(avr_board *b, uint64_t cycle);
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count);
 size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 void usart_line_rate(avr_board *b, uint32_t baud);
