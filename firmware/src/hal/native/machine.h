@@ -111,8 +111,12 @@ static inline int native_rates_differ(uint32_t one, uint32_t other) {
   return difference > other / 25u;
 }
 
-/* What either side reads instead of a byte when the rates differ: never the byte itself, and never the end of a frame. */
-static inline uint8_t native_garbled(uint8_t byte) { return byte != 0xA5u ? byte ^ 0xA5u : 0xFEu; }
+/* What either side reads instead of a byte when the rates differ: never the byte itself, also not when it goes back and
+ * forth, and never the end of a frame. */
+static inline uint8_t native_garbled(uint8_t byte) {
+  const uint8_t garbled = (uint8_t)(5u * byte + 45u);
+  return garbled != 0u ? garbled : 0xFEu;
+}
 
 /* Finds the earliest queued input edge; pins at the same cycle go in order of their numbers. */
 static inline void native_find_next_edge(native_machine *machine) {
