@@ -55,7 +55,8 @@ typedef struct {
     uint8_t kind, number;
   } listener[BOARD_PIN_COUNT];
   uint8_t driven[BOARD_PIN_COUNT];
-  double supply; /* share of the nominal voltage */
+  double supply;      /* share of the nominal voltage, of the rail that board and servos run on */
+  double held_supply; /* that share if a test holds it, or 0 */
   buffer received;
   uint64_t last_byte; /* cycle of the end of the last byte received */
   buffer truth;
@@ -179,6 +180,7 @@ static void on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
 static double on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   (void)cycle;
+  if (channel == BOARD_ANALOG_SUPPLY) return self->supply * BATTERY_NOMINAL_V;
   if (self->has_battery && self->battery.channel == channel) return battery_sample(&self->battery);
   return 0.0;
 }
@@ -357,6 +359,11 @@ static void step_waves(robot *r, uint64_t until) {
   }
 }
 
+static double supply_of(const robot *r) {
+  if (r->held_supply > 0.0) return r->held_supply;
+  return r->has_battery ? r->battery.regulated_v / BATTERY_NOMINAL_V : 1.0;
+}
+
 /* World and parts of one robot, from self->world to self->world + step_cycles. */
 static void step_robot(sim *self, robot *r) {
   const uint64_t begin = self->world;
@@ -374,10 +381,8 @@ static void step_robot(sim *self, robot *r) {
     current += p->servo_a_per_n_m * fabs(torque[side]);
   }
   body_advance(b, self->arena, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
-  if (r->has_battery) {
-    battery_step(&r->battery, current, self->dt);
-    r->supply = r->battery.regulated_v / BATTERY_NOMINAL_V;
-  }
+  if (r->has_battery) battery_step(&r->battery, current, self->dt);
+  r->supply = supply_of(r);
   if (r->has_encoder[SIM_LEFT]) encoder_step(&r->encoder[SIM_LEFT], b->state.wheel_left, begin, self->step_cycles);
   if (r->has_encoder[SIM_RIGHT]) encoder_step(&r->encoder[SIM_RIGHT], b->state.wheel_right, begin, self->step_cycles);
   for (int i = 0; i < r->whiskers; i++) whisker_step(&r->whisker[i], end);
@@ -600,6 +605,14 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
   robot *r = find(self, number);
   if (r == NULL || r->pings == 0) return SIM_BAD_ARGUMENT;
   for (int i = 0; i < r->pings; i++) r->ping[i].answer = echo_cycles;
+  return SIM_OK;
+}
+
+int sim_set_supply(sim *self, int number, double volts) {
+  robot *r = find(self, number);
+  if (r == NULL || !(volts >= 0.0)) return SIM_BAD_ARGUMENT;
+  r->held_supply = volts / BATTERY_NOMINAL_V;
+  r->supply = supply_of(r);
   return SIM_OK;
 }
 

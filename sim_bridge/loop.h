@@ -96,12 +96,14 @@ uint64_t sim_edges_seen(const sim *self, int robot);
 
 /* For tests: a robot put elsewhere, at rest (0, or SIM_BAD_ARGUMENT if the place is not free); a pin taken from its part
  * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
- * every echo pulse in cycles, -1: as the world says, -2: no pulse at all. */
+ * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; voltage of the rail that board and servos run
+ * on, 0: what the regulator gives. */
 int sim_place(sim *self, int robot, double x, double y, double heading);
 int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
 int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
 int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
+int sim_set_supply(sim *self, int robot, double volts);
 
 /* Voltages of pack and regulator. */
 double sim_pack_voltage(const sim *self, int robot);

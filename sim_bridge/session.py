@@ -20,6 +20,8 @@ from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, imag
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Floats, Sim
 
+DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
+
 
 def _cycles(seconds: float) -> int:
     """As many cycles, but at least one of any time at all: a wait that lets no time pass would be repeated for ever."""
@@ -98,6 +100,7 @@ class SimSession:
     def __init__(self, sim: Sim, kind: str, paced: bool = False) -> None:
         self.sim = sim
         self.arena = sim.arena
+        self.baud = _baud(sim.robot)
         self.description = f"{sim.board.description} in arena {sim.arena.name}"
         self.transport = SimTransport(sim, kind, paced)
         self.board = BoardPins(sim)
@@ -158,6 +161,12 @@ def open_avr(request: BoardRequest) -> SimSession:
     return _open(request, "avr", lambda: avr_board(image))
 
 
+def _baud(robot: robots.RobotDescription) -> int:
+    """Of the robot's serial line."""
+    uart = robot.device.get("uart")
+    return uart.baud if isinstance(uart, robots.Uart) else DEFAULT_BAUD
+
+
 def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -> SimSession:
     arena = load_arena(request.arena)
     board = make()
@@ -175,7 +184,6 @@ def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -
     except Exception:
         board.close()
         raise
-    uart = request.robot.device.get("uart")
-    if isinstance(uart, robots.Uart):
-        lib.board_line_rate(board.address, uart.baud)
-    return SimSession(sim, kind, request.realtime)
+    session = SimSession(sim, kind, request.realtime)
+    session.board.line_rate(session.baud)
+    return session
