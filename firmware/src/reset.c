@@ -17,7 +17,7 @@
 typedef struct {
   uint16_t magic;
   uint16_t mark;  /* WATCHDOG_MARK: the watchdog is about to reset the chip */
-  uint32_t count; /* one more each start; begins anywhere */
+  uint32_t count; /* one more for each nonce; begins anywhere */
   uint32_t check;
 } reset_record;
 
@@ -31,6 +31,11 @@ static uint32_t check_of(const reset_record *of) { return of->count ^ ((uint32_t
 
 static bool is_whole(const reset_record *of) { return of->magic == MAGIC && of->check == check_of(of); }
 
+static void set_count(uint32_t count) {
+  record()->count = count;
+  record()->check = check_of(record());
+}
+
 void reset_start(void) {
   reset_record *own = record();
   const bool whole = is_whole(own);
@@ -38,10 +43,9 @@ void reset_start(void) {
   if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
     cause = RESET_CAUSE_WATCHDOG;
   }
-  own->count = whole ? own->count + 1u : hal_memory_noise();
   own->magic = MAGIC;
   own->mark = 0;
-  own->check = check_of(own);
+  set_count(whole ? own->count : hal_memory_noise());
 }
 
 HAL_INTERRUPT_WATCHDOG {
@@ -60,6 +64,7 @@ static uint32_t mixed(uint32_t x) {
 }
 
 uint32_t reset_nonce(void) {
+  set_count(record()->count + 1u);
   uint32_t count = (record()->count + storage_boot_counter() * BOOT_STEP) & NONCE_MASK;
   if (count == 0) {
     count = NONCE_MASK / 2u; /* far from the counts of the starts before and after */

@@ -17,7 +17,7 @@ void reset_start(void);
 /* RESET_CAUSE_... of generated/messages.h. */
 uint8_t reset_cause(void);
 
-/* 21 bits, not 0, another one after every reset; after storage_start(). */
+/* Draws a nonce: 21 bits, not 0, another one at each call, also after a reset. After storage_start(). */
 uint32_t reset_nonce(void);
 
 #ifdef __cplusplus

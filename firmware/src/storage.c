@@ -85,6 +85,7 @@ static uint16_t crc_of_record(uint8_t size) { return crc16(&record.bytes[1], (ui
 
 /* Reads a record; whether it is whole. */
 static bool read_record(uint16_t address, uint8_t size) {
+  hal_eeprom_wait(); /* for a write from before the reset */
   for (uint8_t i = 0; i < size; i++) {
     record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
   }
@@ -137,16 +138,20 @@ static void begin_record(uint16_t address, uint8_t size) {
 
 static uint16_t copy_address(uint8_t copy) { return (uint16_t)(copy * COPY_ROOM); }
 
-/* Tells tables of parameters apart: numbers, ranges, and of the names the length and three letters. A constant. */
-static uint16_t table_hash(void) {
-#define MIX(h, x) (((h) ^ (uint32_t)(x)) * 0x01000193ul)
-#define ENTRY(name, type, minimum, maximum, initial)                                                               \
-  ^MIX(MIX(MIX(MIX(MIX(MIX(0x811C9DC5ul, PARAMETER_##name), sizeof #name), (minimum)), (maximum)),                 \
-               (#name)[0] | (uint32_t)(#name)[sizeof #name / 2u] << 8 | (uint32_t)(#name)[sizeof #name - 2u] << 16), \
-           sizeof #type)
+#define INLINE static inline __attribute__((always_inline))
+INLINE uint32_t mixed(uint32_t hash, uint32_t x) { return (hash ^ x) * 0x01000193ul; }
+INLINE uint32_t entry_hash(uint8_t number, int32_t minimum, int32_t maximum, const char *name, uint8_t length) {
+  const uint32_t letters =
+      (uint8_t)name[0] | (uint32_t)(uint8_t)name[length / 2u] << 8 | (uint32_t)(uint8_t)name[length - 1u] << 16;
+  return mixed(mixed(mixed(mixed(0x811C9DC5ul + number, (uint32_t)minimum), (uint32_t)maximum), length), letters);
+}
+
+/* Tells tables of parameters apart: by numbers and ranges, of the names by the length and three letters. A constant. */
+INLINE uint16_t table_hash(void) {
+#define ENTRY(name, type, minimum, maximum, initial) \
+  ^entry_hash(PARAMETER_##name, (minimum), (maximum), #name, sizeof #name - 1u)
   const uint32_t hash = PARAMETER_COUNT PARAMETER_LIST(ENTRY);
 #undef ENTRY
-#undef MIX
   return (uint16_t)(hash >> 16 ^ hash);
 }
 

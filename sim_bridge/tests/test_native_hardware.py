@@ -191,7 +191,7 @@ TALKER = """
 static uint16_t count;
 static void start(void) {
   const uint32_t rate = hal_eeprom_read(0) | (uint32_t)hal_eeprom_read(1) << 8;
-  if (rate != 0xFFFF) hal_serial_baud(rate * 100u);
+  if (rate != 0xFFFF) hal_start_serial(rate * 100u);
 }
 static void slot(void) {
   uint8_t byte;

@@ -183,9 +183,10 @@ void hal_capture_stop(void) { capture = CAPTURE_OFF; }
 
 /* ---- serial line ---- */
 
-void hal_start_serial(void) { sender_free = machine->now; }
-
-void hal_serial_baud(uint32_t baud) { machine->baud = baud; }
+void hal_start_serial(uint32_t baud) {
+  sender_free = machine->now;
+  machine->baud = baud;
+}
 
 bool hal_serial_receive(uint8_t *byte) {
   if (receive_count == 0) {
@@ -251,14 +252,24 @@ static void byte_arrived(void) {
 /* Entry, a handler of a few instructions, return, and the one instruction of the main loop in between. */
 #define READY_AGAIN_CYCLES 32u
 
-/* Until a part of the firmware has something to write. */
-__attribute__((weak)) HAL_INTERRUPT_EEPROM {}
-
 static void plan_eeprom(uint64_t ready) {
   next_eeprom = machine->eeprom_writing ? machine->eeprom_done : eeprom_interrupt ? ready : NATIVE_NEVER;
 }
 
 bool hal_eeprom_busy(void) { return machine->eeprom_writing != 0; }
+
+static void end_eeprom_write(void) {
+  machine->eeprom[machine->eeprom_address] = machine->eeprom_value;
+  machine->eeprom_writing = 0;
+}
+
+void hal_eeprom_wait(void) {
+  if (hal_eeprom_busy()) {
+    machine->now = machine->now > machine->eeprom_done ? machine->now : machine->eeprom_done;
+    end_eeprom_write();
+    plan_eeprom(machine->now);
+  }
+}
 
 uint8_t hal_eeprom_read(uint16_t address) { return machine->eeprom[address % NATIVE_EEPROM_SIZE]; }
 
@@ -281,8 +292,7 @@ void hal_eeprom_interrupt(bool on) {
 /* The end of a write, at which the interrupt is due too, or the interrupt. */
 static void eeprom_event(void) {
   if (machine->eeprom_writing) {
-    machine->eeprom[machine->eeprom_address] = machine->eeprom_value;
-    machine->eeprom_writing = 0;
+    end_eeprom_write();
     plan_eeprom(machine->now);
     return;
   }
@@ -291,7 +301,18 @@ static void eeprom_event(void) {
   plan_eeprom(machine->now + READY_AGAIN_CYCLES);
 }
 
+/* ---- memory that a reset leaves alone ---- */
+
 void *hal_noinit(void) { return machine->noinit; }
+
+/* FNV-1a of it: the rest of the memory is this process's. */
+uint32_t hal_memory_noise(void) {
+  uint32_t hash = 0x811C9DC5u;
+  for (size_t i = 0; i < sizeof machine->noinit; i++) {
+    hash = (hash ^ machine->noinit[i]) * 0x01000193u;
+  }
+  return hash;
+}
 
 /* ---- supply ---- */
 
@@ -320,6 +341,7 @@ uint8_t hal_reset_cause(void) { return reset_cause; }
 
 void hal_start_watchdog(void) {}
 void hal_kick_watchdog(void) {}
+void hal_watchdog_reset(void) {}
 
 uint32_t hal_image_size(void) { return 0; }
 

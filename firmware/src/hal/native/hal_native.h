@@ -17,6 +17,10 @@ HAL_INTERRUPT_SLOT;
 HAL_INTERRUPT_EDGE;
 HAL_INTERRUPT_CAPTURE;
 
+/* There is no watchdog here; a test may run its interrupt. */
+#define HAL_INTERRUPT_WATCHDOG void hal_native_watchdog(void)
+HAL_INTERRUPT_WATCHDOG;
+
 /* Runs again and again while the EEPROM is ready and its interrupt is on, as on the chip. */
 #define HAL_INTERRUPT_EEPROM void hal_native_eeprom(void)
 HAL_INTERRUPT_EEPROM;
@@ -68,24 +72,6 @@ void hal_serial_seen(void);
 void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
 bool hal_serial_room(uint8_t count);
-
-/* Bit rate of the line from the next byte on; 500,000 after a start. */
-void hal_serial_baud(uint32_t baud);
-
-#define HAL_EEPROM_SIZE 1024u
-bool hal_eeprom_busy(void);                                   /* a write is under way */
-uint8_t hal_eeprom_read(uint16_t address);                    /* not while it is busy */
-void hal_eeprom_write_start(uint16_t address, uint8_t value); /* returns at once; without effect while it is busy */
-void hal_eeprom_interrupt(bool on);                           /* whether HAL_INTERRUPT_EEPROM runs when it is ready */
-
-/* Memory, HAL_NOINIT_SIZE bytes, that a reset leaves alone and power-on fills with anything. */
-#define HAL_NOINIT_SIZE 32u
-void *hal_noinit(void);
-
-/* Starts a measurement of the supply, which takes 104 us; without effect while one is under way. */
-void hal_supply_sample(void);
-/* The last complete one: 1.1 V * 1024 / supply, rounded down; 0 if there is none. */
-uint16_t hal_supply_result(void);
 
 #define HAL_TABLE static const
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
