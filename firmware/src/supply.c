@@ -27,9 +27,10 @@ static uint16_t millivolts(uint16_t bandgap, uint16_t result) {
   return (uint16_t)(quotient * 32u + (uint16_t)(rest * 32u) / result);
 }
 
+/* A minimum of 0 is never undercut. */
 static void judge(uint16_t minimum) {
   const bool below = voltage < minimum;
-  if (minimum == 0 || voltage > minimum + HYSTERESIS) {
+  if (voltage > minimum + HYSTERESIS) {
     low = false;
   } else if (below && was_below) {
     low = true;

@@ -27,8 +27,8 @@ HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
 #define LIMIT_MAX_u16 UINT16_MAX
 #define LIMIT_MIN_i16 INT16_MIN
 #define LIMIT_MAX_i16 INT16_MAX
-#define WITHIN(name, type, minimum, maximum, initial)                                        \
-  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);     \
+#define WITHIN(name, type, minimum, maximum, initial)                                    \
+  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name); \
   _Static_assert((minimum) >= LIMIT_MIN_##type && (maximum) <= LIMIT_MAX_##type, "type of " #name);
 PARAMETER_LIST(WITHIN)
 #undef WITHIN

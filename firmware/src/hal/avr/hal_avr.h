@@ -26,7 +26,7 @@
 #define HAL_INTERRUPT_WATCHDOG ISR(WDT_vect)
 
 /* Runs with interrupts on; that of the EEPROM itself is off until asked for again (eeprom_avr.c). */
-#define HAL_INTERRUPT_EEPROM                                                       \
+#define HAL_INTERRUPT_EEPROM                                                            \
   void __vector_eeprom_body(void) __attribute__((interrupt, used, externally_visible)); \
   void __vector_eeprom_body(void)
 

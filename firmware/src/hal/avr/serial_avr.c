@@ -56,8 +56,8 @@ ISR(USART_RX_vect, ISR_NAKED) {
       "rjmp 2b                           \n"
       :
       : [sreg] "I"(_SFR_IO_ADDR(SREG)), [status] "n"(_SFR_MEM_ADDR(UCSR0A)), [data] "n"(_SFR_MEM_ADDR(UDR0)),
-        [head] "I"(_SFR_IO_ADDR(HAL_RECEIVE_HEAD)), [tail] "I"(_SFR_IO_ADDR(HAL_RECEIVE_TAIL)), [flags] "I"(_SFR_IO_ADDR(GPIOR0)), [overrun] "I"(DOR0),
-        [lost] "I"(HAL_LOST_BIT), [zero] "I"(HAL_ZERO_BIT));
+        [head] "I"(_SFR_IO_ADDR(HAL_RECEIVE_HEAD)), [tail] "I"(_SFR_IO_ADDR(HAL_RECEIVE_TAIL)),
+        [flags] "I"(_SFR_IO_ADDR(GPIOR0)), [overrun] "I"(DOR0), [lost] "I"(HAL_LOST_BIT), [zero] "I"(HAL_ZERO_BIT));
 }
 
 ISR(USART_UDRE_vect, ISR_NAKED) {

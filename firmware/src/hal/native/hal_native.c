@@ -271,7 +271,12 @@ void hal_eeprom_wait(void) {
   }
 }
 
-uint8_t hal_eeprom_read(uint16_t address) { return machine->eeprom[address % NATIVE_EEPROM_SIZE]; }
+uint8_t hal_eeprom_read(uint16_t address) {
+  if (hal_eeprom_busy()) {
+    return machine->eeprom_value; /* as on the chip: nothing is read, the data register stays */
+  }
+  return machine->eeprom[address % NATIVE_EEPROM_SIZE];
+}
 
 void hal_eeprom_write_start(uint16_t address, uint8_t value) {
   if (hal_eeprom_busy()) {
