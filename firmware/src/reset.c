@@ -11,7 +11,7 @@
 #define MAGIC 0x626Fu
 #define NONCE_MASK 0x1FFFFFul
 #define WATCHDOG_MARK 0xB17Eu
-#define BOOT_STEP 0x0E3779ul /* how far apart the nonces' counts of two boot counters lie */
+#define BOOT_SHIFT 11 /* the counts of two boot counters lie 2048 apart */
 
 /* In memory that a reset leaves alone; `check` tells it from what RAM holds when the power comes. */
 typedef struct {
@@ -65,7 +65,7 @@ static uint32_t mixed(uint32_t x) {
 
 uint32_t reset_nonce(void) {
   set_count(record()->count + 1u);
-  uint32_t count = (record()->count + storage_boot_counter() * BOOT_STEP) & NONCE_MASK;
+  uint32_t count = (record()->count + (storage_boot_counter() << BOOT_SHIFT)) & NONCE_MASK;
   if (count == 0) {
     count = NONCE_MASK / 2u; /* far from the counts of the starts before and after */
   }

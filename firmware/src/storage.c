@@ -12,6 +12,9 @@
 #include "schedule.h"
 #include "supply.h"
 
+#define INLINE static inline __attribute__((always_inline))
+#define OUTLINE static __attribute__((noinline)) /* several times in line it would be much flash */
+
 enum { MARK_VALID = 0xA5, MARK_VOID = 0x5A };
 
 /* One of the two copies of all parameters. */
@@ -49,8 +52,9 @@ static union {
 } record;
 static uint16_t record_address;
 static uint8_t record_size;
-static enum { IDLE, TO_VOID, REST, TO_VALID } step;
-static enum { SAVE, COUNT } job;
+enum { IDLE, TO_VOID, REST, TO_VALID };
+static uint8_t step;
+static bool is_save;                   /* or a boot counter's */
 static uint8_t step_first, step_count; /* bytes of the record that the step writes */
 
 /* Shared with the interrupt: the next byte, and how many are left. */
@@ -95,7 +99,7 @@ static bool read_record(uint16_t address, uint8_t size) {
 }
 
 /* Writes `count` bytes of the record from `first` on. */
-static void begin_step(uint8_t next_step, uint8_t first, uint8_t count) {
+OUTLINE void begin_step(uint8_t next_step, uint8_t first, uint8_t count) {
   step = next_step;
   step_first = first;
   step_count = count;
@@ -115,7 +119,7 @@ HAL_INTERRUPT_EEPROM {
 
 static bool step_ended(void) { return write_left == 0 && !hal_eeprom_busy(); }
 
-static bool reads_back(void) {
+OUTLINE bool reads_back(void) {
   for (uint8_t i = step_first; i < (uint8_t)(step_first + step_count); i++) {
     if (hal_eeprom_read((uint16_t)(record_address + i)) != record.bytes[i]) {
       return false;
@@ -125,7 +129,7 @@ static bool reads_back(void) {
 }
 
 /* Begins to write the record at hand, whose last two bytes become its CRC. */
-static void begin_record(uint16_t address, uint8_t size) {
+OUTLINE void begin_record(uint16_t address, uint8_t size) {
   const uint16_t crc = crc_of_record(size);
   memcpy(&record.bytes[size - 2u], &crc, sizeof crc);
   record_address = address;
@@ -138,7 +142,6 @@ static void begin_record(uint16_t address, uint8_t size) {
 
 static uint16_t copy_address(uint8_t copy) { return (uint16_t)(copy * COPY_ROOM); }
 
-#define INLINE static inline __attribute__((always_inline))
 INLINE uint32_t mixed(uint32_t hash, uint32_t x) { return (hash ^ x) * 0x01000193ul; }
 INLINE uint32_t entry_hash(uint8_t number, int32_t minimum, int32_t maximum, const char *name, uint8_t length) {
   const uint32_t letters =
@@ -155,7 +158,7 @@ INLINE uint16_t table_hash(void) {
   return (uint16_t)(hash >> 16 ^ hash);
 }
 
-static bool read_copy(uint8_t copy) {
+OUTLINE bool read_copy(uint8_t copy) {
   return read_record(copy_address(copy), sizeof(copy_record)) && record.copy.table == table_hash();
 }
 
@@ -189,7 +192,7 @@ uint8_t storage_save(void) {
   return ANSWER_STATUS_OK;
 }
 
-bool storage_busy(void) { return save_wanted || (step != IDLE && job == SAVE); }
+bool storage_busy(void) { return save_wanted || (step != IDLE && is_save); }
 
 uint8_t storage_result(void) { return save_result; }
 
@@ -197,7 +200,7 @@ static uint8_t other_copy(void) { return copy_in_force == 0 ? 1u : 0u; }
 
 static void begin_save(void) {
   save_wanted = false;
-  job = SAVE;
+  is_save = true;
   record.copy.generation = (uint8_t)(generation + 1u);
   record.copy.table = table_hash();
   memcpy(record.copy.values, parameters_values(), sizeof record.copy.values);
@@ -234,7 +237,7 @@ static void find_boots(void) {
 uint32_t storage_boot_counter(void) { return boots + 1u; }
 
 static void begin_count(void) {
-  job = COUNT;
+  is_save = false;
   record.boot.spare = 0;
   record.boot.count[0] = (uint16_t)storage_boot_counter();
   record.boot.count[1] = (uint16_t)(storage_boot_counter() >> 16);
@@ -264,9 +267,9 @@ void storage_start(void) {
   find_boots();
 }
 
-static void end_record(uint8_t result) {
+OUTLINE void end_record(uint8_t result) {
   step = IDLE;
-  if (job == SAVE) {
+  if (is_save) {
     end_save(result);
   } else {
     end_count(result);

@@ -88,15 +88,6 @@ void hal_start_watchdog(void);
 void hal_kick_watchdog(void);
 void hal_watchdog_reset(void); /* kicks count no more */
 
-/* EEPROM. A write takes 3.4 ms and goes on through a reset. Before interrupts are on hal_eeprom_wait() waits for it;
- * later only one part of the firmware reads and writes. */
-#define HAL_EEPROM_SIZE 1024u
-void hal_eeprom_wait(void);
-bool hal_eeprom_busy(void);                                   /* a write is under way */
-uint8_t hal_eeprom_read(uint16_t address);                    /* not while it is busy */
-void hal_eeprom_write_start(uint16_t address, uint8_t value); /* returns at once; without effect while it is busy */
-void hal_eeprom_interrupt(bool on);                           /* whether HAL_INTERRUPT_EEPROM runs when it is ready */
-
 /* Starts a measurement of the bandgap against the supply, 104 us long. */
 void hal_supply_sample(void);
 /* The last complete one: bandgap * 1024 / supply, rounded down; 0: none yet. */
@@ -145,6 +136,14 @@ uint32_t hal_image_hash(void);
  *                                                 is woken when more can
  *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt with
  *                                                 interrupts off
+ *   HAL_EEPROM_SIZE                               bytes of EEPROM. A write takes 3.4 ms and goes on through a reset. Before
+ *                                                 interrupts are on hal_eeprom_wait() waits for its end; later only one
+ *                                                 part of the firmware reads and writes.
+ *   bool hal_eeprom_busy(void)                    a write is under way
+ *   uint8_t hal_eeprom_read(uint16_t address)     not while it is busy
+ *   void hal_eeprom_write_start(uint16_t address, uint8_t value)   returns at once; not while it is busy
+ *   void hal_eeprom_interrupt(bool on)            whether HAL_INTERRUPT_EEPROM runs when it is ready
+ *   void hal_eeprom_wait(void)
  *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
  */
 

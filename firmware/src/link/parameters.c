@@ -9,14 +9,15 @@
 #include "storage.h"
 
 typedef struct {
-  uint16_t minimum, maximum, initial; /* as the values are kept */
+  uint16_t minimum, initial; /* as the values are kept */
+  uint16_t span;             /* from minimum to maximum */
   uint8_t is_signed;
 } parameter_range;
 
 enum { TYPE_u16 = 0, TYPE_i16 = 1 };
 
 #define RANGE(name, type, minimum, maximum, initial) \
-  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)(maximum), (uint16_t)(initial), TYPE_##type},
+  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)(initial), (uint16_t)((maximum) - (minimum)), TYPE_##type},
 HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
 #undef RANGE
 
@@ -44,7 +45,7 @@ static parameter_range range_of(uint8_t parameter) {
 
 static int32_t meant(uint16_t kept, uint8_t is_signed) { return is_signed ? (int32_t)(int16_t)kept : (int32_t)kept; }
 
-static bool is_baud_rate(int32_t value) {
+static bool is_baud_rate(uint16_t value) {
   for (uint8_t i = 0; i < sizeof baud_rates / sizeof *baud_rates; i++) {
     uint16_t rate = 0;
     hal_table_copy(&rate, &baud_rates[i], sizeof rate);
@@ -55,16 +56,16 @@ static bool is_baud_rate(int32_t value) {
   return false;
 }
 
-static bool is_allowed(uint8_t parameter, int32_t value) {
-  const parameter_range range = range_of(parameter);
-  if (value < meant(range.minimum, range.is_signed) || value > meant(range.maximum, range.is_signed)) {
+/* A value as it is kept: counted from the minimum, modulo 65536, none outside is within the span. */
+static bool is_allowed(uint8_t parameter, uint16_t kept, const parameter_range *range) {
+  if ((uint16_t)(kept - range->minimum) > range->span) {
     return false;
   }
   switch (parameter) {
     case PARAMETER_DEVICES:
-      return (value & ~(int32_t)PARAMETERS_DEVICES_BUILT) == 0;
+      return (kept & (uint16_t)~PARAMETERS_DEVICES_BUILT) == 0;
     case PARAMETER_BAUD_RATE:
-      return is_baud_rate(value);
+      return is_baud_rate(kept);
     default:
       return true;
   }
@@ -93,10 +94,12 @@ uint8_t parameters_set(uint8_t parameter, int32_t value) {
   if (parameter >= PARAMETER_COUNT) {
     return ANSWER_STATUS_UNKNOWN_PARAMETER;
   }
-  if (!is_allowed(parameter, value)) {
+  const parameter_range range = range_of(parameter);
+  const uint16_t kept = (uint16_t)value;
+  if (meant(kept, range.is_signed) != value || !is_allowed(parameter, kept, &range)) {
     return ANSWER_STATUS_OUT_OF_RANGE;
   }
-  values[parameter] = (uint16_t)value;
+  values[parameter] = kept;
   return ANSWER_STATUS_OK;
 }
 
@@ -106,7 +109,8 @@ const uint16_t *parameters_values(void) { return values; }
 
 bool parameters_restore(const uint16_t *kept) {
   for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
-    if (!is_allowed(parameter, meant(kept[parameter], range_of(parameter).is_signed))) {
+    const parameter_range range = range_of(parameter);
+    if (!is_allowed(parameter, kept[parameter], &range)) {
       return false;
     }
   }

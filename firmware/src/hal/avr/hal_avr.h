@@ -87,6 +87,39 @@ static inline void hal_pin_change_mask(uint8_t bits) {
   PCMSK1 = bits;
 }
 
+/* EEPROM (data sheet, 8.6). */
+#define HAL_EEPROM_SIZE 1024u
+static inline bool hal_eeprom_busy(void) { return (EECR & _BV(EEPE)) != 0; }
+
+static inline void hal_eeprom_wait(void) {
+  while (hal_eeprom_busy()) {
+  }
+}
+
+static inline uint8_t hal_eeprom_read(uint16_t address) {
+  EEAR = address;
+  EECR |= _BV(EERE);
+  return EEDR;
+}
+
+/* EEPE must follow EEMPE within four cycles: two single instructions with nothing in between. */
+static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
+  EEAR = address;
+  EEDR = value;
+  HAL_ATOMIC {
+    EECR |= _BV(EEMPE);
+    EECR |= _BV(EEPE);
+  }
+}
+
+static inline void hal_eeprom_interrupt(bool on) {
+  if (on) {
+    EECR |= _BV(EERIE);
+  } else {
+    EECR = (uint8_t)(EECR & (uint8_t)~_BV(EERIE));
+  }
+}
+
 /* The rings of serial_avr.c. Indices wrap as a byte, or by a mask; equal indices: empty. */
 #define HAL_SEND_RING 128u
 #define HAL_RECEIVE_HEAD GPIOR1

@@ -73,6 +73,13 @@ void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
 bool hal_serial_room(uint8_t count);
 
+#define HAL_EEPROM_SIZE 1024u
+void hal_eeprom_wait(void);
+bool hal_eeprom_busy(void);
+uint8_t hal_eeprom_read(uint16_t address);
+void hal_eeprom_write_start(uint16_t address, uint8_t value);
+void hal_eeprom_interrupt(bool on);
+
 #define HAL_TABLE static const
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
