@@ -15,7 +15,7 @@
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
 #define SLICE_CYCLES 4000u                 /* how often the line is looked at while bytes are coming */
 #define BITS_PER_BYTE 10u
-#define LINE_RATE 500000u
+#define LINE_RATE 500000u /* bit/s, unless set */
 
 enum { LISTENER_NONE, LISTENER_SERVO, LISTENER_INFRARED, LISTENER_PING };
 
@@ -59,6 +59,7 @@ typedef struct {
   double held_supply; /* that share if a test holds it, or 0 */
   buffer received;
   uint64_t last_byte; /* cycle of the end of the last byte received */
+  uint64_t idle;      /* cycles without a byte after which the line is idle: two bytes' time */
   buffer truth;
   buffer looks;
   sim_edge *edges; /* a ring once it has SIM_EDGES_KEPT */
@@ -216,6 +217,8 @@ void sim_destroy(sim *self) {
   free(self);
 }
 
+static uint64_t idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t)BOARD_CLOCK_HZ / baud; }
+
 int sim_add_robot(sim *self, uintptr_t address, const body_parameters *parameters, double x, double y, double heading) {
   board *b = (board *)address;
   if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
@@ -226,6 +229,7 @@ int sim_add_robot(sim *self, uintptr_t address, const body_parameters *parameter
   if (r == NULL) return SIM_NO_MEMORY;
   r->sim = self;
   r->board = b;
+  r->idle = idle_cycles(LINE_RATE);
   r->supply = 1.0;
   memset(r->driven, BOARD_RELEASED, sizeof r->driven);
   body_init(&r->body, parameters, 0.0);
@@ -420,7 +424,6 @@ static void take_bytes(robot *r) {
 }
 
 int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles) {
-  const uint64_t idle = 2u * BITS_PER_BYTE * (BOARD_CLOCK_HZ / LINE_RATE);
   const uint64_t deadline = self->now + max_cycles;
   const uint64_t earliest = self->now + (quiet_cycles < max_cycles ? quiet_cycles : max_cycles);
   while (self->now < deadline) {
@@ -434,7 +437,7 @@ int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles) {
       robot *r = self->robots[i];
       if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + i;
       take_bytes(r);
-      ready |= r->received.count > 0 && target >= r->last_byte + idle;
+      ready |= r->received.count > 0 && target >= r->last_byte + r->idle;
     }
     self->now = target;
     if (ready && self->now >= earliest) return 0;
@@ -447,6 +450,19 @@ uint64_t sim_now(const sim *self) { return self->now; }
 void sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
   robot *r = find(self, number);
   if (r != NULL && count > 0) r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+}
+
+int sim_line_rate(sim *self, int number, uint32_t baud) {
+  robot *r = find(self, number);
+  if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
+  r->idle = idle_cycles(baud);
+  r->board->op->line_rate(r->board, baud);
+  return SIM_OK;
+}
+
+uint64_t sim_last_byte(const sim *self, int number) {
+  const robot *r = find(self, number);
+  return r == NULL ? 0 : r->last_byte;
 }
 
 size_t sim_waiting(const sim *self, int number) {
@@ -643,11 +659,6 @@ const char *board_pin_map(uintptr_t address) {
 void board_reset(uintptr_t address, int cause) {
   board *b = (board *)address;
   b->op->reset(b, (board_reset_cause)cause);
-}
-
-void board_line_rate(uintptr_t address, uint32_t baud) {
-  board *b = (board *)address;
-  b->op->line_rate(b, baud);
 }
 
 const char *board_fault(uintptr_t address) {

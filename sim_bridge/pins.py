@@ -89,7 +89,7 @@ class BoardPins(BoardMemory):
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""
-        lib.board_line_rate(self._sim.board.address, baud)
+        lib.sim_line_rate(self._handle, 0, baud)
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""

@@ -230,7 +230,7 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
         if port.opened():
             session.board.reset("external")
         if (now := port.baud()) is not None and now != baud:
-            session.board.line_rate(now)
+            session.transport.set_baud(now)
             baud = now
         while data := port.read():
             sim.send(data)
@@ -262,7 +262,7 @@ def serve(
     with contextlib.ExitStack() as stack:
         session = openers[kind](request)
         stack.callback(session.close)
-        port: Port = PtyPort(session.baud) if tcp is None else TcpPort(tcp)
+        port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)
         announce(port.url)
         with contextlib.suppress(KeyboardInterrupt):

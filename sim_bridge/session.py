@@ -32,10 +32,12 @@ class SimTransport:
     """The board's serial line, in this process. Time passes only while `read` waits."""
 
     realtime = False
+    baud_given = False
 
     def __init__(self, sim: Sim, name: str, paced: bool = False) -> None:
         """`paced`: `read` also waits until as much time has passed on the wall."""
         self.name = name
+        self.baud = _baud(sim.robot)
         self._sim = sim
         self._handle = sim.handle
         self._pace = Pace(sim) if paced else None
@@ -49,6 +51,19 @@ class SimTransport:
         if self._pace is not None:
             self._pace.wait()
         return self._sim.receive()
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        """As `read`, with the instant at which the last byte had come (s)."""
+        data = self.read(wait_s, quiet_s)
+        return [(lib.sim_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
+
+    def set_baud(self, rate: int) -> None:
+        """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
+        if self._closed:
+            raise BoardError("the emulated board is closed")
+        lib.sim_line_rate(self._handle, 0, rate)
+        self.baud = rate
+        self._sim.receive()
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
@@ -100,9 +115,9 @@ class SimSession:
     def __init__(self, sim: Sim, kind: str, paced: bool = False) -> None:
         self.sim = sim
         self.arena = sim.arena
-        self.baud = _baud(sim.robot)
         self.description = f"{sim.board.description} in arena {sim.arena.name}"
         self.transport = SimTransport(sim, kind, paced)
+        self.transport.set_baud(self.transport.baud)
         self.board = BoardPins(sim)
         self._closed = False
 
@@ -184,6 +199,4 @@ def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -
     except Exception:
         board.close()
         raise
-    session = SimSession(sim, kind, request.realtime)
-    session.board.line_rate(session.baud)
-    return session
+    return SimSession(sim, kind, request.realtime)

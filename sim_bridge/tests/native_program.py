@@ -15,8 +15,8 @@ FIRMWARE = next(
     folder / "firmware" / "src" for folder in Path(__file__).resolve().parents if (folder / "firmware" / "src").is_dir()
 )
 
-# What the hardware layer expects of the firmware. A program defines start() and slot(), which comes every 2.5 ms; what it
-# finds it says on the line.
+# What the hardware layer expects of the firmware. A program defines start() and slot(), which comes every 2.5 ms; what
+# it finds it says on the line.
 PREAMBLE = """
 #include "firmware.h"
 #include "hal/hal.h"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
 
 DATA_BASE = 0x800000  # where the linker puts the data space of an AVR, and behind it the EEPROM
 
@@ -21,9 +22,12 @@ class Symbol(NamedTuple):
 def find_symbol(image: Path | bytes, name: str) -> Symbol:
     """The variable of that name in an ELF image; KeyError if there is none, ValueError if the name is not unique."""
     elf = ELFFile(io.BytesIO(image if isinstance(image, bytes) else image.read_bytes()))
+    table = elf.get_section_by_name(".symtab")
+    if not isinstance(table, SymbolTableSection):
+        raise KeyError(name)
     found = {
         Symbol(symbol["st_value"] & 0xFFFF, symbol["st_size"])
-        for symbol in elf.get_section_by_name(".symtab").iter_symbols()
+        for symbol in table.iter_symbols()
         if symbol.name == name and symbol["st_value"] >= DATA_BASE
     }
     if not found:
