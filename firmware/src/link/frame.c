@@ -1,34 +1,22 @@
 /* frame.c: see frame.h. */
 #include "link/frame.h"
 
-#include <string.h>
-
 #include "hal/hal.h"
 #include "link/crc21.h"
 
 #define CHECK_BYTES 3u
 #define INSIDE_MIN 6u /* code byte, id, sequence, checksum */
 
-/* The register is kept in the top 21 of 24 bits, so that bytes enter from the left. */
-typedef struct {
-  uint8_t high, middle, low;
-} crc21;
-
 static inline crc21 crc_start(uint32_t seed) {
   const uint32_t aligned = seed << 3;
   return (crc21){(uint8_t)(aligned >> 16), (uint8_t)(aligned >> 8), (uint8_t)aligned};
 }
 
-static inline __attribute__((always_inline)) crc21 crc_byte(crc21 crc, uint8_t byte) {
-  const uint8_t index = crc.high ^ byte;
-  return (crc21){crc.middle ^ hal_table_byte(&crc21_high[index]), crc.low ^ hal_table_byte(&crc21_middle[index]),
-                 hal_table_byte(&crc21_low[index])};
-}
-
-static crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
-  for (; count > 0; count--) {
-    crc = crc_byte(crc, *bytes++);
-  }
+/* count > 0 */
+static inline __attribute__((always_inline)) crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
+  do {
+    crc = crc21_byte(crc, *bytes++);
+  } while (--count != 0);
   return crc;
 }
 
@@ -40,93 +28,113 @@ static inline void crc_spread(crc21 crc, uint8_t *check) {
 }
 
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
-  const crc21 crc = crc_bytes(crc_start(seed), bytes, count);
+  crc21 crc = crc_start(seed);
+  if (count > 0) {
+    crc = crc_bytes(crc, bytes, count);
+  }
   return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
 }
 
 static inline uint32_t seed_of(uint8_t id, uint32_t session) { return message_is_handshake(id) ? FRAME_SEED : session; }
 
 /* Bytes from `bytes` on up to the next zero or the end, and one more: what COBS writes in front of them. */
-static inline uint8_t distance_to_zero(const uint8_t *bytes, uint8_t count) {
-  uint8_t distance = 1;
-  for (; count > 0 && *bytes != 0; count--) {
-    bytes++;
-    distance++;
+static inline __attribute__((always_inline)) uint8_t distance_to_zero(const uint8_t *bytes, uint8_t count) {
+  const uint8_t whole = (uint8_t)(count + 1u);
+  uint8_t left = whole;
+  while (--left != 0 && *bytes++ != 0) {
   }
-  return distance;
+  return (uint8_t)(whole - left);
 }
 
 /* COBS: each zero, and the place before the first byte, becomes the distance to the next. Frames are too short for a
  * second code byte. One pass writes the bytes and takes them into the checksum. */
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed) {
   const uint8_t *bytes = payload;
-  const crc21 start = crc_start(seed_of(id, seed));
   uint8_t distance = distance_to_zero(bytes, length);
   wire[0] = 0;
   wire[3] = sequence == 0 ? distance : sequence;
   distance = sequence == 0 ? 1u : (uint8_t)(distance + 1u);
   wire[2] = id == 0 ? distance : id;
   wire[1] = id == 0 ? 1u : (uint8_t)(distance + 1u);
-  crc21 crc = crc_bytes(start, wire + 1, 3);
+  crc21 crc = crc_bytes(crc_start(seed_of(id, seed)), wire + 1, 3);
   uint8_t *to = wire + 4;
-  for (uint8_t left = length; left > 0;) {
-    uint8_t byte = *bytes++;
-    left--;
-    if (byte == 0) {
-      byte = distance_to_zero(bytes, left);
-    }
-    crc = crc_byte(crc, byte);
-    *to++ = byte;
+  if (length > 0) {
+    uint8_t left = length;
+    do {
+      uint8_t byte = *bytes++;
+      left--;
+      if (byte == 0) {
+        byte = distance_to_zero(bytes, left);
+      }
+      crc = crc21_byte(crc, byte);
+      *to++ = byte;
+    } while (left != 0);
   }
   crc_spread(crc, to);
   to[CHECK_BYTES] = 0;
   return (uint8_t)(length + FRAME_OVERHEAD);
 }
 
-/* Takes the stuffing off in place; false unless it ends exactly at `size`. */
-static bool unstuff(uint8_t *bytes, uint8_t size) {
-  uint8_t at = bytes[0];
-  while (at < size) {
-    const uint8_t step = bytes[at];
-    bytes[at] = 0;
-    if (step > (uint8_t)(size - at)) {
-      return false;
-    }
-    at = (uint8_t)(at + step);
+/* Takes the stuffing off in place; false unless it ends exactly at the end. count > 0 */
+static inline bool unstuff(uint8_t *bytes, uint8_t count) {
+  uint8_t step = *bytes;
+  while (step < count) {
+    count = (uint8_t)(count - step);
+    bytes += step;
+    step = *bytes;
+    *bytes = 0;
   }
-  return at == size;
+  return step == count;
 }
 
-/* Whether what was collected is a message; leaves it unstuffed. */
-static bool accept(frame_decoder *decoder) {
-  if (decoder->count < INSIDE_MIN || decoder->count > FRAME_INSIDE_MAX || decoder->bytes[0] < 2) {
+/* Whether the three bytes carry that checksum. */
+static inline bool crc_is(crc21 crc, const uint8_t *check) {
+  uint8_t expected[CHECK_BYTES];
+  crc_spread(crc, expected);
+  return check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2];
+}
+
+/* Whether what was collected is a message; leaves it unstuffed. What is too long to be one has no id of that length. */
+static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t count) {
+  if (count < INSIDE_MIN || bytes[0] < 2) {
     return false;
   }
-  const uint8_t size = (uint8_t)(decoder->count - CHECK_BYTES);
-  const uint8_t id = decoder->bytes[1];
-  if (frame_accepted_length(id) != (int16_t)(size - 3) ||
-      (decoder->seed > FRAME_SEED_MAX && !message_is_handshake(id))) {
+  const uint8_t id = bytes[1];
+  if ((uint8_t)frame_accepted_length(id) != (uint8_t)(count - INSIDE_MIN)) {
     return false;
   }
-  uint8_t check[CHECK_BYTES];
-  crc_spread(crc_bytes(crc_start(seed_of(id, decoder->seed)), decoder->bytes, size), check);
-  return memcmp(check, &decoder->bytes[size], CHECK_BYTES) == 0 && unstuff(decoder->bytes, size);
+  uint32_t seed = FRAME_SEED;
+  if (!message_is_handshake(id)) {
+    seed = decoder->seed;
+    if (seed > FRAME_SEED_MAX) {
+      return false;
+    }
+  }
+  const uint8_t size = (uint8_t)(count - CHECK_BYTES);
+  return crc_is(crc_bytes(crc_start(seed), bytes, size), bytes + size) && unstuff(bytes, size);
 }
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
 
 bool frame_decode_end(frame_decoder *decoder) {
-  const bool empty = decoder->count == 0;
-  const bool accepted = !empty && accept(decoder);
-  if (accepted) {
+  const uint8_t count = decoder->count;
+  const bool synchronised = decoder->synchronised;
+  decoder->count = 0;
+  decoder->synchronised = true;
+  if (count == 0) {
+    return false;
+  }
+  if (accept(decoder, decoder->bytes, count)) {
     decoder->good++;
-    decoder->resynchronised = (uint16_t)(decoder->resynchronised + decoder->lost);
-    decoder->lost = false;
-  } else if (!empty && decoder->synchronised) {
+    if (decoder->lost) {
+      decoder->lost = false;
+      decoder->resynchronised++;
+    }
+    return true;
+  }
+  if (synchronised) {
     decoder->bad++;
     decoder->lost = true;
   }
-  decoder->count = 0;
-  decoder->synchronised = true;
-  return accepted;
+  return false;
 }

@@ -25,16 +25,33 @@ void link_use_seed(uint32_t seed) {
   link_room = 0; /* a request of the session before is not carried out any more */
 }
 
-/* Takes bytes up to the end of a frame; false if they end before. */
+/* Takes bytes up to the end of a frame; false if they end before. frame_decode() in a loop would do the same, slower. */
 static bool take_frame(void) {
-  uint8_t byte = 0;
   hal_serial_seen();
+  uint8_t count = decoder.count;
+  uint8_t *to = &decoder.bytes[count];
+  uint8_t byte = 0;
   while (hal_serial_receive(&byte)) {
-    if (frame_decode(&decoder, byte)) {
-      hal_serial_again();
-      return true;
+    if (byte != 0) {
+      if (count <= FRAME_INSIDE_MAX) {
+        *to++ = byte;
+        count++;
+      }
+    } else if (count == 0) {
+      decoder.synchronised = true; /* an empty frame is nothing */
+    } else {
+      decoder.count = count;
+      if (frame_decode_end(&decoder)) {
+        if (hal_serial_received()) {
+          hal_serial_again();
+        }
+        return true;
+      }
+      count = 0;
+      to = decoder.bytes;
     }
   }
+  decoder.count = count;
   return false;
 }
 
@@ -58,7 +75,8 @@ void link_poll(void) {
       session_heard();
     }
     link_room = room_for(id);
-    if (!link_due()) {
+    if (link_room != 0 && !hal_serial_room(link_room)) {
+      hal_serial_again(); /* waits: it stays due */
       return;
     }
   }
