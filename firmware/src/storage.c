@@ -38,6 +38,7 @@ typedef struct {
 #define COPY_ROOM 128u
 #define BOOT_ADDRESS (COPIES * COPY_ROOM)
 #define BOOT_RECORDS 16u
+#define READ_BACK 10u                        /* cells in a tick */
 #define RUN_TICKS (10u * SCHEDULE_TICK_RATE) /* of a start that counts */
 
 _Static_assert(sizeof(copy_record) <= COPY_ROOM && sizeof(copy_record) == 6u + 2u * PARAMETER_COUNT, "a copy has room");
@@ -55,10 +56,11 @@ static uint8_t record_size;
 enum { IDLE, TO_VOID, REST, TO_VALID };
 static uint8_t step;
 static bool is_save;                   /* or a boot counter's */
-static uint8_t step_first, step_count; /* bytes of the record that the step writes */
+static uint8_t step_first, step_count; /* bytes of the record that the step has written or not read back */
 
-/* Shared with the interrupt: the next byte, and how many are left. */
+/* Of the interrupt: the next byte, how many are left, CRC of those written. */
 static volatile uint8_t write_next, write_left;
+static uint16_t write_crc;
 
 static bool save_wanted;
 static uint8_t save_result;
@@ -74,28 +76,27 @@ static bool counted;        /* this start is in the ring, or no entry takes it *
 
 /* ---- records ---- */
 
-/* CRC-16/CCITT, polynomial 0x1021, from 0xFFFF, reflected. */
-static uint16_t crc16(const uint8_t *bytes, uint8_t count) {
-  uint16_t crc = 0xFFFF;
-  while (count-- > 0) {
-    uint8_t x = (uint8_t)(crc ^ *bytes++);
-    x = (uint8_t)(x ^ (uint8_t)(x << 4));
-    crc = (uint16_t)((uint16_t)((uint16_t)x << 8 | crc >> 8) ^ (uint8_t)(x >> 4) ^ (uint16_t)((uint16_t)x << 3));
-  }
-  return crc;
+/* One byte more of a CRC-16/CCITT: polynomial 0x1021, reflected, from CRC_START. */
+#define CRC_START 0xFFFFu
+static uint16_t crc16(uint16_t crc, uint8_t byte) {
+  uint8_t x = (uint8_t)(crc ^ byte);
+  x = (uint8_t)(x ^ (uint8_t)(x << 4));
+  return (uint16_t)((uint16_t)((uint16_t)x << 8 | crc >> 8) ^ (uint8_t)(x >> 4) ^ (uint16_t)((uint16_t)x << 3));
 }
-
-static uint16_t crc_of_record(uint8_t size) { return crc16(&record.bytes[1], (uint8_t)(size - 3u)); }
 
 /* Reads a record; whether it is whole. */
 static bool read_record(uint16_t address, uint8_t size) {
   hal_eeprom_wait(); /* for a write from before the reset */
+  uint16_t expected = CRC_START;
   for (uint8_t i = 0; i < size; i++) {
     record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
+    if (i > 0 && i < size - 2u) {
+      expected = crc16(expected, record.bytes[i]);
+    }
   }
   uint16_t crc = 0;
   memcpy(&crc, &record.bytes[size - 2u], sizeof crc);
-  return record.bytes[0] == MARK_VALID && crc == crc_of_record(size);
+  return record.bytes[0] == MARK_VALID && crc == expected;
 }
 
 /* Writes `count` bytes of the record from `first` on. */
@@ -105,33 +106,39 @@ OUTLINE void begin_step(uint8_t next_step, uint8_t first, uint8_t count) {
   step_count = count;
   write_next = first;
   write_left = count;
+  write_crc = CRC_START;
   hal_eeprom_interrupt(true);
 }
 
-/* With the EEPROM ready. */
+/* With the EEPROM ready: the next byte. At the end of the rest comes its CRC, which is known by then. */
 HAL_INTERRUPT_EEPROM {
   const uint8_t i = write_next;
+  if (i == record_size - 2u) {
+    memcpy(&record.bytes[i], &write_crc, sizeof write_crc);
+  }
+  write_crc = crc16(write_crc, record.bytes[i]);
   hal_eeprom_write_start((uint16_t)(record_address + i), record.bytes[i]);
   write_next = (uint8_t)(i + 1u);
   write_left--;
   hal_eeprom_interrupt(write_left != 0);
 }
 
-static bool step_ended(void) { return write_left == 0 && !hal_eeprom_busy(); }
+static bool is_written(void) { return write_left == 0 && !hal_eeprom_busy(); }
 
-OUTLINE bool reads_back(void) {
-  for (uint8_t i = step_first; i < (uint8_t)(step_first + step_count); i++) {
-    if (hal_eeprom_read((uint16_t)(record_address + i)) != record.bytes[i]) {
+/* Reads a few of the step's bytes back and takes them off `step_count`; false if one is not as it should be. */
+static bool reads_back(void) {
+  for (uint8_t n = 0; n < READ_BACK && step_count > 0; n++) {
+    if (hal_eeprom_read((uint16_t)(record_address + step_first)) != record.bytes[step_first]) {
       return false;
     }
+    step_first++;
+    step_count--;
   }
   return true;
 }
 
-/* Begins to write the record at hand, whose last two bytes become its CRC. */
+/* Begins to write the record at hand. */
 OUTLINE void begin_record(uint16_t address, uint8_t size) {
-  const uint16_t crc = crc_of_record(size);
-  memcpy(&record.bytes[size - 2u], &crc, sizeof crc);
   record_address = address;
   record_size = size;
   record.bytes[0] = MARK_VOID;
@@ -279,6 +286,8 @@ OUTLINE void end_record(uint8_t result) {
 static void go_on(void) {
   if (!reads_back()) {
     end_record(ANSWER_STATUS_STORAGE_FAILED);
+  } else if (step_count > 0) {
+    return; /* the others in the next tick */
   } else if (step == TO_VOID) {
     begin_step(REST, 1, (uint8_t)(record_size - 1u));
   } else if (step == REST) {
@@ -309,7 +318,7 @@ void storage_task(void) {
   if (supply_low()) {
     give_up();
   } else if (step != IDLE) {
-    if (step_ended()) {
+    if (is_written()) {
       go_on();
     }
   } else if (hal_eeprom_busy()) {

@@ -19,12 +19,21 @@ void supply_start(void) {
   low = was_below = has_settled = false;
 }
 
-/* bandgap * 1024 / result, rounded down, in two divisions of 16 bits: one of 32 would take a thousand cycles. */
+/* bandgap * 1024 / result, rounded down: a division of 16 bits and five steps of a longer one by hand. One of 32 bits
+ * would take more time than the task has. */
 static uint16_t millivolts(uint16_t bandgap, uint16_t result) {
   const uint16_t dividend = (uint16_t)(bandgap * 32u); /* at most 38400 */
-  const uint16_t quotient = dividend / result;
-  const uint16_t rest = (uint16_t)(dividend - quotient * result);
-  return (uint16_t)(quotient * 32u + (uint16_t)(rest * 32u) / result);
+  uint16_t quotient = dividend / result;
+  uint16_t rest = dividend % result;
+  for (uint8_t step = 0; step < 5u; step++) {
+    quotient = (uint16_t)(quotient << 1);
+    rest = (uint16_t)(rest << 1);
+    if (rest >= result) {
+      rest = (uint16_t)(rest - result);
+      quotient++;
+    }
+  }
+  return quotient;
 }
 
 /* A minimum of 0 is never undercut. */
