@@ -46,8 +46,8 @@ _Static_assert(CRC21_BIT_7 == CRC21_STEP(CRC21_BIT_6), "bit 7");
 #define CRC21_LOW(byte) (uint8_t)(CRC21_ENTRY(byte) & 0xFFu)
 
 /* High, middle and low bytes of all entries, one after another; aligned, so that the index is the low byte of the address. */
-HAL_TABLE uint8_t crc21_table[3 * 256] __attribute__((aligned(256))) = {CRC21_256(CRC21_HIGH), CRC21_256(CRC21_MIDDLE),
-                                                                       CRC21_256(CRC21_LOW)};
+HAL_TABLE uint8_t crc21_table[3 * 256]
+    __attribute__((aligned(256))) = {CRC21_256(CRC21_HIGH), CRC21_256(CRC21_MIDDLE), CRC21_256(CRC21_LOW)};
 
 /* The register, in the top 21 of 24 bits, so that bytes enter from the left. */
 typedef struct {
@@ -55,27 +55,26 @@ typedef struct {
 } crc21;
 
 /* Takes one byte in. */
-static inline __attribute__((always_inline)) crc21 crc21_byte(crc21 crc, uint8_t byte) {
+static inline __attribute__((always_inline)) void crc21_take(crc21 *crc, uint8_t byte) {
 #ifdef __AVR__
   /* 16 cycles of the 320 that a byte has on the line; the compiler, which does not know the alignment, needs 30. */
-  uint8_t high = crc.high, middle = crc.middle, low = crc.low;
   uint16_t entry;
-  __asm__("eor %[high], %[byte]       \n"
-          "mov %A[entry], %[high]     \n"
-          "ldi %B[entry], hi8(%[table])\n"
-          "lpm %[high], %a[entry]     \n"
-          "eor %[high], %[middle]     \n"
-          "inc %B[entry]              \n"
-          "lpm %[middle], %a[entry]   \n"
-          "eor %[middle], %[low]      \n"
-          "inc %B[entry]              \n"
-          "lpm %[low], %a[entry]      \n"
-          : [high] "+r"(high), [middle] "+r"(middle), [low] "+r"(low), [entry] "=&z"(entry)
-          : [byte] "r"(byte), [table] "i"(crc21_table));
-  return (crc21){high, middle, low};
+  __asm__(
+      "eor %[high], %[byte]       \n"
+      "mov %A[entry], %[high]     \n"
+      "ldi %B[entry], hi8(%[table])\n"
+      "lpm %[high], %a[entry]     \n"
+      "eor %[high], %[middle]     \n"
+      "inc %B[entry]              \n"
+      "lpm %[middle], %a[entry]   \n"
+      "eor %[middle], %[low]      \n"
+      "inc %B[entry]              \n"
+      "lpm %[low], %a[entry]      \n"
+      : [high] "+r"(crc->high), [middle] "+r"(crc->middle), [low] "+r"(crc->low), [entry] "=&z"(entry)
+      : [byte] "r"(byte), [table] "i"(crc21_table));
 #else
-  const uint8_t *entry = &crc21_table[crc.high ^ byte];
-  return (crc21){(uint8_t)(crc.middle ^ entry[0]), (uint8_t)(crc.low ^ entry[256]), entry[512]};
+  const uint8_t *entry = &crc21_table[crc->high ^ byte];
+  *crc = (crc21){(uint8_t)(crc->middle ^ entry[0]), (uint8_t)(crc->low ^ entry[256]), entry[512]};
 #endif
 }
 

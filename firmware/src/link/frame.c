@@ -15,7 +15,7 @@ static inline crc21 crc_start(uint32_t seed) {
 /* count > 0 */
 static inline __attribute__((always_inline)) crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
   do {
-    crc = crc21_byte(crc, *bytes++);
+    crc21_take(&crc, *bytes++);
   } while (--count != 0);
   return crc;
 }
@@ -66,7 +66,7 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
       if (byte == 0) {
         byte = distance_to_zero(bytes, left);
       }
-      crc = crc21_byte(crc, byte);
+      crc21_take(&crc, byte);
       *to++ = byte;
     } while (left != 0);
   }
