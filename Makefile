@@ -27,8 +27,8 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json"
-	@echo "make soak      a long run in the emulator; SECONDS=3600 by default"
-	@echo "make fuzz      many more random cases for the tests that take random input"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and all of the link's error rates"
+	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
 	@echo "make pictures  the pictures of the documentation"
@@ -61,10 +61,13 @@ SECONDS ?= 3600
 soak:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
+	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000
+FUZZ_SECONDS ?= 60
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
+	@$(PYTHON_VENV) -m tools.fuzz --seconds $(FUZZ_SECONDS)
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis
 
 pictures:

@@ -56,7 +56,8 @@ typedef struct {
   uint32_t seed;    /* of the session */
   uint32_t earlier; /* of the session before */
   uint8_t sequence;
-  uint8_t kinds; /* messages that are sent */
+  uint8_t kinds;  /* messages that are sent */
+  uint16_t drawn; /* payloads so far, if each is to be unlike the others; else 0 */
   uint8_t ids[32], lengths[32];
 } channel;
 
@@ -74,7 +75,7 @@ typedef struct {
  * with channel_session(). */
 void channel_start(channel *line, uint64_t random);
 
-/* Sends only this message from now on. */
+/* Sends only this message from now on, whose payload is to be two bytes, unlike those of the 65534 frames before. */
 void channel_only(channel *line, uint8_t id);
 
 /* A new session; draws its seed, or takes `seed` unless that is 0. */

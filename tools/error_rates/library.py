@@ -38,14 +38,41 @@ class Ablation(NamedTuple):
 
 
 ABLATIONS = {
-    "checksum": Ablation((("memcmp(check, &decoder->bytes[size], CHECK_BYTES) == 0", "true"),)),
-    "exact length": Ablation((("frame_accepted_length(id) != (int16_t)(size - 3)", "frame_accepted_length(id) < 0"),)),
-    "stuffing": Ablation(((" && unstuff(decoder->bytes, size)", " && (unstuff(decoder->bytes, size), true)"),)),
-    "session seed": Ablation(
-        (("message_is_handshake(id) ? FRAME_SEED : session", "FRAME_SEED + 0u * (id + session)"),)
+    "checksum": Ablation(
+        (("check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2]", "check != expected"),)
     ),
+    "exact length": Ablation(
+        (
+            (
+                "(uint8_t)frame_accepted_length(id) != (uint8_t)(count - INSIDE_MIN)",
+                "frame_accepted_length(id) < 0",
+            ),
+        )
+    ),
+    "stuffing": Ablation((("&& unstuff(bytes, size)", "&& (unstuff(bytes, size), true)"),)),
+    "session seed": Ablation(
+        (
+            ("seed = decoder->seed;", "seed = decoder != 0 ? FRAME_SEED : 0;"),
+            ("FRAME_SEED : session", "FRAME_SEED : FRAME_SEED + 0u * session"),
+        )
+    ),
+    "delimiter": Ablation((("  decoder->count = 0;\n", ""),)),
     "leading delimiter": Ablation((), ("-DCHANNEL_WITHOUT_LEADING_DELIMITER",)),
 }
+
+
+def frame_source(without: str) -> str:
+    """The text of frame.c, if wanted without one of its protections.
+
+    Raises:
+        ValueError: frame.c does not hold what is to be replaced.
+    """
+    text = (FIRMWARE / "link" / "frame.c").read_text(encoding="utf-8")
+    for before, after in (ABLATIONS[without] if without else Ablation()).replaced:
+        if text.count(before) != 1:
+            raise ValueError(f"without {without}: frame.c does not hold {before!r} once; tell ABLATIONS what it holds")
+        text = text.replace(before, after)
+    return text
 
 
 @cache
@@ -56,6 +83,11 @@ def ffi() -> cffi.FFI:
     return declared
 
 
+def new(declaration: str, value: object = None) -> Any:
+    """A new C object of that kind, for example "channel *"; zero, or as `value` says."""
+    return ffi().new(declaration, value)
+
+
 @cache
 def library(end: str, without: str = "") -> Any:
     """The functions of interface.cdef, compiled for the receiver at `end`.
@@ -63,20 +95,12 @@ def library(end: str, without: str = "") -> Any:
     Args:
         end: "board" or "host".
         without: the protection to take away, one of ABLATIONS; "" for none.
-
-    Raises:
-        ValueError: frame.c does not hold what the ablation replaces.
     """
     ablation = ABLATIONS[without] if without else Ablation()
-    text = (FIRMWARE / "link" / "frame.c").read_text(encoding="utf-8")
-    for before, after in ablation.replaced:
-        if text.count(before) != 1:
-            raise ValueError(f"without {without}: frame.c does not hold {before!r} once")
-        text = text.replace(before, after)
     folder = BUILT / "-".join([end, *without.split()])
     folder.mkdir(parents=True, exist_ok=True)
     frame = folder / "frame.c"
-    frame.write_text(text, encoding="utf-8")
+    frame.write_text(frame_source(without), encoding="utf-8")
     return ffi().dlopen(str(compiled(folder, [*ENDS[end], *ablation.flags], frame)))
 
 

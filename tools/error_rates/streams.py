@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from typing import Any
 
-from tools.error_rates.library import ffi, library
+from tools.error_rates.library import ffi, library, new
 from tools.error_rates.statistics import LOST_ALLOWED, RATE_ALLOWED, upper_bound
 
 # The faults in the order of channel_fault, as people call them.
@@ -81,7 +81,7 @@ def seed_of(receiver: str, fault: int, part: int) -> int:
 def through_c(end: str, fault: int, rounds: int, part: int = 0, without: str = "") -> Tally:
     """Rounds through the decoder in C at that end ("board" or "host"), if wanted without one of its protections."""
     tally = Tally(f"C, {end}'s end", FAULTS[fault])
-    counts = ffi().new("channel_tally *")
+    counts = new("channel_tally *")
     library(end, without).c_decoder_run(fault, rounds, seed_of(tally.receiver, fault, part), counts)
     tally.add(counts)
     return tally
@@ -93,8 +93,8 @@ def through_python(fault: int, rounds: int, part: int = 0) -> Tally:
 
     tally = Tally("Python", FAULTS[fault])
     lib, buffer = library("host"), ffi().buffer
-    line, spoilt = ffi().new("channel *"), ffi().new("channel_round *")
-    counts = ffi().new("channel_tally *")
+    line, spoilt = new("channel *"), new("channel_round *")
+    counts = new("channel_tally *")
     lib.channel_start(line, seed_of(tally.receiver, fault, part))
     for number in range(rounds):
         if number % SESSION_ROUNDS == 0:

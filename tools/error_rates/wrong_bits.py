@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 
 from boebot.link import messages
-from tools.error_rates.library import ROOT, ffi, library
+from tools.error_rates.library import ROOT, ffi, library, new
 
 FRAME_OVERHEAD = 8
 BITS = (1, 2, 3, 4, 5)
@@ -70,7 +70,7 @@ def measure(end: str, wire_bytes: int, bits: int, samples: int = 0) -> BitTally:
         samples: random sets for each payload; 0: every set, for up to three bits.
     """
     tally = BitTally(end, wire_bytes, bits, samples == 0)
-    lib, counts, frame = library(end), ffi().new("wrong_bits_tally *"), ffi().new("wrong_bits_frame *")
+    lib, counts, frame = library(end), new("wrong_bits_tally *"), new("wrong_bits_frame *")
     for kind in kinds(end):
         if wire_bytes != kind.LENGTH + FRAME_OVERHEAD:
             continue

@@ -11,6 +11,7 @@ import pytest
 
 from boebot.link import messages
 from tools.error_rates import library, wrong_bits
+from tools.error_rates.image import Image
 from tools.error_rates.statistics import LOST_ALLOWED, RATE_ALLOWED, trials_needed, upper_bound
 from tools.error_rates.streams import FAULTS, Tally, pooled, through_c, through_python
 
@@ -67,6 +68,13 @@ def test_python_accepts_no_wrong_frame() -> None:
     assert pooled(tallies).damaged > 200_000 and pooled(tallies).wrong == 0
 
 
+def test_image_accepts_no_wrong_frame_and_counts_as_the_same_c_does() -> None:
+    with Image() as image:
+        tallies = [image.run(fault, 2000) for fault in range(len(FAULTS))]
+    assert_nothing_lost(tallies)
+    assert pooled(tallies).damaged > 25_000 and pooled(tallies).wrong == 0
+
+
 # Without a protection -> the faults that then get through, and the least share of damaged frames that are accepted.
 GETS_THROUGH = {
     "checksum": {"bit errors, 1e-4": 0.2, "bursts": 0.05, "earlier session": 0.5},
@@ -93,8 +101,8 @@ def test_without_the_leading_delimiter_neighbours_are_lost(end: str) -> None:
 
 
 def test_without_the_checksum_wrong_bits_get_through() -> None:
-    frame = library.ffi().new("wrong_bits_frame *", {"id": 0x10, "length": 8, "seed": 5})
+    frame = library.new("wrong_bits_frame *", {"id": 0x10, "length": 8, "seed": 5})
     for without, caught in (("", True), ("checksum", False)):
-        counts = library.ffi().new("wrong_bits_tally *")
+        counts = library.new("wrong_bits_tally *")
         library.library("board", without).wrong_bits_all(frame, 1, counts)
         assert counts.patterns == 8 * 16 and (counts.accepted == 0) == caught
