@@ -1,6 +1,7 @@
-"""Cycles of the firmware's frame code on the emulated ATmega328P, interrupts not counted: python -m tools.bench.frame_cycles
+"""Cycles of the firmware's frame code on the emulated ATmega328P, interrupts not counted.
 
-The program is frame_cycles.c, linked with the firmware in place of main.c, with the flags of the image.
+Run `python -m tools.bench.frame_cycles`. The program is frame_cycles.c, linked with the firmware in
+place of main.c, with the flags of the image.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from sim_bridge.boards.avr import create
-from sim_bridge.boards.board import Level
+from sim_bridge.boards.board import Edge, Level
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / "firmware" / "src"
@@ -36,7 +37,7 @@ def spans() -> list[int]:
     with tempfile.TemporaryDirectory() as folder:
         avr = create(build(Path(folder)))
         board = avr.access()
-        edges = []
+        edges: list[Edge] = []
         while not any(edge.pin == RIGHT_SERVO and edge.level == Level.HIGH for edge in edges):
             board.run(100_000)
             edges += board.log()
@@ -47,7 +48,7 @@ def spans() -> list[int]:
 
 
 def figures() -> dict[str, tuple[float, int]]:
-    """By case: cycles per byte on the wire, and cycles of the whole frame. Raises CalledProcessError if it does not build."""
+    """By case: cycles per byte on the wire, and of the whole frame. Raises CalledProcessError if it does not build."""
     found = {}
     measured = iter(spans())
     for name, length in RECEIVED.items():
