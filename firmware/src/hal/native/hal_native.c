@@ -252,6 +252,9 @@ static void byte_arrived(void) {
 /* Entry, a handler of a few instructions, return, and the one instruction of the main loop in between. */
 #define READY_AGAIN_CYCLES 32u
 
+/* For programs that do not write. */
+__attribute__((weak)) HAL_INTERRUPT_EEPROM {}
+
 static void plan_eeprom(uint64_t ready) {
   next_eeprom = machine->eeprom_writing ? machine->eeprom_done : eeprom_interrupt ? ready : NATIVE_NEVER;
 }
