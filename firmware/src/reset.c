@@ -58,9 +58,11 @@ uint8_t reset_cause(void) { return cause; }
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
  * undone. Close numbers come out far apart. */
 static uint32_t mixed(uint32_t x) {
-  x = (x ^ x >> 11) * 0x0B352Dul & NONCE_MASK;
-  x = (x ^ x >> 9) * 0x16A6B5ul & NONCE_MASK;
-  return x ^ x >> 11;
+  for (uint8_t round = 0; round < 3u; round++) {
+    x = x * 0x0B352Dul & NONCE_MASK;
+    x ^= x >> 11;
+  }
+  return x;
 }
 
 uint32_t reset_nonce(void) {
