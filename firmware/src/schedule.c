@@ -160,6 +160,12 @@ static void begin_tick(void) {
   overrun_row = !overran ? 0u : overrun_row < OVERLOAD_TICKS ? (uint8_t)(overrun_row + 1u) : OVERLOAD_TICKS;
 }
 
+/* What cannot wait for the end of all tasks. */
+static __attribute__((noinline)) void between_tasks(void) {
+  encoder_poll();
+  link_poll();
+}
+
 /* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run, and not in
  * a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
@@ -175,8 +181,7 @@ static void run_tasks(uint8_t slot) {
   if ((due & (uint16_t)(1u << TASK_##name)) != 0) {   \
     name##_task();                                    \
     due &= (uint16_t) ~(uint16_t)(1u << TASK_##name); \
-    encoder_poll();                                   \
-    link_poll();                                      \
+    between_tasks();                                  \
   }
 #include "tasks.def"
 #undef TASK

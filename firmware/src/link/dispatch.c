@@ -14,8 +14,6 @@
 #include "safety.h"
 #include "schedule.h"
 
-static bool within(int16_t value, int16_t minimum, int16_t maximum) { return value >= minimum && value <= maximum; }
-
 /* Whether a set-point may be put in force; counts the late ones. What is late was not wrong to ask. */
 static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
   const safety_verdict verdict = safety_accept(time_to_live, answers_tick, sequence);
@@ -26,30 +24,32 @@ static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t seque
   return verdict == SAFETY_ACCEPTED;
 }
 
-static bool setpoint_signal(uint8_t sequence, const uint8_t *payload) {
+static bool beyond(int16_t value, int16_t most) { return value > most || value < -most; }
+
+/* Signals and speeds have one layout, and ranges with zero in the middle. */
+_Static_assert(sizeof(msg_setpoint_signal) == sizeof(msg_setpoint_speed) && MSG_SETPOINT_SIGNAL_LENGTH == 8,
+               "one layout");
+#define SYMMETRIC(field) (field##_MIN == -field##_MAX)
+_Static_assert(SYMMETRIC(MSG_SETPOINT_SIGNAL_LEFT) && SYMMETRIC(MSG_SETPOINT_SPEED_LEFT), "left");
+_Static_assert(MSG_SETPOINT_SIGNAL_RIGHT_MAX == MSG_SETPOINT_SIGNAL_LEFT_MAX &&
+                   MSG_SETPOINT_SIGNAL_RIGHT_MIN == MSG_SETPOINT_SIGNAL_LEFT_MIN,
+               "right as left");
+_Static_assert(MSG_SETPOINT_SPEED_RIGHT_MAX == MSG_SETPOINT_SPEED_LEFT_MAX &&
+                   MSG_SETPOINT_SPEED_RIGHT_MIN == MSG_SETPOINT_SPEED_LEFT_MIN,
+               "right as left");
+
+static bool setpoint(uint8_t id, uint8_t sequence, const uint8_t *payload) {
   msg_setpoint_signal message;
   memcpy(&message, payload, sizeof message);
-  if (!within(message.left, MSG_SETPOINT_SIGNAL_LEFT_MIN, MSG_SETPOINT_SIGNAL_LEFT_MAX) ||
-      !within(message.right, MSG_SETPOINT_SIGNAL_RIGHT_MIN, MSG_SETPOINT_SIGNAL_RIGHT_MAX)) {
-    return false;
-  }
-  bool refused = false;
-  if (may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
-    motion_signals(message.left, message.right);
-  }
-  return !refused;
-}
-
-static bool setpoint_speed(uint8_t sequence, const uint8_t *payload) {
-  msg_setpoint_speed message;
-  memcpy(&message, payload, sizeof message);
-  if (!within(message.left, MSG_SETPOINT_SPEED_LEFT_MIN, MSG_SETPOINT_SPEED_LEFT_MAX) ||
-      !within(message.right, MSG_SETPOINT_SPEED_RIGHT_MIN, MSG_SETPOINT_SPEED_RIGHT_MAX)) {
-    return false;
-  }
-  bool refused = false;
-  if (may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
-    motion_speeds(message.left, message.right);
+  const bool is_speed = id == MSG_SETPOINT_SPEED_ID;
+  const int16_t most = is_speed ? MSG_SETPOINT_SPEED_LEFT_MAX : MSG_SETPOINT_SIGNAL_LEFT_MAX;
+  bool refused = beyond(message.left, most) || beyond(message.right, most);
+  if (!refused && may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
+    if (is_speed) {
+      motion_speeds(message.left, message.right);
+    } else {
+      motion_signals(message.left, message.right);
+    }
   }
   return !refused;
 }
@@ -139,9 +139,8 @@ bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload) {
       stop(payload);
       return true;
     case MSG_SETPOINT_SIGNAL_ID:
-      return setpoint_signal(sequence, payload);
     case MSG_SETPOINT_SPEED_ID:
-      return setpoint_speed(sequence, payload);
+      return setpoint(id, sequence, payload);
     case MSG_SETPOINT_COAST_ID:
       return setpoint_coast(sequence, payload);
     case MSG_ACKNOWLEDGE_ID:

@@ -13,6 +13,7 @@
 #define PLACES 4u
 #define KINDS (EVENT_KIND_DEAD_MAN + 1u)
 #define RETRY_BYTES 200u /* on the line, besides two ticks */
+#define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
 
 typedef struct {
   uint8_t kind;
@@ -23,9 +24,9 @@ typedef struct {
 static happening queue[PLACES];
 static uint8_t first, count; /* queue[first] is under way */
 static uint16_t number;      /* of the event under way, or of the next one */
-static bool sent;            /* it was sent at least once, last at: */
-static uint32_t sent_at;     /* schedule_time() */
-static uint32_t retry_us;    /* as tick and line have it */
+static bool sent;            /* it was sent at least once */
+static uint16_t wait;        /* slots until it is sent again */
+static uint16_t retry_slots; /* from one sending to the next, as tick and line have it */
 
 /* What found no room: the latest of each kind. Everything in the queue is older. */
 static happening latest[KINDS];
@@ -36,8 +37,9 @@ void events_start(void) {
   count = 0;
   number = 1;
   sent = false;
+  wait = 0;
   merged = 0;
-  retry_us = 2u * SCHEDULE_TICK_US + send_time(RETRY_BYTES);
+  retry_slots = 2u * SCHEDULE_SLOTS_PER_TICK + (uint16_t)(send_time(RETRY_BYTES) / SLOT_US) + 1u;
 }
 
 static void append(const happening *what) {
@@ -82,22 +84,24 @@ void events_acknowledge(uint16_t arrived) {
   first = (uint8_t)(first + 1u) % PLACES;
   count--;
   sent = false;
+  wait = 0;
   if (merged != 0) {
     take_merged();
   }
 }
 
-static uint32_t retry_time(void) {
-  const uint16_t wanted = parameters_u16(PARAMETER_RETRY_TIME);
-  return wanted != 0 ? wanted * 1000ul : retry_us;
+/* Slots from one sending to the next, rounded up. */
+static uint16_t retry_time(void) {
+  const uint16_t wanted = parameters_u16(PARAMETER_RETRY_TIME); /* ms, up to 2000 */
+  return wanted == 0 ? retry_slots : (uint16_t)((wanted * 2u + 4u) / 5u);
 }
+_Static_assert(SLOT_US == 2500, "a slot is 5/2 ms");
 
 void events_task(void) {
-  if (count == 0) {
-    return;
+  if (wait > 0) {
+    wait--;
   }
-  const uint32_t now = schedule_time();
-  if ((sent && now - sent_at < retry_time()) || !send_has_room(MSG_EVENT_LENGTH)) {
+  if (count == 0 || wait > 0 || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
   const happening *what = &queue[first];
@@ -107,5 +111,5 @@ void events_task(void) {
     counters.retransmitted++;
   }
   sent = true;
-  sent_at = now;
+  wait = retry_time();
 }
