@@ -13,7 +13,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -22,9 +22,11 @@ ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware" / "src"
 BUILT = ROOT / "build" / "fuzz"
 FRAME = FIRMWARE / "link" / "frame.c"
+TEST = ROOT / "firmware" / "test"
+SANITIZE = "-fsanitize=fuzzer,address,undefined"
 FLAGS = (
-    *("-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fno-omit-frame-pointer"),
-    *("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}"),
+    *("-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fno-omit-frame-pointer"),
+    *(SANITIZE, "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}"),
 )
 
 
@@ -32,7 +34,7 @@ class Fuzzer(NamedTuple):
     """One program that libFuzzer feeds.
 
     Attributes:
-        end: whose messages it takes, "board" or "host".
+        end: whose golden frames it starts from, "board" or "host"; "": none.
         sources: C files.
         flags: more for the compiler.
         size: longest input (bytes).
@@ -53,22 +55,50 @@ HERE = ROOT / "firmware" / "fuzz"
 FUZZERS = {
     "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME)),
     "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME), ("-DFRAME_OF_HOST",)),
+    "link": Fuzzer("", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400),
 }
 
 
-def build(name: str, folder: Path, instead: Path | None = None) -> Path:
-    """Compiles a fuzzer into a folder; `instead` takes the place of frame.c."""
+# Actions of link_fuzzer.cpp: opens; arms and moves; presses a whisker; lets the supply sag; a message of each kind.
+RUN, OPEN, ARM, SET_POINT = (2, 40), (4, 7), (6,), (7, 50)
+ACTIONS: tuple[tuple[int, ...], ...] = (
+    (*RUN, *OPEN, *RUN),
+    (*RUN, *OPEN, *RUN, *RUN, *ARM, *RUN, *SET_POINT, *RUN),
+    (*RUN, *OPEN, *RUN, 3, 1, *RUN, 3, 0, *RUN),
+    (*RUN, *OPEN, *RUN, *RUN, *SET_POINT, *RUN),
+    (*RUN, *OPEN, 5, 0, *RUN, *RUN),
+    *((*RUN, *OPEN, 1, kind, *[0] * 12, *RUN) for kind in range(24)),
+)
+
+
+def build(name: str, folder: Path, instead: Mapping[Path, Path] | None = None) -> Path:
+    """Compiles a fuzzer into a folder; `instead` names files that take the place of sources."""
     fuzzer = FUZZERS[name]
     folder.mkdir(parents=True, exist_ok=True)
     program = folder / name
-    sources = [instead if instead and source == FRAME else source for source in fuzzer.sources]
-    subprocess.run(["clang", *FLAGS, *fuzzer.flags, *map(str, sources), "-o", str(program)], check=True)
+    sources = [(instead or {}).get(source, source) for source in fuzzer.sources]
+
+    def compiled(source: Path) -> str:
+        made = folder / f"{name}-{source.stem}.o"
+        language = "c++" if source.suffix == ".cpp" else "c"
+        standard = "-std=gnu++17" if language == "c++" else "-std=gnu11"
+        command = ["clang", "-x", language, standard, *FLAGS, *fuzzer.flags, "-c", str(source), "-o", str(made)]
+        subprocess.run(command, check=True)
+        return str(made)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        objects = list(pool.map(compiled, sources))
+    subprocess.run(["clang++", SANITIZE, *objects, "-o", str(program)], check=True)
     return program
 
 
 def write_seeds(name: str, folder: Path) -> None:
-    """The golden frames to the fuzzer's end, each behind its session's seed."""
+    """The golden frames to the fuzzer's end, each behind its session's seed; for others rows of actions."""
     folder.mkdir(parents=True, exist_ok=True)
+    if not FUZZERS[name].end:
+        for number, actions in enumerate(ACTIONS):
+            (folder / f"actions-{number}").write_bytes(bytes(actions))
+        return
     rows = json.loads((ROOT / "protocol" / "vectors" / "frames.json").read_text(encoding="utf-8"))
     for number, row in enumerate(rows):
         if (row["id"] >= 0x80) == (FUZZERS[name].end == "host"):
