@@ -21,7 +21,7 @@ MISSED = {
 
 @pytest.mark.parametrize("name", fuzz.FUZZERS)
 def test_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
-    done = fuzz.run(fuzz.build(name, tmp_path), tmp_path, ["-seed=1", "-max_total_time=4"])
+    done = fuzz.run(fuzz.build(name, tmp_path), tmp_path, ["-seed=1", "-max_total_time=3"])
     assert done.returncode == 0, done.stderr[-4000:]
     runs = re.search(r"Done (\d+) runs", done.stderr)
     assert runs and int(runs[1]) > len(fuzz.ACTIONS), "it has tried something"
