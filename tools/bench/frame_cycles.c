@@ -8,6 +8,7 @@
 #include "link/frame.h"
 #include "link/link.h"
 #include "link/send.h"
+#include "link/session.h"
 #include "pins.h"
 #include "safety.h"
 #include "schedule.h"
@@ -39,6 +40,14 @@ static void receive(uint8_t id, const void *payload, uint8_t length) {
   TIMED(while (hal_serial_due() != 0) link_poll());
   drain();
   TIMED(dispatch(id, 7, payload));
+  drain();
+}
+
+/* All that a message takes, with its answer. */
+static void work_on(uint8_t id, const void *payload, uint8_t length) {
+  uint8_t wire[FRAME_SIZE_MAX];
+  feed(wire, frame_encode(wire, id, 7, payload, length, 0x12345));
+  TIMED(while (hal_serial_due() != 0) link_poll());
   drain();
 }
 
@@ -74,6 +83,13 @@ int main(void) {
     send(MSG_ANSWER_ID, bytes, MSG_ANSWER_LENGTH);
     send(MSG_COUNTERS_ID, bytes, MSG_COUNTERS_LENGTH);
   }
+  work_on(MSG_IDENTIFY_ID, bytes, 0);
+  const msg_get_parameter get = {1, 1};
+  work_on(MSG_GET_PARAMETER_ID, &get, sizeof get);
+  const msg_clock_probe probe = {7};
+  work_on(MSG_CLOCK_PROBE_ID, &probe, sizeof probe);
+  const msg_open open = {PROTOCOL_VERSION, session_board_nonce(), session_board_nonce() ^ 0x54321ul};
+  work_on(MSG_OPEN_ID, &open, sizeof open);
   HAL_PIN_HIGH(SERVO_RIGHT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
   for (;;) {

@@ -21,6 +21,7 @@ FLAGS += ["-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections", "-Wl,--
 OVERHEAD = 8  # bytes of a frame with both delimiters
 RECEIVED = {"set-point": 8, "set-point of zeros": 8, "acknowledgement": 2}  # payload bytes
 SENT = {"telemetry": 38, "identity": 60, "answer": 7, "counters": 20}
+WORKED_ON = {"identify": (0, 60), "get_parameter": (3, 7), "clock_probe": (2, 6), "open": (9, 44)}  # and the answer's
 
 
 def build(folder: Path) -> Path:
@@ -58,9 +59,12 @@ def figures() -> dict[str, tuple[float, int]]:
         for name, length in SENT.items():
             cycles = next(measured)
             found[f"sent {name}, {content}"] = (cycles / (length + OVERHEAD), cycles)
+    for name, (asked, answered) in WORKED_ON.items():
+        cycles = next(measured)
+        found[f"{name} with its answer, all in all"] = (cycles / (asked + answered + 2 * OVERHEAD), cycles)
     return found
 
 
 if __name__ == "__main__":
     for case, (per_byte, whole) in figures().items():
-        print(f"{case:36} {per_byte:6.1f} cycles/byte {whole:6} cycles")
+        print(f"{case:40} {per_byte:6.1f} cycles/byte {whole:6} cycles")

@@ -54,28 +54,68 @@ typedef struct {
   uint8_t high, middle, low;
 } crc21;
 
-/* Takes one byte in. */
-static inline __attribute__((always_inline)) void crc21_take(crc21 *crc, uint8_t byte) {
+/* crc21_take(crc, byte)                takes one byte in
+ * crc21_take_all(crc, bytes, count)    takes bytes in, at least one
+ * crc21_copy(crc, to, from, count)     takes bytes in, at least one, and copies them; both pointers move on */
 #ifdef __AVR__
-  /* 16 cycles of the 320 that a byte has on the line; the compiler, which does not know the alignment, needs 30. */
-  uint16_t entry;
-  __asm__(
-      "eor %[high], %[byte]       \n"
-      "mov %A[entry], %[high]     \n"
-      "ldi %B[entry], hi8(%[table])\n"
-      "lpm %[high], %a[entry]     \n"
-      "eor %[high], %[middle]     \n"
-      "inc %B[entry]              \n"
-      "lpm %[middle], %a[entry]   \n"
-      "eor %[middle], %[low]      \n"
-      "inc %B[entry]              \n"
-      "lpm %[low], %a[entry]      \n"
-      : [high] "+r"(crc->high), [middle] "+r"(crc->middle), [low] "+r"(crc->low), [entry] "=&z"(entry)
-      : [byte] "r"(byte), [table] "i"(crc21_table));
+/* 15 cycles for what is in `byte`, of the 320 that a byte has on the line; the compiler, which does not know that the table
+ * is aligned, needs 30. */
+#define CRC21_TAKE                  \
+  "eor %[high], %[byte]         \n" \
+  "mov r30, %[high]             \n" \
+  "ldi r31, hi8(%[table])       \n" \
+  "lpm %[high], Z               \n" \
+  "eor %[high], %[middle]       \n" \
+  "inc r31                      \n" \
+  "lpm %[middle], Z             \n" \
+  "eor %[middle], %[low]        \n" \
+  "inc r31                      \n" \
+  "lpm %[low], Z                \n"
+#define CRC21_REGISTER [high] "+r"(crc->high), [middle] "+r"(crc->middle), [low] "+r"(crc->low)
+
+static inline __attribute__((always_inline)) void crc21_take(crc21 *crc, uint8_t byte) {
+  __asm__(CRC21_TAKE:CRC21_REGISTER : [byte] "r"(byte), [table] "i"(crc21_table) : "r30", "r31");
+}
+
+static inline __attribute__((always_inline)) void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count) {
+  uint8_t byte;
+  __asm__("1: ld %[byte], %a[bytes]+ \n" CRC21_TAKE
+          "dec %[count]              \n"
+          "brne 1b                   \n"
+          : CRC21_REGISTER, [bytes] "+x"(bytes), [count] "+r"(count), [byte] "=&r"(byte)
+          : [table] "i"(crc21_table), "m"(*(const uint8_t(*)[256])bytes)
+          : "r30", "r31");
+}
+
+static inline __attribute__((always_inline)) void crc21_copy(crc21 *crc, uint8_t **to, const uint8_t **from,
+                                                             uint8_t count) {
+  uint8_t byte;
+  __asm__ volatile("1: ld %[byte], %a[from]+ \n" CRC21_TAKE
+                   "st %a[to]+, %[byte]      \n"
+                   "dec %[count]             \n"
+                   "brne 1b                  \n"
+                   : CRC21_REGISTER, [from] "+x"(*from), [to] "+y"(*to), [count] "+r"(count), [byte] "=&r"(byte)
+                   : [table] "i"(crc21_table)
+                   : "r30", "r31", "memory");
+}
 #else
+static inline void crc21_take(crc21 *crc, uint8_t byte) {
   const uint8_t *entry = &crc21_table[crc->high ^ byte];
   *crc = (crc21){(uint8_t)(crc->middle ^ entry[0]), (uint8_t)(crc->low ^ entry[256]), entry[512]};
-#endif
 }
+
+static inline void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count) {
+  do {
+    crc21_take(crc, *bytes++);
+  } while (--count != 0);
+}
+
+static inline void crc21_copy(crc21 *crc, uint8_t **to, const uint8_t **from, uint8_t count) {
+  do {
+    crc21_take(crc, **from);
+    *(*to)++ = *(*from)++;
+  } while (--count != 0);
+}
+#endif
 
 #endif

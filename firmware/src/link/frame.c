@@ -12,14 +12,6 @@ static inline crc21 crc_start(uint32_t seed) {
   return (crc21){(uint8_t)(aligned >> 16), (uint8_t)(aligned >> 8), (uint8_t)aligned};
 }
 
-/* count > 0 */
-static inline __attribute__((always_inline)) crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
-  do {
-    crc21_take(&crc, *bytes++);
-  } while (--count != 0);
-  return crc;
-}
-
 /* The three bytes that follow the stuffed ones. */
 static inline void crc_spread(crc21 crc, uint8_t *check) {
   check[0] = (uint8_t)(0x80u | crc.high >> 1);
@@ -30,7 +22,7 @@ static inline void crc_spread(crc21 crc, uint8_t *check) {
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
   crc21 crc = crc_start(seed);
   if (count > 0) {
-    crc = crc_bytes(crc, bytes, count);
+    crc21_take_all(&crc, bytes, count);
   }
   return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
 }
@@ -47,28 +39,34 @@ static inline __attribute__((always_inline)) uint8_t distance_to_zero(const uint
 }
 
 /* COBS: each zero, and the place before the first byte, becomes the distance to the next. Frames are too short for a
- * second code byte. One pass writes the bytes and takes them into the checksum. */
+ * second code byte. The bytes between zeros are copied and taken into the checksum in one pass. */
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed) {
   const uint8_t *bytes = payload;
-  uint8_t distance = distance_to_zero(bytes, length);
+  uint8_t left = length;
+  uint8_t distance = distance_to_zero(bytes, left);
+  uint8_t run = (uint8_t)(distance - 1u);
   wire[0] = 0;
   wire[3] = sequence == 0 ? distance : sequence;
   distance = sequence == 0 ? 1u : (uint8_t)(distance + 1u);
   wire[2] = id == 0 ? distance : id;
   wire[1] = id == 0 ? 1u : (uint8_t)(distance + 1u);
-  crc21 crc = crc_bytes(crc_start(seed_of(id, seed)), wire + 1, 3);
+  crc21 crc = crc_start(seed_of(id, seed));
+  crc21_take_all(&crc, wire + 1, 3);
   uint8_t *to = wire + 4;
-  if (length > 0) {
-    uint8_t left = length;
-    do {
-      uint8_t byte = *bytes++;
-      left--;
-      if (byte == 0) {
-        byte = distance_to_zero(bytes, left);
-      }
-      crc21_take(&crc, byte);
-      *to++ = byte;
-    } while (left != 0);
+  for (;;) {
+    if (run != 0) {
+      crc21_copy(&crc, &to, &bytes, run);
+      left = (uint8_t)(left - run);
+    }
+    if (left == 0) {
+      break;
+    }
+    left--; /* a zero */
+    bytes++;
+    distance = distance_to_zero(bytes, left);
+    crc21_take(&crc, distance);
+    *to++ = distance;
+    run = (uint8_t)(distance - 1u);
   }
   crc_spread(crc, to);
   to[CHECK_BYTES] = 0;
@@ -111,7 +109,9 @@ static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t 
     }
   }
   const uint8_t size = (uint8_t)(count - CHECK_BYTES);
-  return crc_is(crc_bytes(crc_start(seed), bytes, size), bytes + size) && unstuff(bytes, size);
+  crc21 crc = crc_start(seed);
+  crc21_take_all(&crc, bytes, size);
+  return crc_is(crc, bytes + size) && unstuff(bytes, size);
 }
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
