@@ -1,0 +1,18 @@
+/* codec_to_host.c: the host's end of codec.h, and what both ends have in common. */
+#define FRAME_OF_HOST
+#define END(name) to_host_##name
+#include "codec_end.h"
+
+void codec_free(codec_decoder *self) { free(self); }
+
+/* The counts are the first member at either end. */
+codec_counts *codec_counts_of(codec_decoder *self) { return (codec_counts *)(void *)self; }
+
+uint32_t codec_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length,
+                      uint32_t seed) {
+  return frame_encode(wire, id, sequence, payload, (uint8_t)length, seed);
+}
+
+void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed) {
+  crc_spread(crc_bytes(crc_start(seed), stuffed, (uint8_t)size), check);
+}
