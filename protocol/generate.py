@@ -4,7 +4,8 @@
     python protocol/generate.py --check    exits 1 and names each file that is stale
 
 Made: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, the golden vectors
-protocol/vectors/frames.json with their C twin firmware/test/vectors.h, and the tables of PROTOCOL.md.
+protocol/vectors/frames.json with their C twin firmware/test/vectors.h, the CAN database protocol/boebot.dbc, and the
+tables of PROTOCOL.md.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ bare = ModuleType("boebot")
 bare.__path__ = [str(ROOT / "host" / "boebot")]
 sys.modules["boebot"] = bare
 
+import can_database  # noqa: E402
 import reference_frame  # noqa: E402
 import schema  # noqa: E402
 
@@ -363,7 +365,7 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
         "static const golden_frame GOLDEN_FRAMES[] = {",
     ]
     for row in rows:
-        head = f'{row["id"]}, {row["sequence"]}, {row["seed"]}'
+        head = f"{row['id']}, {row['sequence']}, {row['seed']}"
         lines.append(f'    {{"{row["message"]}", {head}, "{row["payload"]}",')
         lines.append(f'     "{row["frame"]}"}},')
     lines += ["};", "", "#endif", ""]
@@ -432,6 +434,7 @@ def outputs() -> dict[Path, str]:
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module(spec),
         HERE / "vectors" / "frames.json": json.dumps(golden, indent=1) + "\n",
         ROOT / "firmware" / "test" / "vectors.h": vectors_header(golden),
+        HERE / "boebot.dbc": can_database.database(spec),
         HERE / "PROTOCOL.md": protocol_page(spec),
     }
     maps: dict[str, str] = {}

@@ -24,6 +24,11 @@ has_cargo() {
   return 1
 }
 
+# clang with the libraries of its fuzzer and sanitizers, which Debian keeps in a package of their own
+can_fuzz() {
+  echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | clang -fsanitize=fuzzer,address,undefined -x c -o /dev/null -
+}
+
 for purpose in "$@"; do
   case $purpose in
     run)
@@ -38,6 +43,7 @@ for purpose in "$@"; do
     test)
       need doctest-dev sh -c 'echo "#include <doctest/doctest.h>" | c++ -x c++ -E -'
       need avrdude has avrdude
+      need "clang libclang-rt-dev" can_fuzz
       need build-essential has c++
       ;;
     check)

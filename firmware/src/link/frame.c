@@ -19,15 +19,17 @@ static inline crc21 crc_start(uint32_t seed) {
   return (crc21){(uint8_t)(aligned >> 16), (uint8_t)(aligned >> 8), (uint8_t)aligned};
 }
 
+static inline __attribute__((always_inline)) crc21 crc_byte(crc21 crc, uint8_t byte) {
+  const uint8_t index = crc.high ^ byte;
+  return (crc21){crc.middle ^ hal_table_byte(&crc21_high[index]), crc.low ^ hal_table_byte(&crc21_middle[index]),
+                 hal_table_byte(&crc21_low[index])};
+}
+
 static crc21 crc_bytes(crc21 crc, const uint8_t *bytes, uint8_t count) {
-  uint8_t high = crc.high, middle = crc.middle, low = crc.low;
   for (; count > 0; count--) {
-    const uint8_t index = high ^ *bytes++;
-    high = middle ^ hal_table_byte(&crc21_high[index]);
-    middle = low ^ hal_table_byte(&crc21_middle[index]);
-    low = hal_table_byte(&crc21_low[index]);
+    crc = crc_byte(crc, *bytes++);
   }
-  return (crc21){high, middle, low};
+  return crc;
 }
 
 /* The three bytes that follow the stuffed ones. */
@@ -42,42 +44,42 @@ uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
   return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
 }
 
-static uint32_t seed_of(uint8_t id, uint32_t session) {
-  switch (id) {
-    case MSG_HELLO_REQUEST_ID:
-    case MSG_HELLO_ID:
-    case MSG_IDENTIFY_ID:
-    case MSG_IDENTITY_ID:
-      return FRAME_SEED;
-    default:
-      return session;
+static inline uint32_t seed_of(uint8_t id, uint32_t session) { return message_is_handshake(id) ? FRAME_SEED : session; }
+
+/* Bytes from `bytes` on up to the next zero or the end, and one more: what COBS writes in front of them. */
+static inline uint8_t distance_to_zero(const uint8_t *bytes, uint8_t count) {
+  uint8_t distance = 1;
+  for (; count > 0 && *bytes != 0; count--) {
+    bytes++;
+    distance++;
   }
+  return distance;
 }
 
+/* COBS: each zero, and the place before the first byte, becomes the distance to the next. Frames are too short for a
+ * second code byte. One pass writes the bytes and takes them into the checksum. */
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed) {
-  uint8_t *body = wire + 2; /* after the delimiter and the first code byte */
-  body[0] = id;
-  body[1] = sequence;
-  if (length > 0) { /* a message without fields has no payload */
-    memcpy(body + 2, payload, length);
-  }
-  const uint8_t size = (uint8_t)(length + 2u);
-
-  /* COBS: each zero, and the place before the first byte, becomes the distance to the next. Frames are too short for a
-   * second code byte. */
+  const uint8_t *bytes = payload;
+  const crc21 start = crc_start(seed_of(id, seed));
+  uint8_t distance = distance_to_zero(bytes, length);
   wire[0] = 0;
-  uint8_t code = 1;
-  for (uint8_t i = size; i-- > 0;) {
-    if (body[i] == 0) {
-      body[i] = code;
-      code = 1;
-    } else {
-      code++;
+  wire[3] = sequence == 0 ? distance : sequence;
+  distance = sequence == 0 ? 1u : (uint8_t)(distance + 1u);
+  wire[2] = id == 0 ? distance : id;
+  wire[1] = id == 0 ? 1u : (uint8_t)(distance + 1u);
+  crc21 crc = crc_bytes(start, wire + 1, 3);
+  uint8_t *to = wire + 4;
+  for (uint8_t left = length; left > 0;) {
+    uint8_t byte = *bytes++;
+    left--;
+    if (byte == 0) {
+      byte = distance_to_zero(bytes, left);
     }
+    crc = crc_byte(crc, byte);
+    *to++ = byte;
   }
-  wire[1] = code;
-  crc_spread(crc_bytes(crc_start(seed_of(id, seed)), wire + 1, (uint8_t)(size + 1u)), body + size);
-  body[size + CHECK_BYTES] = 0;
+  crc_spread(crc, to);
+  to[CHECK_BYTES] = 0;
   return (uint8_t)(length + FRAME_OVERHEAD);
 }
 
@@ -102,7 +104,8 @@ static bool accept(frame_decoder *decoder) {
   }
   const uint8_t size = (uint8_t)(decoder->count - CHECK_BYTES);
   const uint8_t id = decoder->bytes[1];
-  if (message_length(id) != (int16_t)(size - 3)) {
+  if (frame_accepted_length(id) != (int16_t)(size - 3) ||
+      (decoder->seed > FRAME_SEED_MAX && !message_is_handshake(id))) {
     return false;
   }
   uint8_t check[CHECK_BYTES];
@@ -115,8 +118,13 @@ void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (fr
 bool frame_decode_end(frame_decoder *decoder) {
   const bool empty = decoder->count == 0;
   const bool accepted = !empty && accept(decoder);
-  if (!empty && !accepted && decoder->synchronised) {
+  if (accepted) {
+    decoder->good++;
+    decoder->resynchronised = (uint16_t)(decoder->resynchronised + decoder->lost);
+    decoder->lost = false;
+  } else if (!empty && decoder->synchronised) {
     decoder->bad++;
+    decoder->lost = true;
   }
   decoder->count = 0;
   decoder->synchronised = true;

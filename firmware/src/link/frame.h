@@ -5,7 +5,10 @@
  *
  * c2 c1 c0: CRC-21 of the stuffed bytes as on the wire, seven bits each under a set top bit, so that 00 occurs only as
  * the delimiter. A frame is accepted only if its length is exactly that of its id, its checksum is right, and its
- * stuffing ends exactly at its end. Neighbours may share a delimiter; empty frames are nothing. */
+ * stuffing ends exactly at its end. Neighbours may share a delimiter; empty frames are nothing.
+ *
+ * Either end makes frames of both directions. The board's end accepts messages to the board; compiled with
+ * -DFRAME_OF_HOST this is the host's end and accepts messages to the host. */
 #ifndef FRAME_H
 #define FRAME_H
 
@@ -18,23 +21,42 @@
 extern "C" {
 #endif
 
-#define FRAME_SEED 0x155555ul
-#define FRAME_OVERHEAD 8u                                     /* bytes added to a payload, with both delimiters */
-#define FRAME_SIZE_MAX (MESSAGE_PAYLOAD_MAX + FRAME_OVERHEAD) /* longest frame sent */
-#define FRAME_INSIDE_MAX (MESSAGE_PAYLOAD_MAX + FRAME_OVERHEAD - 2u) /* longest between delimiters */
+#define FRAME_SEED 0x155555ul         /* of the handshake's messages */
+#define FRAME_NO_SESSION 0xFFFFFFFFul /* seed of a decoder that accepts only the handshake's messages */
+#define FRAME_SEED_MAX 0x1FFFFFul     /* seeds have 21 bits */
+#define FRAME_OVERHEAD 8u             /* bytes added to a payload, with both delimiters */
+
+#if MESSAGE_PAYLOAD_MAX_TO_HOST > MESSAGE_PAYLOAD_MAX_TO_BOARD
+#define FRAME_PAYLOAD_MAX MESSAGE_PAYLOAD_MAX_TO_HOST
+#else
+#define FRAME_PAYLOAD_MAX MESSAGE_PAYLOAD_MAX_TO_BOARD
+#endif
+#define FRAME_SIZE_MAX (FRAME_PAYLOAD_MAX + FRAME_OVERHEAD) /* longest frame of either direction */
+
+#ifdef FRAME_OF_HOST
+#define FRAME_ACCEPTED_MAX MESSAGE_PAYLOAD_MAX_TO_HOST
+static inline int16_t frame_accepted_length(uint8_t id) { return message_length_to_host(id); }
+#else
+#define FRAME_ACCEPTED_MAX MESSAGE_PAYLOAD_MAX_TO_BOARD
+static inline int16_t frame_accepted_length(uint8_t id) { return message_length_to_board(id); }
+#endif
+#define FRAME_INSIDE_MAX (FRAME_ACCEPTED_MAX + FRAME_OVERHEAD - 2u) /* longest accepted between delimiters */
 
 /* CRC-21 of `count` bytes, after `seed`. */
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count);
 
 /* Writes the frame of a message to `wire` (FRAME_SIZE_MAX bytes); returns its length. The session's seed is used but
- * for the messages of the handshake, which keep FRAME_SEED. length <= MESSAGE_PAYLOAD_MAX */
+ * for the messages of the handshake, which keep FRAME_SEED. length <= FRAME_PAYLOAD_MAX */
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed);
 
 typedef struct {
-  uint32_t seed;     /* the session's */
-  uint8_t bad;       /* frames refused, modulo 256 */
-  bool synchronised; /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
-  uint8_t count;     /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
+  uint32_t seed;           /* the session's, or FRAME_NO_SESSION; may be changed between frames */
+  uint16_t good;           /* frames accepted, modulo 65536 */
+  uint16_t bad;            /* frames refused, modulo 65536 */
+  uint16_t resynchronised; /* times that a good frame followed bad ones, modulo 65536 */
+  bool synchronised;       /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
+  bool lost;               /* the last frame was refused */
+  uint8_t count;           /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
   uint8_t bytes[FRAME_INSIDE_MAX + 2u];
 } frame_decoder;
 

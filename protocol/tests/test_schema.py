@@ -1,0 +1,97 @@
+"""What the schema demands of messages.toml: each rule, broken once, is refused by a sentence that names the place."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+PROTOCOL = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(PROTOCOL))
+
+import schema  # noqa: E402
+
+TEXT = (PROTOCOL / "messages.toml").read_text()
+
+
+def message(name: str, fields: str, delivery: str = "telemetry", direction: str = "to_board", number: int = 126) -> str:
+    return (
+        f'\n[[message]]\nname = "{name}"\nid = {number}\ndirection = "{direction}"\n'
+        f'delivery = "{delivery}"\ndoc = ""\nfields = [{fields}]\n'
+    )
+
+
+def parameter(type_: str = "u16", least: int = 0, greatest: int = 10, number: int = -1, name: str = "extra") -> str:
+    number = number if number >= 0 else len(schema.load().parameter)
+    return (
+        f'\n[[parameter]]\nname = "{name}"\nid = {number}\ntype = "{type_}"\nunit = ""\ndoc = ""\n'
+        f"min = {least}\nmax = {greatest}\ndefault = 1\n"
+    )
+
+
+def load(folder: Path, extra: str, text: str = TEXT) -> schema.Schema:
+    (folder / "messages.toml").write_text(text + extra)
+    return schema.load(folder / "messages.toml")
+
+
+NUMBER = '{ name = "number", type = "u8" }'
+VALUE = '{ name = "value", type = "u8" }'
+LIVES = '{ name = "time_to_live", type = "u16" }'
+ANSWERS = '{ name = "answers_tick", type = "u16" }'
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        message("ask", f"{NUMBER}, {VALUE}", "exactly_once"),
+        message("move", f"{VALUE}, {LIVES}, {ANSWERS}", "set_point"),
+        message("tell", VALUE, direction="to_host", number=0xFE),
+        parameter(),
+        parameter("i16", -5, 5),
+    ],
+)
+def test_what_keeps_the_rules_is_taken(tmp_path: Path, extra: str) -> None:
+    assert load(tmp_path, extra).hash != schema.load().hash
+
+
+@pytest.mark.parametrize(
+    ("extra", "sentence"),
+    [
+        (message("ask", f"{VALUE}, {NUMBER}", "exactly_once"), "ask: .*its first field must be number"),
+        (message("ask", "", "exactly_once"), "ask: .*its first field must be number"),
+        (message("move", f"{VALUE}, {ANSWERS}, {LIVES}", "set_point"), "move: .*must end with time_to_live and"),
+        (message("move", f"{LIVES}, {ANSWERS}, {VALUE}", "set_point"), "move: .*must end with time_to_live and"),
+        (message("move", ANSWERS, "set_point"), "move: .*must end with time_to_live and"),
+        (message("say", VALUE, "perhaps"), "say: unknown delivery 'perhaps'"),
+        (message("say", VALUE, number=0xFE), "say: ids from 0x80 on are for messages to the host"),
+        (message("say", VALUE, direction="to_host"), "say: ids from 0x80 on are for messages to the host"),
+        (message("say", VALUE, number=0x08), "message: 0x8 used twice"),
+        (message("stop", VALUE), "message: stop used twice"),
+        (message("say", '{ name = "x", type = "u64" }'), "say: field x has unknown type 'u64'"),
+        (message("say", '{ name = "x", type = "u8", flags = "moods" }'), "say: field x names unknown flags 'moods'"),
+        (message("say", '{ name = "x", type = "u8", enum = "moods" }'), "say: field x names unknown enum 'moods'"),
+        (parameter("u32"), "parameter extra: type 'u32'"),
+        (parameter("u8"), "parameter extra: type 'u8'"),
+        (parameter("u16", -1, 5), "parameter extra: -1 to 5 is no range"),
+        (parameter("u16", 5, 5), "parameter extra: 5 to 5 is no range"),
+        (parameter("i16", 0, 32768), "parameter extra: 0 to 32768 is no range"),
+        (parameter(number=100), "parameter ids must count from 0 without gaps"),
+        (parameter(name="bandgap"), "parameter: bandgap used twice"),
+    ],
+)
+def test_what_breaks_a_rule_is_refused(tmp_path: Path, extra: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        load(tmp_path, extra)
+
+
+def test_devices_without_a_robot_part_are_refused(tmp_path: Path) -> None:
+    text = TEXT.replace(', "buzzer"]\n# The', ', "buzzer", "radio"]\n# The')
+    assert text != TEXT
+    with pytest.raises(ValueError, match="flags devices: expected one device for each bit"):
+        load(tmp_path, "", text)
+
+
+def test_a_key_that_nobody_reads_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="colour"):
+        load(tmp_path, message("say", '{ name = "x", type = "u8", colour = "red" }'))
