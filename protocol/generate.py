@@ -108,7 +108,10 @@ def messages_header(spec: schema.Schema) -> str:
         "/* X(id, payload bytes, hash) for each message, in order of ids. */",
         f"#define MESSAGE_COUNT {len(spec.message)}u",
     ]
-    rows = [f"  X(0x{m.id:02X}, {m.length}, 0x{m.hash:04X})" for m in sorted(spec.message, key=lambda m: m.id)]
+    rows = [
+        f"  X(0x{m.id:02X}, {m.length}, 0x{spec.message_hash(m):08X}ul)"
+        for m in sorted(spec.message, key=lambda m: m.id)
+    ]
     lines += [*continued("#define MESSAGE_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
 
@@ -241,8 +244,8 @@ def python_module(spec: schema.Schema) -> str:
     lines += [f"    {'' if i == 0 else '| '}{class_name(m.name)}" for i, m in enumerate(spec.message)]
     lines += [")", "", "MESSAGES: dict[int, type[Message]] = {"]
     lines += [f"    0x{m.id:02X}: {class_name(m.name)}," for m in spec.message]
-    lines += ["}", "", "# id -> 16 bits of a hash of the message's layout", "HASHES: dict[int, int] = {"]
-    lines += [f"    0x{m.id:02X}: 0x{m.hash:04X}," for m in spec.message]
+    lines += ["}", "", "# id -> hash of the message", "HASHES: dict[int, int] = {"]
+    lines += [f"    0x{m.id:02X}: 0x{spec.message_hash(m):08X}," for m in spec.message]
     lines += ["}"]
     lines += ["", "", "class ParameterSpec(NamedTuple):", '    """A run-time parameter of the firmware."""', ""]
     lines += ["    id: int", "    unit: str", "    scale: float  # unit per count", "    minimum: int  # counts"]
@@ -378,10 +381,13 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
 def tables(spec: schema.Schema) -> str:
     """The message and parameter tables, in Markdown."""
     lines = [f"Version {spec.version}, schema hash `0x{spec.hash:08X}`.", ""]
-    lines += ["| id | message | direction | delivery | payload | meaning |", "|---|---|---|---|---|---|"]
+    hashes = {m.id: f"{spec.message_hash(m):08X}" for m in spec.message}
+    lines += ["| id | message | direction | delivery | payload | hash | meaning |", "|---|---|---|---|---|---|---|"]
     for m in spec.message:
         way = "host → board" if m.direction == "to_board" else "board → host"
-        lines.append(f"| `0x{m.id:02X}` | `{m.name}` | {way} | {m.delivery} | {m.length} B | {m.doc} |")
+        lines.append(
+            f"| `0x{m.id:02X}` | `{m.name}` | {way} | {m.delivery} | {m.length} B | `0x{hashes[m.id]}` | {m.doc} |"
+        )
     for m in spec.message:
         if not m.fields:
             continue

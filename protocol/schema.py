@@ -13,6 +13,7 @@ import msgspec
 HERE = Path(__file__).resolve().parent
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
+NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from")  # keys that both ends need not agree on
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
@@ -80,11 +81,6 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         """Payload bytes."""
         return sum(field.size for field in self.fields)
 
-    @property
-    def hash(self) -> int:
-        """16 bits of the CRC-32 of the message without its explanations."""
-        return _crc32(self) & 0xFFFF
-
 
 class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A set of named bits."""
@@ -131,18 +127,27 @@ class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         """CRC-32 of what both ends must agree on: everything but the explanations."""
         return _crc32(self)
 
+    def message_hash(self, message: Message) -> int:
+        """CRC-32 of what both ends must agree on in one message, with the flags and values that its fields name; the
+        parameters belong to set_parameter.
+        """
+        named = {field.flags: self.flags[field.flags] for field in message.fields if field.flags}
+        values = {field.enum: self.enum[field.enum] for field in message.fields if field.enum}
+        parameters = self.parameter if message.name == "set_parameter" else []
+        return _crc32([message, named, values, parameters])
+
     def of_direction(self, direction: str) -> list[Message]:
         """The messages to one side."""
         return [message for message in self.message if message.direction == direction]
 
 
-def _crc32(part: Schema | Message) -> int:
+def _crc32(part: Any) -> int:
     return zlib.crc32(json.dumps(_without_docs(msgspec.to_builtins(part)), sort_keys=True).encode())
 
 
 def _without_docs(node: Any) -> Any:
     if isinstance(node, dict):
-        return {key: _without_docs(value) for key, value in node.items() if key != "doc"}
+        return {key: _without_docs(value) for key, value in node.items() if key not in NOT_ON_THE_WIRE}
     if isinstance(node, list):
         return [_without_docs(value) for value in node]
     return node
@@ -178,6 +183,13 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown flags {field.flags!r}")
             if field.enum and field.enum not in schema.enum:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown enum {field.enum!r}")
+    for message in schema.message:
+        alike = {m.delivery for m in schema.of_direction(message.direction) if m.length == message.length}
+        if message.delivery == "handshake" and alike != {"handshake"}:
+            raise ValueError(
+                f"message {message.name}: of the handshake, so no other message {message.direction} may be as long: "
+                "a wrong bit in the id would change the checksum's seed"
+            )
     for parameter in schema.parameter:
         if parameter.type not in PARAMETER_TYPES:
             raise ValueError(f"parameter {parameter.name}: type {parameter.type!r} is none of {PARAMETER_TYPES}")

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 2u
-#define SCHEMA_HASH 0x79744B46ul
+#define SCHEMA_HASH 0xB80C3E10ul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
@@ -69,14 +69,15 @@ enum {
   ANSWER_STATUS_OUT_OF_RANGE = 2,
   ANSWER_STATUS_SUPPLY_LOW = 3,
   ANSWER_STATUS_STORAGE_FAILED = 4,
+  ANSWER_STATUS_LATCHED_AGAIN = 5,
+  ANSWER_STATUS_BUSY = 6,
 };
 
 /* What happened, and what `value` is. */
 enum {
   EVENT_KIND_WHISKERS = 0,
-  EVENT_KIND_ARMED = 1,
-  EVENT_KIND_LATCHED = 2,
-  EVENT_KIND_DEAD_MAN = 3,
+  EVENT_KIND_LATCH = 1,
+  EVENT_KIND_DEAD_MAN = 2,
 };
 
 /* Opens a session with the seed (board_nonce XOR host_nonce), or confirms the one that has it. */
@@ -98,22 +99,26 @@ typedef struct __attribute__((packed)) {
 
 /* Asks how the board understands one message, to name what differs when the schema hashes do. */
 #define MSG_DESCRIBE_ID 0x03u
-#define MSG_DESCRIBE_LENGTH 1u
+#define MSG_DESCRIBE_LENGTH 5u
 typedef struct __attribute__((packed)) {
   uint8_t index; /* 0, 1, ... in order of ids */
+  uint32_t board_nonce; /* as in the last hello; another one is refused */
 } msg_describe;
+#define MSG_DESCRIBE_BOARD_NONCE_MIN (0)
+#define MSG_DESCRIBE_BOARD_NONCE_MAX (2097151)
 
 /* Who speaks, which contract, which session. Sent on its own (see Session) and in answer to open. */
 #define MSG_HELLO_ID 0x80u
-#define MSG_HELLO_LENGTH 42u
+#define MSG_HELLO_LENGTH 44u
 typedef struct __attribute__((packed)) {
   uint8_t protocol_version;
   uint32_t schema_hash; /* CRC-32 of the normalised messages.toml */
-  uint32_t board_nonce; /* another one after every reset */
+  uint32_t board_nonce; /* what the next open must name: another one after every start, opening and end of a session */
   uint32_t session; /* seed of the session that is open; 0: none */
   uint16_t tick_rate; /* Hz */
+  uint16_t session_time_out; /* ms; silence of the host after which a session ends */
   uint8_t telemetry_period; /* ticks; ticks between two telemetry messages, as the baud rate allows */
-  uint32_t boot_counter; /* starts of this board, this one included, that ran for 10 s; 0: not known */
+  uint32_t boot_counter; /* number of this start: 1 + the earlier ones that ran for 10 s */
   uint8_t reset_cause; /* reset_cause */
   uint8_t parameters_saved; /* 1: the parameters in force at start came from the EEPROM; 0: they are the image's defaults */
   uint32_t devices; /* devices */
@@ -137,13 +142,13 @@ typedef struct __attribute__((packed)) {
 
 /* How the board understands one message. An index beyond the last gives id 0. */
 #define MSG_DESCRIPTION_ID 0x82u
-#define MSG_DESCRIPTION_LENGTH 6u
+#define MSG_DESCRIPTION_LENGTH 8u
 typedef struct __attribute__((packed)) {
   uint8_t index;
   uint8_t count; /* messages that the board knows */
   uint8_t id;
   uint8_t length; /* B; of the payload */
-  uint16_t hash; /* low half of the CRC-32 of the normalised message */
+  uint32_t hash; /* of the message, as in the table */
 } msg_description;
 
 /* Stops the motors at once and latches them off until armed again. */
@@ -152,6 +157,15 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uint8_t token; /* comes back in stopped */
 } msg_stop;
+
+/* The host leaves: the session ends at once. */
+#define MSG_CLOSE_ID 0x09u
+#define MSG_CLOSE_LENGTH 4u
+typedef struct __attribute__((packed)) {
+  uint32_t session; /* the session's seed; another one is refused */
+} msg_close;
+#define MSG_CLOSE_SESSION_MIN (0)
+#define MSG_CLOSE_SESSION_MAX (2097151)
 
 /* Motor signals: -1 full backward, 0 hold still, +1 full forward. */
 #define MSG_SETPOINT_SIGNAL_ID 0x10u
@@ -197,47 +211,48 @@ typedef struct __attribute__((packed)) {
 
 /* Asks for one parameter. */
 #define MSG_GET_PARAMETER_ID 0x20u
-#define MSG_GET_PARAMETER_LENGTH 2u
+#define MSG_GET_PARAMETER_LENGTH 3u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request: 1 for the first of a session, then one more each */
+  uint16_t number; /* of the request: 1 for the first of a session, then one more each */
   uint8_t parameter; /* number of the parameter */
 } msg_get_parameter;
 
 /* Sets one parameter until the next reset. */
 #define MSG_SET_PARAMETER_ID 0x21u
-#define MSG_SET_PARAMETER_LENGTH 6u
+#define MSG_SET_PARAMETER_LENGTH 7u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request */
+  uint16_t number; /* of the request */
   uint8_t parameter; /* number of the parameter */
   int32_t value; /* in counts of the parameter's scale */
 } msg_set_parameter;
 
 /* Writes all parameters to the EEPROM; answered when they are written and read back. */
 #define MSG_SAVE_PARAMETERS_ID 0x22u
-#define MSG_SAVE_PARAMETERS_LENGTH 1u
+#define MSG_SAVE_PARAMETERS_LENGTH 2u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request */
+  uint16_t number; /* of the request */
 } msg_save_parameters;
 
 /* All parameters to the image's defaults; what is saved stays until save_parameters. */
 #define MSG_RESET_PARAMETERS_ID 0x23u
-#define MSG_RESET_PARAMETERS_LENGTH 1u
+#define MSG_RESET_PARAMETERS_LENGTH 2u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request */
+  uint16_t number; /* of the request */
 } msg_reset_parameters;
 
-/* Ends the latch: from now on fresh set-points move the motors. Refused while the supply is low. */
+/* Ends the latch: set-points that answer a later tick move the motors. Refused while the supply is low or not yet measured. */
 #define MSG_ARM_ID 0x24u
-#define MSG_ARM_LENGTH 1u
+#define MSG_ARM_LENGTH 3u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request */
+  uint16_t number; /* of the request */
+  uint8_t latches; /* as in the telemetry that the host knows; refused (latched_again) if there has been another since */
 } msg_arm;
 
-/* All events up to this number have arrived. */
+/* The event of this number has arrived. */
 #define MSG_ACKNOWLEDGE_ID 0x28u
-#define MSG_ACKNOWLEDGE_LENGTH 1u
+#define MSG_ACKNOWLEDGE_LENGTH 2u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the event */
+  uint16_t number; /* of the event */
 } msg_acknowledge;
 
 /* Asks for the board's time, at once. Also keeps the session open. */
@@ -256,7 +271,7 @@ typedef struct __attribute__((packed)) {
 
 /* Everything the board knows, once per control tick or less often where the line is slow. */
 #define MSG_TELEMETRY_ID 0x90u
-#define MSG_TELEMETRY_LENGTH 37u
+#define MSG_TELEMETRY_LENGTH 38u
 typedef struct __attribute__((packed)) {
   uint32_t tick; /* control ticks since reset */
   uint32_t time; /* us; board time at the start of this tick since reset; rolls over after 71.6 min */
@@ -274,6 +289,7 @@ typedef struct __attribute__((packed)) {
   uint16_t supply; /* 0.001 V; supply voltage against the bandgap; 0: not yet measured */
   uint16_t status; /* status */
   uint8_t latch; /* latch */
+  uint8_t latches; /* times that the motors were latched off since reset, repeated stops included, modulo 256 */
   uint8_t setpoint_sequence; /* sequence number of the last set-point that was accepted */
   uint8_t overruns; /* control ticks overrun since reset, modulo 256 */
 } msg_telemetry;
@@ -296,18 +312,18 @@ typedef struct __attribute__((packed)) {
 
 /* Answer to a numbered request. */
 #define MSG_ANSWER_ID 0xA0u
-#define MSG_ANSWER_LENGTH 6u
+#define MSG_ANSWER_LENGTH 7u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the request */
+  uint16_t number; /* of the request */
   uint8_t status; /* answer_status */
   int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale */
 } msg_answer;
 
 /* Something happened. Sent again until acknowledged. */
 #define MSG_EVENT_ID 0xA1u
-#define MSG_EVENT_LENGTH 8u
+#define MSG_EVENT_LENGTH 9u
 typedef struct __attribute__((packed)) {
-  uint8_t number; /* of the event: 1 for the first of a session, then one more each */
+  uint16_t number; /* of the event: 1 for the first of a session, then one more each */
   uint8_t kind; /* event_kind */
   uint16_t value; /* see event_kind */
   uint32_t time; /* us; board time since reset */
@@ -332,6 +348,8 @@ static inline int16_t message_length_to_board(uint8_t id) {
       return MSG_DESCRIBE_LENGTH;
     case MSG_STOP_ID:
       return MSG_STOP_LENGTH;
+    case MSG_CLOSE_ID:
+      return MSG_CLOSE_LENGTH;
     case MSG_SETPOINT_SIGNAL_ID:
       return MSG_SETPOINT_SIGNAL_LENGTH;
     case MSG_SETPOINT_SPEED_ID:
@@ -399,30 +417,31 @@ static inline bool message_is_handshake(uint8_t id) {
 }
 
 /* X(id, payload bytes, hash) for each message, in order of ids. */
-#define MESSAGE_COUNT 23u
-#define MESSAGE_LIST(X) \
-  X(0x01, 9, 0xE033)    \
-  X(0x02, 0, 0xA6BC)    \
-  X(0x03, 1, 0x7A4D)    \
-  X(0x08, 1, 0xC8D0)    \
-  X(0x10, 8, 0x757B)    \
-  X(0x11, 8, 0x0B21)    \
-  X(0x12, 4, 0x6AC3)    \
-  X(0x20, 2, 0x4D41)    \
-  X(0x21, 6, 0x7659)    \
-  X(0x22, 1, 0x99A5)    \
-  X(0x23, 1, 0x308B)    \
-  X(0x24, 1, 0xC080)    \
-  X(0x28, 1, 0x7BE0)    \
-  X(0x30, 2, 0x2C2C)    \
-  X(0x80, 42, 0x4FA2)   \
-  X(0x81, 60, 0x9530)   \
-  X(0x82, 6, 0x5DF1)    \
-  X(0x88, 1, 0x9252)    \
-  X(0x90, 37, 0x879F)   \
-  X(0x91, 20, 0x71D0)   \
-  X(0xA0, 6, 0x9FE2)    \
-  X(0xA1, 8, 0xC475)    \
-  X(0xB0, 6, 0x6A0E)
+#define MESSAGE_COUNT 24u
+#define MESSAGE_LIST(X)     \
+  X(0x01, 9, 0xE0471814ul)  \
+  X(0x02, 0, 0xBD434780ul)  \
+  X(0x03, 5, 0xDDE1C4B0ul)  \
+  X(0x08, 1, 0xF533989Aul)  \
+  X(0x09, 4, 0x0C4FA8AAul)  \
+  X(0x10, 8, 0xEFBA28FDul)  \
+  X(0x11, 8, 0xFCEB8D85ul)  \
+  X(0x12, 4, 0xD86ACD27ul)  \
+  X(0x20, 3, 0x9199C85Ful)  \
+  X(0x21, 7, 0x78EEA412ul)  \
+  X(0x22, 2, 0x1DEAD58Cul)  \
+  X(0x23, 2, 0x5C7C21EEul)  \
+  X(0x24, 3, 0x7A25B50Eul)  \
+  X(0x28, 2, 0x306E772Cul)  \
+  X(0x30, 2, 0x1011476Bul)  \
+  X(0x80, 44, 0xE0F2D7FDul) \
+  X(0x81, 60, 0xF379E8B5ul) \
+  X(0x82, 8, 0xACE09C27ul)  \
+  X(0x88, 1, 0x24E076A5ul)  \
+  X(0x90, 38, 0x425355C1ul) \
+  X(0x91, 20, 0x7EF8DA38ul) \
+  X(0xA0, 7, 0x754ACE51ul)  \
+  X(0xA1, 9, 0xCCFD276Eul)  \
+  X(0xB0, 6, 0xFC092B76ul)
 
 #endif

@@ -40,7 +40,7 @@
   X(WHEEL_RADIUS, u16, 500, 20000, DEFAULT_WHEEL_RADIUS)               \
   X(TRACK_WIDTH, u16, 2000, 60000, DEFAULT_TRACK_WIDTH)                \
   X(TELEMETRY_PERIOD, u16, 1, 100, 1)                                  \
-  X(SESSION_TIME_OUT, u16, 200, 10000, 1000)                           \
+  X(SESSION_TIME_OUT, u16, 200, 1500, 1000)                            \
   X(RETRY_TIME, u16, 0, 2000, 0)                                       \
   X(SUPPLY_MINIMUM, u16, 0, 5500, 4200)                                \
   X(BANDGAP, u16, 1000, 1200, 1100)                                    \

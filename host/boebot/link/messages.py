@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 2
-SCHEMA_HASH = 0x79744B46
+SCHEMA_HASH = 0xB80C3E10
 
 
 class Whiskers(IntFlag):
@@ -105,15 +105,16 @@ class AnswerStatus(IntEnum):
     OUT_OF_RANGE = 2
     SUPPLY_LOW = 3
     STORAGE_FAILED = 4
+    LATCHED_AGAIN = 5
+    BUSY = 6
 
 
 class EventKind(IntEnum):
     """What happened, and what `value` is."""
 
     WHISKERS = 0
-    ARMED = 1
-    LATCHED = 2
-    DEAD_MAN = 3
+    LATCH = 1
+    DEAD_MAN = 2
 
 
 class _OpenFields(NamedTuple):
@@ -168,6 +169,7 @@ class Identify(_IdentifyFields):
 
 class _DescribeFields(NamedTuple):
     index: int  # 0, 1, ... in order of ids
+    board_nonce: int  # as in the last hello; another one is refused
 
 
 class Describe(_DescribeFields):
@@ -177,8 +179,8 @@ class Describe(_DescribeFields):
     ID: ClassVar[int] = 0x03
     NAME: ClassVar[str] = "describe"
     DELIVERY: ClassVar[str] = "handshake"
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    LENGTH: ClassVar[int] = 5
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BI")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -193,11 +195,12 @@ class Describe(_DescribeFields):
 class _HelloFields(NamedTuple):
     protocol_version: int
     schema_hash: int  # CRC-32 of the normalised messages.toml
-    board_nonce: int  # another one after every reset
+    board_nonce: int  # what the next open must name: another one after every start, opening and end of a session
     session: int  # seed of the session that is open; 0: none
     tick_rate: int  # Hz
+    session_time_out: int  # ms; silence of the host after which a session ends
     telemetry_period: int  # ticks; ticks between two telemetry messages, as the baud rate allows
-    boot_counter: int  # starts of this board, this one included, that ran for 10 s; 0: not known
+    boot_counter: int  # number of this start: 1 + the earlier ones that ran for 10 s
     reset_cause: int  # reset_cause
     parameters_saved: int  # 1: the parameters in force at start came from the EEPROM; 0: they are the image's defaults
     devices: int  # devices
@@ -211,8 +214,8 @@ class Hello(_HelloFields):
     ID: ClassVar[int] = 0x80
     NAME: ClassVar[str] = "hello"
     DELIVERY: ClassVar[str] = "handshake"
-    LENGTH: ClassVar[int] = 42
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIIIHBIBBI16s")
+    LENGTH: ClassVar[int] = 44
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIIIHHBIBBI16s")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -257,7 +260,7 @@ class _DescriptionFields(NamedTuple):
     count: int  # messages that the board knows
     id: int
     length: int  # B; of the payload
-    hash: int  # low half of the CRC-32 of the normalised message
+    hash: int  # of the message, as in the table
 
 
 class Description(_DescriptionFields):
@@ -267,8 +270,8 @@ class Description(_DescriptionFields):
     ID: ClassVar[int] = 0x82
     NAME: ClassVar[str] = "description"
     DELIVERY: ClassVar[str] = "handshake"
-    LENGTH: ClassVar[int] = 6
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBBH")
+    LENGTH: ClassVar[int] = 8
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBBI")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -293,6 +296,30 @@ class Stop(_StopFields):
     DELIVERY: ClassVar[str] = "stop"
     LENGTH: ClassVar[int] = 1
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _CloseFields(NamedTuple):
+    session: int  # the session's seed; another one is refused
+
+
+class Close(_CloseFields):
+    """The host leaves: the session ends at once."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x09
+    NAME: ClassVar[str] = "close"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 4
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<I")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -395,8 +422,8 @@ class GetParameter(_GetParameterFields):
     ID: ClassVar[int] = 0x20
     NAME: ClassVar[str] = "get_parameter"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 2
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+    LENGTH: ClassVar[int] = 3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -421,8 +448,8 @@ class SetParameter(_SetParameterFields):
     ID: ClassVar[int] = 0x21
     NAME: ClassVar[str] = "set_parameter"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 6
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBi")
+    LENGTH: ClassVar[int] = 7
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBi")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -445,8 +472,8 @@ class SaveParameters(_SaveParametersFields):
     ID: ClassVar[int] = 0x22
     NAME: ClassVar[str] = "save_parameters"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    LENGTH: ClassVar[int] = 2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -469,8 +496,8 @@ class ResetParameters(_ResetParametersFields):
     ID: ClassVar[int] = 0x23
     NAME: ClassVar[str] = "reset_parameters"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    LENGTH: ClassVar[int] = 2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -484,17 +511,18 @@ class ResetParameters(_ResetParametersFields):
 
 class _ArmFields(NamedTuple):
     number: int  # of the request
+    latches: int  # as in the telemetry that the host knows; refused (latched_again) if there has been another since
 
 
 class Arm(_ArmFields):
-    """Ends the latch: from now on fresh set-points move the motors. Refused while the supply is low."""
+    """Ends the latch: set-points that answer a later tick move the motors. Refused while the supply is low or not yet measured."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x24
     NAME: ClassVar[str] = "arm"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    LENGTH: ClassVar[int] = 3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -511,14 +539,14 @@ class _AcknowledgeFields(NamedTuple):
 
 
 class Acknowledge(_AcknowledgeFields):
-    """All events up to this number have arrived."""
+    """The event of this number has arrived."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x28
     NAME: ClassVar[str] = "acknowledge"
     DELIVERY: ClassVar[str] = "telemetry"
-    LENGTH: ClassVar[int] = 1
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    LENGTH: ClassVar[int] = 2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -595,6 +623,7 @@ class _TelemetryFields(NamedTuple):
     supply: int  # 0.001 V; supply voltage against the bandgap; 0: not yet measured
     status: int  # status
     latch: int  # latch
+    latches: int  # times that the motors were latched off since reset, repeated stops included, modulo 256
     setpoint_sequence: int  # sequence number of the last set-point that was accepted
     overruns: int  # control ticks overrun since reset, modulo 256
 
@@ -606,8 +635,8 @@ class Telemetry(_TelemetryFields):
     ID: ClassVar[int] = 0x90
     NAME: ClassVar[str] = "telemetry"
     DELIVERY: ClassVar[str] = "telemetry"
-    LENGTH: ClassVar[int] = 37
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBHHHHBBB")
+    LENGTH: ClassVar[int] = 38
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBHHHHBBBB")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -665,8 +694,8 @@ class Answer(_AnswerFields):
     ID: ClassVar[int] = 0xA0
     NAME: ClassVar[str] = "answer"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 6
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBi")
+    LENGTH: ClassVar[int] = 7
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBi")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -692,8 +721,8 @@ class Event(_EventFields):
     ID: ClassVar[int] = 0xA1
     NAME: ClassVar[str] = "event"
     DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 8
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBHI")
+    LENGTH: ClassVar[int] = 9
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBHI")
 
     def pack(self) -> bytes:
         """The payload."""
@@ -738,6 +767,7 @@ Message = (
     | Identity
     | Description
     | Stop
+    | Close
     | SetpointSignal
     | SetpointSpeed
     | SetpointCoast
@@ -764,6 +794,7 @@ MESSAGES: dict[int, type[Message]] = {
     0x81: Identity,
     0x82: Description,
     0x08: Stop,
+    0x09: Close,
     0x10: SetpointSignal,
     0x11: SetpointSpeed,
     0x12: SetpointCoast,
@@ -782,31 +813,32 @@ MESSAGES: dict[int, type[Message]] = {
     0xB0: ClockAnswer,
 }
 
-# id -> 16 bits of a hash of the message's layout
+# id -> hash of the message
 HASHES: dict[int, int] = {
-    0x01: 0xE033,
-    0x02: 0xA6BC,
-    0x03: 0x7A4D,
-    0x80: 0x4FA2,
-    0x81: 0x9530,
-    0x82: 0x5DF1,
-    0x08: 0xC8D0,
-    0x10: 0x757B,
-    0x11: 0x0B21,
-    0x12: 0x6AC3,
-    0x20: 0x4D41,
-    0x21: 0x7659,
-    0x22: 0x99A5,
-    0x23: 0x308B,
-    0x24: 0xC080,
-    0x28: 0x7BE0,
-    0x30: 0x2C2C,
-    0x88: 0x9252,
-    0x90: 0x879F,
-    0x91: 0x71D0,
-    0xA0: 0x9FE2,
-    0xA1: 0xC475,
-    0xB0: 0x6A0E,
+    0x01: 0xE0471814,
+    0x02: 0xBD434780,
+    0x03: 0xDDE1C4B0,
+    0x80: 0xE0F2D7FD,
+    0x81: 0xF379E8B5,
+    0x82: 0xACE09C27,
+    0x08: 0xF533989A,
+    0x09: 0x0C4FA8AA,
+    0x10: 0xEFBA28FD,
+    0x11: 0xFCEB8D85,
+    0x12: 0xD86ACD27,
+    0x20: 0x9199C85F,
+    0x21: 0x78EEA412,
+    0x22: 0x1DEAD58C,
+    0x23: 0x5C7C21EE,
+    0x24: 0x7A25B50E,
+    0x28: 0x306E772C,
+    0x30: 0x1011476B,
+    0x88: 0x24E076A5,
+    0x90: 0x425355C1,
+    0x91: 0x7EF8DA38,
+    0xA0: 0x754ACE51,
+    0xA1: 0xCCFD276E,
+    0xB0: 0xFC092B76,
 }
 
 
@@ -837,7 +869,7 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "wheel_radius": ParameterSpec(11, "m", 1e-05, 500, 20000, "radius of the wheels; the board only keeps it", "body.wheel_radius_m"),
     "track_width": ParameterSpec(12, "m", 1e-05, 2000, 60000, "distance between the wheels; the board only keeps it", "body.track_width_m"),
     "telemetry_period": ParameterSpec(13, "ticks", 1.0, 1, 100, "ticks between two telemetry messages, where the baud rate allows it"),
-    "session_time_out": ParameterSpec(14, "ms", 1.0, 200, 10000, "silence of the host after which the session ends and the motors are latched off"),
+    "session_time_out": ParameterSpec(14, "ms", 1.0, 200, 1500, "silence of the host after which the session ends and the motors are latched off"),
     "retry_time": ParameterSpec(15, "ms", 1.0, 0, 2000, "time after which an unacknowledged event is sent again; 0: follows from tick and baud rate"),
     "supply_minimum": ParameterSpec(16, "V", 0.001, 0, 5500, "supply below which motors and EEPROM writes are refused; 0: never"),
     "bandgap": ParameterSpec(17, "V", 0.001, 1000, 1200, "this chip's bandgap voltage, against which the supply is measured"),
