@@ -75,8 +75,7 @@ def firmware_sources() -> list[str]:
 
 
 def headers() -> list[str]:
-    """Every header of ours, and frame.c, which the codec includes: when one changes, all that may include it is compiled
-    again."""
+    """Every header of ours, and frame.c, which the codec includes: when one changes, what includes it is compiled again."""
     found = [path for folder in ("sim_bridge", "host") for path in Path(folder).rglob("*.h")]
     found += [FIRMWARE / "link" / "frame.c", *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
     return sorted(str(path) for path in found)

@@ -1,4 +1,4 @@
-"""Builder of `boebot.link._codec`, the firmware's frame code for Python (codec.h), by cffi's API mode; setup.py uses `ffi`."""
+"""Builder of `boebot.link._codec`, the firmware's frame code for Python (codec.h), by cffi's API mode, for setup.py."""
 
 from __future__ import annotations
 

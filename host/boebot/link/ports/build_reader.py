@@ -1,4 +1,4 @@
-"""Builder of `boebot.link.ports._reader`, the thread that reads a port (reader.h), by cffi's API mode; setup.py uses `ffi`.
+"""Builder of `boebot.link.ports._reader`, the thread that reads a port (reader.h), by cffi's API mode, for setup.py.
 
 Where there is no POSIX `poll` for devices (Windows, macOS) it is not built, and the calling thread reads.
 """
