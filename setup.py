@@ -75,7 +75,7 @@ def firmware_sources() -> list[str]:
 
 
 def headers() -> list[str]:
-    """Every header of ours, and frame.c, which the codec includes: when one changes, what includes it is compiled again."""
+    """Every header of ours, and frame.c, which the codec includes: a change of one compiles anew what may need it."""
     found = [path for folder in ("sim_bridge", "host") for path in Path(folder).rglob("*.h")]
     found += [FIRMWARE / "link" / "frame.c", *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
     return sorted(str(path) for path in found)

@@ -10,9 +10,12 @@ import time
 import weakref
 
 import serial
+from serial import rfc2217
 
 from boebot.errors import BoardError
 from boebot.link.ports import switch_interval
+
+PyserialPort = serial.Serial | rfc2217.Serial
 
 
 class PolledTransport:
@@ -25,7 +28,7 @@ class PolledTransport:
 
     realtime = True
 
-    def __init__(self, name: str, device: serial.SerialBase, *, baud_given: bool, gone: str) -> None:
+    def __init__(self, name: str, device: PyserialPort, *, baud_given: bool, gone: str) -> None:
         """Takes over an open port. `gone`: why it might not be there any more."""
         self.name = name
         self.baud_given = baud_given
@@ -91,7 +94,7 @@ class PolledTransport:
         return BoardError(f"{self.name} has gone: {self._why_gone}")
 
 
-def _close(device: serial.SerialBase) -> None:
+def _close(device: PyserialPort) -> None:
     with contextlib.suppress(OSError):
         device.close()
     switch_interval.restore()

@@ -10,6 +10,7 @@ import sys
 import threading
 
 INTERVAL_S = 0.001
+_HALF_S = 0.5e-6  # Python cuts to whole microseconds
 
 _lock = threading.Lock()
 _users = 0
@@ -24,8 +25,8 @@ def shorten() -> None:
         _users += 1
         if _users == 1:
             _before_s = sys.getswitchinterval()
-            sys.setswitchinterval(min(INTERVAL_S, _before_s))
-            _ours_s = sys.getswitchinterval()  # rounded by Python
+            sys.setswitchinterval(min(INTERVAL_S, _before_s) + _HALF_S)
+            _ours_s = sys.getswitchinterval()
 
 
 def restore() -> None:
@@ -34,4 +35,4 @@ def restore() -> None:
     with _lock:
         _users -= 1
         if _users == 0 and sys.getswitchinterval() == _ours_s:
-            sys.setswitchinterval(_before_s)
+            sys.setswitchinterval(_before_s + _HALF_S)
