@@ -15,7 +15,7 @@
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
 #define SLICE_CYCLES 4000u                 /* how often the line is looked at while bytes are coming */
 #define BITS_PER_BYTE 10u
-#define LINE_RATE 500000u
+#define LINE_RATE 500000u /* bit/s, unless set */
 
 enum { LISTENER_NONE, LISTENER_SERVO, LISTENER_INFRARED, LISTENER_PING };
 
@@ -55,9 +55,11 @@ typedef struct {
     uint8_t kind, number;
   } listener[BOARD_PIN_COUNT];
   uint8_t driven[BOARD_PIN_COUNT];
-  double supply; /* share of the nominal voltage */
+  double supply;      /* share of the nominal voltage, of the rail that board and servos run on */
+  double held_supply; /* that share if a test holds it, or 0 */
   buffer received;
   uint64_t last_byte; /* cycle of the end of the last byte received */
+  uint64_t idle;      /* cycles without a byte after which the line is idle: two bytes' time */
   buffer truth;
   buffer looks;
   sim_edge *edges; /* a ring once it has SIM_EDGES_KEPT */
@@ -179,6 +181,7 @@ static void on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
 static double on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   (void)cycle;
+  if (channel == BOARD_ANALOG_SUPPLY) return self->supply * BATTERY_NOMINAL_V;
   if (self->has_battery && self->battery.channel == channel) return battery_sample(&self->battery);
   return 0.0;
 }
@@ -214,6 +217,8 @@ void sim_destroy(sim *self) {
   free(self);
 }
 
+static uint64_t idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t)BOARD_CLOCK_HZ / baud; }
+
 int sim_add_robot(sim *self, uintptr_t address, const body_parameters *parameters, double x, double y, double heading) {
   board *b = (board *)address;
   if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
@@ -224,6 +229,7 @@ int sim_add_robot(sim *self, uintptr_t address, const body_parameters *parameter
   if (r == NULL) return SIM_NO_MEMORY;
   r->sim = self;
   r->board = b;
+  r->idle = idle_cycles(LINE_RATE);
   r->supply = 1.0;
   memset(r->driven, BOARD_RELEASED, sizeof r->driven);
   body_init(&r->body, parameters, 0.0);
@@ -357,6 +363,11 @@ static void step_waves(robot *r, uint64_t until) {
   }
 }
 
+static double supply_of(const robot *r) {
+  if (r->held_supply > 0.0) return r->held_supply;
+  return r->has_battery ? r->battery.regulated_v / BATTERY_NOMINAL_V : 1.0;
+}
+
 /* World and parts of one robot, from self->world to self->world + step_cycles. */
 static void step_robot(sim *self, robot *r) {
   const uint64_t begin = self->world;
@@ -374,10 +385,8 @@ static void step_robot(sim *self, robot *r) {
     current += p->servo_a_per_n_m * fabs(torque[side]);
   }
   body_advance(b, self->arena, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
-  if (r->has_battery) {
-    battery_step(&r->battery, current, self->dt);
-    r->supply = r->battery.regulated_v / BATTERY_NOMINAL_V;
-  }
+  if (r->has_battery) battery_step(&r->battery, current, self->dt);
+  r->supply = supply_of(r);
   if (r->has_encoder[SIM_LEFT]) encoder_step(&r->encoder[SIM_LEFT], b->state.wheel_left, begin, self->step_cycles);
   if (r->has_encoder[SIM_RIGHT]) encoder_step(&r->encoder[SIM_RIGHT], b->state.wheel_right, begin, self->step_cycles);
   for (int i = 0; i < r->whiskers; i++) whisker_step(&r->whisker[i], end);
@@ -415,7 +424,6 @@ static void take_bytes(robot *r) {
 }
 
 int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles) {
-  const uint64_t idle = 2u * BITS_PER_BYTE * (BOARD_CLOCK_HZ / LINE_RATE);
   const uint64_t deadline = self->now + max_cycles;
   const uint64_t earliest = self->now + (quiet_cycles < max_cycles ? quiet_cycles : max_cycles);
   while (self->now < deadline) {
@@ -429,7 +437,7 @@ int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles) {
       robot *r = self->robots[i];
       if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + i;
       take_bytes(r);
-      ready |= r->received.count > 0 && target >= r->last_byte + idle;
+      ready |= r->received.count > 0 && target >= r->last_byte + r->idle;
     }
     self->now = target;
     if (ready && self->now >= earliest) return 0;
@@ -442,6 +450,19 @@ uint64_t sim_now(const sim *self) { return self->now; }
 void sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
   robot *r = find(self, number);
   if (r != NULL && count > 0) r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+}
+
+int sim_line_rate(sim *self, int number, uint32_t baud) {
+  robot *r = find(self, number);
+  if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
+  r->idle = idle_cycles(baud);
+  r->board->op->line_rate(r->board, baud);
+  return SIM_OK;
+}
+
+uint64_t sim_last_byte(const sim *self, int number) {
+  const robot *r = find(self, number);
+  return r == NULL ? 0 : r->last_byte;
 }
 
 size_t sim_waiting(const sim *self, int number) {
@@ -603,6 +624,14 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
   return SIM_OK;
 }
 
+int sim_set_supply(sim *self, int number, double volts) {
+  robot *r = find(self, number);
+  if (r == NULL || !(volts >= 0.0)) return SIM_BAD_ARGUMENT;
+  r->held_supply = volts / BATTERY_NOMINAL_V;
+  r->supply = supply_of(r);
+  return SIM_OK;
+}
+
 /* ---- boards by address ------------------------------------------------------------------------------------------- */
 
 int board_check(uintptr_t address) {
@@ -630,11 +659,6 @@ const char *board_pin_map(uintptr_t address) {
 void board_reset(uintptr_t address, int cause) {
   board *b = (board *)address;
   b->op->reset(b, (board_reset_cause)cause);
-}
-
-void board_line_rate(uintptr_t address, uint32_t baud) {
-  board *b = (board *)address;
-  b->op->line_rate(b, baud);
 }
 
 const char *board_fault(uintptr_t address) {

@@ -78,6 +78,12 @@ int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles);
 /* The cycle up to which the simulation has run. */
 uint64_t sim_now(const sim *self);
 
+/* Bit rate of the outside's side of a robot's serial line, 500,000 unless set. Returns SIM_OK or an error. */
+int sim_line_rate(sim *self, int robot, uint32_t baud);
+
+/* The cycle at which the last byte from a robot's board had come. */
+uint64_t sim_last_byte(const sim *self, int robot);
+
 /* Bytes to and from a robot's board. */
 void sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
 size_t sim_waiting(const sim *self, int robot);
@@ -96,12 +102,14 @@ uint64_t sim_edges_seen(const sim *self, int robot);
 
 /* For tests: a robot put elsewhere, at rest (0, or SIM_BAD_ARGUMENT if the place is not free); a pin taken from its part
  * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
- * every echo pulse in cycles, -1: as the world says, -2: no pulse at all. */
+ * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; voltage of the rail that board and servos run
+ * on, 0: what the regulator gives. */
 int sim_place(sim *self, int robot, double x, double y, double heading);
 int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
 int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
 int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
+int sim_set_supply(sim *self, int robot, double volts);
 
 /* Voltages of pack and regulator. */
 double sim_pack_voltage(const sim *self, int robot);
@@ -114,7 +122,6 @@ uint8_t board_output(uintptr_t board, uint8_t pin);
 void board_destroy(uintptr_t board);
 const char *board_pin_map(uintptr_t board); /* that its firmware was built for, or NULL where the board does not know */
 void board_reset(uintptr_t board, int cause);
-void board_line_rate(uintptr_t board, uint32_t baud);
 const char *board_fault(uintptr_t board);
 /* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
 void board_read_counters(uintptr_t board, uint64_t counters[8]);

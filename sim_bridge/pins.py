@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, ResetCause
+from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, BoardMemory, ResetCause
 from sim_bridge.sim import Sim
 
 EDGE = np.dtype(  # sim_edge of loop.h
@@ -17,13 +17,14 @@ EDGE = np.dtype(  # sim_edge of loop.h
 )
 
 
-class BoardPins:
-    """The board's pins and what else a test reaches for.
+class BoardPins(BoardMemory):
+    """The board's pins, its memory and what else a test reaches for.
 
     Pins by Arduino number 0..19 (A0 is 14); levels LOW 0, HIGH 1, RELEASED 2.
     """
 
     def __init__(self, sim: Sim) -> None:
+        super().__init__(lib, ffi, ffi.cast("board *", sim.board.address))
         self._sim = sim
         self._handle = sim.handle
         self.reset_cycle = 0  # when the program last started
@@ -68,6 +69,10 @@ class BoardPins:
         """The Ping measures distances again."""
         self._check(lib.sim_answer_ping(self._handle, 0, -1), "Ping")
 
+    def supply(self, volts: float | None) -> None:
+        """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
+        self._check(lib.sim_set_supply(self._handle, 0, 0.0 if volts is None else volts), "supply")
+
     def place(self, x: float, y: float, heading: float) -> None:
         """Puts the robot elsewhere, at rest (m, m, rad).
 
@@ -84,7 +89,7 @@ class BoardPins:
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""
-        lib.board_line_rate(self._sim.board.address, baud)
+        lib.sim_line_rate(self._handle, 0, baud)
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""

@@ -1,7 +1,9 @@
 """Offers an emulated robot to other programs, at real-time pace: on a pseudo-terminal or on a TCP port of loopback.
 
 To a client it is a robot on a port: `boebot run BRAIN --on /dev/pts/N`. Time also passes while no client is there. As
-on a real Uno, the board is reset when a client opens the port. Pseudo-terminals exist on POSIX systems only.
+on a real Uno, the board is reset when a client opens the port, and on a pseudo-terminal the client sets the bit rate of
+its side of the line: at a wrong one both sides read garbage. A TCP port has no bit rate. Pseudo-terminals exist on
+POSIX systems only.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import errno
 import os
 import select
 import socket
+import sys
 from collections.abc import Callable
 from typing import Protocol
 
@@ -40,21 +43,40 @@ class Port(Protocol):
     def write(self, data: bytes) -> None:
         """To the client, if there is one."""
 
+    def baud(self) -> int | None:
+        """The bit rate that the client has set; None: the robot's own."""
+
     def close(self) -> None:
         """Gives the port back."""
+
+
+TCGETS2 = 0x802C542A
+TERMIOS2_SIZE = 44  # Linux: the settings of a terminal with its bit rates as numbers, the last one that of the output
+
+
+def _rates() -> dict[int, int]:
+    """Bit rates by the numbers that this system's terminals have for them."""
+    import termios
+
+    return {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
 
 
 class PtyPort:
     """The master side of a pseudo-terminal. The other side hangs up when its last client closes it."""
 
-    def __init__(self) -> None:
-        """Raises BoardError where there are no pseudo-terminals."""
+    def __init__(self, baud: int) -> None:
+        """`baud`: the bit rate until a client sets another. Raises BoardError where there are no pseudo-terminals."""
         try:
+            import termios
             import tty
         except ImportError:
             raise BoardError("this system has no pseudo-terminals; use --tcp PORT") from None
         self._master, slave = os.openpty()
         tty.setraw(slave)
+        self._rates = _rates()
+        settings = termios.tcgetattr(slave)
+        settings[4] = settings[5] = next((code for code, rate in self._rates.items() if rate == baud), termios.B38400)
+        termios.tcsetattr(slave, termios.TCSANOW, settings)
         self.url = os.ttyname(slave)
         os.close(slave)  # from now on the master hears a hang-up while nobody has the other side open
         os.set_blocking(self._master, False)
@@ -96,6 +118,20 @@ class PtyPort:
         with contextlib.suppress(OSError):
             while self._waiting:
                 self._waiting = self._waiting[os.write(self._master, self._waiting) :]
+
+    def baud(self) -> int | None:
+        """The bit rate that the terminal is set to; None where it cannot be told."""
+        import fcntl
+        import termios
+
+        code = termios.tcgetattr(self._master)[5]
+        if code in self._rates:
+            return self._rates[code] or None  # B0 hangs up and is no rate
+        try:
+            settings = fcntl.ioctl(self._master, TCGETS2, bytes(TERMIOS2_SIZE))
+        except OSError:
+            return None
+        return int.from_bytes(settings[-4:], sys.byteorder)
 
     def close(self) -> None:
         """Ends the pseudo-terminal."""
@@ -171,6 +207,10 @@ class TcpPort:
         except OSError:
             self._drop()
 
+    def baud(self) -> int | None:
+        """TCP has none."""
+        return None
+
     def close(self) -> None:
         """Closes client and port."""
         self._drop()
@@ -185,9 +225,13 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
     """
     sim = session.sim
     pace = Pace(sim)
+    baud = None
     while running():
         if port.opened():
             session.board.reset("external")
+        if (now := port.baud()) is not None and now != baud:
+            session.transport.set_baud(now)
+            baud = now
         while data := port.read():
             sim.send(data)
         cycles = pace.due()
@@ -218,7 +262,7 @@ def serve(
     with contextlib.ExitStack() as stack:
         session = openers[kind](request)
         stack.callback(session.close)
-        port: Port = PtyPort() if tcp is None else TcpPort(tcp)
+        port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)
         announce(port.url)
         with contextlib.suppress(KeyboardInterrupt):

@@ -20,6 +20,8 @@ from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, imag
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Floats, Sim
 
+DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
+
 
 def _cycles(seconds: float) -> int:
     """As many cycles, but at least one of any time at all: a wait that lets no time pass would be repeated for ever."""
@@ -30,10 +32,12 @@ class SimTransport:
     """The board's serial line, in this process. Time passes only while `read` waits."""
 
     realtime = False
+    baud_given = False
 
     def __init__(self, sim: Sim, name: str, paced: bool = False) -> None:
         """`paced`: `read` also waits until as much time has passed on the wall."""
         self.name = name
+        self.baud = _baud(sim.robot)
         self._sim = sim
         self._handle = sim.handle
         self._pace = Pace(sim) if paced else None
@@ -47,6 +51,19 @@ class SimTransport:
         if self._pace is not None:
             self._pace.wait()
         return self._sim.receive()
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        """As `read`, with the instant at which the last byte had come (s)."""
+        data = self.read(wait_s, quiet_s)
+        return [(lib.sim_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
+
+    def set_baud(self, rate: int) -> None:
+        """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
+        if self._closed:
+            raise BoardError("the emulated board is closed")
+        lib.sim_line_rate(self._handle, 0, rate)
+        self.baud = rate
+        self._sim.receive()
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
@@ -100,6 +117,7 @@ class SimSession:
         self.arena = sim.arena
         self.description = f"{sim.board.description} in arena {sim.arena.name}"
         self.transport = SimTransport(sim, kind, paced)
+        self.transport.set_baud(self.transport.baud)
         self.board = BoardPins(sim)
         self._closed = False
 
@@ -158,6 +176,12 @@ def open_avr(request: BoardRequest) -> SimSession:
     return _open(request, "avr", lambda: avr_board(image))
 
 
+def _baud(robot: robots.RobotDescription) -> int:
+    """Of the robot's serial line."""
+    uart = robot.device.get("uart")
+    return uart.baud if isinstance(uart, robots.Uart) else DEFAULT_BAUD
+
+
 def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -> SimSession:
     arena = load_arena(request.arena)
     board = make()
@@ -175,7 +199,4 @@ def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -
     except Exception:
         board.close()
         raise
-    uart = request.robot.device.get("uart")
-    if isinstance(uart, robots.Uart):
-        lib.board_line_rate(board.address, uart.baud)
     return SimSession(sim, kind, request.realtime)

@@ -210,7 +210,7 @@ void encoder_start(void) {
   for (uint8_t line = 0; line < LINES; line++) {
     fired[line] = 0;
   }
-  limit = (uint8_t)parameters_get(PARAMETER_ENCODER_LIMIT);
+  limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   before = PORT_BITS();
   watched = lines_on();
   listen();
@@ -258,7 +258,7 @@ void encoder_task(void) {
   encoder_poll();
   close_wheel(LEFT);
   close_wheel(RIGHT);
-  limit = (uint8_t)parameters_get(PARAMETER_ENCODER_LIMIT);
+  limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   const uint8_t lines = lines_on();
   const uint8_t back = (uint8_t)(lines & (uint8_t)~watched); /* these begin at their present level */
   before = (uint8_t)((before & (uint8_t)~back) | (PORT_BITS() & back));

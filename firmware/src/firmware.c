@@ -8,23 +8,30 @@
 #include "link/link.h"
 #include "link/parameters.h"
 #include "ping.h"
+#include "reset.h"
 #include "safety.h"
 #include "schedule.h"
 #include "servo.h"
+#include "storage.h"
+#include "supply.h"
 #include "whisker.h"
 
 void firmware_start(void) {
+  reset_start();
   identity_start();
+  storage_start();
   parameters_start();
   servo_start();
   encoder_start();
   whisker_start();
   infrared_start();
   ping_start();
+  supply_start();
+  schedule_start(0);
   safety_start();
-  hal_start_serial();
-  link_start();
-  schedule_start();
+  const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
+  hal_start_serial(100ul * baud);
+  link_start(baud);
   hal_start_timers();
   hal_start_watchdog();
 }

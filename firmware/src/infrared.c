@@ -81,7 +81,7 @@ void infrared_task(void) {
   }
   if (parameters_device_on(DEVICES_INFRARED)) {
     if (wait == 0) {
-      wait = (uint8_t)parameters_get(PARAMETER_INFRARED_PERIOD);
+      wait = (uint8_t)parameters_u16(PARAMETER_INFRARED_PERIOD);
       armed = true;
     }
   } else {

@@ -36,12 +36,12 @@ int16_t motion_signal_of_speed(int16_t speed, int16_t maximum) {
 
 void motion_signals(int16_t left, int16_t right) {
   servo_set(
-      motion_pulse(parameters_get(PARAMETER_SERVO_LEFT_CENTRE), parameters_get(PARAMETER_SERVO_LEFT_GAIN), left),
-      motion_pulse(parameters_get(PARAMETER_SERVO_RIGHT_CENTRE), parameters_get(PARAMETER_SERVO_RIGHT_GAIN), right));
+      motion_pulse(parameters_u16(PARAMETER_SERVO_LEFT_CENTRE), parameters_i16(PARAMETER_SERVO_LEFT_GAIN), left),
+      motion_pulse(parameters_u16(PARAMETER_SERVO_RIGHT_CENTRE), parameters_i16(PARAMETER_SERVO_RIGHT_GAIN), right));
 }
 
 void motion_speeds(int16_t left, int16_t right) {
-  const int16_t maximum = (int16_t)parameters_get(PARAMETER_WHEEL_SPEED_MAXIMUM);
+  const int16_t maximum = (int16_t)parameters_u16(PARAMETER_WHEEL_SPEED_MAXIMUM); /* up to 5000 */
   motion_signals(motion_signal_of_speed(left, maximum), motion_signal_of_speed(right, maximum));
 }
 

@@ -4,7 +4,7 @@
  *   signal = speed / wheel_speed_maximum           for set-points in m/s
  *
  * clamped to 1300..1700 us. Signal 0 with a set-point in force gives the centre pulse: the servo holds still and
- * resists. Stop and dead-man give no pulses at all: a Boe-Bot servo then free-wheels (safety.h). */
+ * resists. Latch, dead-man and set-points to coast give no pulses at all: a Boe-Bot servo then free-wheels (safety.h). */
 #ifndef MOTION_H
 #define MOTION_H
 

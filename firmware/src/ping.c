@@ -82,7 +82,7 @@ void ping_task(void) {
     }
   }
   if (state == IDLE && parameters_device_on(DEVICES_PING) &&
-      since_trigger >= (uint8_t)parameters_get(PARAMETER_PING_PERIOD)) {
+      since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
     since_trigger = 0;
     state = RISING;
     hal_ping_trigger();

@@ -2,48 +2,118 @@
 #include "safety.h"
 
 #include "generated/messages.h"
+#include "link/events.h"
 #include "link/parameters.h"
 #include "motion.h"
 #include "schedule.h"
+#include "supply.h"
 
-#define TIME_TO_LIVE_MAX 2000u /* ms */
+#define TIME_TO_LIVE_MAX MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MAX              /* ms; of every kind of set-point */
+#define AGE_MAX ((uint16_t)(TIME_TO_LIVE_MAX * 1000ul / SCHEDULE_TICK_US)) /* ticks; all older ones are late */
 
-static uint16_t status;
-static uint32_t deadline; /* schedule_now() at which the set-point in force ends */
+_Static_assert(MSG_SETPOINT_SPEED_TIME_TO_LIVE_MAX == TIME_TO_LIVE_MAX, "one limit for all");
+_Static_assert(MSG_SETPOINT_COAST_TIME_TO_LIVE_MAX == TIME_TO_LIVE_MAX, "one limit for all");
+
+static uint8_t latch;   /* LATCH_... */
+static uint8_t latches; /* how often */
+static uint8_t
+    state; /* STATUS_MOTORS_ENABLED: a set-point is in force; STATUS_DEAD_MAN: it has outlived itself; or 0 */
+static bool just_armed; /* set-points of ticks up to arm_tick might still look fresh */
+static uint16_t arm_tick;
+
+/* The last set-point that was accepted: */
+static uint32_t deadline;  /* schedule_time() at which it ends */
+static uint16_t last_tick; /* the tick that it answers */
+static uint8_t last_sequence;
 
 void safety_start(void) {
-  status = 0;
+  latch = LATCH_START;
+  latches = 1;
+  state = 0;
+  just_armed = false;
+  last_sequence = 0;
   motion_off();
 }
 
-bool safety_accept(uint16_t time_to_live) {
-  if (time_to_live > TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVOS)) {
-    return false;
-  }
-  if (time_to_live == 0) {
-    time_to_live = (uint16_t)parameters_get(PARAMETER_TIME_TO_LIVE_DEFAULT);
-  }
-  deadline = schedule_now() + (uint32_t)time_to_live * SCHEDULE_CYCLES_PER_MS;
-  status = STATUS_MOTORS_ENABLED;
-  return true;
+/* Whether the set-point in force is newer than another one, or is that one. */
+static bool has_newer(uint16_t answers_tick, uint8_t sequence) {
+  const int16_t ticks = (int16_t)(answers_tick - last_tick);
+  return (state & STATUS_MOTORS_ENABLED) != 0 && (ticks < 0 || (ticks == 0 && (int8_t)(sequence - last_sequence) <= 0));
 }
 
-void safety_stop(void) {
-  status = STATUS_STOPPED;
-  motion_off();
+safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence) {
+  if (latch != LATCH_NONE || time_to_live > TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVOS)) {
+    return SAFETY_REFUSED;
+  }
+  const schedule_instant now = schedule_instant_now();
+  const uint16_t ticks = (uint16_t)((uint16_t)now.tick - answers_tick);
+  if (ticks > AGE_MAX) { /* a tick to come is one of long ago */
+    return SAFETY_LATE;
+  }
+  const uint32_t age = now.since + ticks * (uint32_t)SCHEDULE_TICK_US;
+  const uint32_t life = (time_to_live != 0 ? time_to_live : parameters_u16(PARAMETER_TIME_TO_LIVE)) * 1000ul;
+  if (age >= life || has_newer(answers_tick, sequence) || (just_armed && (int16_t)(answers_tick - arm_tick) <= 0)) {
+    return SAFETY_LATE;
+  }
+  deadline = now.tick * SCHEDULE_TICK_US + now.since + (life - age);
+  state = STATUS_MOTORS_ENABLED;
+  last_tick = answers_tick;
+  last_sequence = sequence;
+  return SAFETY_ACCEPTED;
 }
+
+uint8_t safety_setpoint_sequence(void) { return last_sequence; }
+
+void safety_latch(uint8_t reason) {
+  motion_off();
+  state = 0;
+  if (latch == LATCH_NONE) {
+    latch = reason;
+    events_raise(EVENT_KIND_LATCH, reason);
+  } else if (reason != LATCH_STOP_COMMAND) {
+    return;
+  }
+  latches++;
+}
+
+uint8_t safety_latches(void) { return latches; }
+
+uint8_t safety_arm(uint8_t known_latches) {
+  if (known_latches != latches) {
+    return ANSWER_STATUS_LATCHED_AGAIN;
+  }
+  if (supply_low() || supply_voltage() == 0) {
+    return ANSWER_STATUS_SUPPLY_LOW;
+  }
+  if (latch != LATCH_NONE) {
+    latch = LATCH_NONE;
+    arm_tick = (uint16_t)schedule_instant_now().tick;
+    just_armed = true;
+    events_raise(EVENT_KIND_LATCH, LATCH_NONE);
+  }
+  return ANSWER_STATUS_OK;
+}
+
+uint8_t safety_latched(void) { return latch; }
 
 void safety_task(void) {
-  if ((status & STATUS_MOTORS_ENABLED) == 0) {
+  if (supply_low()) {
+    safety_latch(LATCH_SUPPLY_LOW);
+  }
+  if ((uint16_t)((uint16_t)schedule_tick() - arm_tick) > AGE_MAX + 1u) { /* before the difference rolls over */
+    just_armed = false;
+  }
+  if ((state & STATUS_MOTORS_ENABLED) == 0) {
     return;
   }
   if (!parameters_device_on(DEVICES_SERVOS)) {
-    status = 0;
+    state = 0;
     motion_off();
-  } else if ((int32_t)(schedule_now() - deadline) >= 0) {
-    status = STATUS_DEAD_MAN;
+  } else if ((int32_t)(schedule_time() - deadline) >= 0) {
+    state = STATUS_DEAD_MAN;
     motion_off();
+    events_raise(EVENT_KIND_DEAD_MAN, last_tick);
   }
 }
 
-uint16_t safety_status(void) { return status; }
+uint16_t safety_status(void) { return (uint16_t)(state | (latch != LATCH_NONE ? STATUS_LATCHED : 0u)); }

@@ -3,15 +3,22 @@
 
 #include "encoder.h"
 #include "infrared.h"
+#include "link/counters.h"
+#include "link/events.h"
 #include "link/link.h"
+#include "link/requests.h"
+#include "link/session.h"
 #include "link/telemetry.h"
 #include "ping.h"
 #include "pins.h"
 #include "safety.h"
 #include "servo.h"
+#include "storage.h"
+#include "supply.h"
 #include "whisker.h"
 
 #define SLOTS_PER_FRAME 8u
+#define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
 #define OVERLOAD_TICKS 10u /* ticks in a row that overran: the watchdog ends it */
 
 enum {
@@ -29,6 +36,7 @@ enum {
 #include "tasks.def"
 #undef TASK
 #undef RESERVED
+_Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go together");
 _Static_assert(TASKS <= 16, "the due tasks are bits of 16");
 
 volatile uint8_t schedule_slot;
@@ -36,21 +44,25 @@ uint8_t schedule_next_slot;
 volatile uint16_t schedule_slot_start;
 
 static volatile uint32_t slot_cycles; /* time at which schedule_slot began */
+static volatile uint32_t slot_us;     /* the same on the board's clock */
 static volatile bool edge_is_servo;   /* whom the next edge interrupt is for */
 
 static uint32_t tick;
+static uint32_t tick_us; /* time on the board's clock at which it begins, or has begun */
 static uint8_t overruns;
 static bool late;           /* a slot of this tick was worked on when the next tick had begun */
 static bool overran;        /* so it was in the previous tick, or ticks were dropped */
 static uint8_t overrun_row; /* ticks in a row that overran, at most OVERLOAD_TICKS */
 
-void schedule_start(void) {
+void schedule_start(uint32_t first_tick) {
   schedule_slot = 0xFF;
   schedule_slot_start = 0;
   slot_cycles = 0;
+  tick = first_tick;
+  tick_us = first_tick * SCHEDULE_TICK_US;
+  slot_us = tick_us - SLOT_US; /* the first slot is still to begin */
   edge_is_servo = false;
   schedule_next_slot = 0;
-  tick = 0;
   overruns = 0;
   late = false;
   overran = false;
@@ -61,6 +73,7 @@ HAL_INTERRUPT_SLOT {
   schedule_slot++;
   schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
   slot_cycles += HAL_SLOT_CYCLES;
+  slot_us += SLOT_US;
   hal_slot_arm((uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES));
   switch (schedule_slot % SLOTS_PER_FRAME) {
     case 0:
@@ -106,7 +119,28 @@ uint32_t schedule_now(void) {
   return cycles;
 }
 
+uint32_t schedule_time(void) {
+  uint32_t us = 0;
+  HAL_ATOMIC { us = slot_us + (uint16_t)(hal_time() - schedule_slot_start) / HAL_CYCLES_PER_US; }
+  return us;
+}
+
 uint32_t schedule_tick(void) { return tick; }
+
+uint32_t schedule_tick_time(void) { return tick_us; }
+
+schedule_instant schedule_instant_now(void) {
+  const uint32_t since = schedule_time() - tick_us;
+  if ((int32_t)since < 0) { /* the next tick's tasks are awaited, but it has not begun */
+    return (schedule_instant){tick - 1u, since + SCHEDULE_TICK_US};
+  }
+  return (schedule_instant){tick, since};
+}
+
+static void next_tick(void) {
+  tick++;
+  tick_us += SCHEDULE_TICK_US;
+}
 
 uint8_t schedule_overruns(void) { return overruns; }
 
@@ -119,7 +153,7 @@ static void begin_tick(void) {
   while (schedule_waiting() >
          2u * SCHEDULE_SLOTS_PER_TICK) { /* hopelessly behind: drop whole ticks, keep the time right */
     schedule_next_slot = (uint8_t)(schedule_next_slot + SCHEDULE_SLOTS_PER_TICK);
-    tick++;
+    next_tick();
     overruns++;
     overran = true;
   }
@@ -162,7 +196,7 @@ void schedule_poll(void) {
   run_tasks(schedule_next_slot);
   schedule_next_slot++;
   if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
-    tick++;
+    next_tick();
   }
   /* Work of a tick that ends when a later tick has already begun has overrun. */
   const uint8_t waiting = schedule_waiting();

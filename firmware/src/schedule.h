@@ -15,9 +15,9 @@ extern "C" {
 #define SCHEDULE_SLOTS_PER_TICK 4u
 #define SCHEDULE_TICK_RATE 100u /* Hz */
 #define SCHEDULE_TICK_US 10000u
-#define SCHEDULE_CYCLES_PER_MS 16000u
 
-void schedule_start(void);
+/* The first tick to come is `first_tick`: 0 but for tests of what happens where counts roll over. */
+void schedule_start(uint32_t first_tick);
 
 /* Low byte of the number of the slot that has begun, and of the first one whose tasks have not run. */
 extern volatile uint8_t schedule_slot;
@@ -31,10 +31,21 @@ static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
 /* Runs the tasks of the next slot that has begun, if any. */
 void schedule_poll(void);
 
-/* The control tick whose tasks run now. */
+/* The control tick whose tasks run now; when they all have run, the next one, which may not have begun yet. */
 uint32_t schedule_tick(void);
 
-/* Cycles since the timers started, modulo 2^32 (268 s). Main loop only. */
+/* The board's time in us modulo 2^32: now, and at the start of schedule_tick(). Tick n begins at n * SCHEDULE_TICK_US, so
+ * the moments before the first tick count down from 2^32. Main loop only. */
+uint32_t schedule_time(void);
+uint32_t schedule_tick_time(void);
+
+/* The tick that has begun, and how long ago in us. Main loop only. */
+typedef struct {
+  uint32_t tick, since;
+} schedule_instant;
+schedule_instant schedule_instant_now(void);
+
+/* Cycles since the timers started, modulo 2^32 (268 s); the low half is hal_time(). Main loop only. */
 uint32_t schedule_now(void);
 
 /* Ticks whose work did not end in time since reset, modulo 256; and whether the previous one did not. */

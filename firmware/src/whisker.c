@@ -3,6 +3,7 @@
 
 #include "generated/messages.h"
 #include "hal/hal.h"
+#include "link/events.h"
 #include "link/parameters.h"
 #include "pins.h"
 
@@ -31,8 +32,14 @@ void whisker_start(void) {
 }
 
 void whisker_task(void) {
+  const uint8_t before = whisker_read();
   whisker_debounce(&states[LEFT], HAL_PIN_READ(WHISKER_LEFT) == 0);
   whisker_debounce(&states[RIGHT], HAL_PIN_READ(WHISKER_RIGHT) == 0);
+  const uint8_t now = whisker_read();
+  if (now != before) {
+    const uint8_t closed = now & (uint8_t)~before;
+    events_raise(EVENT_KIND_WHISKERS, (uint16_t)(now | closed << 8));
+  }
 }
 
 uint8_t whisker_read(void) {

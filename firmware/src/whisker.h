@@ -1,7 +1,8 @@
 /* whisker.h: the two whiskers, debounced. A whisker shorts its pin to ground when pressed and bounces for up to 10 ms.
  *
  * Sampled in every slot (2.5 ms). Pressed after 2 pressed samples in a row, released after 4 released ones: a touch or
- * its end is in the telemetry within two ticks, and a bounce that still touches once in 10 ms is one touch. */
+ * its end is in the telemetry within two ticks and raises an event, and a bounce that still touches once in 10 ms is one
+ * touch. */
 #ifndef WHISKER_H
 #define WHISKER_H
 

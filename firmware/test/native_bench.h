@@ -1,5 +1,6 @@
 /* native_bench.h: the whole firmware on the bench: a native machine (hal/native/machine.h) whose pins and line the tests
- * hold in their hands. Each bench is a fresh power-on. */
+ * hold in their hands, and the least of a host: it opens a session, numbers its requests, acknowledges events if it is
+ * told to, and remembers what the board said. Each bench is a fresh power-on. */
 #ifndef NATIVE_BENCH_H
 #define NATIVE_BENCH_H
 
@@ -10,8 +11,10 @@
 
 #include "generated/messages.h"
 #include "hal/native/machine.h"
+#include "host_frame.h"
 #include "link/frame.h"
 #include "pins.h"
+#include "schedule.h"
 
 extern "C" const native_api *firmware_board_api(void);
 
@@ -27,6 +30,7 @@ struct pin_edge {
 struct message {
   uint8_t id, sequence;
   std::vector<uint8_t> payload;
+  uint64_t cycle; /* when its last byte had been handed to the sender */
 
   template <typename T>
   T as() const {
@@ -39,19 +43,28 @@ struct message {
 class native_bench {
  public:
   native_machine machine{};
+  double volts = 5.0;
   std::vector<pin_edge> edges;   /* everything the firmware did to its pins */
-  std::vector<message> messages; /* everything it said */
+  std::vector<message> messages; /* everything it said that is of this session or of the handshake */
   uint64_t bytes_out = 0;
+  uint32_t seed = FRAME_NO_SESSION; /* of the session that the host believes in */
+  uint16_t next_number = 1;         /* of the next request */
+  uint8_t next_sequence = 0;
+  bool acknowledges = false; /* every event at once */
 
-  explicit native_bench(uint8_t reset_cause = RESET_CAUSE_POWER, uint64_t start = 0) {
+  /* `first_tick`: number of the first tick, for what happens where counts roll over. */
+  explicit native_bench(uint8_t reset_cause = RESET_CAUSE_POWER, uint64_t start = 0, uint32_t first_tick = 0) {
     machine.now = start;
     machine.next_edge = machine.next_byte = NATIVE_NEVER;
     std::memset(machine.output, NATIVE_RELEASED, sizeof machine.output);
     std::memset(machine.outside, NATIVE_RELEASED, sizeof machine.outside);
+    std::memset(machine.eeprom, 0xFF, sizeof machine.eeprom);
     machine.edge = on_edge;
     machine.transmit = on_transmit;
-    frame_decoder_start(&decoder_, FRAME_SEED);
+    machine.supply = [](native_machine *self, uint64_t) { return of(self).volts; };
+    host_decoder_start(&decoder_, FRAME_NO_SESSION);
     api_->start(&machine, reset_cause);
+    schedule_start(first_tick);
     start_ = machine.now;
   }
   native_bench(const native_bench &) = delete;
@@ -66,9 +79,12 @@ class native_bench {
   void run(uint64_t cycles) { api_->advance(machine.now + cycles); }
   void run_to(uint64_t cycle) { api_->advance(cycle); }
 
-  /* The cycle at which the slot, tick of that number begins. */
+  /* The cycle at which the slot, tick of that number (counted from the start) begins. */
   uint64_t slot(uint64_t number) const { return start_ + SLOT * (number + 1); }
   uint64_t tick(uint64_t number) const { return slot(4 * number); }
+
+  /* Number of ticks since the start that have begun. */
+  uint64_t ticks_begun() const { return machine.now < tick(0) ? 0 : (machine.now - tick(0)) / TICK + 1; }
 
   /* Queues an edge; each pin's in order of time. */
   void drive(uint64_t at, uint8_t pin, uint8_t level) {
@@ -76,6 +92,8 @@ class native_bench {
     append(queue.edges, queue.first, queue.count, queue.capacity, native_edge{at, level});
     native_find_next_edge(&machine);
   }
+
+  /* ---- line ---- */
 
   void send_bytes(const std::vector<uint8_t> &bytes) {
     native_byte_queue &queue = machine.incoming;
@@ -89,19 +107,83 @@ class native_bench {
     machine.next_byte = queue.count == 0 ? NATIVE_NEVER : queue.bytes[queue.first].cycle;
   }
 
-  void send(uint8_t id, const void *payload = nullptr, uint8_t length = 0) {
+  std::vector<uint8_t> frame(uint8_t id, const void *payload = nullptr, uint8_t length = 0) {
     std::vector<uint8_t> wire(FRAME_SIZE_MAX);
-    wire.resize(frame_encode(wire.data(), id, next_sequence_++, payload, length, FRAME_SEED));
-    send_bytes(wire);
+    wire.resize(frame_encode(wire.data(), id, next_sequence++, payload, length, seed));
+    return wire;
   }
+  void send(uint8_t id, const void *payload = nullptr, uint8_t length = 0) { send_bytes(frame(id, payload, length)); }
+
+  template <typename T>
+  void say(uint8_t id, const T &payload) {
+    send(id, &payload, sizeof payload);
+  }
+
+  /* ---- the host's part of the protocol ---- */
+
+  /* From now on the host's frames are made with that seed, and only such are understood. */
+  void use_seed(uint32_t session) {
+    seed = session;
+    host_decoder_seed(&decoder_, session);
+  }
+
+  msg_hello hello() const { return last(MSG_HELLO_ID).as<msg_hello>(); }
+
+  void say_open(uint32_t board_nonce, uint32_t host_nonce, uint8_t version = PROTOCOL_VERSION) {
+    say(MSG_OPEN_ID, msg_open{version, board_nonce, host_nonce});
+  }
+
+  /* Opens a session with the nonce of the last hello; runs 3 ms. */
+  void open(uint32_t host_nonce = 0x12345) {
+    const uint32_t board_nonce = hello().board_nonce;
+    say_open(board_nonce, host_nonce);
+    use_seed(board_nonce ^ host_nonce);
+    next_number = 1;
+    run(3 * MILLISECOND);
+  }
+
+  /* Waits for the hello and the first measurement of the supply, then opens and arms; runs 5 ticks and the time of the
+   * frames. From the next tick on set-points move the motors. */
+  void start() {
+    run_to(tick(4));
+    open();
+    arm();
+    run_to(tick(6));
+  }
+
+  void arm(uint8_t latches) { say(MSG_ARM_ID, msg_arm{next_number++, latches}); }
+  void arm() {
+    if (last(MSG_TELEMETRY_ID).payload.empty()) {
+      run(TICK + MILLISECOND);
+    }
+    arm(telemetry().latches);
+  }
+  void stop(uint8_t token) { say(MSG_STOP_ID, msg_stop{token}); }
+  void probe(uint16_t token) { say(MSG_CLOCK_PROBE_ID, msg_clock_probe{token}); }
+
+  /* A set-point that answers the last telemetry. */
   void signal(int16_t left, int16_t right, uint16_t time_to_live) {
-    const msg_setpoint_signal setpoint{left, right, time_to_live, 0};
-    send(MSG_SETPOINT_SIGNAL_ID, &setpoint, sizeof setpoint);
+    signal(left, right, time_to_live, static_cast<uint16_t>(telemetry().tick));
   }
+  void signal(int16_t left, int16_t right, uint16_t time_to_live, uint16_t answers_tick) {
+    say(MSG_SETPOINT_SIGNAL_ID, msg_setpoint_signal{left, right, time_to_live, answers_tick});
+  }
+  void get(uint8_t parameter) { say(MSG_GET_PARAMETER_ID, msg_get_parameter{next_number++, parameter}); }
   void set(uint8_t parameter, int32_t value) {
-    const msg_set_parameter request{parameter, value};
-    send(MSG_SET_PARAMETER_ID, &request, sizeof request);
+    say(MSG_SET_PARAMETER_ID, msg_set_parameter{next_number++, parameter, value});
   }
+  void save() { say(MSG_SAVE_PARAMETERS_ID, msg_save_parameters{next_number++}); }
+
+  /* Runs that long, and keeps the session open meanwhile. */
+  void run_in_session(uint64_t cycles) {
+    const uint64_t end = machine.now + cycles;
+    while (machine.now < end) {
+      probe(0);
+      run_to(machine.now + 5 * TICK < end ? machine.now + 5 * TICK : end);
+    }
+  }
+
+  /* ---- what it said ---- */
 
   /* The last message of that id; its payload is empty if there is none. */
   message last(uint8_t id) const {
@@ -110,9 +192,29 @@ class native_bench {
         return *found;
       }
     }
-    return message{0, 0, {}};
+    return message{0, 0, {}, 0};
   }
+  std::vector<message> all(uint8_t id) const {
+    std::vector<message> found;
+    for (const message &m : messages) {
+      if (m.id == id) {
+        found.push_back(m);
+      }
+    }
+    return found;
+  }
+  size_t count(uint8_t id) const { return all(id).size(); }
   msg_telemetry telemetry() const { return last(MSG_TELEMETRY_ID).as<msg_telemetry>(); }
+  msg_answer answer() const { return last(MSG_ANSWER_ID).as<msg_answer>(); }
+
+  /* The board's counters, sent every 64 ticks: waits for the next ones. */
+  msg_counters counters() {
+    const size_t before = count(MSG_COUNTERS_ID);
+    for (int i = 0; i < 20 && count(MSG_COUNTERS_ID) == before; i++) {
+      run_in_session(5 * TICK);
+    }
+    return last(MSG_COUNTERS_ID).as<msg_counters>();
+  }
 
   std::vector<pin_edge> edges_of(uint8_t pin) const {
     std::vector<pin_edge> found;
@@ -134,12 +236,19 @@ class native_bench {
     native_bench &self = of(machine);
     self.bytes_out += count;
     for (size_t i = 0; i < count; i++) {
-      if (frame_decode(&self.decoder_, bytes[i])) {
-        const uint8_t *payload = frame_payload(&self.decoder_);
-        const uint8_t id = frame_id(&self.decoder_);
-        self.messages.push_back(
-            {id, frame_sequence(&self.decoder_), std::vector<uint8_t>(payload, payload + message_length(id))});
+      if (host_decode(&self.decoder_, bytes[i])) {
+        self.hear();
       }
+    }
+  }
+
+  void hear() {
+    const uint8_t id = host_message_id(&decoder_);
+    const uint8_t *payload = host_message_payload(&decoder_);
+    messages.push_back({id, host_message_sequence(&decoder_),
+                        std::vector<uint8_t>(payload, payload + message_length_to_host(id)), machine.now});
+    if (id == MSG_EVENT_ID && acknowledges) {
+      say(MSG_ACKNOWLEDGE_ID, msg_acknowledge{messages.back().as<msg_event>().number});
     }
   }
 
@@ -155,8 +264,7 @@ class native_bench {
   const native_api *api_ = firmware_board_api();
   uint64_t start_ = 0;
   uint64_t line_free_ = 0;
-  uint8_t next_sequence_ = 0;
-  frame_decoder decoder_{};
+  host_decoder decoder_{};
 };
 
 #endif

@@ -37,6 +37,7 @@ def load(folder: Path, extra: str, text: str = TEXT) -> schema.Schema:
 
 NUMBER = '{ name = "number", type = "u8" }'
 VALUE = '{ name = "value", type = "u8" }'
+LONG = '{ name = "text", type = "text[40]" }'  # as long as no message to the board
 LIVES = '{ name = "time_to_live", type = "u16" }'
 ANSWERS = '{ name = "answers_tick", type = "u16" }'
 
@@ -45,7 +46,8 @@ ANSWERS = '{ name = "answers_tick", type = "u16" }'
     "extra",
     [
         message("ask", f"{NUMBER}, {VALUE}", "exactly_once"),
-        message("move", f"{VALUE}, {LIVES}, {ANSWERS}", "set_point"),
+        message("move", f"{LONG}, {LIVES}, {ANSWERS}", "set_point"),
+        message("greet", LONG, "handshake"),
         message("tell", VALUE, direction="to_host", number=0xFE),
         parameter(),
         parameter("i16", -5, 5),
@@ -63,6 +65,8 @@ def test_what_keeps_the_rules_is_taken(tmp_path: Path, extra: str) -> None:
         (message("move", f"{VALUE}, {ANSWERS}, {LIVES}", "set_point"), "move: .*must end with time_to_live and"),
         (message("move", f"{LIVES}, {ANSWERS}, {VALUE}", "set_point"), "move: .*must end with time_to_live and"),
         (message("move", ANSWERS, "set_point"), "move: .*must end with time_to_live and"),
+        (message("greet", VALUE, "handshake"), "greet: of the handshake, so no other message to_board may be as long"),
+        (message("say", "", "telemetry"), "identify: of the handshake, so no other message to_board may be as long"),
         (message("say", VALUE, "perhaps"), "say: unknown delivery 'perhaps'"),
         (message("say", VALUE, number=0xFE), "say: ids from 0x80 on are for messages to the host"),
         (message("say", VALUE, direction="to_host"), "say: ids from 0x80 on are for messages to the host"),

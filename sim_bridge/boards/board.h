@@ -17,6 +17,10 @@
 #define BOARD_INTERFACE_VERSION 1u
 #define BOARD_GUARD_CYCLES 64u
 
+#define BOARD_NOMINAL_VOLTS 5.0
+#define BOARD_ANALOG_SUPPLY 128u /* not a pin: the voltage at VCC and AVCC */
+#define BOARD_BAND_GAP_VOLTS 1.1 /* the chip's own reference (data sheet of the ATmega328P, 11.7) */
+
 /* What the firmware does to a pin, and what the outside may do to it (the first three only). */
 enum { BOARD_LOW = 0, BOARD_HIGH = 1, BOARD_RELEASED = 2, BOARD_PULLED_UP = 3 };
 
@@ -44,7 +48,28 @@ typedef struct board board;
  * PULLED_UP); at a reset for each pin that changes. Whoever owns the board owns the sink and hands edges on. */
 typedef void board_edge_sink(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
 
+/* The voltage at analog channel 0..5, or at BOARD_ANALOG_SUPPLY; 0 for what the source does not know. */
 typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channel);
+
+/* What `extension` may offer under these names. */
+#define BOARD_DATA "data" /* uint8_t[BOARD_DATA_SIZE]: data space of an AVR, I/O registers as last written */
+#define BOARD_DATA_SIZE 0x0900u
+#define BOARD_EEPROM "eeprom" /* a board_eeprom */
+#define BOARD_EEPROM_SIZE 1024u
+
+/* What a cell of the EEPROM holds after the supply failed while it was being written. */
+typedef enum {
+  BOARD_DAMAGE_ERASED, /* 0xFF */
+  BOARD_DAMAGE_OLD,    /* what it held before */
+  BOARD_DAMAGE_NEW,    /* what it was to hold */
+  BOARD_DAMAGE_GARBAGE /* whatever the test says */
+} board_damage;
+
+typedef struct {
+  uint8_t *bytes; /* BOARD_EEPROM_SIZE; a cell changes when its write is complete */
+  board_damage damage;
+  uint8_t garbage;
+} board_eeprom;
 
 typedef struct {
   uint32_t version; /* BOARD_INTERFACE_VERSION */
@@ -67,7 +92,8 @@ typedef struct {
   /* What the firmware does to the pin now: LOW, HIGH, RELEASED, PULLED_UP. */
   uint8_t (*output)(const board *self, uint8_t pin);
 
-  /* Who is asked for the voltage at analog channel 0..5 when the converter samples it; NULL: 0 V. */
+  /* Who is asked for the voltage at an analog channel when the converter samples it; NULL: 0 V at the pins and the
+   * nominal supply. */
   void (*analog)(board *self, board_analog_source *source, void *context);
 
   /* Puts bytes on the line towards the board, back to back, the first start bit not before cycle `at`. */
@@ -81,7 +107,8 @@ typedef struct {
   void (*line_rate)(board *self, uint32_t baud);
 
   /* Resets the microcontroller at its next instruction. Time and what drives its pins from outside stay; POWER also
-   * loses RAM. Bytes in flight are lost. */
+   * loses RAM. Bytes in flight are lost. A write to the EEPROM that is under way is completed, but at POWER and BROWN_OUT
+   * its cell is damaged. */
   void (*reset)(board *self, board_reset_cause cause);
 
   void (*counters)(const board *self, board_counters *out);
@@ -98,5 +125,26 @@ struct board {
   board_edge_sink *sink; /* NULL: nobody listens */
   void *sink_context;
 };
+
+/* The supply as a source gives it. */
+static inline double board_supply_volts(board_analog_source *source, void *context, uint64_t cycle) {
+  const double volts = source ? source(context, cycle, BOARD_ANALOG_SUPPLY) : 0.0;
+  return volts > 0.0 ? volts : BOARD_NOMINAL_VOLTS;
+}
+
+/* What a cell holds whose write from `before` to `after` was cut short. */
+static inline uint8_t board_damaged_cell(const board_eeprom *eeprom, uint8_t before, uint8_t after) {
+  switch (eeprom->damage) {
+    case BOARD_DAMAGE_OLD:
+      return before;
+    case BOARD_DAMAGE_NEW:
+      return after;
+    case BOARD_DAMAGE_GARBAGE:
+      return eeprom->garbage;
+    case BOARD_DAMAGE_ERASED:
+    default:
+      return 0xFF;
+  }
+}
 
 #endif

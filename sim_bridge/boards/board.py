@@ -1,4 +1,5 @@
-"""A board by itself: drive its pins, send it bytes, see what it does. For tests and tools; no world, no loop.
+"""A board by itself: drive its pins, send it bytes, see what it does and what it remembers. For tests and tools; no
+world, no loop.
 
 Works on every kind of board: the extension that made it lends its `board_access` functions.
 """
@@ -12,6 +13,8 @@ from typing import Any, NamedTuple
 from boebot.errors import BoardError
 
 CLOCK_HZ = 16_000_000
+DATA_SIZE = 0x900
+EEPROM_SIZE = 1024
 
 
 class Level(IntEnum):
@@ -30,6 +33,15 @@ class ResetCause(IntEnum):
     EXTERNAL = 1
     BROWN_OUT = 2
     WATCHDOG = 3
+
+
+class Damage(IntEnum):
+    """What a cell of the EEPROM holds after the supply failed while it was being written."""
+
+    ERASED = 0
+    OLD = 1
+    NEW = 2
+    GARBAGE = 3
 
 
 class Edge(NamedTuple):
@@ -59,11 +71,78 @@ COUNTERS = (
 )
 
 
-class BoardAccess:
+class BoardMemory:
+    """What lies inside a board: the data space of an AVR, the EEPROM of every kind of microcontroller."""
+
+    def __init__(self, lib: Any, ffi: Any, pointer: Any) -> None:
+        """Of the board at `pointer`, which its owner keeps alive."""
+        self._memory_lib = lib
+        self._memory_ffi = ffi
+        self._memory_board = pointer
+
+    def _data(self, address: int, count: int) -> Any:
+        self._check_open()
+        _check_range("data", address, count, DATA_SIZE)
+        data = self._memory_lib.board_memory(self._memory_board)
+        if data == self._memory_ffi.NULL:
+            raise BoardError("this kind of board has no data memory to look into; only the emulated ATmega328P has")
+        return self._memory_ffi.buffer(data + address, count)
+
+    def read_memory(self, address: int, count: int) -> bytes:
+        """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100.
+
+        Raises:
+            BoardError: this kind of board has none.
+        """
+        return bytes(self._data(address, count))
+
+    def write_memory(self, address: int, data: bytes | Iterable[int]) -> None:
+        """Puts bytes into the data space; an I/O register does not notice.
+
+        Raises:
+            BoardError: this kind of board has none.
+        """
+        data = bytes(data)
+        self._data(address, len(data))[:] = data
+
+    def _check_open(self) -> None:
+        if self._memory_board == self._memory_ffi.NULL:
+            raise BoardError("this board is closed")
+
+    def _eeprom(self) -> Any:
+        self._check_open()
+        eeprom = self._memory_lib.board_eeprom_of(self._memory_board)
+        if eeprom == self._memory_ffi.NULL:
+            raise BoardError("this kind of board has no EEPROM")
+        return eeprom
+
+    def read_eeprom(self) -> bytes:
+        """The whole EEPROM; a cell changes when its write is complete."""
+        return bytes(self._memory_ffi.buffer(self._eeprom().bytes, EEPROM_SIZE))
+
+    def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
+        """Puts bytes into the EEPROM at once."""
+        data = bytes(data)
+        _check_range("EEPROM", address, len(data), EEPROM_SIZE)
+        self._memory_ffi.buffer(self._eeprom().bytes + address, len(data))[:] = data
+
+    def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
+        """What becomes of a cell whose write is cut short by a power-on or brown-out reset; `garbage`: for GARBAGE."""
+        eeprom = self._eeprom()
+        eeprom.damage, eeprom.garbage = int(damage), garbage
+
+
+def _check_range(what: str, address: int, count: int, size: int) -> None:
+    if address < 0 or count < 0 or address + count > size:
+        raise ValueError(f"no {what} at 0x{address:X}..0x{address + count - 1:X}; the last address is 0x{size - 1:X}")
+
+
+class BoardAccess(BoardMemory):
     """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
 
     def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None) -> None:
         """Becomes the listener of the board at `pointer`; `owner` is kept alive."""
+        super().__init__(lib, ffi, pointer)
         self._lib = lib
         self._ffi = ffi
         self._owner = owner
@@ -127,6 +206,10 @@ class BoardAccess:
         """Sets the voltage at analog channel 0..5."""
         self._access.volts[channel] = volts
 
+    def supply(self, volts: float) -> None:
+        """Sets the voltage at VCC and AVCC; 5 V if nobody does."""
+        self._access.supply = volts
+
     def answer(self, pin: int, on: int, delay: int) -> None:
         """Answers each output edge of `pin` by driving pin `on` to the same level `delay` cycles later."""
         self._access.echo_pin = pin
@@ -149,5 +232,5 @@ class BoardAccess:
         """Lets go of the board."""
         if self._access != self._ffi.NULL:
             self._lib.board_access_close(self._access)
-            self._access = self._ffi.NULL
+            self._access = self._memory_board = self._ffi.NULL
             self._owner = None

@@ -35,6 +35,7 @@ static void sink(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
 static double volts(void *context, uint64_t cycle, uint8_t channel) {
   const board_access *self = context;
   (void)cycle;
+  if (channel == BOARD_ANALOG_SUPPLY) return self->supply;
   return channel < 6 ? self->volts[channel] : 0.0;
 }
 
@@ -89,3 +90,7 @@ void board_access_counters(const board_access *self, board_counters *out) {
 }
 
 const char *board_access_fault(const board_access *self) { return self->board->op->fault(self->board); }
+
+uint8_t *board_memory(board *self) { return self->op->extension(self, BOARD_DATA); }
+
+board_eeprom *board_eeprom_of(board *self) { return self->op->extension(self, BOARD_EEPROM); }

@@ -1,4 +1,5 @@
-/* board_access.h: a board by itself, for tests and tools: its pin log, its analog voltages, its operations as functions.
+/* board_access.h: a board by itself, for tests and tools: its pin log, its voltages, its operations as functions; and what
+ * lies inside any board, also one in a simulated world.
  *
  * In a simulated world the loop owns the board and its sink; here nobody else does. Works on every kind of board.
  * SPDX-License-Identifier: MIT
@@ -29,6 +30,7 @@ typedef struct {
   board *board;
   board_log log;
   double volts[6]; /* at analog channels 0..5 */
+  double supply;   /* V; 0: the nominal one */
   int echo_pin;    /* pin whose every output edge is answered on `echo_to`, or -1; tests of answers from the sink */
   int echo_to;
   uint64_t echo_delay;
@@ -51,5 +53,11 @@ void board_access_line_rate(board_access *self, uint32_t baud);
 void board_access_reset(board_access *self, int cause);
 void board_access_counters(const board_access *self, board_counters *out);
 const char *board_access_fault(const board_access *self);
+
+/* Data space of the microcontroller, to be read or written; NULL on a board that has none. */
+uint8_t *board_memory(board *self);
+
+/* NULL on a board that has none. */
+board_eeprom *board_eeprom_of(board *self);
 
 #endif

@@ -207,6 +207,100 @@ def test_watchdog_interrupt_comes_before_the_reset() -> None:
     assert machine.board.counters()["resets"] == 1
 
 
+# The interrupt keeps WDTCSR as it was while it ran at 0x0200, and what follows it at 0x0201; pin 13 changes with each.
+WARNED = """
+.global __vector_6
+__vector_6:
+  sbi PINB, 5
+  lds r24, WDTCSR
+  sts 0x0200, r24
+  {again}
+  reti
+main:
+  in r16, MCUSR
+  out MCUSR, r1
+  sbrc r16, WDRF
+1: rjmp 1b
+  sbi DDRB, 5
+  ldi r24, 1 << WDCE | 1 << WDE
+  sts WDTCSR, r24
+  ldi r24, {mode}
+  sts WDTCSR, r24
+  {enable}
+2: lds r25, WDTCSR
+  sts 0x0201, r25
+  rjmp 2b
+"""
+BOTH = "1 << WDIE | 1 << WDE"
+SET_AGAIN = "ldi r25, 1 << WDIE | 1 << WDE\n sts WDTCSR, r25"
+WDIF, WDIE, WDE = 0x80, 0x40, 0x08
+
+
+def test_the_warning_clears_its_own_enable() -> None:
+    machine = Machine(WARNED.format(mode=BOTH, again="", enable="sei"))
+    machine.board.advance(WATCHDOG_CYCLES + 1000)
+    assert machine.avr.data(0x200, 2) == bytes([WDE, WDE])  # WDIE and WDIF cleared by hardware (11.8.2)
+    machine.board.advance(2 * WATCHDOG_CYCLES - 100)
+    assert machine.board.counters()["resets"] == 0
+    machine.board.run(1000)
+    assert machine.board.counters()["resets"] == 1
+    assert machine.avr.data(16)[0] == 8  # MCUSR after it: WDRF
+
+
+def test_a_warning_that_is_set_again_warns_again() -> None:
+    machine = Machine(WARNED.format(mode=BOTH, again=SET_AGAIN, enable="sei"))
+    machine.board.advance(5 * WATCHDOG_CYCLES + 1000)
+    assert machine.board.counters()["resets"] == 0
+    warnings = edges_of(machine.board.log(), 13)[1:]
+    assert gaps(warnings) == pytest.approx([WATCHDOG_CYCLES] * 4, abs=20)
+
+
+def test_a_program_that_hears_no_warning_is_reset() -> None:
+    # interrupts off for ever: the flag stands at the second time-out
+    machine = Machine(WARNED.format(mode=BOTH, again="", enable=""))
+    machine.board.advance(WATCHDOG_CYCLES + 1000)
+    assert machine.avr.data(0x201)[0] == WDIF | WDIE | WDE
+    assert machine.board.counters()["resets"] == 0
+    machine.board.advance(2 * WATCHDOG_CYCLES + 1000)
+    assert machine.board.counters()["resets"] == 1
+    assert machine.avr.data(16)[0] == 8
+
+
+@pytest.mark.parametrize("enable", ["sei", ""])
+def test_interrupt_mode_alone_never_resets(enable: str) -> None:
+    machine = Machine(WARNED.format(mode="1 << WDIE", again="", enable=enable))
+    machine.board.advance(5 * WATCHDOG_CYCLES + 1000)
+    assert machine.board.counters()["resets"] == 0
+    assert len(edges_of(machine.board.log(), 13)) == (1 + 5 if enable else 1)
+
+
+RAM, RAM_SIZE = 0x100, 0x700  # below it the stack of the programs here
+
+
+@pytest.mark.parametrize("cause", [ResetCause.EXTERNAL, ResetCause.BROWN_OUT, ResetCause.WATCHDOG])
+def test_memory_outlives_a_reset(cause: ResetCause) -> None:
+    board = Machine("main: rjmp main").board
+    board.run(100)
+    kept = bytes(random.Random(1).randbytes(RAM_SIZE))
+    board.write_memory(RAM, kept)
+    board.reset(cause)
+    board.run(100)
+    assert board.read_memory(RAM, RAM_SIZE) == kept
+
+
+def test_memory_holds_anything_after_power_on() -> None:
+    board, other = Machine("main: rjmp main").board, Machine("main: rjmp main").board
+    board.run(100)
+    other.run(5000)
+    first = board.read_memory(RAM, RAM_SIZE)
+    assert len(set(first)) > 200, "not zeros"
+    assert other.read_memory(RAM, RAM_SIZE) == first, "the same each time"
+    board.write_memory(RAM, bytes(RAM_SIZE))
+    board.reset(ResetCause.POWER)
+    board.run(100)
+    assert board.read_memory(RAM, RAM_SIZE) == first
+
+
 @pytest.mark.parametrize(
     ("cause", "flags"),
     [(ResetCause.POWER, 1), (ResetCause.EXTERNAL, 3), (ResetCause.BROWN_OUT, 5), (ResetCause.WATCHDOG, 9)],

@@ -261,3 +261,65 @@ def test_analog_conversion() -> None:
     _, start_1, end_1, start_2, end_2 = edges_of(machine.board.log(), 13)
     assert 25 * 128 <= end_1 - start_1 < 26 * 128 + 20
     assert 13 * 128 <= end_2 - start_2 < 14 * 128 + 20
+
+
+# Selects AVCC and a channel, waits, and converts: the result is in r16 and r17. The converter runs at 125 kHz and has
+# done its first conversion before.
+CONVERT = """
+main:
+  ldi r24, 1 << ADEN | 1 << ADSC | 7
+  sts ADCSRA, r24
+1: lds r24, ADCSRA
+  sbrc r24, ADSC
+  rjmp 1b
+  ldi r24, {reference} << REFS0 | {channel}
+  sts ADMUX, r24
+  ldi r30, lo8({wait} / 4)
+  ldi r31, hi8({wait} / 4)
+2: sbiw r30, 1
+  brne 2b
+  ldi r24, 1 << ADEN | 1 << ADSC | 7
+  sts ADCSRA, r24
+3: lds r24, ADCSRA
+  sbrc r24, ADSC
+  rjmp 3b
+  lds r16, ADCL
+  lds r17, ADCH
+4: rjmp 4b
+"""
+AVCC, BAND_GAP_REFERENCE = 1, 3
+BAND_GAP_CHANNEL = 14
+SETTLED = 70 * 16  # cycles: t_BG is 70 us at most (29.5)
+
+
+def converted(channel: int, supply: float | None = None, wait: int = 4 * SETTLED, reference: int = AVCC) -> int:
+    """The result of a conversion at `channel` that was selected `wait` cycles before; 3.3 V at channel 2."""
+    machine = Machine(CONVERT.format(reference=reference, channel=channel, wait=wait))
+    machine.board.analog(2, 3.3)
+    if supply is not None:
+        machine.board.supply(supply)
+    machine.board.run(20_000)
+    return int.from_bytes(machine.avr.data(16, 2), "little")
+
+
+@pytest.mark.parametrize(("supply", "result"), [(None, 225), (5.0, 225), (4.5, 250), (3.3, 341), (2.7, 417)])
+def test_band_gap_tells_the_supply(supply: float | None, result: int) -> None:
+    # 1.1 V * 1024 / supply (24.7): 225.28, 250.3, 341.3, 417.2
+    assert converted(BAND_GAP_CHANNEL, supply) == result
+
+
+def test_supply_scales_every_channel() -> None:
+    assert converted(2) == 675  # 3.3 * 1024 / 5 = 675.8
+    assert converted(2, supply=4.0) == 844  # 844.8
+    assert converted(2, supply=3.0) == 1023
+    assert converted(15) == converted(15, supply=3.0) == 0  # ground
+    assert converted(2, reference=BAND_GAP_REFERENCE) == 1023
+    assert converted(BAND_GAP_CHANNEL, supply=4.0, reference=BAND_GAP_REFERENCE) == 1023
+
+
+def test_band_gap_needs_70_us_from_its_selection() -> None:
+    # the sample is held 1.5 to 2.5 cycles of 128 after the start
+    early = [converted(BAND_GAP_CHANNEL, wait=wait) for wait in (16, 200, 400, 600)]
+    assert early == sorted(early)
+    assert 0 < early[0] < early[-1] < 225
+    assert converted(BAND_GAP_CHANNEL, wait=SETTLED) == 225

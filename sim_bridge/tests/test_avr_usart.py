@@ -81,11 +81,45 @@ def test_double_speed_set_after_the_divisor_counts() -> None:
         assert second.cycle - first.cycle == BYTE_CYCLES
 
 
-def test_outside_at_another_bit_rate_reads_garbage() -> None:
+@pytest.mark.parametrize("baud", [115_200, 250_000, 440_000, 570_000, 1_000_000])
+def test_outside_at_another_bit_rate_reads_garbage(baud: int) -> None:
+    machine = Machine(SEND_THREE.format(setup=SETUP))
+    machine.board.line_rate(baud)
+    machine.board.run(5000)
+    heard = [byte for _, byte in machine.board.receive()]
+    assert heard
+    assert heard != [0x12, 0x34, 0x56]
+
+
+def test_outside_reads_by_its_own_clock() -> None:
+    # three frames, each a start bit, the lowest bit first, a stop bit; then the line rests; one of the outside's bits
+    # is two of these
+    line = "".join("0" + f"{byte:08b}"[::-1] + "1" for byte in (0x12, 0x34, 0x56)) + "1" * 40
+    expected, start = [], line.find("0")
+    while start >= 0:
+        expected.append(sum(int(line[start + 2 * k + 3]) << k for k in range(8)))
+        start = line.find("10", start + 19 - 1) + 1 or -1  # looked for from the middle of the stop bit on
     machine = Machine(SEND_THREE.format(setup=SETUP))
     machine.board.line_rate(250_000)
+    machine.board.run(3000)
+    assert [byte for _, byte in machine.board.receive()] == expected
+
+
+@pytest.mark.parametrize("baud", [485_000, 515_000])
+def test_outside_within_tolerance_understands(baud: int) -> None:
+    machine = Machine(SEND_THREE.format(setup=SETUP))
+    machine.board.line_rate(baud)
     machine.board.run(2000)
-    assert [byte for _, byte in machine.board.receive()] != [0x12, 0x34, 0x56]
+    assert [byte for _, byte in machine.board.receive()] == [0x12, 0x34, 0x56]
+
+
+def test_slowest_setting_of_the_divisor() -> None:
+    machine = Machine(SEND_THREE.format(setup="ldi r24, 15\n sts UBRR0H, r24\n ldi r24, 255\n sts UBRR0L, r24\n"))
+    machine.board.line_rate(300)
+    machine.board.run(3 * 10 * 65_536)
+    first, second = machine.board.receive()[:2]  # a bit of 65,536 cycles is 1.23 of the outside's: garbage
+    assert second.cycle > first.cycle > 10 * 53_000
+    assert machine.board.counters()["bytes_out"] == 2
 
 
 def test_transmit_interrupts() -> None:

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot import robots
+from boebot.errors import BoardError
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
@@ -481,6 +482,35 @@ def test_charge_runs_out() -> None:
     robot.run(20.0)
     assert lib.sim_pack_voltage(robot.sim.handle, 0) == pytest.approx(5.0 - 0.6 * 0.08)
     assert lib.sim_supply_voltage(robot.sim.handle, 0) == pytest.approx(4.5 - 0.6 * 0.08)
+
+
+def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
+    robot = scripted()
+    supply = 128  # BOARD_ANALOG_SUPPLY
+    assert lib.script_board_volts(robot.script, supply) == 5.0
+    parameters = imperfections.battery_parameters()
+    parameters.capacity_as = 1.0
+    assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
+    robot.run(20.0)
+    # an empty pack of 5.0 V, sagging under the board's 0.08 A, less the drop-out of 0.5 V
+    assert lib.script_board_volts(robot.script, supply) == pytest.approx(5.0 - 0.6 * 0.08 - 0.5)
+    robot.pins.supply(3.9)
+    assert lib.script_board_volts(robot.script, supply) == pytest.approx(3.9)
+    robot.run(0.1)
+    assert lib.script_board_volts(robot.script, supply) == pytest.approx(3.9)
+    assert lib.sim_supply_voltage(robot.sim.handle, 0) == pytest.approx(3.9)
+    robot.pins.supply(None)
+    assert lib.script_board_volts(robot.script, supply) == pytest.approx(4.452)
+    with pytest.raises(BoardError):
+        robot.pins.supply(-1.0)
+
+
+def test_board_without_memory_says_so() -> None:
+    robot = scripted()
+    with pytest.raises(BoardError, match="no data memory"):
+        robot.pins.read_memory(0x100, 1)
+    with pytest.raises(BoardError, match="no EEPROM"):
+        robot.pins.read_eeprom()
 
 
 def test_pins_of_no_part_are_left_alone() -> None:

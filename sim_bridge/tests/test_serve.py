@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
+import serial
 
 from boebot.boards import BoardRequest, open_port
 from boebot.errors import BoardError
@@ -73,6 +74,45 @@ def test_client_meets_a_robot_that_just_started(tcp: int | None) -> None:
             client.write(frame.encode(messages.HelloRequest.ID, 0, messages.HelloRequest(1).pack()))
             assert any(kind == messages.Hello.ID for kind, _, _ in listen(client, 0.2))
             client.close()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals")
+def test_the_client_sets_the_bit_rate_of_a_pty() -> None:
+    with served(None) as url:
+        for baud in (115_200, 460_800, 250_000):  # the last one has no name among a terminal's rates
+            client = open_port(url, baud)
+            time.sleep(0.05)
+            assert listen(client, 0.3) == []
+            client.write(frame.encode(messages.HelloRequest.ID, 0, messages.HelloRequest(1).pack()))
+            assert listen(client, 0.2) == []
+            client.close()
+            time.sleep(0.05)
+        client = open_port(url, 500_000)
+        heard = listen(client, 0.3)
+        assert heard[0][0] == messages.Hello.ID
+        assert len(heard) > 10
+        client.close()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals")
+def test_the_bit_rate_may_change_while_the_port_is_open() -> None:
+    with served(None) as url, serial.Serial(url, 500_000, timeout=0.05) as port:
+
+        def hear() -> int:
+            """Messages in 0.3 s, the first one perhaps cut."""
+            port.reset_input_buffer()
+            decoder, end, count = frame.Decoder(), time.monotonic() + 0.3, 0
+            while time.monotonic() < end:
+                count += len(decoder.feed(port.read(64)))
+            return count
+
+        assert hear() > 10
+        port.baudrate = 115_200
+        time.sleep(0.05)
+        assert hear() == 0
+        port.baudrate = 500_000
+        time.sleep(0.05)
+        assert hear() > 10
 
 
 def test_client_that_does_not_read_stops_nobody() -> None:

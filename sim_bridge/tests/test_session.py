@@ -14,6 +14,7 @@ from boebot.boards import BoardRequest
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.robots import load_robot
+from sim_bridge.boards.board import Damage
 from sim_bridge.session import SimSession, open_native
 from sim_bridge.tests.simulated import MS
 
@@ -50,6 +51,18 @@ def test_board_says_hello_and_sends_a_message_per_tick(session: SimSession) -> N
     ticks = [messages.Telemetry.unpack(payload).tick for kind, _, payload in heard if kind == messages.Telemetry.ID]
     assert ticks == list(range(len(ticks)))
     assert len(ticks) in (99, 100)
+
+
+def test_memory_is_within_reach(session: SimSession) -> None:
+    session.transport.read(0.01, 0.01)
+    assert session.board.read_eeprom() == b"\xff" * 1024
+    session.board.write_eeprom(1020, b"abcd")
+    session.board.eeprom_damage(Damage.GARBAGE, 0x33)
+    session.board.reset("power")
+    session.transport.read(0.1, 0.1)
+    assert session.board.read_eeprom()[1020:] == b"abcd"
+    with pytest.raises(BoardError, match="no data memory"):
+        session.board.read_memory(0x100, 1)
 
 
 def test_each_read_brings_one_whole_message(session: SimSession) -> None:

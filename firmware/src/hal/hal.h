@@ -7,6 +7,8 @@
  *   HAL_INTERRUPT_SLOT        a new slot has begun                                  schedule.c
  *   HAL_INTERRUPT_EDGE        the time given to hal_edge_arm() is HAL_EDGE_LEAD off  schedule.c
  *   HAL_INTERRUPT_CAPTURE     an edge on the Ping pin; hal_capture_time() has when  ping.c
+ *   HAL_INTERRUPT_EEPROM      the EEPROM is ready; others may interrupt it          storage.c
+ *   HAL_INTERRUPT_WATCHDOG    the watchdog was not kicked: a reset comes            reset.c
  * They stamp and store. What they share with the rest is read and written inside HAL_ATOMIC { ... }, the only way that
  * this firmware turns interrupts off outside an interrupt.
  *
@@ -63,18 +65,33 @@ static inline volatile hal_change *hal_change_after(uint8_t index) {
   return (volatile hal_change *)(void *)((uint8_t *)hal_changes + HAL_CHANGE_BYTES + index);
 }
 
-/* Saves why the chip started, before anything else can lose it. */
-uint8_t hal_reset_cause(void); /* RESET_CAUSE_... of generated/messages.h */
+/* Why the chip says that it started, RESET_CAUSE_... of generated/messages.h; unknown behind a bootloader that took the
+ * cause. Of several the one that loses most: power, brown-out, watchdog, external. */
+uint8_t hal_reset_cause(void);
 
-/* Line at 500,000 baud, 8N1. Call once, before the timers. */
-void hal_start_serial(void);
+/* Memory, HAL_NOINIT_SIZE bytes, that a reset leaves alone and power-on fills with anything. */
+#define HAL_NOINIT_SIZE 32u
+void *hal_noinit(void);
+
+/* A hash of memory that nobody has written since the start: what RAM held when the power came, if it just came. */
+uint32_t hal_memory_noise(void);
+
+/* Line at that rate (9600 ... 1000000 bit/s, as near as the clock allows), 8N1. Call once, before the timers. */
+void hal_start_serial(uint32_t baud);
 
 /* Starts the time and the slots. Interrupts are enabled from here on. */
 void hal_start_timers(void);
 
-/* The chip resets itself unless kicked every 120 ms. */
+/* The chip resets itself unless kicked every 120 ms: after that time comes HAL_INTERRUPT_WATCHDOG, which ends in
+ * hal_watchdog_reset(), and 16 ms later the reset; or 120 ms later, if interrupts are off for good. */
 void hal_start_watchdog(void);
 void hal_kick_watchdog(void);
+void hal_watchdog_reset(void); /* kicks count no more */
+
+/* Starts a measurement of the bandgap against the supply, 104 us long. */
+void hal_supply_sample(void);
+/* The last complete one: bandgap * 1024 / supply, rounded down; 0: none yet. */
+uint16_t hal_supply_result(void);
 
 /* Queues bytes for sending. The caller has asked for room. */
 void hal_serial_send(const uint8_t *bytes, uint8_t count);
@@ -119,6 +136,14 @@ uint32_t hal_image_hash(void);
  *                                                 is woken when more can
  *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt with
  *                                                 interrupts off
+ *   HAL_EEPROM_SIZE                               bytes of EEPROM. A write takes 3.4 ms and goes on through a reset. Before
+ *                                                 interrupts are on hal_eeprom_wait() waits for its end; later only one
+ *                                                 part of the firmware reads and writes.
+ *   bool hal_eeprom_busy(void)                    a write is under way
+ *   uint8_t hal_eeprom_read(uint16_t address)     not while it is busy
+ *   void hal_eeprom_write_start(uint16_t address, uint8_t value)   returns at once; not while it is busy
+ *   void hal_eeprom_interrupt(bool on)            whether HAL_INTERRUPT_EEPROM runs when it is ready
+ *   void hal_eeprom_wait(void)
  *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
  */
 

@@ -4,89 +4,153 @@
 #include <string.h>
 
 #include "generated/messages.h"
+#include "link/counters.h"
+#include "link/events.h"
 #include "link/identity.h"
-#include "link/parameters.h"
+#include "link/requests.h"
 #include "link/send.h"
+#include "link/session.h"
 #include "motion.h"
 #include "safety.h"
-
-static uint8_t setpoint_sequence;
-
-void dispatch_start(void) { setpoint_sequence = 0; }
-
-uint8_t dispatch_setpoint_sequence(void) { return setpoint_sequence; }
+#include "schedule.h"
 
 static bool within(int16_t value, int16_t minimum, int16_t maximum) { return value >= minimum && value <= maximum; }
+
+/* Whether a set-point may be put in force; counts the late ones. What is late was not wrong to ask. */
+static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
+  const safety_verdict verdict = safety_accept(time_to_live, answers_tick, sequence);
+  if (verdict == SAFETY_LATE) {
+    counters.late++;
+  }
+  *refused = verdict == SAFETY_REFUSED;
+  return verdict == SAFETY_ACCEPTED;
+}
 
 static bool setpoint_signal(uint8_t sequence, const uint8_t *payload) {
   msg_setpoint_signal message;
   memcpy(&message, payload, sizeof message);
   if (!within(message.left, MSG_SETPOINT_SIGNAL_LEFT_MIN, MSG_SETPOINT_SIGNAL_LEFT_MAX) ||
-      !within(message.right, MSG_SETPOINT_SIGNAL_RIGHT_MIN, MSG_SETPOINT_SIGNAL_RIGHT_MAX) ||
-      !safety_accept(message.time_to_live)) {
+      !within(message.right, MSG_SETPOINT_SIGNAL_RIGHT_MIN, MSG_SETPOINT_SIGNAL_RIGHT_MAX)) {
     return false;
   }
-  motion_signals(message.left, message.right);
-  setpoint_sequence = sequence;
-  return true;
+  bool refused = false;
+  if (may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
+    motion_signals(message.left, message.right);
+  }
+  return !refused;
 }
 
 static bool setpoint_speed(uint8_t sequence, const uint8_t *payload) {
   msg_setpoint_speed message;
   memcpy(&message, payload, sizeof message);
   if (!within(message.left, MSG_SETPOINT_SPEED_LEFT_MIN, MSG_SETPOINT_SPEED_LEFT_MAX) ||
-      !within(message.right, MSG_SETPOINT_SPEED_RIGHT_MIN, MSG_SETPOINT_SPEED_RIGHT_MAX) ||
-      !safety_accept(message.time_to_live)) {
+      !within(message.right, MSG_SETPOINT_SPEED_RIGHT_MIN, MSG_SETPOINT_SPEED_RIGHT_MAX)) {
     return false;
   }
-  motion_speeds(message.left, message.right);
-  setpoint_sequence = sequence;
+  bool refused = false;
+  if (may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
+    motion_speeds(message.left, message.right);
+  }
+  return !refused;
+}
+
+static bool setpoint_coast(uint8_t sequence, const uint8_t *payload) {
+  msg_setpoint_coast message;
+  memcpy(&message, payload, sizeof message);
+  bool refused = false;
+  if (may_move(message.time_to_live, message.answers_tick, sequence, &refused)) {
+    motion_off();
+  }
+  return !refused;
+}
+
+static bool open(const uint8_t *payload) {
+  msg_open message;
+  memcpy(&message, payload, sizeof message);
+  return session_open(&message);
+}
+
+static bool close(const uint8_t *payload) {
+  msg_close message;
+  memcpy(&message, payload, sizeof message);
+  return session_close(message.session);
+}
+
+static bool describe(const uint8_t *payload) {
+  msg_describe message;
+  memcpy(&message, payload, sizeof message);
+  if (message.board_nonce != session_board_nonce()) {
+    return false;
+  }
+  identity_describe(message.index);
   return true;
 }
 
-static void answer_parameter(uint8_t parameter, uint8_t status) {
-  const msg_parameter answer = {.parameter = parameter, .value = parameters_get(parameter), .status = status};
-  send_message(MSG_PARAMETER_ID, &answer, sizeof answer);
-}
-
-static void get_parameter(const uint8_t *payload) {
-  const uint8_t parameter = payload[0];
-  answer_parameter(parameter, parameter < PARAMETER_COUNT ? PARAMETER_STATUS_OK : PARAMETER_STATUS_UNKNOWN_PARAMETER);
-}
-
-static void set_parameter(const uint8_t *payload) {
-  msg_set_parameter message;
+static void acknowledge(const uint8_t *payload) {
+  msg_acknowledge message;
   memcpy(&message, payload, sizeof message);
-  answer_parameter(message.parameter, parameters_set(message.parameter, message.value));
+  events_acknowledge(message.number);
 }
 
-bool dispatch_answers(uint8_t id) {
-  return id == MSG_HELLO_REQUEST_ID || id == MSG_IDENTIFY_ID || id == MSG_GET_PARAMETER_ID ||
-         id == MSG_SET_PARAMETER_ID;
+/* The confirmation may be lost for want of room: the host asks again. Stopping waits for nothing. */
+static void stop(const uint8_t *payload) {
+  safety_latch(LATCH_STOP_COMMAND);
+  const msg_stopped stopped = {.token = payload[0]};
+  send_message(MSG_STOPPED_ID, &stopped, sizeof stopped);
+}
+
+static void clock_probe(const uint8_t *payload) {
+  msg_clock_answer answer = {.time = schedule_time()};
+  memcpy(&answer.token, payload, sizeof answer.token);
+  send_message(MSG_CLOCK_ANSWER_ID, &answer, sizeof answer);
+}
+
+int8_t dispatch_answer_length(uint8_t id) {
+  switch (id) {
+    case MSG_IDENTIFY_ID:
+      return MSG_IDENTITY_LENGTH;
+    case MSG_DESCRIBE_ID:
+      return MSG_DESCRIPTION_LENGTH;
+    case MSG_CLOCK_PROBE_ID:
+      return MSG_CLOCK_ANSWER_LENGTH;
+    case MSG_GET_PARAMETER_ID:
+    case MSG_SET_PARAMETER_ID:
+    case MSG_SAVE_PARAMETERS_ID:
+    case MSG_RESET_PARAMETERS_ID:
+    case MSG_ARM_ID:
+      return MSG_ANSWER_LENGTH;
+    default:
+      return -1;
+  }
 }
 
 bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload) {
   switch (id) {
-    case MSG_HELLO_REQUEST_ID:
-      identity_send_hello();
-      return true;
+    case MSG_OPEN_ID:
+      return open(payload);
     case MSG_IDENTIFY_ID:
       identity_send();
+      return true;
+    case MSG_DESCRIBE_ID:
+      return describe(payload);
+    case MSG_CLOSE_ID:
+      return close(payload);
+    case MSG_STOP_ID:
+      stop(payload);
       return true;
     case MSG_SETPOINT_SIGNAL_ID:
       return setpoint_signal(sequence, payload);
     case MSG_SETPOINT_SPEED_ID:
       return setpoint_speed(sequence, payload);
-    case MSG_STOP_ID:
-      safety_stop();
+    case MSG_SETPOINT_COAST_ID:
+      return setpoint_coast(sequence, payload);
+    case MSG_ACKNOWLEDGE_ID:
+      acknowledge(payload);
       return true;
-    case MSG_GET_PARAMETER_ID:
-      get_parameter(payload);
+    case MSG_CLOCK_PROBE_ID:
+      clock_probe(payload);
       return true;
-    case MSG_SET_PARAMETER_ID:
-      set_parameter(payload);
-      return true;
-    default:
-      return false;
+    default: /* the numbered ones: no other message is accepted */
+      return requests_take(id, payload);
   }
 }

@@ -9,17 +9,13 @@
 extern "C" {
 #endif
 
-void dispatch_start(void);
-
-/* Does what a whole, undamaged message asks; `payload` has the length of its id. False if it was refused: not a message
- * to the board, or a value out of range. */
+/* Does what a whole, undamaged message to the board asks; `payload` has the length of its id. False if it was refused:
+ * a value out of range, or nothing that can be done now. */
 bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload);
 
-/* Whether a message of that id is answered. */
-bool dispatch_answers(uint8_t id);
-
-/* Sequence number of the last set-point that was accepted. */
-uint8_t dispatch_setpoint_sequence(void);
+/* Payload bytes of the answer for which a message of that id waits until there is room; -1: it does not wait. (A hello that
+ * finds no room is said later.) */
+int8_t dispatch_answer_length(uint8_t id);
 
 #ifdef __cplusplus
 }

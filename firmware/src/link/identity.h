@@ -1,6 +1,9 @@
-/* identity.h: who speaks (hello) and which image runs (identity). */
+/* identity.h: who speaks (hello), which image runs (identity), and how it understands each message (description). */
 #ifndef IDENTITY_H
 #define IDENTITY_H
+
+#include <stdbool.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -9,8 +12,12 @@ extern "C" {
 /* Computes the image's hash. */
 void identity_start(void);
 
-void identity_send_hello(void);
-void identity_send(void);
+/* Each returns false if there was no room for it. */
+bool identity_send_hello(void);
+bool identity_send(void);
+
+/* The message of that index in order of ids; id 0 beyond the last. */
+bool identity_describe(uint8_t index);
 
 #ifdef __cplusplus
 }

@@ -1,23 +1,28 @@
 /* link.c: see link.h. */
 #include "link/link.h"
 
-#include "hal/hal.h"
+#include "link/counters.h"
 #include "link/dispatch.h"
 #include "link/frame.h"
-#include "link/identity.h"
 #include "link/send.h"
+#include "link/session.h"
+#include "link/telemetry.h"
 
 static frame_decoder decoder;
-bool link_request_waits; /* the decoder holds it */
-static uint8_t refused;  /* frames that were whole but asked for what cannot be */
+uint8_t link_room;
 
-void link_start(void) {
-  frame_decoder_start(&decoder, FRAME_SEED);
-  link_request_waits = false;
-  refused = 0;
-  send_start();
-  dispatch_start();
-  identity_send_hello();
+void link_start(uint16_t baud) {
+  frame_decoder_start(&decoder, FRAME_NO_SESSION);
+  link_room = 0;
+  send_start(baud);
+  counters_start();
+  telemetry_start_line();
+  session_start();
+}
+
+void link_use_seed(uint32_t seed) {
+  decoder.seed = seed;
+  link_room = 0; /* a request of the session before is not carried out any more */
 }
 
 /* Takes bytes up to the end of a frame; false if they end before. */
@@ -33,23 +38,38 @@ static bool take_frame(void) {
   return false;
 }
 
+/* Room for a message's answer and the next telemetry; 0: it waits for none. */
+static uint8_t room_for(uint8_t id) {
+  const int8_t length = dispatch_answer_length(id);
+  return length < 0 ? 0u : (uint8_t)((uint8_t)length + MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD);
+}
+
 void link_poll(void) {
   if (!link_due()) {
     return;
   }
-  if (!link_request_waits) {
+  const uint8_t *payload = frame_payload(&decoder);
+  if (link_room == 0) {
     if (!take_frame()) {
       return;
     }
-    link_request_waits = dispatch_answers(frame_id(&decoder));
+    const uint8_t id = frame_id(&decoder);
+    if (!message_is_handshake(id)) {
+      session_heard();
+    }
+    link_room = room_for(id);
     if (!link_due()) {
       return;
     }
   }
-  link_request_waits = false;
-  if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), frame_payload(&decoder))) {
-    refused++;
+  link_room = 0;
+  if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), payload)) {
+    counters.refused++;
   }
 }
 
-uint8_t link_frames_bad(void) { return (uint8_t)(decoder.bad + refused); }
+void link_count(msg_counters *into) {
+  into->good = decoder.good;
+  into->bad = decoder.bad;
+  into->resynchronised = decoder.resynchronised;
+}

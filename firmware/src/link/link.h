@@ -5,30 +5,33 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
 #include "hal/hal.h"
-#include "link/frame.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Forgets everything and queues the hello. */
-void link_start(void);
+/* Forgets everything and queues the hello; the line carries `baud` * 100 bit/s. */
+void link_start(uint16_t baud);
 
-/* Takes received bytes, up to the end of one frame, and does what it asks. A request, and all that follows it, waits
+/* From now on frames of that session are accepted; FRAME_NO_SESSION: only the handshake's. What waits for room is
+ * forgotten. */
+void link_use_seed(uint32_t seed);
+
+/* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits
  * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of
- * answers. */
+ * answers. A stop and set-points do not wait themselves. */
 void link_poll(void);
 
-extern bool link_request_waits;
+extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room */
 
 static inline __attribute__((always_inline)) bool link_due(void) {
-  return hal_serial_due() != 0 &&
-         (!link_request_waits || hal_serial_room(FRAME_SIZE_MAX + MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD));
+  return hal_serial_due() != 0 && (link_room == 0 || hal_serial_room(link_room));
 }
 
-/* Frames refused since reset, modulo 256. */
-uint8_t link_frames_bad(void);
+/* Frames accepted and refused, and times that a good one followed bad ones, into the counters. */
+void link_count(msg_counters *into);
 
 #ifdef __cplusplus
 }

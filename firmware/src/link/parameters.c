@@ -1,25 +1,41 @@
-/* parameters.c: see parameters.h. */
+/* parameters.c: see parameters.h. Ranges and defaults are in flash, the values in 16 bits each. */
 #include "link/parameters.h"
+
+#include <string.h>
 
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "pins.h"
+#include "storage.h"
 
 typedef struct {
-  int32_t minimum, maximum, initial;
+  uint16_t minimum, initial; /* as the values are kept */
+  uint16_t span;             /* from minimum to maximum */
+  uint8_t is_signed;
 } parameter_range;
 
-#define RANGE(name, id, minimum, maximum, initial) [id] = {(minimum), (maximum), (initial)},
+enum { TYPE_u16 = 0, TYPE_i16 = 1 };
+
+#define RANGE(name, type, minimum, maximum, initial) \
+  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)(initial), (uint16_t)((maximum) - (minimum)), TYPE_##type},
 HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
 #undef RANGE
 
-#define WITHIN(name, id, minimum, maximum, initial) \
-  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);
+/* Rates that the line can have, in counts of the parameter. */
+HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
+
+#define LIMIT_MIN_u16 0
+#define LIMIT_MAX_u16 UINT16_MAX
+#define LIMIT_MIN_i16 INT16_MIN
+#define LIMIT_MAX_i16 INT16_MAX
+#define WITHIN(name, type, minimum, maximum, initial)                                    \
+  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name); \
+  _Static_assert((minimum) >= LIMIT_MIN_##type && (maximum) <= LIMIT_MAX_##type, "type of " #name);
 PARAMETER_LIST(WITHIN)
 #undef WITHIN
 _Static_assert((DEFAULT_DEVICES & ~PARAMETERS_DEVICES_BUILT) == 0, "the robot switches on a device that is not built");
 
-static int32_t values[PARAMETER_COUNT];
+static uint16_t values[PARAMETER_COUNT];
 
 static parameter_range range_of(uint8_t parameter) {
   parameter_range range;
@@ -27,25 +43,77 @@ static parameter_range range_of(uint8_t parameter) {
   return range;
 }
 
+static int32_t meant(uint16_t kept, uint8_t is_signed) { return is_signed ? (int32_t)(int16_t)kept : (int32_t)kept; }
+
+static bool is_baud_rate(uint16_t value) {
+  for (uint8_t i = 0; i < sizeof baud_rates / sizeof *baud_rates; i++) {
+    uint16_t rate = 0;
+    hal_table_copy(&rate, &baud_rates[i], sizeof rate);
+    if (value == rate) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* A value as it is kept: counted from the minimum, modulo 65536, none outside is within the span. */
+static bool is_allowed(uint8_t parameter, uint16_t kept, const parameter_range *range) {
+  if ((uint16_t)(kept - range->minimum) > range->span) {
+    return false;
+  }
+  switch (parameter) {
+    case PARAMETER_DEVICES:
+      return (kept & (uint16_t)~PARAMETERS_DEVICES_BUILT) == 0;
+    case PARAMETER_BAUD_RATE:
+      return is_baud_rate(kept);
+    default:
+      return true;
+  }
+}
+
 void parameters_start(void) {
+  parameters_reset();
+  storage_load_parameters();
+}
+
+void parameters_reset(void) {
   for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
     values[parameter] = range_of(parameter).initial;
   }
 }
 
-int32_t parameters_get(uint8_t parameter) { return parameter < PARAMETER_COUNT ? values[parameter] : 0; }
+uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
+
+int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
+
+int32_t parameters_get(uint8_t parameter) {
+  return parameter < PARAMETER_COUNT ? meant(values[parameter], range_of(parameter).is_signed) : 0;
+}
 
 uint8_t parameters_set(uint8_t parameter, int32_t value) {
   if (parameter >= PARAMETER_COUNT) {
-    return PARAMETER_STATUS_UNKNOWN_PARAMETER;
+    return ANSWER_STATUS_UNKNOWN_PARAMETER;
   }
   const parameter_range range = range_of(parameter);
-  if (value < range.minimum || value > range.maximum ||
-      (parameter == PARAMETER_DEVICES && (value & ~(int32_t)PARAMETERS_DEVICES_BUILT) != 0)) {
-    return PARAMETER_STATUS_OUT_OF_RANGE;
+  const uint16_t kept = (uint16_t)value;
+  if (meant(kept, range.is_signed) != value || !is_allowed(parameter, kept, &range)) {
+    return ANSWER_STATUS_OUT_OF_RANGE;
   }
-  values[parameter] = value;
-  return PARAMETER_STATUS_OK;
+  values[parameter] = kept;
+  return ANSWER_STATUS_OK;
 }
 
-bool parameters_device_on(uint16_t device) { return ((uint16_t)values[PARAMETER_DEVICES] & device) != 0; }
+bool parameters_device_on(uint16_t device) { return (values[PARAMETER_DEVICES] & device) != 0; }
+
+const uint16_t *parameters_values(void) { return values; }
+
+bool parameters_restore(const uint16_t *kept) {
+  for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
+    const parameter_range range = range_of(parameter);
+    if (!is_allowed(parameter, kept[parameter], &range)) {
+      return false;
+    }
+  }
+  memcpy(values, kept, sizeof values);
+  return true;
+}

@@ -1,5 +1,6 @@
-/* parameters.h: what can be set at run time; names, ranges and defaults come from messages.toml and the robot's
- * description (generated/parameters.h). A value lasts until the next reset. Units: counts of the parameter's scale. */
+/* parameters.h: what can be set at run time; names, types, ranges and defaults come from messages.toml and the robot's
+ * description (generated/parameters.h). A value lasts until the next reset, unless it is saved (storage.h). Units: counts
+ * of the parameter's scale. */
 #ifndef LINK_PARAMETERS_H
 #define LINK_PARAMETERS_H
 
@@ -16,17 +17,30 @@ extern "C" {
 #define PARAMETERS_DEVICES_BUILT \
   (DEVICES_SERVOS | DEVICES_ENCODERS | DEVICES_WHISKERS | DEVICES_INFRARED | DEVICES_PING)
 
-/* All values to their defaults. */
+/* At start: the defaults, then what is saved, if it is all there and within its ranges. */
 void parameters_start(void);
 
-/* The value in force; 0 for a number that is no parameter. */
+/* All values to their defaults. */
+void parameters_reset(void);
+
+/* The value in force of a parameter of that type. Cheap; `parameter` must be one. */
+uint16_t parameters_u16(uint8_t parameter);
+int16_t parameters_i16(uint8_t parameter);
+
+/* The value in force of a parameter of any type; 0 for a number that is no parameter. */
 int32_t parameters_get(uint8_t parameter);
 
-/* Returns a PARAMETER_STATUS_...; the value changes only on PARAMETER_STATUS_OK. */
+/* Returns an ANSWER_STATUS_...; the value changes only on ANSWER_STATUS_OK. */
 uint8_t parameters_set(uint8_t parameter, int32_t value);
 
 /* Whether a device (DEVICES_... bit) is switched on. */
 bool parameters_device_on(uint16_t device);
+
+/* All values as they are kept, PARAMETER_COUNT of them: an i16 in two's complement. */
+const uint16_t *parameters_values(void);
+
+/* Puts PARAMETER_COUNT such values in force, if each is within its range; otherwise none, and returns false. */
+bool parameters_restore(const uint16_t *kept);
 
 #ifdef __cplusplus
 }

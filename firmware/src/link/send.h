@@ -9,12 +9,18 @@
 extern "C" {
 #endif
 
-/* The next frame is the first. */
-void send_start(void);
+/* The next frame is the first; the line carries `baud` * 100 bit/s. */
+void send_start(uint16_t baud);
+
+/* From now on frames are made with that session's seed. */
+void send_use_seed(uint32_t seed);
 
 /* Sends a message; false if there is no room. A message that is not sent leaves a gap in the sequence numbers, so that
- * the host can count it. */
+ * the host can count it, and is counted here. */
 bool send_message(uint8_t id, const void *payload, uint8_t length);
+
+/* Time in us that so many bytes take on the line. */
+uint32_t send_time(uint16_t bytes);
 
 #ifdef __cplusplus
 }

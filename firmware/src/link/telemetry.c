@@ -3,17 +3,46 @@
 
 #include "encoder.h"
 #include "generated/messages.h"
-#include "hal/hal.h"
 #include "infrared.h"
-#include "link/dispatch.h"
-#include "link/link.h"
+#include "link/counters.h"
+#include "link/frame.h"
+#include "link/parameters.h"
 #include "link/send.h"
+#include "link/session.h"
 #include "ping.h"
 #include "pins.h"
+#include "reset.h"
 #include "safety.h"
 #include "schedule.h"
 #include "servo.h"
+#include "storage.h"
+#include "supply.h"
 #include "whisker.h"
+
+static uint8_t line_period; /* ticks */
+static uint8_t due_in;      /* ticks until the next is sent */
+
+void telemetry_start_line(void) {
+  static const uint8_t factors[] = {2, 5, 10};                                   /* 1, 2, 5, 10, 20, 50, 100 */
+  const uint32_t needed = 2u * send_time(MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD); /* us */
+  line_period = 1;
+  for (uint8_t i = 0, decade = 1; line_period * (uint32_t)SCHEDULE_TICK_US < needed && line_period < 100; i++) {
+    if (i == sizeof factors) {
+      i = 0;
+      decade = 10;
+    }
+    line_period = (uint8_t)(decade * factors[i]);
+  }
+}
+
+void telemetry_start(void) { due_in = 1; }
+
+uint8_t telemetry_line_period(void) { return line_period; }
+
+uint8_t telemetry_period(void) {
+  const uint16_t wanted = parameters_u16(PARAMETER_TELEMETRY_PERIOD); /* up to 100 */
+  return (uint8_t)(wanted > line_period ? wanted : line_period);
+}
 
 static uint16_t status_bits(const encoder_reading *left, const encoder_reading *right) {
   uint16_t status = safety_status();
@@ -26,11 +55,17 @@ static uint16_t status_bits(const encoder_reading *left, const encoder_reading *
   if (schedule_overran()) {
     status |= STATUS_TICK_OVERRUN;
   }
-  if (hal_serial_overrun()) {
+  if (counters_bytes_lost()) {
     status |= STATUS_RECEIVE_OVERRUN;
   }
-  if (hal_reset_cause() == RESET_CAUSE_WATCHDOG) {
+  if (reset_cause() == RESET_CAUSE_WATCHDOG) {
     status |= STATUS_WATCHDOG_RESET;
+  }
+  if (supply_low()) {
+    status |= STATUS_SUPPLY_LOW;
+  }
+  if (storage_busy()) {
+    status |= STATUS_SAVING;
   }
   return status;
 }
@@ -39,9 +74,13 @@ void telemetry_task(void) {
   const encoder_reading *left = encoder_read(LEFT);
   const encoder_reading *right = encoder_read(RIGHT);
   ping_collect();
+  if (!session_is_open() || --due_in != 0) {
+    return;
+  }
+  due_in = telemetry_period();
   const msg_telemetry telemetry = {
       .tick = schedule_tick(),
-      .time = schedule_tick() * SCHEDULE_TICK_US,
+      .time = schedule_tick_time(),
       .encoder_left = left->count,
       .encoder_right = right->count,
       .edge_period_left = left->period,
@@ -53,9 +92,11 @@ void telemetry_task(void) {
       .ping_age = ping_age(),
       .pulse_left = servo_pulse(LEFT),
       .pulse_right = servo_pulse(RIGHT),
+      .supply = supply_voltage(),
       .status = status_bits(left, right),
-      .setpoint_sequence = dispatch_setpoint_sequence(),
-      .frames_bad = link_frames_bad(),
+      .latch = safety_latched(),
+      .latches = safety_latches(),
+      .setpoint_sequence = safety_setpoint_sequence(),
       .overruns = schedule_overruns(),
   };
   send_message(MSG_TELEMETRY_ID, &telemetry, sizeof telemetry);

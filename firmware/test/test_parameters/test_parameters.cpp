@@ -1,92 +1,136 @@
-/* Parameters: ranges and answers. */
+/* Parameters: types, ranges and what is refused. */
 #include <doctest.h>
 
+#include <string>
 #include <vector>
 
-#include "../native_bench.h"
+#include "../memory_bench.h"
 #include "link/parameters.h"
+#include "pins.h"
 
 namespace {
 
 struct range {
   uint8_t id;
+  bool is_signed;
   int32_t minimum, maximum, initial;
 };
 
-#define RANGE(name, id, minimum, maximum, initial) {id, minimum, maximum, initial},
+#define RANGE(name, type, minimum, maximum, initial) \
+  {PARAMETER_##name, std::string(#type) == "i16", minimum, maximum, initial},
 const std::vector<range> RANGES = {PARAMETER_LIST(RANGE)};
 #undef RANGE
 
-/* Asks the running firmware for a parameter, or to set it. */
-msg_parameter ask(native_bench &bench, uint8_t id, const void *payload, uint8_t length) {
-  bench.messages.clear();
-  bench.send(id, payload, length);
-  bench.run(2 * MILLISECOND);
-  return bench.last(MSG_PARAMETER_ID).as<msg_parameter>();
+const std::vector<int32_t> RATES = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
+
+std::vector<int32_t> all() {
+  std::vector<int32_t> values;
+  for (uint8_t id = 0; id < PARAMETER_COUNT; id++) {
+    values.push_back(parameters_get(id));
+  }
+  return values;
 }
 
-msg_parameter get(native_bench &bench, uint8_t parameter) { return ask(bench, MSG_GET_PARAMETER_ID, &parameter, 1); }
-
-msg_parameter set(native_bench &bench, uint8_t parameter, int32_t value) {
-  const msg_set_parameter request{parameter, value};
-  return ask(bench, MSG_SET_PARAMETER_ID, &request, sizeof request);
-}
+struct started {
+  memory_bench bench;
+  started() { bench.power_on(); }
+};
 
 }  // namespace
 
-TEST_CASE("every parameter starts at its default") {
-  native_bench bench;
+TEST_CASE_FIXTURE(started, "every parameter starts at its default") {
   REQUIRE(RANGES.size() == PARAMETER_COUNT);
   for (const range &r : RANGES) {
-    const msg_parameter answer = get(bench, r.id);
-    CHECK(answer.parameter == r.id);
-    CHECK(answer.value == r.initial);
-    CHECK(answer.status == PARAMETER_STATUS_OK);
+    CAPTURE(r.id);
+    CHECK(parameters_get(r.id) == r.initial);
   }
 }
 
-TEST_CASE("the ends of a range are in it, the next values are not") {
-  native_bench bench;
+TEST_CASE_FIXTURE(started, "the ends of a range are in it, the next values are not") {
   for (const range &r : RANGES) {
     if (r.id == PARAMETER_DEVICES) {
       continue; /* below: only built devices */
     }
     CAPTURE(r.id);
     for (int32_t value : {r.minimum, r.maximum}) {
-      CHECK(set(bench, r.id, value).status == PARAMETER_STATUS_OK);
-      CHECK(get(bench, r.id).value == value);
+      CHECK(parameters_set(r.id, value) == ANSWER_STATUS_OK);
+      CHECK(parameters_get(r.id) == value);
+      CHECK((r.is_signed ? parameters_i16(r.id) : parameters_u16(r.id)) == value);
     }
-    for (int32_t value : {r.minimum - 1, r.maximum + 1, INT32_MIN, INT32_MAX}) {
-      const msg_parameter answer = set(bench, r.id, value);
-      CHECK(answer.status == PARAMETER_STATUS_OUT_OF_RANGE);
-      CHECK(answer.value == r.maximum);
+    for (int32_t value : {r.minimum - 1, r.maximum + 1, r.minimum + 65536, r.maximum - 65536, INT32_MIN, INT32_MAX}) {
+      CHECK(parameters_set(r.id, value) == ANSWER_STATUS_OUT_OF_RANGE);
+      CHECK(parameters_get(r.id) == r.maximum);
     }
   }
 }
 
-TEST_CASE("only devices that are built can be switched on") {
-  native_bench bench;
-  CHECK(set(bench, PARAMETER_DEVICES, static_cast<int32_t>(PARAMETERS_DEVICES_BUILT)).status == PARAMETER_STATUS_OK);
-  CHECK(set(bench, PARAMETER_DEVICES, 0).status == PARAMETER_STATUS_OK);
-  CHECK(set(bench, PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_COMPASS)).status == PARAMETER_STATUS_OUT_OF_RANGE);
-  CHECK(get(bench, PARAMETER_DEVICES).value == 0);
-}
-
-TEST_CASE("a number that is no parameter is answered so") {
-  native_bench bench;
-  for (uint8_t id : {static_cast<uint8_t>(PARAMETER_COUNT), static_cast<uint8_t>(255)}) {
-    CHECK(get(bench, id).status == PARAMETER_STATUS_UNKNOWN_PARAMETER);
-    CHECK(set(bench, id, 1).status == PARAMETER_STATUS_UNKNOWN_PARAMETER);
-    CHECK(get(bench, id).value == 0);
+TEST_CASE_FIXTURE(started, "setting one parameter leaves the others alone") {
+  for (const range &r : RANGES) {
+    parameters_reset();
+    std::vector<int32_t> expected = all();
+    expected[r.id] = r.id == PARAMETER_DEVICES ? 0 : r.minimum;
+    CHECK(parameters_set(r.id, expected[r.id]) == ANSWER_STATUS_OK);
+    CHECK(all() == expected);
   }
 }
 
-TEST_CASE("a reset brings the defaults back") {
-  {
-    native_bench bench;
-    set(bench, PARAMETER_INFRARED_PERIOD, 17);
-    REQUIRE(get(bench, PARAMETER_INFRARED_PERIOD).value == 17);
+TEST_CASE_FIXTURE(started, "only devices that are built can be switched on") {
+  CHECK(parameters_set(PARAMETER_DEVICES, PARAMETERS_DEVICES_BUILT) == ANSWER_STATUS_OK);
+  CHECK(parameters_device_on(DEVICES_PING));
+  CHECK(parameters_set(PARAMETER_DEVICES, 0) == ANSWER_STATUS_OK);
+  CHECK_FALSE(parameters_device_on(DEVICES_PING));
+  CHECK(parameters_set(PARAMETER_DEVICES, DEVICES_COMPASS) == ANSWER_STATUS_OUT_OF_RANGE);
+  CHECK(parameters_get(PARAMETER_DEVICES) == 0);
+}
+
+TEST_CASE_FIXTURE(started, "the line has eight rates and no other") {
+  size_t allowed = 0;
+  for (int32_t rate = 0; rate <= 11000; rate++) {
+    allowed += parameters_set(PARAMETER_BAUD_RATE, rate) == ANSWER_STATUS_OK;
   }
-  native_bench bench;
-  CHECK(get(bench, PARAMETER_INFRARED_PERIOD).value == DEFAULT_INFRARED_PERIOD);
+  CHECK(allowed == RATES.size());
+  for (int32_t rate : RATES) {
+    CHECK(parameters_set(PARAMETER_BAUD_RATE, rate) == ANSWER_STATUS_OK);
+    CHECK(parameters_u16(PARAMETER_BAUD_RATE) == rate);
+  }
+}
+
+TEST_CASE_FIXTURE(started, "a number that is no parameter is told") {
+  const std::vector<int32_t> before = all();
+  for (int id = PARAMETER_COUNT; id < 256; id++) {
+    CHECK(parameters_set(static_cast<uint8_t>(id), 1) == ANSWER_STATUS_UNKNOWN_PARAMETER);
+    CHECK(parameters_get(static_cast<uint8_t>(id)) == 0);
+  }
+  CHECK(all() == before);
+}
+
+TEST_CASE_FIXTURE(started, "the defaults come back when asked for, and at a reset") {
+  const std::vector<int32_t> defaults = all();
+  for (bool by_reset : {false, true}) {
+    REQUIRE(parameters_set(PARAMETER_INFRARED_PERIOD, 17) == ANSWER_STATUS_OK);
+    REQUIRE(all() != defaults);
+    if (by_reset) {
+      bench.reset(RESET_CAUSE_EXTERNAL);
+    } else {
+      parameters_reset();
+    }
+    CHECK(all() == defaults);
+  }
+}
+
+TEST_CASE_FIXTURE(started, "kept values are taken all or not at all") {
+  const std::vector<int32_t> defaults = all();
+  std::vector<uint16_t> kept(parameters_values(), parameters_values() + PARAMETER_COUNT);
+  kept[PARAMETER_INFRARED_PERIOD] = 17;
+  kept[PARAMETER_SERVO_LEFT_GAIN] = static_cast<uint16_t>(-3200);
+  for (const range &r : RANGES) {
+    std::vector<uint16_t> wrong = kept;
+    wrong[r.id] = static_cast<uint16_t>(r.maximum + 1);
+    CAPTURE(r.id);
+    CHECK_FALSE(parameters_restore(wrong.data()));
+    CHECK(all() == defaults);
+  }
+  CHECK(parameters_restore(kept.data()));
+  CHECK(parameters_get(PARAMETER_INFRARED_PERIOD) == 17);
+  CHECK(parameters_get(PARAMETER_SERVO_LEFT_GAIN) == -3200);
 }

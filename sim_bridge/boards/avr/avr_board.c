@@ -66,6 +66,9 @@ static void happen(avr_board *b, due_source source, uint64_t cycle) {
     case DUE_TRANSMITTER:
       usart_due_transmitter(b, cycle);
       break;
+    case DUE_OUTSIDE:
+      usart_due_outside(b, cycle);
+      break;
     case DUE_RECEIVER:
       usart_due_receiver(b, cycle);
       break;
@@ -74,6 +77,9 @@ static void happen(avr_board *b, due_source source, uint64_t cycle) {
       break;
     case DUE_WATCHDOG:
       watchdog_due(b, cycle);
+      break;
+    case DUE_EEPROM:
+      eeprom_due(b);
       break;
     case DUE_COUNT:
       break;
@@ -122,7 +128,8 @@ void enable_interrupt(avr_board *b, uint8_t vector, bool enabled) {
 static void acknowledge(avr_board *b, uint8_t vector) {
   timer_state *timer = timer_of_vector(b, vector);
   if (timer) timer_bring_up(timer, b->avr->cycle);
-  if (vector != VECTOR_USART_RX && vector != VECTOR_USART_UDRE) clear_flag(b, vector); /* these stand for a state */
+  bool is_state = vector == VECTOR_USART_RX || vector == VECTOR_USART_UDRE || vector == VECTOR_EE_READY;
+  if (!is_state) clear_flag(b, vector);
   if (timer) timer_plan(timer);
   if (vector == VECTOR_WDT) watchdog_acknowledged(b);
   if (vector == VECTOR_INT0 || vector == VECTOR_INT1) pins_acknowledged(b, vector);
@@ -246,10 +253,15 @@ void want_reset(avr_board *b, board_reset_cause cause) {
 /* What is in RAM and registers when the power comes is anything; here, always the same anything. */
 static void scramble_memory(avr_board *b) {
   uint32_t x = 0x328;
-  for (size_t i = 0; i < AVR_BOARD_DATA_SIZE; i++) {
+  for (size_t i = 0; i < BOARD_DATA_SIZE; i++) {
     x = x * 1664525u + 1013904223u;
     b->avr->data[i] = (uint8_t)(x >> 24);
   }
+}
+
+void halt_cpu(avr_board *b, unsigned cycles) {
+  b->avr->cycle += cycles;
+  stop_core(b);
 }
 
 static void restart(avr_board *b) {
@@ -278,6 +290,7 @@ static void restart(avr_board *b) {
   usart_reset(b);
   converter_reset(b);
   watchdog_reset(b, cycle);
+  eeprom_reset(b, causes & (1u << BOARD_RESET_POWER | 1u << BOARD_RESET_BROWN_OUT));
   pins_reset(b, cycle);
 }
 
@@ -361,8 +374,8 @@ static int on_request(avr_io_t *io, uint32_t request, void *param) {
   return 0;
 }
 
-/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory and EEPROM;
- * SPI, I2C and the analog comparator answer nothing. */
+/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; SPI, I2C and
+ * the analog comparator answer nothing. */
 void mx8_init(struct avr_t *avr) {
   avr_board *b = avr->custom.data;
   struct mcu_t *chip = (struct mcu_t *)avr;
@@ -371,7 +384,6 @@ void mx8_init(struct avr_t *avr) {
   b->io.ioctl = on_request;
   avr_flash_init(avr, &chip->selfprog);
   avr_register_io(avr, &b->io);
-  avr_eeprom_init(avr, &chip->eeprom);
   on_write(b, REG_MCUSR, write_reset_flags, b);
   on_write(b, RESERVED_RAMPZ, ignore_write, b);
   pins_init(b);
@@ -379,6 +391,7 @@ void mx8_init(struct avr_t *avr) {
   usart_init(b);
   converter_init(b);
   watchdog_init(b);
+  eeprom_init(b);
 }
 
 void mx8_reset(struct avr_t *avr) {
@@ -451,7 +464,8 @@ static const char *fault(const board *self) {
 
 static void *extension(board *self, const char *name) {
   avr_board *b = (avr_board *)self;
-  if (!strcmp(name, AVR_BOARD_DATA)) return b->avr->data;
+  if (!strcmp(name, BOARD_DATA)) return b->avr->data;
+  if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
   if (!strcmp(name, AVR_BOARD_FLASH)) return b->avr->flash;
   return NULL;
 }

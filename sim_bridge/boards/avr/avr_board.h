@@ -14,10 +14,6 @@
  * and one sentence in `error`. */
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 
-/* The board's extension "data": its data space, 0x0000..0x08FF: registers, I/O registers as last written, RAM. */
-#define AVR_BOARD_DATA "data"
-#define AVR_BOARD_DATA_SIZE 0x0900u
-
 /* The board's extension "flash": its program memory. */
 #define AVR_BOARD_FLASH "flash"
 #define AVR_BOARD_FLASH_SIZE 0x8000u

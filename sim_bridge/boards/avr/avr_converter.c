@@ -1,11 +1,14 @@
 /* avr_converter.c: the analog-to-digital converter (24): 13 clocks of the converter for a conversion, 25 for the first
  * one after it was enabled; the input is held 1.5 (13.5) clocks after the start. Single conversions and free running.
  *
+ * The reference is AVCC, at the supply, or the band gap; nothing is joined to AREF, which reads as AVCC. The band gap as
+ * input (channel 14) is good 70 us after it was selected (29.5, the longest start-up time), until then too low.
+ *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_parts.h"
 
-#define BAND_GAP_VOLTS 1.1
+#define BAND_GAP_CYCLES (70u * (BOARD_CLOCK_HZ / 1000000u))
 #define STEPS 1024.0
 
 enum {
@@ -17,7 +20,8 @@ enum {
   ADPS = 0x07,
   ADLAR = 0x20,
   REFS = 0xC0,
-  MUX = 0x0F
+  MUX = 0x0F,
+  MUX_BAND_GAP = 14
 };
 
 static uint64_t clock_cycles(const avr_board *b) {
@@ -37,16 +41,26 @@ static void start(avr_board *b, uint64_t cycle) {
   set_due(b, DUE_CONVERTER, first_edge + hold);
 }
 
-static double volts_at(avr_board *b, uint64_t cycle) {
-  unsigned channel = b->avr->data[REG_ADMUX] & MUX;
-  if (channel == 14) return BAND_GAP_VOLTS;
-  if (channel > 5 || !b->converter.source) return 0.0;
-  return b->converter.source(b->converter.context, cycle, (uint8_t)channel);
+static double band_gap_at(const converter_state *c, uint64_t cycle) {
+  uint64_t since = c->band_gap_from > c->enabled_at ? c->band_gap_from : c->enabled_at;
+  uint64_t settled = cycle - since;
+  return settled >= BAND_GAP_CYCLES ? BOARD_BAND_GAP_VOLTS : BOARD_BAND_GAP_VOLTS * (double)settled / BAND_GAP_CYCLES;
 }
 
-static uint16_t quantize(const avr_board *b, double volts) {
-  bool band_gap = (b->avr->data[REG_ADMUX] & REFS) == REFS;
-  double steps = volts / (band_gap ? BAND_GAP_VOLTS : SUPPLY_VOLTS) * STEPS;
+static double volts_at(const avr_board *b, uint64_t cycle) {
+  const converter_state *c = &b->converter;
+  unsigned channel = b->avr->data[REG_ADMUX] & MUX;
+  if (channel == MUX_BAND_GAP) return band_gap_at(c, cycle);
+  return channel > 5 || !c->source ? 0.0 : c->source(c->context, cycle, (uint8_t)channel);
+}
+
+static double reference_at(const avr_board *b, uint64_t cycle) {
+  if ((b->avr->data[REG_ADMUX] & REFS) == REFS) return BOARD_BAND_GAP_VOLTS;
+  return board_supply_volts(b->converter.source, b->converter.context, cycle);
+}
+
+static uint16_t convert(const avr_board *b, uint64_t cycle) {
+  double steps = volts_at(b, cycle) / reference_at(b, cycle) * STEPS;
   if (!(steps > 0.0)) return 0;
   return steps >= STEPS - 1.0 ? 1023 : (uint16_t)steps;
 }
@@ -55,7 +69,7 @@ void converter_due(avr_board *b, uint64_t cycle) {
   converter_state *c = &b->converter;
   uint8_t *control = &b->avr->data[REG_ADCSRA];
   if (!c->sampled) {
-    c->sample = quantize(b, volts_at(b, cycle));
+    c->sample = convert(b, cycle);
     c->sampled = true;
     set_due(b, DUE_CONVERTER, c->done);
     return;
@@ -101,6 +115,13 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   }
 }
 
+static void write_selection(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  uint64_t cycle = begin_access(b) + 1;
+  if ((avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = cycle;
+  avr->data[address] = value;
+}
+
 static uint8_t read_low(avr_t *avr, avr_io_addr_t address, void *param) {
   avr_board *b = param;
   (void)avr;
@@ -129,6 +150,7 @@ void converter_reset(avr_board *b) {
 void converter_init(avr_board *b) {
   on_read(b, REG_ADCSRA, read_control, b);
   on_write(b, REG_ADCSRA, write_control, b);
+  on_write(b, REG_ADMUX, write_selection, b);
   on_read(b, REG_ADCL, read_low, b);
   on_read(b, REG_ADCH, read_high, b);
 }

@@ -1,4 +1,6 @@
-/* avr_dog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact.
+/* avr_dog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact. In the
+ * interrupt and system reset mode (WDE and WDIE) the first time-out asks for the interrupt, whose execution clears WDIE;
+ * the next one resets, whether the interrupt was executed or not (table 11-1).
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -22,9 +24,10 @@ static void plan(avr_board *b) {
 }
 
 void watchdog_due(avr_board *b, uint64_t cycle) {
-  uint8_t *control = &b->avr->data[REG_WDTCSR];
+  const uint8_t *control = &b->avr->data[REG_WDTCSR];
   b->watchdog.since = cycle;
-  if (*control & WDIE) {
+  bool warned = (*control & WDE) && (b->raised & FLAG(VECTOR_WDT));
+  if ((*control & WDIE) && !warned) {
     raise_flag(b, VECTOR_WDT);
   } else {
     want_reset(b, BOARD_RESET_WATCHDOG);

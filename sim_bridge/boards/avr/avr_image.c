@@ -18,7 +18,6 @@
 #define ARCHITECTURE_AVR5 5u /* that of the ATmega328P */
 #define SEGMENT_LOAD 1u
 #define EEPROM_BASE 0x810000u
-#define EEPROM_SIZE 1024u
 
 static uint32_t half(const uint8_t *p) { return p[0] | (uint32_t)p[1] << 8; }
 static uint32_t word(const uint8_t *p) { return half(p) | half(p + 2) << 16; }
@@ -33,10 +32,9 @@ static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, u
   if (address < AVR_BOARD_FLASH_SIZE) {
     if (size > AVR_BOARD_FLASH_SIZE - address) return false;
     memcpy(b->avr->flash + address, bytes, size);
-  } else if (address >= EEPROM_BASE && address < EEPROM_BASE + EEPROM_SIZE) {
-    if (size > EEPROM_BASE + EEPROM_SIZE - address) return false;
-    avr_eeprom_desc_t content = {(uint8_t *)bytes, (uint16_t)(address - EEPROM_BASE), size};
-    avr_ioctl(b->avr, AVR_IOCTL_EEPROM_SET, &content);
+  } else if (address >= EEPROM_BASE && address < EEPROM_BASE + BOARD_EEPROM_SIZE) {
+    if (size > EEPROM_BASE + BOARD_EEPROM_SIZE - address) return false;
+    memcpy(b->eeprom.cells + (address - EEPROM_BASE), bytes, size);
   } else if (address < EEPROM_BASE) {
     return false;
   }

@@ -2,8 +2,8 @@
  *
  * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
  * here: run loop and interrupts (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c), USART
- * (avr_usart.c), ADC (avr_converter.c), watchdog (avr_dog.c), program image (avr_image.c). Section numbers in these
- * files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
+ * (avr_usart.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c), program image (avr_image.c).
+ * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
  * instruction that starts at c and takes n cycles reads and writes I/O registers in the last of them (IN, OUT and SBIC
@@ -24,7 +24,6 @@
 #include "sim_megax8.h"
 
 #define NEVER UINT64_MAX
-#define SUPPLY_VOLTS 5.0
 
 /* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
  * (13.2.1, 17.3). */
@@ -66,9 +65,11 @@ typedef enum {
   DUE_TIMER1,
   DUE_TIMER2,
   DUE_TRANSMITTER,
+  DUE_OUTSIDE, /* has read a byte */
   DUE_RECEIVER,
   DUE_CONVERTER,
   DUE_WATCHDOG,
+  DUE_EEPROM,
   DUE_COUNT
 } due_source;
 
@@ -83,6 +84,10 @@ enum {
   REG_PCIFR = 0x3B,
   REG_EIFR = 0x3C,
   REG_EIMSK = 0x3D,
+  REG_EECR = 0x3F,
+  REG_EEDR = 0x40,
+  REG_EEARL = 0x41,
+  REG_EEARH = 0x42,
   REG_GTCCR = 0x43,
   REG_SMCR = 0x53,
   REG_MCUSR = 0x54,
@@ -182,9 +187,16 @@ typedef struct {
 
 typedef struct {
   uint64_t start;    /* of the start bit, in cycles << 16 */
-  uint32_t bit_time; /* in cycles << 16 */
+  uint64_t bit_time; /* in cycles << 16 */
+  uint8_t bits;      /* with start and stop bits */
   uint8_t byte;
 } line_frame;
+
+/* What stands on one direction of the line, in the order of time. */
+typedef struct {
+  line_frame *frames;
+  size_t first, end, capacity;
+} line_queue;
 
 typedef struct {
   uint8_t byte;
@@ -206,9 +218,7 @@ typedef struct {
   /* transmitter */
   bool sending;
   bool holding; /* a byte waits in UDR0 */
-  uint8_t shifting_byte, holding_byte;
-  uint8_t shifting_bits;
-  uint32_t shifting_bit_time;
+  uint8_t holding_byte;
   /* receiver */
   enum { RECEIVER_OFF, RECEIVER_SEARCHING, RECEIVER_SAMPLING } receiver;
   uint64_t from;         /* searching: since when; sampling: start of the frame; cycles << 16 */
@@ -220,9 +230,11 @@ typedef struct {
   /* the outside */
   uint32_t line_bit_time; /* in cycles << 16 */
   uint64_t line_free;     /* when the line's last byte ends, cycles << 16 */
-  line_frame *line;       /* bytes on their way to the board */
-  size_t line_first, line_end, line_capacity;
-  sent_byte *out; /* bytes that left the board */
+  line_queue to_board;
+  line_queue from_board;
+  uint64_t outside_from;  /* since when the outside looks for a start bit, cycles << 16 */
+  uint64_t outside_start; /* of the byte that it reads, or NEVER */
+  sent_byte *out;         /* bytes that the outside has read */
   size_t out_first, out_end, out_capacity;
 } usart_state;
 
@@ -232,8 +244,9 @@ typedef struct {
   board_analog_source *source;
   void *context;
   uint64_t enabled_at;
-  uint64_t done; /* when the conversion ends */
-  bool first;    /* the next conversion is the first since the converter was enabled */
+  uint64_t done;          /* when the conversion ends */
+  uint64_t band_gap_from; /* since when the band gap is switched to the converter */
+  bool first;             /* the next conversion is the first since the converter was enabled */
   bool sampled;
   uint16_t result; /* in the register, as ADLAR has it */
   uint16_t sample;
@@ -244,6 +257,20 @@ typedef struct {
   uint64_t since;        /* when its counter was last reset */
   uint64_t change_until; /* WDCE is set before this cycle */
 } watchdog_state;
+
+/* ---- EEPROM ---- */
+
+typedef struct {
+  board_eeprom face;
+  uint8_t cells[BOARD_EEPROM_SIZE];
+  uint64_t armed_until; /* EEMPE is set before this cycle */
+  uint16_t selected;    /* EEAR */
+  uint8_t data;         /* EEDR */
+  bool writing;         /* EEPE */
+  uint8_t mode;         /* EEPM of the write under way */
+  uint16_t address;     /* of the write under way */
+  uint8_t value;        /* that it ends with */
+} eeprom_state;
 
 /* ---- the board ---- */
 
@@ -280,6 +307,7 @@ typedef struct avr_board {
   usart_state usart;
   converter_state converter;
   watchdog_state watchdog;
+  eeprom_state eeprom;
 } avr_board;
 
 /* avr_board.c */
@@ -289,6 +317,7 @@ void clear_flag(avr_board *b, uint8_t vector);
 void enable_interrupt(avr_board *b, uint8_t vector, bool enabled);
 void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled` */
 void want_reset(avr_board *b, board_reset_cause cause);
+void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
 uint64_t begin_access(avr_board *b);
@@ -325,6 +354,7 @@ void usart_reset(avr_board *b);
 void usart_free(avr_board *b);
 void usart_due_transmitter(avr_board *b, uint64_t cycle);
 void usart_due_receiver(avr_board *b, uint64_t cycle);
+void usart_due_outside(avr_board *b, uint64_t cycle);
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count);
 size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 void usart_line_rate(avr_board *b, uint32_t baud);
@@ -340,6 +370,11 @@ void watchdog_reset(avr_board *b, uint64_t cycle);
 void watchdog_due(avr_board *b, uint64_t cycle);
 void watchdog_kick(avr_board *b);
 void watchdog_acknowledged(avr_board *b);
+
+/* avr_eeprom.c */
+void eeprom_init(avr_board *b);
+void eeprom_reset(avr_board *b, bool power_failed);
+void eeprom_due(avr_board *b);
 
 /* avr_image.c */
 bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size);

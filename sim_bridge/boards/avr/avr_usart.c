@@ -1,12 +1,12 @@
 /* avr_usart.c: USART0 in asynchronous mode (20), and the line between it and the outside.
  *
- * The line is a waveform: the outside's bytes back to back, 8N1, at the outside's bit rate. The receiver looks for a
- * falling edge and samples the middle of each bit by its own clock, so that a wrong bit rate gives what it gives on
- * the bench: garbage and framing errors. It holds two bytes in its buffer and one in the shift register; when a start
+ * The line is a waveform in each direction: the outside's bytes back to back, 8N1, at the outside's bit rate, and the
+ * board's frames at its own. A receiver looks for a falling edge and samples the middle of each bit by its own clock, so
+ * that a wrong bit rate gives what it gives on the bench: garbage and framing errors. The board's receiver holds two bytes in its buffer and one in the shift register; when a start
  * bit comes while all three are full, the third is lost and the next byte read bears DOR0 (20.8.1). RXC is set when the
  * stop bit has been sampled, a little before its end.
  *
- * The transmitter's byte is complete for the outside at the end of its stop bit. Bits do not show at pins 0 and 1, which
+ * A byte is complete for the outside at the end of its stop bit, whatever level that has. Bits do not show at pins 0 and 1, which
  * rest high. Synchronous and SPI modes, the ninth bit's value and parity checks are not built.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
@@ -25,9 +25,9 @@ enum { RX_MASK = 1, TX_MASK = 2 };                                              
 #define FRACTION 16   /* binary places of the times on the line */
 #define SLOWEST_BAUD 300u
 
-/* ---- the line to the board ---- */
+/* ---- the line ---- */
 
-static uint64_t end_of(const line_frame *f) { return f->start + (uint64_t)LINE_BITS * f->bit_time; }
+static uint64_t end_of(const line_frame *f) { return f->start + (uint64_t)f->bits * f->bit_time; }
 
 /* The level of a frame's bit: start, eight data bits, stop. */
 static bool bit_of(uint8_t byte, uint64_t index) {
@@ -35,9 +35,9 @@ static bool bit_of(uint8_t byte, uint64_t index) {
   return index > 8 || (byte >> (index - 1) & 1);
 }
 
-static bool line_level(const usart_state *u, uint64_t time) {
-  for (size_t i = u->line_first; i < u->line_end; i++) {
-    const line_frame *f = &u->line[i];
+static bool line_level(const line_queue *q, uint64_t time) {
+  for (size_t i = q->first; i < q->end; i++) {
+    const line_frame *f = &q->frames[i];
     if (time < f->start) break;
     if (time < end_of(f)) return bit_of(f->byte, (time - f->start) / f->bit_time);
   }
@@ -45,12 +45,12 @@ static bool line_level(const usart_state *u, uint64_t time) {
 }
 
 /* The first falling edge at or after `time`. */
-static uint64_t falling_edge(const usart_state *u, uint64_t time) {
-  for (size_t i = u->line_first; i < u->line_end; i++) {
-    const line_frame *f = &u->line[i];
+static uint64_t falling_edge(const line_queue *q, uint64_t time) {
+  for (size_t i = q->first; i < q->end; i++) {
+    const line_frame *f = &q->frames[i];
     if (end_of(f) <= time) continue;
     bool before = true;
-    for (unsigned bit = 0; bit < LINE_BITS; bit++) {
+    for (unsigned bit = 0; bit < f->bits; bit++) {
       uint64_t edge = f->start + (uint64_t)bit * f->bit_time;
       bool level = bit_of(f->byte, bit);
       if (before && !level && edge >= time) return edge;
@@ -60,9 +60,9 @@ static uint64_t falling_edge(const usart_state *u, uint64_t time) {
   return NEVER;
 }
 
-static void forget_line(usart_state *u, uint64_t until) {
-  while (u->line_first < u->line_end && end_of(&u->line[u->line_first]) <= until) u->line_first++;
-  if (u->line_first == u->line_end) u->line_first = u->line_end = 0;
+static void forget_line(line_queue *q, uint64_t until) {
+  while (q->first < q->end && end_of(&q->frames[q->first]) <= until) q->first++;
+  if (q->first == q->end) q->first = q->end = 0;
 }
 
 /* Makes room for `count` more items behind `*end`. */
@@ -80,6 +80,11 @@ static void *grow(void *items, size_t size, size_t *first, size_t *end, size_t *
   *first = 0;
   *end = used;
   return moved;
+}
+
+static void put_on_line(line_queue *q, line_frame frame) {
+  q->frames = grow(q->frames, sizeof *q->frames, &q->first, &q->end, &q->capacity, 1);
+  q->frames[q->end++] = frame;
 }
 
 /* ---- receiver ---- */
@@ -107,7 +112,7 @@ static uint64_t sampled_after(const avr_board *b) {
 static void plan_receiver(avr_board *b) {
   usart_state *u = &b->usart;
   uint64_t time = NEVER;
-  if (u->receiver == RECEIVER_SEARCHING) time = falling_edge(u, u->from);
+  if (u->receiver == RECEIVER_SEARCHING) time = falling_edge(&u->to_board, u->from);
   if (u->receiver == RECEIVER_SAMPLING) time = u->from + sampled_after(b);
   uint64_t round_up = (UINT64_C(1) << FRACTION) - 1;
   set_due(b, DUE_RECEIVER, time == NEVER ? NEVER : (time + round_up) >> FRACTION);
@@ -115,7 +120,7 @@ static void plan_receiver(avr_board *b) {
 
 static void start_bit(avr_board *b) {
   usart_state *u = &b->usart;
-  u->from = falling_edge(u, u->from);
+  u->from = falling_edge(&u->to_board, u->from);
   u->receiver = RECEIVER_SAMPLING;
   if (u->has_waiting) { /* the shift register is overwritten */
     u->has_waiting = false;
@@ -129,13 +134,13 @@ static void stop_bit(avr_board *b) {
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
   received_byte r = {0};
   for (unsigned bit = 0; bit < u->data_bits && bit < 8; bit++) {
-    if (line_level(u, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
+    if (line_level(&u->to_board, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
   }
-  r.framing_error = !line_level(u, u->from + bit_time * (2 * bits_before_stop(u) + 1) / 2);
-  bool noise = line_level(u, u->from + bit_time / 2); /* no start bit after all */
+  r.framing_error = !line_level(&u->to_board, u->from + bit_time * (2 * bits_before_stop(u) + 1) / 2);
+  bool noise = line_level(&u->to_board, u->from + bit_time / 2); /* no start bit after all */
   u->receiver = RECEIVER_SEARCHING;
   u->from += noise ? bit_time / 2 : sampled_after(b);
-  forget_line(u, u->from);
+  forget_line(&u->to_board, u->from);
   if (noise) return;
   b->counters.bytes_in++;
   if (r.framing_error) b->counters.framing_errors++;
@@ -187,24 +192,34 @@ static uint8_t read_data(avr_t *avr, avr_io_addr_t address, void *param) {
 
 /* ---- transmitter ---- */
 
+/* The outside's receiver: when it will have read the next byte. */
+static void plan_outside(avr_board *b) {
+  usart_state *u = &b->usart;
+  u->outside_start = falling_edge(&u->from_board, u->outside_from);
+  bool idle = u->outside_start == NEVER;
+  set_due(b, DUE_OUTSIDE, idle ? NEVER : (u->outside_start + (uint64_t)LINE_BITS * u->line_bit_time) >> FRACTION);
+}
+
+void usart_due_outside(avr_board *b, uint64_t cycle) {
+  usart_state *u = &b->usart;
+  uint64_t bit_time = u->line_bit_time;
+  uint8_t byte = 0;
+  for (unsigned bit = 0; bit < 8; bit++) {
+    if (line_level(&u->from_board, u->outside_start + bit_time * (2 * bit + 3) / 2)) byte |= (uint8_t)(1u << bit);
+  }
+  u->out = grow(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
+  u->out[u->out_end++] = (sent_byte){cycle, byte};
+  u->outside_from = u->outside_start + bit_time * (2 * LINE_BITS - 1) / 2;
+  forget_line(&u->from_board, u->outside_from);
+  plan_outside(b);
+}
+
 static void begin_frame(avr_board *b, uint8_t byte, uint64_t cycle) {
   usart_state *u = &b->usart;
   u->sending = true;
-  u->shifting_byte = byte;
-  u->shifting_bits = u->frame_bits;
-  u->shifting_bit_time = u->bit_time;
+  put_on_line(&u->from_board, (line_frame){cycle << FRACTION, (uint64_t)u->bit_time << FRACTION, u->frame_bits, byte});
+  if (u->outside_start == NEVER) plan_outside(b);
   set_due(b, DUE_TRANSMITTER, cycle + (uint64_t)u->frame_bits * u->bit_time);
-}
-
-/* What the outside reads of the frame that was just sent. */
-static uint8_t as_outside_reads(const usart_state *u) {
-  uint64_t bit_time = (uint64_t)u->shifting_bit_time << FRACTION;
-  uint8_t byte = 0;
-  for (unsigned bit = 0; bit < 8; bit++) {
-    uint64_t index = (uint64_t)u->line_bit_time * (2 * bit + 3) / 2 / bit_time;
-    if (bit_of(u->shifting_byte, index)) byte |= (uint8_t)(1u << bit);
-  }
-  return byte;
 }
 
 static void drive_transmit_pin(avr_board *b, uint64_t cycle) {
@@ -220,8 +235,6 @@ static void drive_transmit_pin(avr_board *b, uint64_t cycle) {
 
 void usart_due_transmitter(avr_board *b, uint64_t cycle) {
   usart_state *u = &b->usart;
-  u->out = grow(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
-  u->out[u->out_end++] = (sent_byte){cycle, as_outside_reads(u)};
   b->counters.bytes_out++;
   if (u->holding) {
     u->holding = false;
@@ -300,7 +313,7 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   if ((value & RXEN) && u->receiver == RECEIVER_OFF) {
     u->receiver = RECEIVER_SEARCHING;
     u->from = cycle << FRACTION;
-    forget_line(u, u->from);
+    forget_line(&u->to_board, u->from);
   } else if (!(value & RXEN)) {
     u->receiver = RECEIVER_OFF;
     empty_receiver(u);
@@ -323,11 +336,10 @@ void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count) {
   if (at < b->clock) at = b->clock;
   uint64_t start = at << FRACTION;
   if (start < u->line_free) start = u->line_free;
-  if (u->receiver == RECEIVER_OFF) forget_line(u, b->clock << FRACTION);
-  u->line = grow(u->line, sizeof *u->line, &u->line_first, &u->line_end, &u->line_capacity, count);
+  if (u->receiver == RECEIVER_OFF) forget_line(&u->to_board, b->clock << FRACTION);
   for (size_t i = 0; i < count; i++) {
-    u->line[u->line_end] = (line_frame){start, u->line_bit_time, bytes[i]};
-    start = end_of(&u->line[u->line_end++]);
+    put_on_line(&u->to_board, (line_frame){start, u->line_bit_time, LINE_BITS, bytes[i]});
+    start += (uint64_t)LINE_BITS * u->line_bit_time;
   }
   u->line_free = start;
   plan_receiver(b);
@@ -347,6 +359,7 @@ size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capa
 void usart_line_rate(avr_board *b, uint32_t baud) {
   if (baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
   b->usart.line_bit_time = (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
+  if (b->usart.outside_start != NEVER) plan_outside(b);
 }
 
 /* ---- construction ---- */
@@ -357,7 +370,10 @@ void usart_reset(avr_board *b) {
   u->sending = u->holding = false;
   u->receiver = RECEIVER_OFF;
   empty_receiver(u);
+  u->from_board.first = u->from_board.end = 0;
+  u->outside_start = NEVER;
   set_due(b, DUE_TRANSMITTER, NEVER);
+  set_due(b, DUE_OUTSIDE, NEVER);
   raise_flag(b, VECTOR_USART_UDRE);
   update_settings(b);
 }
@@ -374,6 +390,7 @@ void usart_init(avr_board *b) {
 }
 
 void usart_free(avr_board *b) {
-  free(b->usart.line);
+  free(b->usart.to_board.frames);
+  free(b->usart.from_board.frames);
   free(b->usart.out);
 }

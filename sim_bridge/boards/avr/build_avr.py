@@ -18,7 +18,7 @@ BOARDS = HERE.parent
 BUILD = Path("build/simavr")
 CONFIGURATION = BUILD / "configuration"
 
-# Of simavr: the instruction core and what it cannot do without, program memory and EEPROM. Everything that has to do
+# Of simavr: the instruction core and what it cannot do without, and program memory. Everything that has to do
 # with time or pins is ours.
 SIMAVR_SOURCES = (
     *(
@@ -31,7 +31,7 @@ SIMAVR_SOURCES = (
         "sim_hex",
         "sim_interrupts",
     ),
-    *("sim_io", "sim_irq", "sim_utils", "sim_vcd_file", "avr_eeprom", "avr_flash"),
+    *("sim_io", "sim_irq", "sim_utils", "sim_vcd_file", "avr_flash"),
 )
 CHIP_SOURCE = "cores/sim_mega328.c"
 
@@ -66,7 +66,7 @@ PREAMBLE = """
 #include "../board_access.h"
 
 static void avr_board_destroy(board *self) { self->op->destroy(self); }
-static uint8_t *avr_board_data(board *self) { return self->op->extension(self, AVR_BOARD_DATA); }
+static uint8_t *avr_board_data(board *self) { return self->op->extension(self, BOARD_DATA); }
 """
 
 

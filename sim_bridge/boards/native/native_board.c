@@ -12,8 +12,7 @@
 #include "generated/messages.h"
 #include "hal/native/machine.h"
 
-#define RATE_TOLERANCE 40u /* a line more than 1/40 (2.5 %) off the board's rate is not understood */
-#define GARBLED 0xFEu      /* what either side reads then */
+#define SLOWEST_BAUD 300u
 
 typedef struct {
   board face;
@@ -33,6 +32,10 @@ typedef struct {
   native_byte_queue outgoing;
   uint64_t bytes_out; /* taken by receive() */
   uint64_t edges_out, resets;
+
+  board_analog_source *analog_source;
+  void *analog_context;
+  board_eeprom eeprom;
 } native_board;
 
 static native_board *of_board(board *self) { return (native_board *)(void *)self; }
@@ -87,17 +90,25 @@ static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_
   }
 }
 
-static bool rates_differ(const native_board *self) {
-  const uint32_t difference = self->baud > NATIVE_BAUD ? self->baud - NATIVE_BAUD : NATIVE_BAUD - self->baud;
-  return difference > NATIVE_BAUD / RATE_TOLERANCE;
-}
-
 static void on_transmit(native_machine *machine, uint64_t cycle, const uint8_t *bytes, size_t count) {
   native_board *self = of_machine(machine);
-  const bool garbled = rates_differ(self);
+  const uint64_t byte_cycles = native_byte_cycles(machine->baud);
   for (size_t i = 0; i < count; i++) {
-    push_byte(&self->outgoing, (native_byte){cycle + i * NATIVE_BYTE_CYCLES, garbled ? GARBLED : bytes[i], 0});
+    push_byte(&self->outgoing, (native_byte){cycle + i * byte_cycles, bytes[i], machine->baud});
   }
+}
+
+/* What the outside reads of a byte that has left, at the rate it has now. */
+static void read_by_outside(const native_board *self, native_byte *byte) {
+  if (byte->baud != 0 && native_rates_differ(self->baud, byte->baud)) {
+    byte->byte = native_garbled(byte->byte);
+  }
+  byte->baud = 0;
+}
+
+static double on_supply(native_machine *machine, uint64_t cycle) {
+  const native_board *self = of_machine(machine);
+  return board_supply_volts(self->analog_source, self->analog_context, cycle);
 }
 
 /* Loads a fresh copy of the library and finds its face. */
@@ -146,9 +157,27 @@ static void cut_outgoing(native_board *self) {
 
 /* Loses the byte that is arriving now; those that the outside sends later arrive. */
 static void cut_incoming(native_board *self) {
-  const uint64_t byte_cycles = 10u * (uint64_t)BOARD_CLOCK_HZ / self->baud;
+  const uint64_t byte_cycles = native_byte_cycles(self->baud);
   if (self->machine.next_byte != NATIVE_NEVER && self->machine.next_byte < self->machine.now + byte_cycles) {
     (void)native_take_byte(&self->machine);
+  }
+}
+
+/* What loss of supply does: a cell of the EEPROM that is being written is damaged; memory holds anything after power-on,
+ * here always the same anything. */
+static void lose_power(native_board *self) {
+  native_machine *machine = &self->machine;
+  if (machine->eeprom_writing) {
+    uint8_t *cell = &machine->eeprom[machine->eeprom_address];
+    *cell = board_damaged_cell(&self->eeprom, *cell, machine->eeprom_value);
+    machine->eeprom_writing = 0;
+  }
+  if (self->reset_cause == BOARD_RESET_POWER) {
+    uint32_t x = 0x328;
+    for (size_t i = 0; i < sizeof machine->noinit; i++) {
+      x = x * 1664525u + 1013904223u;
+      machine->noinit[i] = (uint8_t)(x >> 24);
+    }
   }
 }
 
@@ -157,6 +186,9 @@ static bool restart(native_board *self) {
   char error[256];
   self->reset_asked = false;
   self->machine.stop = 0;
+  if (self->reset_cause == BOARD_RESET_POWER || self->reset_cause == BOARD_RESET_BROWN_OUT) {
+    lose_power(self);
+  }
   if (!self->started) {
     self->started = true;
     self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
@@ -229,9 +261,9 @@ static uint8_t board_output(const board *face, uint8_t pin) {
 }
 
 static void board_analog(board *face, board_analog_source *source, void *context) {
-  (void)face; /* this firmware reads no voltages */
-  (void)source;
-  (void)context;
+  native_board *self = of_board(face); /* this firmware reads the supply only */
+  self->analog_source = source;
+  self->analog_context = context;
 }
 
 static void board_send(board *face, uint64_t at, const uint8_t *bytes, size_t count) {
@@ -240,10 +272,9 @@ static void board_send(board *face, uint64_t at, const uint8_t *bytes, size_t co
   if (start < self->line_free) {
     start = self->line_free;
   }
-  const bool garbled = rates_differ(self);
   for (size_t i = 0; i < count; i++) {
     const uint64_t end = start + (i + 1) * 10u * (uint64_t)BOARD_CLOCK_HZ / self->baud;
-    push_byte(&self->machine.incoming, (native_byte){end, garbled ? GARBLED : bytes[i], garbled});
+    push_byte(&self->machine.incoming, (native_byte){end, bytes[i], self->baud});
     self->line_free = end;
   }
   const native_byte_queue *queue = &self->machine.incoming;
@@ -257,6 +288,7 @@ static size_t board_receive(board *face, uint8_t *bytes, uint64_t *cycles, size_
   native_byte_queue *queue = &self->outgoing;
   size_t taken = 0;
   while (taken < capacity && queue->count > 0 && queue->bytes[queue->first].cycle <= self->machine.now) {
+    read_by_outside(self, &queue->bytes[queue->first]);
     bytes[taken] = queue->bytes[queue->first].byte;
     if (cycles != NULL) {
       cycles[taken] = queue->bytes[queue->first].cycle;
@@ -270,9 +302,12 @@ static size_t board_receive(board *face, uint8_t *bytes, uint64_t *cycles, size_
 }
 
 static void board_line_rate(board *face, uint32_t baud) {
-  if (baud > 0) {
-    of_board(face)->baud = baud;
+  native_board *self = of_board(face);
+  const native_byte_queue *queue = &self->outgoing;
+  for (size_t i = 0; i < queue->count && queue->bytes[queue->first + i].cycle <= self->machine.now; i++) {
+    read_by_outside(self, &queue->bytes[queue->first + i]); /* these were read at the old rate */
   }
+  self->baud = baud < SLOWEST_BAUD ? SLOWEST_BAUD : baud;
 }
 
 static void board_reset(board *face, board_reset_cause cause) {
@@ -304,6 +339,9 @@ static const char *board_fault(const board *face) { return of_const_board(face)-
 
 static void *board_extension(board *face, const char *name) {
   native_board *self = of_board(face);
+  if (strcmp(name, BOARD_EEPROM) == 0) {
+    return &self->eeprom;
+  }
   if (strcmp(name, "pin_map") == 0 && self->api != NULL) {
     const char *const *pin_map = &self->api->pin_map;
     void *result = NULL;
@@ -346,6 +384,9 @@ board *native_board_create(const char *library_path, char *error, size_t error_s
   machine->next_byte = NATIVE_NEVER;
   machine->edge = on_edge;
   machine->transmit = on_transmit;
+  machine->supply = on_supply;
+  memset(machine->eeprom, 0xFF, sizeof machine->eeprom);
+  self->eeprom.bytes = machine->eeprom;
   memset(machine->output, NATIVE_RELEASED, sizeof machine->output);
   memset(machine->outside, NATIVE_RELEASED, sizeof machine->outside);
   self->image = library_read(library_path, &self->image_size, error, error_size);

@@ -1,7 +1,4 @@
-/* hal_avr.c: start-up, carrier, Ping trigger, watchdog and image of the ATmega328P. */
-#include <avr/wdt.h>
-
-#include "generated/messages.h"
+/* hal_avr.c: timers, carrier, Ping trigger and image of the ATmega328P. */
 #include "hal/hal.h"
 #include "pins.h"
 
@@ -10,31 +7,6 @@
 #endif
 
 #define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
-
-/* Why the chip started, saved before the start-up code clears memory; behind Optiboot it is 0, unknown. */
-static uint8_t saved_mcusr __attribute__((section(".noinit")));
-
-/* After a watchdog reset the watchdog goes on with its shortest time: it is switched off before memory is set up. */
-void hal_before_start(void) __attribute__((naked, used, section(".init3")));
-void hal_before_start(void) {
-  saved_mcusr = MCUSR;
-  MCUSR = 0;
-  wdt_disable();
-}
-
-uint8_t hal_reset_cause(void) {
-  const uint8_t mcusr = saved_mcusr;
-  if ((mcusr & _BV(PORF)) != 0) { /* power-on may set the others too */
-    return RESET_CAUSE_POWER;
-  }
-  if ((mcusr & _BV(WDRF)) != 0) {
-    return RESET_CAUSE_WATCHDOG;
-  }
-  if ((mcusr & _BV(BORF)) != 0) {
-    return RESET_CAUSE_BROWN_OUT;
-  }
-  return (mcusr & _BV(EXTRF)) != 0 ? RESET_CAUSE_EXTERNAL : RESET_CAUSE_UNKNOWN;
-}
 
 void hal_start_timers(void) {
   TCCR2A = _BV(WGM21);
@@ -51,10 +23,6 @@ void hal_start_timers(void) {
   TCCR1B = _BV(CS10);
   sei();
 }
-
-void hal_start_watchdog(void) { wdt_enable(WDTO_120MS); }
-
-void hal_kick_watchdog(void) { wdt_reset(); }
 
 /* ---- IR carrier ---- */
 

@@ -2,10 +2,12 @@
  *
  *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots
  *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier
- *   Timer0  free for the buzzer
+ *   Timer0  free for the buzzer, but for compare B
+ *   ADC     the bandgap, for the supply
  *   GPIOR0  bit 0, 1: the carrier toggles the left, right LED; bit 2: received bytes were lost; bit 3: pin
- *           changes were stopped; bit 4: a zero byte was received
- *   GPIOR1  head of the receive ring      GPIOR2  tail of the send ring      (one-cycle access in the interrupts)
+ *           changes were stopped; bit 4: a zero byte was received; bit 5: the watchdog has run out
+ *   GPIOR1  head of the receive ring      OCR0B  its tail      GPIOR2  tail of the send ring
+ *           (one-cycle access in the interrupts; Timer0 never needs its second compare value)
  */
 #ifndef HAL_AVR_H
 #define HAL_AVR_H
@@ -21,6 +23,12 @@
 #define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect)
 #define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect)
 #define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect)
+#define HAL_INTERRUPT_WATCHDOG ISR(WDT_vect)
+
+/* Runs with interrupts on; that of the EEPROM itself is off until asked for again (eeprom_avr.c). */
+#define HAL_INTERRUPT_EEPROM                                                            \
+  void __vector_eeprom_body(void) __attribute__((interrupt, used, externally_visible)); \
+  void __vector_eeprom_body(void)
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
@@ -79,13 +87,46 @@ static inline void hal_pin_change_mask(uint8_t bits) {
   PCMSK1 = bits;
 }
 
+/* EEPROM (data sheet, 8.6). */
+#define HAL_EEPROM_SIZE 1024u
+static inline bool hal_eeprom_busy(void) { return (EECR & _BV(EEPE)) != 0; }
+
+static inline void hal_eeprom_wait(void) {
+  while (hal_eeprom_busy()) {
+  }
+}
+
+static inline uint8_t hal_eeprom_read(uint16_t address) {
+  EEAR = address;
+  EECR |= _BV(EERE);
+  return EEDR;
+}
+
+/* EEPE must follow EEMPE within four cycles: two single instructions with nothing in between. */
+static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
+  EEAR = address;
+  EEDR = value;
+  HAL_ATOMIC {
+    EECR |= _BV(EEMPE);
+    EECR |= _BV(EEPE);
+  }
+}
+
+static inline void hal_eeprom_interrupt(bool on) {
+  if (on) {
+    EECR |= _BV(EERIE);
+  } else {
+    EECR = (uint8_t)(EECR & (uint8_t)~_BV(EERIE));
+  }
+}
+
 /* The rings of serial_avr.c. Indices wrap as a byte, or by a mask; equal indices: empty. */
 #define HAL_SEND_RING 128u
 #define HAL_RECEIVE_HEAD GPIOR1
+#define HAL_RECEIVE_TAIL OCR0B
 #define HAL_SEND_TAIL GPIOR2
 extern uint8_t hal_receive_ring[256];
 extern uint8_t hal_send_ring[HAL_SEND_RING];
-extern volatile uint8_t hal_receive_tail;
 extern volatile uint8_t hal_send_head;
 
 #define HAL_LOST_BIT 2 /* of GPIOR0 */
@@ -104,31 +145,31 @@ static inline __attribute__((always_inline)) void hal_serial_take(void) {
     GPIOR0 |= _BV(HAL_ZERO_BIT);
   }
   const uint8_t next = (uint8_t)(head + 1u);
-  if ((status & _BV(DOR0)) != 0 || next == hal_receive_tail) {
+  if ((status & _BV(DOR0)) != 0 || next == HAL_RECEIVE_TAIL) {
     GPIOR0 |= _BV(HAL_LOST_BIT);
   }
-  if (next != hal_receive_tail) {
+  if (next != HAL_RECEIVE_TAIL) {
     HAL_RECEIVE_HEAD = next;
   }
 }
 
 static inline uint8_t hal_serial_due(void) {
-  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) | ((uint8_t)(HAL_RECEIVE_HEAD - hal_receive_tail) & 0xC0u));
+  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) | ((uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL) & 0xC0u));
 }
 
 static inline void hal_serial_seen(void) { GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_ZERO_BIT)); }
 
 static inline void hal_serial_again(void) { GPIOR0 |= _BV(HAL_ZERO_BIT); }
 
-static inline bool hal_serial_received(void) { return HAL_RECEIVE_HEAD != hal_receive_tail; }
+static inline bool hal_serial_received(void) { return HAL_RECEIVE_HEAD != HAL_RECEIVE_TAIL; }
 
 static inline bool hal_serial_receive(uint8_t *byte) {
-  const uint8_t tail = hal_receive_tail;
+  const uint8_t tail = HAL_RECEIVE_TAIL;
   if (HAL_RECEIVE_HEAD == tail) {
     return false;
   }
   *byte = hal_receive_ring[tail];
-  hal_receive_tail = (uint8_t)(tail + 1u);
+  HAL_RECEIVE_TAIL = (uint8_t)(tail + 1u);
   return true;
 }
 

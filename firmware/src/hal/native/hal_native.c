@@ -23,7 +23,9 @@ static uint64_t epoch; /* cycle at which the timer read 0 */
 static uint64_t next_slot = NATIVE_NEVER;
 static uint64_t next_edge_match = NATIVE_NEVER;
 static uint64_t next_carrier = NATIVE_NEVER;
-static uint64_t next_room = NATIVE_NEVER; /* when a sender that asked for room has it */
+static uint64_t next_room = NATIVE_NEVER;   /* when a sender that asked for room has it */
+static uint64_t next_eeprom = NATIVE_NEVER; /* the end of a write, or the next ready interrupt */
+static uint64_t next_supply = NATIVE_NEVER; /* the end of a measurement */
 
 static uint8_t carrier_pin;
 static bool level_high[NATIVE_PINS]; /* PORT bits */
@@ -37,6 +39,8 @@ static uint16_t receive_first, receive_count;
 static bool overrun;
 static bool zero_received;
 static uint64_t sender_free; /* cycle at which the last queued byte has left */
+static bool eeprom_interrupt;
+static uint16_t supply_result;
 
 /* ---- pins ---- */
 
@@ -179,7 +183,10 @@ void hal_capture_stop(void) { capture = CAPTURE_OFF; }
 
 /* ---- serial line ---- */
 
-void hal_start_serial(void) { sender_free = machine->now; }
+void hal_start_serial(uint32_t baud) {
+  sender_free = machine->now;
+  machine->baud = baud;
+}
 
 bool hal_serial_receive(uint8_t *byte) {
   if (receive_count == 0) {
@@ -207,26 +214,29 @@ bool hal_serial_overrun(void) {
 
 bool hal_serial_room(uint8_t count) {
   /* Bytes not yet wholly sent stand in the ring, but for the one being shifted out. */
-  const uint64_t queued = sender_free > machine->now ? (sender_free - machine->now) / NATIVE_BYTE_CYCLES : 0;
+  const uint64_t byte_cycles = native_byte_cycles(machine->baud);
+  const uint64_t queued = sender_free > machine->now ? (sender_free - machine->now) / byte_cycles : 0;
   if (queued + count <= SEND_RING) {
     return true;
   }
-  next_room = sender_free - (SEND_RING - (uint64_t)count + 1u) * NATIVE_BYTE_CYCLES + 1u;
+  next_room = sender_free - (SEND_RING - (uint64_t)count + 1u) * byte_cycles + 1u;
   return false;
 }
 
 void hal_serial_send(const uint8_t *bytes, uint8_t count) {
   const uint64_t start = sender_free > machine->now ? sender_free : machine->now;
-  machine->transmit(machine, start + NATIVE_BYTE_CYCLES, bytes, count);
-  sender_free = start + (uint64_t)count * NATIVE_BYTE_CYCLES;
+  const uint64_t byte_cycles = native_byte_cycles(machine->baud);
+  machine->transmit(machine, start + byte_cycles, bytes, count);
+  sender_free = start + count * byte_cycles;
 }
 
 static void byte_arrived(void) {
-  const native_byte byte = native_take_byte(machine);
+  native_byte byte = native_take_byte(machine);
   machine->bytes_in++;
   machine->interrupts++;
-  if (byte.bad) {
-    machine->framing_errors++; /* the byte is read all the same; the frame's checksum refuses it */
+  if (byte.baud != 0 && native_rates_differ(byte.baud, machine->baud)) {
+    machine->framing_errors++; /* a byte is read all the same; the frame's checksum refuses it */
+    byte.byte = native_garbled(byte.byte);
   }
   if (receive_count == RECEIVE_RING - 1u) {
     overrun = true;
@@ -237,12 +247,106 @@ static void byte_arrived(void) {
   }
 }
 
+/* ---- EEPROM ---- */
+
+/* Entry, a handler of a few instructions, return, and the one instruction of the main loop in between. */
+#define READY_AGAIN_CYCLES 32u
+
+static void plan_eeprom(uint64_t ready) {
+  next_eeprom = machine->eeprom_writing ? machine->eeprom_done : eeprom_interrupt ? ready : NATIVE_NEVER;
+}
+
+bool hal_eeprom_busy(void) { return machine->eeprom_writing != 0; }
+
+static void end_eeprom_write(void) {
+  machine->eeprom[machine->eeprom_address] = machine->eeprom_value;
+  machine->eeprom_writing = 0;
+}
+
+void hal_eeprom_wait(void) {
+  if (hal_eeprom_busy()) {
+    machine->now = machine->now > machine->eeprom_done ? machine->now : machine->eeprom_done;
+    end_eeprom_write();
+    plan_eeprom(machine->now);
+  }
+}
+
+uint8_t hal_eeprom_read(uint16_t address) {
+  if (hal_eeprom_busy()) {
+    return machine->eeprom_value; /* as on the chip: nothing is read, the data register stays */
+  }
+  return machine->eeprom[address % NATIVE_EEPROM_SIZE];
+}
+
+void hal_eeprom_write_start(uint16_t address, uint8_t value) {
+  if (hal_eeprom_busy()) {
+    return;
+  }
+  machine->eeprom_writing = 1;
+  machine->eeprom_address = address % NATIVE_EEPROM_SIZE;
+  machine->eeprom_value = value;
+  machine->eeprom_done = machine->now + NATIVE_EEPROM_CYCLES;
+  plan_eeprom(machine->now);
+}
+
+void hal_eeprom_interrupt(bool on) {
+  eeprom_interrupt = on;
+  plan_eeprom(machine->now);
+}
+
+/* The end of a write, at which the interrupt is due too, or the interrupt. */
+static void eeprom_event(void) {
+  if (machine->eeprom_writing) {
+    end_eeprom_write();
+    plan_eeprom(machine->now);
+    return;
+  }
+  machine->interrupts++;
+  hal_native_eeprom();
+  plan_eeprom(machine->now + READY_AGAIN_CYCLES);
+}
+
+/* ---- memory that a reset leaves alone ---- */
+
+void *hal_noinit(void) { return machine->noinit; }
+
+/* FNV-1a of it: the rest of the memory is this process's. */
+uint32_t hal_memory_noise(void) {
+  uint32_t hash = 0x811C9DC5u;
+  for (size_t i = 0; i < sizeof machine->noinit; i++) {
+    hash = (hash ^ machine->noinit[i]) * 0x01000193u;
+  }
+  return hash;
+}
+
+/* ---- supply ---- */
+
+#define CONVERSION_CYCLES (104u * HAL_CYCLES_PER_US) /* 13 cycles of 125 kHz */
+#define NOMINAL_VOLTS 5.0
+#define BAND_GAP_VOLTS 1.1
+
+void hal_supply_sample(void) {
+  if (next_supply == NATIVE_NEVER) {
+    next_supply = machine->now + CONVERSION_CYCLES;
+  }
+}
+
+uint16_t hal_supply_result(void) { return supply_result; }
+
+static void supply_measured(void) {
+  const double volts = machine->supply != NULL ? machine->supply(machine, machine->now) : NOMINAL_VOLTS;
+  const double steps = BAND_GAP_VOLTS * 1024.0 / volts;
+  next_supply = NATIVE_NEVER;
+  supply_result = steps < 1023.0 ? (uint16_t)steps : 1023u;
+}
+
 /* ---- the rest of hal.h ---- */
 
 uint8_t hal_reset_cause(void) { return reset_cause; }
 
 void hal_start_watchdog(void) {}
 void hal_kick_watchdog(void) {}
+void hal_watchdog_reset(void) {}
 
 uint32_t hal_image_size(void) { return 0; }
 
@@ -260,7 +364,11 @@ static void start(native_machine *owner, uint8_t cause) {
   machine = owner;
   reset_cause = cause;
   hal_native_port_b = hal_native_port_c = hal_native_port_d = 0;
-  next_slot = next_edge_match = next_carrier = next_room = NATIVE_NEVER;
+  next_slot = next_edge_match = next_carrier = next_room = next_supply = NATIVE_NEVER;
+  machine->baud = NATIVE_BAUD;
+  eeprom_interrupt = false;
+  supply_result = 0;
+  plan_eeprom(machine->now); /* a write goes on */
   memset(level_high, 0, sizeof level_high);
   memset(is_output, 0, sizeof is_output);
   pin_change_bits = 0;
@@ -283,14 +391,15 @@ static void run_carrier(uint64_t until) {
     machine->interrupts++;
     hal_native_toggle(carrier_pin);
   } while (next_carrier <= until && next_carrier < machine->next_edge && next_carrier < machine->next_byte &&
-           next_carrier < next_slot && next_carrier < next_edge_match && next_carrier < next_room && !machine->stop);
+           next_carrier < next_slot && next_carrier < next_edge_match && next_carrier < next_room &&
+           next_carrier < next_eeprom && next_carrier < next_supply && !machine->stop);
 }
 
 static void advance(uint64_t until) {
   while (!machine->stop) {
-    /* At the same cycle: input edges, bytes, carrier, exact edges, slots. */
+    /* At the same cycle: input edges, bytes, carrier, exact edges, slots, what is left. */
     uint64_t next = machine->next_edge;
-    enum { PIN, BYTE, CARRIER, EDGE, SLOT, ROOM } kind = PIN;
+    enum { PIN, BYTE, CARRIER, EDGE, SLOT, ROOM, SUPPLY, EEPROM } kind = PIN;
     if (machine->next_byte < next) {
       next = machine->next_byte;
       kind = BYTE;
@@ -310,6 +419,14 @@ static void advance(uint64_t until) {
     if (next_room < next) {
       next = next_room;
       kind = ROOM;
+    }
+    if (next_supply < next) {
+      next = next_supply;
+      kind = SUPPLY;
+    }
+    if (next_eeprom < next) {
+      next = next_eeprom;
+      kind = EEPROM;
     }
     if (next > until) {
       break;
@@ -347,6 +464,15 @@ static void advance(uint64_t until) {
       case ROOM:
         next_room = NATIVE_NEVER;
         poll_firmware();
+        break;
+      case SUPPLY:
+        supply_measured();
+        break;
+      case EEPROM:
+        eeprom_event();
+        if (firmware_due()) {
+          poll_firmware();
+        }
         break;
     }
   }

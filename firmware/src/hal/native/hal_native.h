@@ -17,6 +17,14 @@ HAL_INTERRUPT_SLOT;
 HAL_INTERRUPT_EDGE;
 HAL_INTERRUPT_CAPTURE;
 
+/* There is no watchdog here; a test may run its interrupt. */
+#define HAL_INTERRUPT_WATCHDOG void hal_native_watchdog(void)
+HAL_INTERRUPT_WATCHDOG;
+
+/* Runs again and again while the EEPROM is ready and its interrupt is on, as on the chip. */
+#define HAL_INTERRUPT_EEPROM void hal_native_eeprom(void)
+HAL_INTERRUPT_EEPROM;
+
 /* Interrupts come between calls, never inside one. */
 #define HAL_ATOMIC
 
@@ -64,6 +72,13 @@ void hal_serial_seen(void);
 void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
 bool hal_serial_room(uint8_t count);
+
+#define HAL_EEPROM_SIZE 1024u
+void hal_eeprom_wait(void);
+bool hal_eeprom_busy(void);
+uint8_t hal_eeprom_read(uint16_t address);
+void hal_eeprom_write_start(uint16_t address, uint8_t value);
+void hal_eeprom_interrupt(bool on);
 
 #define HAL_TABLE static const
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }

@@ -1,8 +1,8 @@
 /* machine.h: what surrounds the firmware in a PC process, the border between hal/native and whoever loads it.
  *
  * The library exports one function, firmware_board_api(). Its owner keeps a native_machine: everything that outlives a
- * reset of the microcontroller (time, levels that the outside drives, bytes under way, counters). Each loaded copy of
- * the library is one microcontroller, from start() to the copy's unloading, which is its reset.
+ * reset of the microcontroller (time, levels that the outside drives, bytes under way, EEPROM, counters). Each loaded copy
+ * of the library is one microcontroller, from start() to the copy's unloading, which is its reset.
  *
  * Time is in cycles of 16 MHz. The owner queues input edges and bytes; the library takes them in order of time, and
  * calls the owner for each output edge and for bytes that leave.
@@ -13,10 +13,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define NATIVE_API_VERSION 1u
+#define NATIVE_API_VERSION 2u
 #define NATIVE_PINS 20u
-#define NATIVE_BAUD 500000u
-#define NATIVE_BYTE_CYCLES 320u /* 10 bits at 500,000 baud */
+#define NATIVE_BAUD 500000u     /* of the board until the program selects another */
+#define NATIVE_BYTE_CYCLES 320u /* 10 bits of it */
+#define NATIVE_EEPROM_SIZE 1024u
+#define NATIVE_EEPROM_CYCLES 54400u /* a write: 3.4 ms (data sheet of the ATmega328P, table 8-1) */
+#define NATIVE_NOINIT_SIZE 32u
 #define NATIVE_NEVER UINT64_MAX
 
 /* What a pin is given, by the firmware or (the first three) from outside; the numbers are those of the board interface. */
@@ -36,7 +39,7 @@ typedef struct {
 typedef struct {
   uint64_t cycle; /* end of the stop bit */
   uint8_t byte;
-  uint8_t bad; /* not 0: sent at another rate, no stop bit where the receiver looks for it */
+  uint32_t baud; /* the sender's bit rate; 0: the receiver's own */
 } native_byte;
 
 typedef struct {
@@ -62,6 +65,21 @@ struct native_machine {
   /* Called when bytes are handed to the sender: the first one's stop bit ends at `cycle`, the others follow back to
    * back. */
   void (*transmit)(native_machine *self, uint64_t cycle, const uint8_t *bytes, size_t count);
+
+  uint32_t baud; /* of the board's side of the line; a start sets it to NATIVE_BAUD */
+
+  /* EEPROM, and the write under way: its cell gets the value at cycle `eeprom_done`. */
+  uint8_t eeprom[NATIVE_EEPROM_SIZE];
+  uint8_t eeprom_writing;
+  uint8_t eeprom_value;
+  uint16_t eeprom_address;
+  uint64_t eeprom_done;
+
+  /* Memory that no start clears; its owner spoils it when the power comes. */
+  uint8_t noinit[NATIVE_NOINIT_SIZE];
+
+  /* Voltage of the supply; NULL: the nominal 5 V. */
+  double (*supply)(native_machine *self, uint64_t cycle);
 };
 
 typedef struct {
@@ -83,6 +101,22 @@ typedef struct {
 
 #define NATIVE_API_SYMBOL "firmware_board_api"
 typedef const native_api *native_api_function(void);
+
+/* Cycles of a byte of ten bits. */
+static inline uint64_t native_byte_cycles(uint32_t baud) { return 10u * 16000000u / baud; }
+
+/* Whether two sides of a line are too far apart to understand each other: more than 4 % (data sheet, table 20-2). */
+static inline int native_rates_differ(uint32_t one, uint32_t other) {
+  const uint32_t difference = one > other ? one - other : other - one;
+  return difference > other / 25u;
+}
+
+/* What either side reads instead of a byte when the rates differ: never the byte itself, also not when it goes back and
+ * forth, and never the end of a frame. */
+static inline uint8_t native_garbled(uint8_t byte) {
+  const uint8_t garbled = (uint8_t)(5u * byte + 45u);
+  return garbled != 0u ? garbled : 0xFEu;
+}
 
 /* Finds the earliest queued input edge; pins at the same cycle go in order of their numbers. */
 static inline void native_find_next_edge(native_machine *machine) {

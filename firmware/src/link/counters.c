@@ -1,0 +1,40 @@
+/* counters.c: see counters.h. */
+#include "link/counters.h"
+
+#include "hal/hal.h"
+#include "link/link.h"
+#include "link/send.h"
+#include "link/session.h"
+#include "link/telemetry.h"
+
+#define PERIOD 64u /* ticks on a fast line */
+
+msg_counters counters;
+static bool bytes_lost;
+static uint16_t ticks; /* since they were sent */
+
+void counters_start(void) {
+  counters = (msg_counters){0};
+  bytes_lost = false;
+  ticks = 0;
+}
+
+bool counters_bytes_lost(void) {
+  const bool lost = bytes_lost;
+  bytes_lost = false;
+  return lost;
+}
+
+void counters_task(void) {
+  if (hal_serial_overrun()) {
+    counters.overrun++;
+    bytes_lost = true;
+  }
+  ticks++;
+  if (!session_is_open() || ticks < PERIOD * telemetry_line_period()) {
+    return;
+  }
+  ticks = 0;
+  link_count(&counters);
+  send_message(MSG_COUNTERS_ID, &counters, sizeof counters);
+}

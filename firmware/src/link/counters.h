@@ -1,0 +1,28 @@
+/* counters.h: what this end of the link has counted, and its message. */
+#ifndef LINK_COUNTERS_H
+#define LINK_COUNTERS_H
+
+#include <stdbool.h>
+
+#include "generated/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Counted where it happens, modulo 65536; good, bad and resynchronised are the decoder's (link.h). */
+extern msg_counters counters;
+
+void counters_start(void);
+
+/* In every tick: looks whether received bytes were lost; in a session sends the counters now and then. */
+void counters_task(void);
+
+/* Whether received bytes were lost since the last call. */
+bool counters_bytes_lost(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,41 @@
+/* session.h: what one start of the board and one opening by a host have in common (protocol/PROTOCOL.md, "Session"). Its
+ * seed separates its frames from those of all others. */
+#ifndef LINK_SESSION_H
+#define LINK_SESSION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "generated/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* No session is open; says hello. */
+void session_start(void);
+
+/* The host opens a session, or confirms the one that is open: answers with hello. False if that is refused. */
+bool session_open(const msg_open *message);
+
+/* The host leaves the session of that seed. False if it is not the one that is open. */
+bool session_close(uint32_t seed);
+
+/* Its seed; 0: none is open. */
+uint32_t session_seed(void);
+bool session_is_open(void);
+
+/* The board's half of the next session's seed. */
+uint32_t session_board_nonce(void);
+
+/* A frame of the session was accepted. */
+void session_heard(void);
+
+/* In every tick: says hello now and then, ends the session when the host was silent for too long. */
+void session_task(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

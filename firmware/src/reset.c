@@ -1,0 +1,73 @@
+/* reset.c: see reset.h. */
+#include "reset.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "storage.h"
+
+#define MAGIC 0x626Fu
+#define NONCE_MASK 0x1FFFFFul
+#define WATCHDOG_MARK 0xB17Eu
+#define BOOT_SHIFT 11 /* the counts of two boot counters lie 2048 apart */
+
+/* In memory that a reset leaves alone; `check` tells it from what RAM holds when the power comes. */
+typedef struct {
+  uint16_t magic;
+  uint16_t mark;  /* WATCHDOG_MARK: the watchdog is about to reset the chip */
+  uint32_t count; /* one more for each nonce; begins anywhere */
+  uint32_t check;
+} reset_record;
+
+_Static_assert(sizeof(reset_record) <= HAL_NOINIT_SIZE, "the record fits");
+
+static uint8_t cause;
+
+static reset_record *record(void) { return (reset_record *)hal_noinit(); }
+
+static uint32_t check_of(const reset_record *of) { return of->count ^ ((uint32_t)MAGIC << 16 | MAGIC) ^ 0x5A0FF05Aul; }
+
+static bool is_whole(const reset_record *of) { return of->magic == MAGIC && of->check == check_of(of); }
+
+static void set_count(uint32_t count) {
+  record()->count = count;
+  record()->check = check_of(record());
+}
+
+void reset_start(void) {
+  reset_record *own = record();
+  const bool whole = is_whole(own);
+  cause = hal_reset_cause();
+  if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
+    cause = RESET_CAUSE_WATCHDOG;
+  }
+  own->magic = MAGIC;
+  own->mark = 0;
+  set_count(whole ? own->count : hal_memory_noise());
+}
+
+HAL_INTERRUPT_WATCHDOG {
+  record()->mark = WATCHDOG_MARK;
+  hal_watchdog_reset();
+}
+
+uint8_t reset_cause(void) { return cause; }
+
+/* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
+ * undone. Close numbers come out far apart. */
+static uint32_t mixed(uint32_t x) {
+  x = (x ^ x >> 11) * 0x0B352Dul & NONCE_MASK;
+  x = (x ^ x >> 9) * 0x16A6B5ul & NONCE_MASK;
+  return x ^ x >> 11;
+}
+
+uint32_t reset_nonce(void) {
+  set_count(record()->count + 1u);
+  uint32_t count = (record()->count + (storage_boot_counter() << BOOT_SHIFT)) & NONCE_MASK;
+  if (count == 0) {
+    count = NONCE_MASK / 2u; /* far from the counts of the starts before and after */
+  }
+  return mixed(count);
+}

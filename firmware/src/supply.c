@@ -1,0 +1,57 @@
+/* supply.c: see supply.h. The converter measures the bandgap with the supply as its reference, so that
+ *   result = bandgap * 1024 / supply     (24.7)     and     supply = bandgap * 1024 / result.
+ * A step of the result is 22 mV at 5 V. */
+#include "supply.h"
+
+#include "hal/hal.h"
+#include "link/parameters.h"
+
+#define HYSTERESIS 100u /* mV */
+#define RESULT_MIN 32u  /* 35 V: no result of a chip that works */
+
+static uint16_t voltage;
+static bool low;
+static bool was_below;   /* the last measurement was */
+static bool has_settled; /* a measurement since power was given to bandgap and converter is past */
+
+void supply_start(void) {
+  voltage = 0;
+  low = was_below = has_settled = false;
+}
+
+/* bandgap * 1024 / result, rounded down, in two divisions of 16 bits: one of 32 would take a thousand cycles. */
+static uint16_t millivolts(uint16_t bandgap, uint16_t result) {
+  const uint16_t dividend = (uint16_t)(bandgap * 32u); /* at most 38400 */
+  const uint16_t quotient = dividend / result;
+  const uint16_t rest = (uint16_t)(dividend - quotient * result);
+  return (uint16_t)(quotient * 32u + (uint16_t)(rest * 32u) / result);
+}
+
+/* A minimum of 0 is never undercut. */
+static void judge(uint16_t minimum) {
+  const bool below = voltage < minimum;
+  if (voltage > minimum + HYSTERESIS) {
+    low = false;
+  } else if (below && was_below) {
+    low = true;
+  }
+  was_below = below;
+}
+
+void supply_task(void) {
+  const uint16_t result = hal_supply_result();
+  hal_supply_sample();
+  if (result < RESULT_MIN) {
+    return;
+  }
+  if (!has_settled) { /* the first conversion after the reference was chosen may be wrong (24.5.2) */
+    has_settled = true;
+    return;
+  }
+  voltage = millivolts(parameters_u16(PARAMETER_BANDGAP), result);
+  judge(parameters_u16(PARAMETER_SUPPLY_MINIMUM));
+}
+
+uint16_t supply_voltage(void) { return voltage; }
+
+bool supply_low(void) { return low; }

@@ -1,0 +1,28 @@
+/* supply.h: the supply voltage, measured once a tick against the chip's bandgap (data sheet of the ATmega328P, 24.9), and
+ * whether it is too low for motors and EEPROM. */
+#ifndef SUPPLY_H
+#define SUPPLY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void supply_start(void);
+
+/* In every tick: takes the measurement that the last one began, and begins the next. */
+void supply_task(void);
+
+/* mV; 0: not yet measured. */
+uint16_t supply_voltage(void);
+
+/* Two measurements in a row were below the parameter supply_minimum, and none since was 100 mV above it. */
+bool supply_low(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,139 @@
+/* Reset: causes as the chip tells them or as the record tells, and nonces. */
+#include <doctest.h>
+
+#include <set>
+
+#include "../memory_bench.h"
+#include "hal/hal.h"
+#include "reset.h"
+
+namespace {
+
+constexpr uint32_t NONCES = 1u << 21;
+
+/* Bits in which two numbers differ. */
+int distance(uint32_t a, uint32_t b) {
+  int bits = 0;
+  for (uint32_t x = a ^ b; x != 0; x &= x - 1) {
+    bits++;
+  }
+  return bits;
+}
+
+}  // namespace
+
+TEST_CASE("a cause that the chip tells is told") {
+  memory_bench bench;
+  bench.power_on();
+  CHECK(reset_cause() == RESET_CAUSE_POWER);
+  for (uint8_t cause : {RESET_CAUSE_EXTERNAL, RESET_CAUSE_BROWN_OUT, RESET_CAUSE_WATCHDOG}) {
+    bench.reset(cause);
+    CHECK(reset_cause() == cause);
+  }
+}
+
+TEST_CASE("behind a bootloader that takes the cause it is unknown") {
+  memory_bench bench;
+  bench.power_on();
+  for (int i = 0; i < 3; i++) {
+    bench.reset(RESET_CAUSE_UNKNOWN);
+    CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+  }
+}
+
+TEST_CASE("behind such a bootloader a watchdog that spoke before it bit is told, once") {
+  memory_bench bench;
+  bench.power_on();
+  bench.run(memory_bench::TICK);
+  hal_native_watchdog();
+  bench.reset(RESET_CAUSE_UNKNOWN);
+  CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
+  bench.reset(RESET_CAUSE_UNKNOWN);
+  CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+}
+
+TEST_CASE("what the chip tells counts more than the record") {
+  memory_bench bench;
+  bench.power_on();
+  hal_native_watchdog();
+  bench.reset(RESET_CAUSE_EXTERNAL);
+  CHECK(reset_cause() == RESET_CAUSE_EXTERNAL);
+  bench.reset(RESET_CAUSE_UNKNOWN); /* and takes the mark away */
+  CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+}
+
+TEST_CASE("a power failure behind such a bootloader is not taken for a watchdog") {
+  memory_bench bench;
+  for (int i = 0; i < 1000; i++) {
+    bench.power_on();
+    hal_native_watchdog();
+    bench.spoil();
+    bench.reset(RESET_CAUSE_UNKNOWN);
+    CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+  }
+}
+
+TEST_CASE("a record with a wrong bit is not believed") {
+  memory_bench bench;
+  for (int bit = 0; bit < 8 * 12; bit++) {
+    bench.power_on();
+    hal_native_watchdog();
+    uint8_t &byte = bench.machine.noinit[bit / 8];
+    byte = static_cast<uint8_t>(byte ^ 1 << bit % 8);
+    bench.reset(RESET_CAUSE_UNKNOWN);
+    CAPTURE(bit);
+    CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+  }
+}
+
+TEST_CASE("nonces: 21 bits, not 0, another one after each reset") {
+  memory_bench bench;
+  bench.power_on();
+  std::set<uint32_t> seen;
+  for (int i = 0; i < 5000; i++) {
+    const uint32_t nonce = reset_nonce();
+    CHECK(nonce > 0);
+    CHECK(nonce < NONCES);
+    CHECK(seen.insert(nonce).second);
+    bench.reset(i % 2 == 0 ? RESET_CAUSE_EXTERNAL : RESET_CAUSE_UNKNOWN);
+  }
+}
+
+TEST_CASE("nonces of one start: nearly all numbers come once before one comes again") {
+  memory_bench bench;
+  bench.power_on();
+  std::vector<bool> seen(NONCES);
+  uint32_t again = 0;
+  for (uint32_t i = 0; i < NONCES; i++) {
+    const uint32_t nonce = reset_nonce();
+    REQUIRE(nonce > 0);
+    again += seen[nonce];
+    seen[nonce] = true;
+  }
+  CHECK(again == 1); /* in place of 0 */
+}
+
+TEST_CASE("nonces that follow each other differ in half of their bits") {
+  memory_bench bench;
+  bench.power_on();
+  uint32_t last = reset_nonce();
+  int total = 0;
+  for (int i = 0; i < 10000; i++) {
+    const uint32_t nonce = reset_nonce();
+    total += distance(nonce, last);
+    last = nonce;
+  }
+  CHECK(total > 9 * 10000);
+  CHECK(total < 12 * 10000);
+}
+
+TEST_CASE("power-ons draw from all nonces: as many coincidences as chance gives") {
+  memory_bench bench;
+  std::set<uint32_t> seen;
+  int again = 0;
+  for (int i = 0; i < 4000; i++) {
+    bench.power_on();
+    again += !seen.insert(reset_nonce()).second;
+  }
+  CHECK(again <= 14); /* 4000^2 / 2 / 2^21 = 3.8 expected; more than 14 once in 100,000 */
+}

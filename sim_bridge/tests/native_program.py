@@ -1,0 +1,46 @@
+"""Small native programs for tests: C on the native hardware layer alone, in place of the firmware."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from sim_bridge._core import ffi, lib
+from sim_bridge.boards.board import BoardAccess
+from sim_bridge.boards.emulated import native_board
+
+# The tests may stand in a copy of the package below the checkout.
+FIRMWARE = next(
+    folder / "firmware" / "src" for folder in Path(__file__).resolve().parents if (folder / "firmware" / "src").is_dir()
+)
+
+# What the hardware layer expects of the firmware. A program defines start() and slot(), which comes every 2.5 ms; what
+# it finds it says on the line.
+PREAMBLE = """
+#include "firmware.h"
+#include "hal/hal.h"
+static void start(void);
+static void slot(void);
+static inline void say(const void *bytes, uint8_t count) { hal_serial_send(bytes, count); }
+void firmware_start(void) { hal_start_serial(500000u); start(); hal_start_timers(); }
+void firmware_poll(void) {}
+bool firmware_due(void) { return false; }
+HAL_INTERRUPT_SLOT { hal_slot_arm((uint16_t)(hal_time() + HAL_SLOT_CYCLES)); slot(); }
+HAL_INTERRUPT_EDGE {}
+HAL_INTERRUPT_CAPTURE {}
+"""
+
+
+def native_program(source: str) -> BoardAccess:
+    """A native board, powered on, that runs the C program `source`."""
+    with tempfile.TemporaryDirectory() as folder:
+        program, library = Path(folder, "program.c"), Path(folder, "program.so")
+        program.write_text(PREAMBLE + source, encoding="ascii")
+        command = ["cc", "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
+        command += ["-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", "-o", str(library), str(program)]
+        command += [str(FIRMWARE / "hal" / "native" / "hal_native.c")]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert result.returncode == 0, result.stderr
+        board = native_board(library)
+    return BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
