@@ -16,7 +16,14 @@ from boebot.runner import Progress
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of
-_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes)$")
+_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v)$")
+
+_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V"}
+
+
+def say(sentence: str) -> None:
+    """What a user should know, on standard error."""
+    print(f"boebot: {sentence}", file=sys.stderr, flush=True)
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -38,7 +45,7 @@ def print_table(values: Mapping[str, Any]) -> None:
         if value is None:
             continue
         match = _UNIT.search(name)
-        unit = match[1].replace("m_s", "m/s").replace("hz", "Hz") if match else ""
+        unit = _UNITS.get(match[1], match[1]) if match else ""
         table.add_row(_UNIT.sub("", name).replace("_", " "), _text(value), unit)
     Console().print(table)
 
