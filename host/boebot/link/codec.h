@@ -28,17 +28,23 @@ codec_counts *codec_counts_of(codec_decoder *self);
 void to_host_seed(codec_decoder *self, uint32_t seed);
 void to_board_seed(codec_decoder *self, uint32_t seed);
 
-/* Takes bytes as they come; returns how many messages they complete. Message i: ids[i], sequences[i], and its payload
- * from ends[i - 1] (0 for the first) to ends[i] in payloads. size bytes complete at most size / 7 + 1 messages, with
- * payloads of size + 60 bytes. */
-uint32_t to_host_feed(codec_decoder *self, const uint8_t *bytes, uint32_t size, uint8_t *ids, uint8_t *sequences,
-                      uint32_t *ends, uint8_t *payloads);
-uint32_t to_board_feed(codec_decoder *self, const uint8_t *bytes, uint32_t size, uint8_t *ids, uint8_t *sequences,
-                       uint32_t *ends, uint8_t *payloads);
+#define CODEC_SLICE 16384 /* the most bytes fed at once */
+#define CODEC_FOUND 2341  /* the most messages that they complete: one for 7 bytes, and one begun before */
 
-/* Writes a frame of either direction to `wire` (length + 8 bytes). length <= 60 */
-uint32_t codec_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length,
-                      uint32_t seed);
+/* Messages in order: message i has its payload from ends[i - 1] (0 for the first) to ends[i] in payloads. */
+typedef struct {
+  uint8_t ids[2341];
+  uint8_t sequences[2341];
+  uint32_t ends[2341];
+  char payloads[16448]; /* CODEC_SLICE and the rest of one begun before */
+} codec_found;
+
+/* Takes bytes as they come; returns how many messages they complete. size <= CODEC_SLICE */
+uint32_t to_host_feed(codec_decoder *self, const uint8_t *bytes, uint32_t size, codec_found *found);
+uint32_t to_board_feed(codec_decoder *self, const uint8_t *bytes, uint32_t size, codec_found *found);
+
+/* The frame of a message of either direction, length + 8 bytes, until this thread's next call. length <= 60 */
+const char *codec_encode(uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length, uint32_t seed);
 
 /* The three check bytes of stuffed bytes. size < 256 */
 void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed);

@@ -70,22 +70,25 @@ static void take_counts(codec_decoder *self) {
   frames->good = frames->bad = frames->resynchronised = 0;
 }
 
-uint32_t END(feed)(codec_decoder *self, const uint8_t *bytes, uint32_t size, uint8_t *ids, uint8_t *sequences,
-                   uint32_t *ends, uint8_t *payloads) {
-  uint32_t found = 0, end = 0;
+_Static_assert(CODEC_FOUND >= CODEC_SLICE / 7 + 1, "room for the shortest frames");
+_Static_assert(sizeof(((codec_found *)0)->ids) == CODEC_FOUND, "room for the shortest frames");
+_Static_assert(sizeof(((codec_found *)0)->payloads) >= CODEC_SLICE + FRAME_PAYLOAD_MAX, "room for all payloads");
+
+uint32_t END(feed)(codec_decoder *self, const uint8_t *bytes, uint32_t size, codec_found *found) {
+  uint32_t count = 0, end = 0;
   for (uint32_t i = 0; i < size; i++) {
     if (frame_decode(&self->frames, bytes[i])) {
       const uint32_t length = (uint32_t)frame_accepted_length(frame_id(&self->frames));
-      memcpy(payloads + end, frame_payload(&self->frames), length);
+      memcpy(found->payloads + end, frame_payload(&self->frames), length);
       end += length;
-      ids[found] = frame_id(&self->frames);
-      sequences[found] = frame_sequence(&self->frames);
-      ends[found++] = end;
+      found->ids[count] = frame_id(&self->frames);
+      found->sequences[count] = frame_sequence(&self->frames);
+      found->ends[count++] = end;
       count_lost(self);
     }
     if (bytes[i] == 0) {
       take_counts(self);
     }
   }
-  return found;
+  return count;
 }

@@ -8,9 +8,10 @@ void codec_free(codec_decoder *self) { free(self); }
 /* The counts are the first member at either end. */
 codec_counts *codec_counts_of(codec_decoder *self) { return (codec_counts *)(void *)self; }
 
-uint32_t codec_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length,
-                      uint32_t seed) {
-  return frame_encode(wire, id, sequence, payload, (uint8_t)length, seed);
+const char *codec_encode(uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length, uint32_t seed) {
+  static _Thread_local uint8_t wire[FRAME_SIZE_MAX];
+  frame_encode(wire, id, sequence, payload, (uint8_t)length, seed);
+  return (const char *)wire;
 }
 
 void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed) {

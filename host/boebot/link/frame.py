@@ -16,8 +16,7 @@ NO_SESSION = 0xFFFFFFFF  # seed of a decoder that accepts the handshake's messag
 FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters counted
 LONGEST_PAYLOAD = max(message.LENGTH for message in messages.MESSAGES.values())
 
-_SLICE = 16384  # bytes for one call into C
-_SHORTEST = 7  # bytes of a frame that shares a delimiter
+_SLICE = lib.CODEC_SLICE  # bytes for one call into C
 _STUFFED_MAX = 255
 
 _Message = tuple[int, int, bytes]
@@ -39,9 +38,8 @@ def encode(message_id: int, sequence: int, payload: bytes, seed: int = SEED) -> 
     length = len(payload)
     if length > LONGEST_PAYLOAD:
         raise ValueError(f"a payload of {length} bytes; expected at most {LONGEST_PAYLOAD}")
-    wire = bytearray(length + FRAME_OVERHEAD)
-    lib.codec_encode(ffi.from_buffer(wire), message_id, sequence, payload, length, seed)
-    return bytes(wire)
+    wire: bytes = ffi.unpack(lib.codec_encode(message_id, sequence, payload, length, seed), length + FRAME_OVERHEAD)
+    return wire
 
 
 def checksum(stuffed: bytes, seed: int = SEED) -> int:
@@ -96,15 +94,8 @@ class Decoder:
             raise MemoryError("no memory for a decoder")
         self.counts = lib.codec_counts_of(self._decoder)
         self._seed = seed
-        room = _SLICE // _SHORTEST + 1
-        self._arrays = (
-            ffi.new("uint8_t[]", room),
-            ffi.new("uint8_t[]", room),
-            ffi.new("uint32_t[]", room),
-            ffi.new("uint8_t[]", _SLICE + LONGEST_PAYLOAD),
-        )
-        self._ids, self._sequences, ends, self._payloads = (memoryview(ffi.buffer(array)) for array in self._arrays)
-        self._ends = ends.cast("I")
+        self._found = found = ffi.new("codec_found *")
+        self._ids, self._sequences, self._ends, self._payloads = found.ids, found.sequences, found.ends, found.payloads
 
     @property
     def seed(self) -> int:
@@ -121,12 +112,12 @@ class Decoder:
         if len(data) > _SLICE:
             slices = (data[start : start + _SLICE] for start in range(0, len(data), _SLICE))
             return [message for piece in slices for message in self.feed(piece)]
-        count = self._feed(self._decoder, data, len(data), *self._arrays)
+        count = self._feed(self._decoder, data, len(data), self._found)
         if count == 0:
             return []
         if count == 1:
-            return [(self._ids[0], self._sequences[0], self._payloads[: self._ends[0]].tobytes())]
-        ends = self._ends[:count].tolist()
-        payloads = self._payloads[: ends[-1]].tobytes()
+            return [(self._ids[0], self._sequences[0], ffi.unpack(self._payloads, self._ends[0]))]
+        ids, sequences, ends = (ffi.unpack(numbers, count) for numbers in (self._ids, self._sequences, self._ends))
+        payloads = ffi.unpack(self._payloads, ends[-1])
         cut = [payloads[start:end] for start, end in zip([0, *ends], ends, strict=False)]
-        return list(zip(self._ids[:count], self._sequences[:count], cut, strict=True))
+        return list(zip(ids, sequences, cut, strict=True))
