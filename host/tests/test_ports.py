@@ -232,10 +232,13 @@ def test_reset_switches_dtr_off_and_on_in_case_it_was_left_on(board: Line, monke
     switched: list[bool] = []
     update = lambda port: switched.append(bool(port._dtr_state))  # noqa: E731
     monkeypatch.setattr(serial.Serial, "_update_dtr_state", update)
-    SerialTransport(board.path).close()
-    assert switched[-2:] == [False, True]
+    transport = SerialTransport(board.path)
+    transport.close()
+    assert switched[-2:] == [False, True] and transport.resets_board
     switched.clear()
-    SerialTransport(board.path, reset=False).close()
+    transport = SerialTransport(board.path, reset=False)
+    transport.close()
+    assert not transport.resets_board, "a pty has no DTR"
     assert False not in switched, "Linux switches DTR on at opening; off and on again would be a reset"
 
 
@@ -461,10 +464,12 @@ def test_shared_port_carries_all_bytes_and_its_rate() -> None:
 
 
 def test_shared_port_is_reset_or_not() -> None:
-    for setting, expected in (("", [True, False, True]), ("?reset=no", [False])):
+    for reset, expected in ((True, [True, False, True]), (False, [False])):
         with rfc2217_server() as (server, _):
             del server.serial.dtr_was[:]
-            open_port(f"rfc2217://127.0.0.1:{server.port}{setting}", 500_000).close()
+            transport = Rfc2217Transport("127.0.0.1", server.port, reset=reset)
+            transport.close()
+            assert transport.resets_board is reset
             assert server.serial.dtr_was[: len(expected)] == expected
 
 

@@ -36,9 +36,11 @@ class DescriptorTransport:
 
     Attributes:
         name: the port's.
+        resets_board: opening may have reset the board.
     """
 
     realtime = True
+    resets_board = False
 
     def __init__(self, name: str, descriptor: int, release: Callable[[], None], thread: bool = True) -> None:
         """Takes over `descriptor`; `release` closes it and whatever belongs to it, at the latest when Python ends."""

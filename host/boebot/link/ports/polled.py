@@ -24,9 +24,11 @@ class PolledTransport:
     Attributes:
         name: the port's.
         baud_given: the URL named the bit rate.
+        resets_board: opening has reset the board, which then takes some seconds to start.
     """
 
     realtime = True
+    resets_board = False
 
     def __init__(self, name: str, device: PyserialPort, *, baud_given: bool, gone: str) -> None:
         """Takes over an open port. `gone`: why it might not be there any more."""

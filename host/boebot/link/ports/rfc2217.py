@@ -46,8 +46,7 @@ class Rfc2217Transport(PolledTransport):
             within(TIMEOUT_S, lambda: _open(device), lambda _: device.close())
         except (OSError, ValueError) as error:
             raise BoardError(_why_not(name, host, baud, error)) from None
-        if reset:
-            pulse_dtr(device)
+        self.resets_board = reset and pulse_dtr(device)
         super().__init__(name, device, baud_given=baud_given, gone="closed by the other side")
 
     def set_baud(self, rate: int) -> None:

@@ -58,7 +58,12 @@ def open_serial(port: str, baud: int, *, baud_given: bool = False, reset: bool =
 
 
 class SerialTransport(DescriptorTransport):
-    """A serial port with a file descriptor."""
+    """A serial port with a file descriptor.
+
+    Attributes:
+        baud_given: the user has named the bit rate.
+        resets_board: opening may have reset the board, which then takes some seconds to start.
+    """
 
     def __init__(
         self, port: str, baud: int = 500_000, *, baud_given: bool = False, reset: bool = True, thread: bool = True
@@ -73,8 +78,7 @@ class SerialTransport(DescriptorTransport):
             descriptor = device.fileno()
             _keep_for_us_alone(descriptor)
             _keep_dtr_at_close(descriptor, keep=not reset)
-            if reset:
-                pulse_dtr(device)
+            self.resets_board = pulse_dtr(device) if reset else _has_dtr(descriptor)
         except (OSError, ValueError, termios.error) as error:  # pyserial's SerialException is an OSError
             device.close()
             lock.release()
@@ -117,8 +121,7 @@ class WindowsSerialTransport(PolledTransport):
         device.write_timeout = 1.0
         try:
             device.open()
-            if reset:
-                pulse_dtr(device)
+            self.resets_board = reset and pulse_dtr(device)
         except (OSError, ValueError) as error:
             raise BoardError(why_not(port, baud, error)) from None
         super().__init__(port, device, baud_given=baud_given, gone="unplugged, or closed by the other side")
@@ -141,12 +144,15 @@ def configured(port: str, baud: int, reset: bool) -> serial.Serial:
     return device
 
 
-def pulse_dtr(device: serial.SerialBase) -> None:
-    """Switches DTR off and on; what has no such line has no need of it."""
-    with contextlib.suppress(OSError):
+def pulse_dtr(device: serial.SerialBase) -> bool:
+    """Switches DTR off and on. False: the port has no such line (a pty)."""
+    try:
         device.dtr = False
         time.sleep(_DTR_OFF_S)
         device.dtr = True
+    except OSError:
+        return False
+    return True
 
 
 def take_lock(port: str) -> LockFile:
@@ -205,6 +211,15 @@ def _keep_for_us_alone(descriptor: int) -> None:
     """Nobody else may open the port. Not so a pty, whose mark would outlive a killed process."""
     if not os.ttyname(descriptor).startswith(("/dev/pts/", "/dev/ttys")):
         fcntl.ioctl(descriptor, termios.TIOCEXCL)
+
+
+def _has_dtr(descriptor: int) -> bool:
+    """Whether there are modem lines: a pty has none."""
+    try:
+        fcntl.ioctl(descriptor, termios.TIOCMGET, bytearray(4))
+    except OSError:
+        return False
+    return True
 
 
 def _keep_dtr_at_close(descriptor: int, *, keep: bool) -> None:
