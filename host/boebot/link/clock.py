@@ -25,6 +25,9 @@ DRIFT_LIMIT = 5.5e-3  # of h's slope: clocks of +-5000 ppm, as ceramic resonator
 WANDER = 0.02e-6  # 1/s: the change of rate that the bound allows for; a resonator that warms up by 1 K in a minute
 WINDOW_S = 40.0
 RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and what is lost in rounding here
+_WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
+_WORTH_S = 1e-6
+_WORTH_MOST_S = 1e-3  # of the present bound
 _WRAP_US = 1 << 32
 _FAR_S = 1e4  # o at the beginning
 
@@ -110,9 +113,15 @@ class BoardClock:
         board_s = self._hear(raw_us, received_s)
         received_s -= _ANSWER_BYTES * self._byte_s
         sent_s += _PROBE_BYTES * self._byte_s - RESOLUTION_S
-        self._bound_by(board_s, received_s, 1.0)
-        self._bound_by(board_s, sent_s, -1.0)
-        self._refresh(board_s)
+        since_s = board_s - self._at_s
+        latest_wins = received_s - board_s < self._useful_below + since_s * self._useful_fastest
+        earliest_wins = sent_s - board_s > self._useful_above + since_s * self._useful_slowest
+        if latest_wins or since_s < 0:
+            self._bound_by(board_s, received_s, 1.0)
+        if earliest_wins or since_s < 0:
+            self._bound_by(board_s, sent_s, -1.0)
+        if latest_wins or earliest_wins:
+            self._refresh(board_s)
 
     def observe(self, raw_us: int, received_s: float) -> Stamp:
         """Takes the time of a telemetry message's tick, received at that host time; returns the tick's stamp."""
@@ -126,7 +135,7 @@ class BoardClock:
         board_s = us * 1e-6
         since_s = board_s - self._at_s
         latest_s = received_s - _TELEMETRY_BYTES * self._byte_s
-        if latest_s - board_s < self._useful_below + since_s * self._useful_slope:
+        if latest_s - board_s < self._useful_below + since_s * self._useful_fastest:
             self._bound_by(board_s, latest_s, 1.0)
             self._refresh(board_s)
             return board_s, self._middle, self._bound
@@ -157,6 +166,7 @@ class BoardClock:
             self._zero = received_s - board_s  # g: keeps the polygon's numbers small
             self._polygons = [_plane()]
             self._began = [board_s]
+            self._refresh(board_s)
         return board_s
 
     def _bound_by(self, board_s: float, host_s: float, side: float) -> None:
@@ -198,14 +208,18 @@ class BoardClock:
         self._bound = max(high - value, value - low)
         self._slope = slope
         self._slope_bound = max(fastest - slope, slope - slowest)
-        youngest = self._polygons[-1]
         if len(self._polygons) > 1:
-            x = board_s - self._began[-1]
-            high = max(o + r * x for o, r in youngest)
-            fastest = max(r for _, r in youngest)
-        # a later bound above this cuts nothing off any polygon
-        self._useful_below = self._zero + high - self._loosened_s
-        self._useful_slope = fastest
+            x = board_s - self._began[1]
+            values = [o + r * x for o, r in self._polygons[1]]
+            slopes = [r for _, r in self._polygons[1]]
+            low, high = min(values), max(values)
+            slowest, fastest = min(slopes), max(slopes)
+        # a later bound between these cuts little or nothing off any polygon
+        loosened_s = self._loosened_s + _WORTH_S + _WORTH * min(self._bound, _WORTH_MOST_S)
+        self._useful_below = self._zero + high - loosened_s
+        self._useful_above = self._zero + low + loosened_s
+        self._useful_fastest = fastest
+        self._useful_slowest = slowest
 
 
 def _plane() -> _Polygon:

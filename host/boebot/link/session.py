@@ -20,6 +20,7 @@ import random
 import secrets
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
@@ -39,7 +40,7 @@ from boebot.link.delivery import (
     TakenOverError,
 )
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
-from boebot.link.transport import BaudSelectable, Transport, stamped
+from boebot.link.transport import BaudSelectable, Stamping, Transport
 
 _M = TypeVar("_M")
 Telemetry = tuple[bytes, float, float, float]
@@ -157,6 +158,7 @@ class Link:
         self._time_out_s = 1.0  # of the board's patience
         # in simulated time a run has to be the same each time; on a real line no session's seed may come again
         self._draw = random.Random("link") if not transport.realtime else random.Random(secrets.randbits(64))
+        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(_stamp_now, transport)
         self._learn_baud()
         self._answers: list[messages.Identity | messages.Description] = []
         self._handlers: dict[int, Callable[[bytes, float], None]] = {
@@ -613,7 +615,7 @@ class Link:
 
     def _receive(self, wait_s: float, quiet_s: float) -> None:
         """Reads and sorts what arrived."""
-        for stamp, data in stamped(self.transport, wait_s, quiet_s):
+        for stamp, data in self._read(wait_s, quiet_s):
             if self._record:
                 self.received.append((stamp, data))
             if self.hello is None:
@@ -825,6 +827,12 @@ class Link:
             f"the board at {self.transport.name} was to {request.what}, but no session came about within "
             f"{request.limit_s:g} s"
         )
+
+
+def _stamp_now(transport: Transport, wait_s: float, quiet_s: float) -> list[tuple[float, bytes]]:
+    """Reads from a transport that does not stamp what comes."""
+    data = transport.read(wait_s, quiet_s)
+    return [(transport.now(), data)] if data else []
 
 
 def _speaks_alike(hello: messages.Hello) -> bool:
