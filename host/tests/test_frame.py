@@ -65,7 +65,7 @@ def test_every_message_is_framed_as_the_page_says(number: int, sequence: int, da
     assert frame.Decoder(seed, to_board=number < 0x80).feed(wire) == [(number, sequence, payload)]
 
 
-@given(st.binary(max_size=255), seeds)
+@given(st.binary(max_size=600), seeds)
 def test_checksum_is_the_pages(data: bytes, seed: int) -> None:
     check = reference_frame.crc21(data, seed)
     spread = bytes(0x80 | check >> shift & 0x7F for shift in (14, 7, 0))
@@ -75,8 +75,6 @@ def test_checksum_is_the_pages(data: bytes, seed: int) -> None:
 def test_too_long_and_out_of_range_are_errors_not_frames() -> None:
     with pytest.raises(ValueError, match="61 bytes; expected at most 60"):
         frame.encode(TELEMETRY, 0, bytes(61))
-    with pytest.raises(ValueError, match="256 stuffed bytes"):
-        frame.checksum(bytes(256))
     with pytest.raises(OverflowError):
         frame.encode(TELEMETRY, 256, bytes(LENGTH))
 

@@ -46,7 +46,7 @@ uint32_t to_board_feed(codec_decoder *self, const uint8_t *bytes, uint32_t size,
 /* The frame of a message of either direction, length + 8 bytes, until this thread's next call. length <= 60 */
 const char *codec_encode(uint8_t id, uint8_t sequence, const uint8_t *payload, uint32_t length, uint32_t seed);
 
-/* The three check bytes of stuffed bytes. size < 256 */
+/* The three check bytes of stuffed bytes. */
 void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed);
 /* python: end */
 

@@ -17,7 +17,6 @@ FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters co
 LONGEST_PAYLOAD = max(message.LENGTH for message in messages.MESSAGES.values())
 
 _SLICE = lib.CODEC_SLICE  # bytes for one call into C
-_STUFFED_MAX = 255
 
 _Message = tuple[int, int, bytes]
 
@@ -43,9 +42,7 @@ def encode(message_id: int, sequence: int, payload: bytes, seed: int = SEED) -> 
 
 
 def checksum(stuffed: bytes, seed: int = SEED) -> int:
-    """CRC-21 of at most 255 stuffed bytes, spread over the low 24 bits as on the wire."""
-    if len(stuffed) > _STUFFED_MAX:
-        raise ValueError(f"{len(stuffed)} stuffed bytes; expected at most {_STUFFED_MAX}")
+    """CRC-21 of stuffed bytes, spread over the low 24 bits as on the wire."""
     check = bytearray(3)
     lib.codec_check(ffi.from_buffer(check), stuffed, len(stuffed), seed)
     return int.from_bytes(check, "big")
