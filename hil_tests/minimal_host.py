@@ -1,4 +1,4 @@
-"""The least that a host must do, for tests of the board alone: hello, open, requests, all as PROTOCOL.md says and with its
+"""The least that a host must do, for tests of the board alone: hello, open, requests, as PROTOCOL.md says, with its
 plainest frame (protocol/reference_frame.py). No world, no retries unless a test asks for them.
 
 Time is the board's; every wait is in seconds of it and says what it waits for.
@@ -17,7 +17,7 @@ from sim_bridge.boards.board import BoardAccess
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "protocol"))
-import reference_frame  # noqa: E402
+import reference_frame
 
 CYCLES_PER_S = 16_000_000
 TICK_S = 0.010

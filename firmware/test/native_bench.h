@@ -76,8 +76,14 @@ class native_bench {
     std::free(machine.incoming.bytes);
   }
 
-  void run(uint64_t cycles) { api_->advance(machine.now + cycles); }
-  void run_to(uint64_t cycle) { api_->advance(cycle); }
+  void run(uint64_t cycles) { run_to(machine.now + cycles); }
+  void run_to(uint64_t cycle) {
+    while (attended_ && cycle > machine.now + PROBE_PERIOD) {
+      probe(0);
+      api_->advance(machine.now + PROBE_PERIOD);
+    }
+    api_->advance(cycle);
+  }
 
   /* The cycle at which the slot, tick of that number (counted from the start) begins. */
   uint64_t slot(uint64_t number) const { return start_ + SLOT * (number + 1); }
@@ -176,11 +182,19 @@ class native_bench {
 
   /* Runs that long, and keeps the session open meanwhile. */
   void run_in_session(uint64_t cycles) {
-    const uint64_t end = machine.now + cycles;
-    while (machine.now < end) {
-      probe(0);
-      run_to(machine.now + 5 * TICK < end ? machine.now + 5 * TICK : end);
-    }
+    const bool before = attended_;
+    attended_ = true;
+    probe(0);
+    run(cycles);
+    attended_ = before;
+  }
+
+  /* Opens a session before the first tick, and keeps it open whenever time goes by: for tests of devices. */
+  void attend() {
+    say_open(hello().board_nonce, 0x12345);
+    use_seed(hello().board_nonce ^ 0x12345);
+    run_to(tick(0) - 1);
+    attended_ = true;
   }
 
   /* ---- what it said ---- */
@@ -261,10 +275,19 @@ class native_bench {
     items[first + count++] = item;
   }
 
+  static constexpr uint64_t PROBE_PERIOD = 5 * TICK;
+
   const native_api *api_ = firmware_board_api();
+  bool attended_ = false; /* the host probes the clock, so that the session stays open */
   uint64_t start_ = 0;
   uint64_t line_free_ = 0;
   host_decoder decoder_{};
+};
+
+/* A bench with a session from the first tick on. */
+class attended_bench : public native_bench {
+ public:
+  attended_bench() { attend(); }
 };
 
 #endif

@@ -31,7 +31,7 @@ void counters_task(void) {
     bytes_lost = true;
   }
   ticks++;
-  if (!session_is_open() || ticks < PERIOD * telemetry_line_period()) {
+  if (!session_is_open() || ticks < PERIOD * telemetry_line_period() || !send_has_room(sizeof counters)) {
     return;
   }
   ticks = 0;

@@ -4,9 +4,7 @@
 #include <stdbool.h>
 
 #include "generated/messages.h"
-#include "hal/hal.h"
 #include "link/counters.h"
-#include "link/frame.h"
 #include "link/parameters.h"
 #include "link/send.h"
 #include "link/session.h"
@@ -99,7 +97,7 @@ void events_task(void) {
     return;
   }
   const uint32_t now = schedule_time();
-  if ((sent && now - sent_at < retry_time()) || !hal_serial_room(MSG_EVENT_LENGTH + FRAME_OVERHEAD)) {
+  if ((sent && now - sent_at < retry_time()) || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
   const happening *what = &queue[first];

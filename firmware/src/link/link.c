@@ -41,7 +41,7 @@ static bool take_frame(void) {
 /* Room for a message's answer and the next telemetry; 0: it waits for none. */
 static uint8_t room_for(uint8_t id) {
   const int8_t length = dispatch_answer_length(id);
-  return length < 0 ? 0u : (uint8_t)((uint8_t)length + MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD);
+  return length < 0 ? 0u : SEND_ROOM((uint8_t)length);
 }
 
 void link_poll(void) {

@@ -5,9 +5,7 @@
 #include <string.h>
 
 #include "generated/messages.h"
-#include "hal/hal.h"
 #include "link/counters.h"
-#include "link/frame.h"
 #include "link/parameters.h"
 #include "link/send.h"
 #include "safety.h"
@@ -95,7 +93,7 @@ bool requests_take(uint8_t id, const uint8_t *payload) {
 }
 
 void requests_task(void) {
-  if (saving && !storage_busy() && hal_serial_room(MSG_ANSWER_LENGTH + FRAME_OVERHEAD)) {
+  if (saving && !storage_busy() && send_has_room(MSG_ANSWER_LENGTH)) {
     saving = false;
     answer.status = storage_result();
     send_answer();

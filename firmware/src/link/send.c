@@ -1,9 +1,7 @@
 /* send.c: see send.h. */
 #include "link/send.h"
 
-#include "hal/hal.h"
 #include "link/counters.h"
-#include "link/frame.h"
 
 static uint8_t next_sequence;
 static uint16_t baud_rate; /* 100 bit/s */

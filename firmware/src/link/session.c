@@ -33,7 +33,7 @@ static uint16_t hello_period(void) {
 
 /* Says hello now or, where it would leave no room for the next telemetry, in a later tick. */
 static void say_hello(void) {
-  const bool room = hal_serial_room(MSG_HELLO_LENGTH + MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD);
+  const bool room = seed == 0 ? hal_serial_room(MSG_HELLO_LENGTH + FRAME_OVERHEAD) : send_has_room(MSG_HELLO_LENGTH);
   hello_in = room && identity_send_hello() ? hello_period() : 0u;
 }
 

@@ -42,7 +42,7 @@ TEST_CASE("steps of two lines") {
 #if ENCODER_QUADRATURE
 TEST_CASE("a random walk of phases is counted exactly") {
   std::mt19937 random(3);
-  native_bench bench;
+  attended_bench bench;
   int phase = 0, turns = 0;
   uint64_t at = bench.tick(1);
   for (int step = 0; step < 4000; step++) {
@@ -62,17 +62,17 @@ TEST_CASE("a random walk of phases is counted exactly") {
 }
 #else
 TEST_CASE("every edge counts up") {
-  native_bench bench;
+  attended_bench bench;
   toggle(bench, LEFT_LINE, bench.tick(1), 10000, 1000);
   toggle(bench, RIGHT_LINE, bench.tick(1), 7000, 501);
   bench.run(70 * TICK);
   CHECK(bench.telemetry().encoder_left == 1000);
   CHECK(bench.telemetry().encoder_right == 501);
-  CHECK(bench.telemetry().status == 0);
+  CHECK(bench.telemetry().status == STATUS_LATCHED);
 }
 
 TEST_CASE("the count goes on beyond 16 bits") {
-  native_bench bench;
+  attended_bench bench;
   toggle(bench, LEFT_LINE, bench.tick(1), 2500, 70000);
   bench.run(1110 * TICK);
   CHECK(bench.telemetry().encoder_left == 70000);
@@ -81,7 +81,7 @@ TEST_CASE("the count goes on beyond 16 bits") {
 
 TEST_CASE("the time between the last two edges, to 16 us") {
   for (uint64_t period : {300u, 2560u, 39999u, 40001u, 170000u, 1600000u, 7900000u}) {
-    native_bench bench;
+    attended_bench bench;
     toggle(bench, LEFT_LINE, bench.tick(1) + 12345, period, 3);
     bench.run_to(bench.tick(1) + 12345 + 2 * period + TICK);
     CAPTURE(period);
@@ -91,12 +91,12 @@ TEST_CASE("the time between the last two edges, to 16 us") {
 }
 
 TEST_CASE("edges more than half a second apart have no period, nor has a wheel at rest") {
-  native_bench bench;
+  attended_bench bench;
   toggle(bench, LEFT_LINE, bench.tick(1), 8100000, 2);
   bench.run_to(bench.tick(1) + 8100000 + 2 * TICK);
   CHECK(bench.telemetry().edge_period_left == 0);
 
-  native_bench moving;
+  attended_bench moving;
   toggle(moving, LEFT_LINE, moving.tick(1), 100000, 10);
   moving.run_to(moving.tick(40));
   CHECK(moving.telemetry().edge_period_left == 390);
@@ -106,7 +106,7 @@ TEST_CASE("edges more than half a second apart have no period, nor has a wheel a
 
 TEST_CASE("after a long rest the first edge gives no period, whatever the clock's roll-over") {
   for (uint64_t rest : {10100000u, 10240000u, 10250000u, 20480100u}) {
-    native_bench bench;
+    attended_bench bench;
     toggle(bench, LEFT_LINE, bench.tick(1), rest, 2);
     bench.run_to(bench.tick(1) + rest + 2 * TICK);
     CAPTURE(rest);
@@ -115,7 +115,7 @@ TEST_CASE("after a long rest the first edge gives no period, whatever the clock'
 }
 
 TEST_CASE("a line that fires above its limit is masked until the tick ends, and reported") {
-  native_bench bench;
+  attended_bench bench;
   const uint64_t start = bench.tick(2);
   toggle(bench, LEFT_LINE, start + 100, 160, 3000);  /* 100 kHz for three ticks */
   toggle(bench, RIGHT_LINE, start + 100, 16000, 30); /* a wheel that turns */
@@ -134,7 +134,7 @@ TEST_CASE("a line that fires above its limit is masked until the tick ends, and 
 }
 
 TEST_CASE("changes back to back are a storm: masked at once, the other wheel counts on") {
-  native_bench bench;
+  attended_bench bench;
   const uint64_t start = bench.tick(2);
   toggle(bench, LEFT_LINE, start + 1000, 200, 750);  /* 80 kHz until the tick ends */
   toggle(bench, RIGHT_LINE, start + 1001, 3000, 50); /* a wheel that turns, in step with it */
@@ -152,7 +152,7 @@ TEST_CASE("changes back to back are a storm: masked at once, the other wheel cou
 }
 
 TEST_CASE("all lines changing at once is no storm") {
-  native_bench bench;
+  attended_bench bench;
   for (uint64_t i = 0; i < 600; i++) {
     for (uint8_t pin = 14; pin < 18; pin++) {
       bench.drive(bench.tick(2) + 3000 * i + 60 * pin, pin, i % 2 == 0 ? NATIVE_HIGH : NATIVE_LOW);
@@ -160,12 +160,12 @@ TEST_CASE("all lines changing at once is no storm") {
   }
   for (int tick = 3; tick < 13; tick++) {
     bench.run_to(bench.tick(static_cast<uint64_t>(tick)) + 1);
-    CHECK(bench.telemetry().status == 0);
+    CHECK(bench.telemetry().status == STATUS_LATCHED);
   }
 }
 
 TEST_CASE("the time across a gap is no period: switched off and on, and masked") {
-  native_bench bench;
+  attended_bench bench;
   toggle(bench, LEFT_LINE, bench.tick(1), 200000, 40);
   bench.run_to(bench.tick(6));
   CHECK(bench.telemetry().edge_period_left == 200000 / 256);
@@ -180,7 +180,7 @@ TEST_CASE("the time across a gap is no period: switched off and on, and masked")
   }
   CHECK(bench.telemetry().edge_period_left == 200000 / 256);
 
-  native_bench noisy;
+  attended_bench noisy;
   toggle(noisy, LEFT_LINE, noisy.tick(2) + 1000, 160, 500);
   toggle(noisy, LEFT_LINE, noisy.tick(5), 400000, 3);
   for (uint64_t tick = 3; tick < 10; tick++) {
@@ -192,19 +192,19 @@ TEST_CASE("the time across a gap is no period: switched off and on, and masked")
 }
 
 TEST_CASE("a line at its limit is not masked") {
-  native_bench bench;
+  attended_bench bench;
   bench.set(PARAMETER_ENCODER_LIMIT, 20);
   bench.run_to(bench.tick(2));
   toggle(bench, LEFT_LINE, bench.tick(2) + 100, 7000, 20);
   bench.run_to(bench.tick(3) + 1);
-  CHECK(bench.telemetry().status == 0);
+  CHECK(bench.telemetry().status == STATUS_LATCHED);
   toggle(bench, LEFT_LINE, bench.tick(3) + 100, 7000, 21);
   bench.run_to(bench.tick(4) + 1);
-  CHECK(bench.telemetry().status == STATUS_ENCODER_LEFT_MASKED);
+  CHECK(bench.telemetry().status == (STATUS_LATCHED | STATUS_ENCODER_LEFT_MASKED));
 }
 
 TEST_CASE("switched off, encoders do not count") {
-  native_bench bench;
+  attended_bench bench;
   bench.set(PARAMETER_DEVICES, 0);
   bench.run_to(bench.tick(2));
   toggle(bench, LEFT_LINE, bench.tick(2) + 100, 7000, 20);

@@ -6,7 +6,7 @@
 #include "generated/parameters.h"
 
 TEST_CASE("every reading is 1 ms of 38 kHz on each LED, left first, and leaves the LEDs dark") {
-  native_bench bench;
+  attended_bench bench;
   bench.run_to(bench.tick(DEFAULT_INFRARED_PERIOD) - 1);
   for (const uint8_t pin : std::initializer_list<uint8_t>{PIN_INFRARED_LEFT_LED, PIN_INFRARED_RIGHT_LED}) {
     const auto edges = bench.edges_of(pin);
@@ -30,7 +30,7 @@ TEST_CASE("every reading is 1 ms of 38 kHz on each LED, left first, and leaves t
 }
 
 TEST_CASE("a low receiver at the burst's end is an object on that side") {
-  native_bench bench;
+  attended_bench bench;
   bench.drive(0, PIN_INFRARED_LEFT_RECEIVER, NATIVE_HIGH);
   bench.drive(0, PIN_INFRARED_RIGHT_RECEIVER, NATIVE_HIGH);
   const uint64_t burst = bench.slot(4 * DEFAULT_INFRARED_PERIOD + 3); /* the second right burst */
@@ -45,7 +45,7 @@ TEST_CASE("a low receiver at the burst's end is an object on that side") {
 }
 
 TEST_CASE("the age counts ticks since the reading") {
-  native_bench bench;
+  attended_bench bench;
   bench.run_to(bench.tick(0) + 1);
   CHECK(bench.telemetry().infrared_age == 255);
   for (unsigned tick = 1; tick <= 30; tick++) {
@@ -56,7 +56,7 @@ TEST_CASE("the age counts ticks since the reading") {
 
 TEST_CASE("the period is a parameter, odd or even") {
   for (int32_t period : {2, 3, 7, 250}) {
-    native_bench bench;
+    attended_bench bench;
     bench.set(PARAMETER_INFRARED_PERIOD, period);
     bench.run_to(bench.tick(20));
     bench.edges.clear();
@@ -77,7 +77,7 @@ TEST_CASE("the period is a parameter, odd or even") {
 }
 
 TEST_CASE("switched off: no bursts, no reading") {
-  native_bench bench;
+  attended_bench bench;
   bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS));
   bench.run_to(bench.tick(8));
   bench.edges.clear();

@@ -33,7 +33,7 @@ void echo(native_bench &bench, uint64_t cycles) {
 }  // namespace
 
 TEST_CASE("the trigger lasts 5 us and leaves the pin to the sensor") {
-  native_bench bench;
+  attended_bench bench;
   bench.run_to(bench.tick(1));
   const auto edges = bench.edges_of(PIN_PING);
   REQUIRE(edges.size() >= 4);
@@ -49,7 +49,7 @@ TEST_CASE("the trigger lasts 5 us and leaves the pin to the sensor") {
 TEST_CASE("an echo is measured to the nearest microsecond, from 115 us to 18.5 ms") {
   for (uint64_t us : {115u, 116u, 1000u, 2500u, 4096u, 5000u, 17493u, 18500u}) {
     for (uint64_t cycles : {us * 16 - 8, us * 16, us * 16 + 7}) {
-      native_bench bench;
+      attended_bench bench;
       bench.run_to(bench.tick(2));
       echo(bench, cycles);
       CHECK(bench.telemetry().ping_echo == us);
@@ -59,7 +59,7 @@ TEST_CASE("an echo is measured to the nearest microsecond, from 115 us to 18.5 m
 }
 
 TEST_CASE("the age counts from the tick in which the echo ended") {
-  native_bench bench;
+  attended_bench bench;
   bench.set(PARAMETER_PING_PERIOD, 10);
   bench.run_to(bench.tick(1));
   CHECK(bench.telemetry().ping_age == 255);
@@ -71,7 +71,7 @@ TEST_CASE("the age counts from the tick in which the echo ended") {
 }
 
 TEST_CASE("no echo: given up after 20 ms, reported as 0") {
-  native_bench bench;
+  attended_bench bench;
   bench.run_to(bench.tick(2));
   echo(bench, 3000 * 16);
   REQUIRE(bench.telemetry().ping_echo == 3000);
@@ -84,7 +84,7 @@ TEST_CASE("no echo: given up after 20 ms, reported as 0") {
 
 TEST_CASE("shorter than the sensor's shortest echo: noise, no echo") {
   for (uint64_t us : {1u, 50u, 99u, 100u}) {
-    native_bench bench;
+    attended_bench bench;
     bench.run_to(bench.tick(2));
     echo(bench, us * 16);
     CHECK(bench.telemetry().ping_echo == (us < 100 ? 0 : us));
@@ -93,7 +93,7 @@ TEST_CASE("shorter than the sensor's shortest echo: noise, no echo") {
 }
 
 TEST_CASE("a pin stuck high neither stops the tick nor the next reading") {
-  native_bench bench;
+  attended_bench bench;
   bench.run_to(bench.tick(2));
   bench.drive(bench.machine.now + 100, PIN_PING, NATIVE_HIGH);
   bench.run(50 * TICK);
@@ -106,7 +106,7 @@ TEST_CASE("a pin stuck high neither stops the tick nor the next reading") {
 
 TEST_CASE("triggers keep the period") {
   for (int32_t period : {4, 5, 9}) {
-    native_bench bench;
+    attended_bench bench;
     bench.set(PARAMETER_PING_PERIOD, period);
     bench.run_to(bench.tick(20));
     bench.edges.clear();
@@ -123,7 +123,7 @@ TEST_CASE("triggers keep the period") {
 }
 
 TEST_CASE("switched off: no trigger, no reading") {
-  native_bench bench;
+  attended_bench bench;
   bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS));
   bench.run_to(bench.tick(8));
   bench.edges.clear();

@@ -38,7 +38,7 @@ TEST_CASE("a bouncing touch is one touch") {
 
 TEST_CASE("touch and release are in the telemetry within two ticks, at any phase") {
   for (uint64_t phase = 0; phase < TICK; phase += 997) {
-    native_bench bench;
+    attended_bench bench;
     bench.drive(0, PIN_WHISKER_LEFT, NATIVE_HIGH);
     bench.drive(0, PIN_WHISKER_RIGHT, NATIVE_HIGH);
     const uint64_t touch = bench.tick(3) + 1 + phase; /* in tick 3 */
@@ -58,14 +58,14 @@ TEST_CASE("touch and release are in the telemetry within two ticks, at any phase
 }
 
 TEST_CASE("a free whisker pin is pulled up: no touch") {
-  native_bench bench;
+  attended_bench bench;
   bench.run(10 * TICK);
   CHECK(bench.telemetry().whiskers == 0);
   CHECK(bench.machine.output[PIN_WHISKER_LEFT] == NATIVE_PULLED_UP);
 }
 
 TEST_CASE("switched off, whiskers are silent") {
-  native_bench bench;
+  attended_bench bench;
   bench.drive(0, PIN_WHISKER_LEFT, NATIVE_LOW);
   bench.run(5 * TICK);
   CHECK(bench.telemetry().whiskers == WHISKERS_LEFT);

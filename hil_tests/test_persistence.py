@@ -1,0 +1,289 @@
+"""What a board remembers: saved parameters, boot counter, reset cause; with the power cut at every cell of a write."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from boebot import resources
+from boebot.link import messages
+from hil_tests.minimal_host import CYCLES_PER_S, TICK_S, MinimalHost, power_on
+from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
+from sim_bridge.tests.symbols import find_symbol
+
+pytestmark = pytest.mark.emulated
+
+CYCLES_PER_MS = CYCLES_PER_S // 1000
+CELL_S = 0.0034  # a write
+SAVED_BYTES = 44  # of one copy; firmware/src/storage.h
+COPIES = (0, 128)
+BOOT_RING = range(256, 384)
+BANDGAP, TRACK_WIDTH, LEFT_CENTRE, RIGHT_GAIN = 17, 12, 2, 5
+VALUES = ({BANDGAP: 1050, TRACK_WIDTH: 10_001, LEFT_CENTRE: 22_500, RIGHT_GAIN: -3100},
+          {BANDGAP: 1180, TRACK_WIDTH: 43_210, LEFT_CENTRE: 25_599, RIGHT_GAIN: 1234})  # fmt: skip
+
+OK, SUPPLY_LOW = messages.AnswerStatus.OK, messages.AnswerStatus.SUPPLY_LOW
+
+
+@pytest.fixture
+def board(board_url: str) -> Iterator[BoardAccess]:
+    board = power_on(board_url)
+    yield board
+    board.close()
+
+
+def choose(host: MinimalHost, values: dict[int, int]) -> None:
+    for parameter, value in values.items():
+        assert host.ask(messages.SetParameter, parameter, value).status == OK
+
+
+def in_force(host: MinimalHost) -> dict[int, int]:
+    return {parameter: host.ask(messages.GetParameter, parameter).value for parameter in VALUES[0]}
+
+
+def restart(host: MinimalHost, cause: ResetCause) -> messages.Hello:
+    """Resets the board and opens a session with it; returns what it says of itself."""
+    host.board.reset(cause)
+    return host.open()
+
+
+def test_saved_parameters_outlive_the_power(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    assert host.open().parameters_saved == 0
+    choose(host, VALUES[0])
+    assert host.ask(messages.SaveParameters).status == OK
+    choose(host, VALUES[1])  # and does not save
+    for cause in ResetCause:
+        assert restart(host, cause).parameters_saved == 1
+        assert in_force(host) == VALUES[0]
+
+
+def test_a_save_is_answered_when_it_is_written_and_no_tick_is_missed(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    host.open()
+    begin = board.now
+    assert host.ask(messages.SaveParameters).status == OK
+    assert SAVED_BYTES * CELL_S < (board.now - begin) / CYCLES_PER_S < SAVED_BYTES * CELL_S + 8 * TICK_S
+    telemetry = [message for message in host.messages if isinstance(message, messages.Telemetry)]
+    ticks = [message.tick for message in telemetry]
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+    assert telemetry[-1].overruns == 0
+    assert sum(message.status & messages.Status.SAVING != 0 for message in telemetry) >= SAVED_BYTES * CELL_S / TICK_S
+
+
+@pytest.mark.parametrize("damage", list(Damage))
+def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -> None:
+    """Cuts 3 ms apart meet each write of 3.4 ms; after each one the values are all old or all new."""
+    host = MinimalHost(board)
+    board.eeprom_damage(damage, garbage=0x33)
+    host.open()
+    choose(host, VALUES[0])
+    assert host.ask(messages.SaveParameters).status == OK
+    now = 0
+    hit: set[int] = set()
+    outcomes = []
+    for cut in range(70):
+        choose(host, VALUES[1 - now])
+        before = board.read_eeprom()
+        host.begin(messages.SaveParameters)
+        host.listen(cut * 0.003)
+        written = board.read_eeprom()
+        board.reset(ResetCause.POWER)
+        board.run(100)
+        after = board.read_eeprom()
+        hit |= {i for i in range(len(after)) if after[i] != written[i]}
+        assert host.open().parameters_saved == 1
+        found = in_force(host)
+        assert found in VALUES, f"after a cut {cut * 3} ms into a save: neither old nor new, {found}"
+        outcomes.append(found == VALUES[1 - now])
+        now = VALUES.index(found)
+        touched = {i // 128 for i in range(256) if before[i] != after[i]}
+        assert len(touched) <= 1, "a save touched the copy that is in force"
+    assert True in outcomes
+    assert False in outcomes
+    if damage is Damage.GARBAGE:
+        spared = [{i - at for i in hit if at <= i < at + SAVED_BYTES} for at in COPIES]
+        assert len(spared[0] | spared[1]) >= SAVED_BYTES - 2, "the cuts did not meet every cell"
+
+
+def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
+    """Started again and again, cut in mid-write: it goes up by one or stays, and never anything else."""
+    board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)
+    host = MinimalHost(board)
+    counter = host.hello().boot_counter
+    assert counter == 1
+    went_up = 0
+    for cut in range(18):
+        board.run(9_900 * CYCLES_PER_MS)
+        before = board.read_eeprom()
+        for _ in range(300):
+            if board.read_eeprom() != before:
+                break
+            board.run(CYCLES_PER_MS)
+        else:
+            raise AssertionError("the start was not counted after 10 s")
+        board.run(3 * cut * CYCLES_PER_MS)  # the first cell is written: into each of the others, and beyond
+        board.reset(ResetCause.POWER)
+        board.run(100)
+        assert {i for i, cell in enumerate(board.read_eeprom()) if cell != before[i]} <= set(BOOT_RING)
+        host.messages.clear()
+        found = host.hello().boot_counter
+        assert found in (counter, counter + 1)
+        went_up += found - counter
+        counter = found
+    assert 1 <= went_up <= 9
+    for _ in range(2):
+        board.run(10_300 * CYCLES_PER_MS)
+        board.reset(ResetCause.EXTERNAL)
+        host.messages.clear()
+        counter += 1
+        assert host.hello().boot_counter == counter
+
+
+def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    host.open()
+    choose(host, VALUES[0])
+    assert host.ask(messages.SaveParameters).status == OK
+    choose(host, VALUES[1])
+    number = host.begin(messages.SaveParameters)
+    host.listen(0.05)
+    board.supply(3.9)
+    answer = host.wait_for(messages.Answer, lambda answer: answer.number == number, 0.1, "the end of the save")
+    assert answer.status == SUPPLY_LOW
+    host.listen(0.01)  # the cell under way
+    before = board.read_eeprom()
+    assert host.ask(messages.SaveParameters).status == SUPPLY_LOW
+    host.listen(0.3)
+    assert board.read_eeprom() == before
+    board.supply(5.0)
+    restart(host, ResetCause.POWER)
+    assert in_force(host) == VALUES[0]
+
+
+def test_supply_is_told_in_millivolts(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    host.open()
+    for volts in (4.4, 5.0, 5.5):
+        board.supply(volts)
+        host.listen(0.05)
+        telemetry = [m for m in host.messages if isinstance(m, messages.Telemetry)][-1]
+        assert telemetry.supply == 1100 * 1024 // int(1.1 * 1024 / volts)
+
+
+@pytest.mark.parametrize("hundreds", [96, 192, 384, 576, 1152, 2500, 5000, 10000])
+def test_line_has_the_saved_rate_after_the_next_reset(board: BoardAccess, hundreds: int) -> None:
+    host = MinimalHost(board)
+    host.open()
+    assert host.ask(messages.SetParameter, 18, hundreds).status == OK
+    assert host.ask(messages.SaveParameters).status == OK
+    board.reset(ResetCause.EXTERNAL)
+    board.line_rate(100 * hundreds)
+    host.messages.clear()
+    assert host.open().session != 0
+    assert host.ask(messages.GetParameter, 18, within_s=2.0).value == hundreds
+
+
+# ---- resets ----------------------------------------------------------------------------------------------------------
+
+
+def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    assert host.hello().reset_cause == messages.ResetCause.POWER
+    for cause, told in (
+        (ResetCause.EXTERNAL, messages.ResetCause.EXTERNAL),
+        (ResetCause.BROWN_OUT, messages.ResetCause.BROWN_OUT),
+        (ResetCause.WATCHDOG, messages.ResetCause.WATCHDOG),
+        (ResetCause.POWER, messages.ResetCause.POWER),
+    ):
+        board.reset(cause)
+        assert host.hello().reset_cause == told
+
+
+def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:
+    host = MinimalHost(board)
+    nonces = [host.hello().board_nonce]
+    for i in range(40):
+        board.reset(ResetCause.EXTERNAL if i % 2 else ResetCause.WATCHDOG)
+        nonces.append(host.hello().board_nonce)
+    assert len(set(nonces)) == len(nonces)
+    assert all(0 < nonce < 1 << 21 for nonce in nonces)
+
+
+JUMP_TO_ITSELF, CLI = b"\xff\xcf", b"\xf8\x94"
+IN_R24_MCUSR, LDI_R24_0 = b"\x84\xb7", b"\x80\xe0"
+
+
+def patched(folder: Path, *patches: tuple[str, bytes, bytes]) -> str:
+    """A copy of the image in which functions begin with other code: (function, what is there, what shall be there)."""
+    original = (resources.folder("images") / "shieldbot.elf").read_bytes()
+    image = bytearray(original)
+    elf = ELFFile(io.BytesIO(original))
+    symbols, text = elf.get_section_by_name(".symtab"), elf.get_section_by_name(".text")
+    assert isinstance(symbols, SymbolTableSection)
+    assert text is not None
+    for function, old, new in patches:
+        found = symbols.get_symbol_by_name(function)
+        assert found is not None
+        (symbol,) = found
+        start = text["sh_offset"] + symbol["st_value"] - text["sh_addr"]
+        assert image[start : start + len(old)] == old, function
+        image[start : start + len(new)] = new
+    path = folder / "patched.elf"
+    path.write_bytes(image)
+    return str(path)
+
+
+# Optiboot clears MCUSR before the program starts: the program finds 0.
+BEHIND_OPTIBOOT = ("hal_before_start", IN_R24_MCUSR, LDI_R24_0)
+HANGS = ("identity_send", b"", JUMP_TO_ITSELF)
+HANGS_DEAF = ("identity_send", b"", CLI + JUMP_TO_ITSELF)
+
+
+@pytest.mark.parametrize(
+    ("patches", "told", "reset_s"),
+    [
+        ([HANGS], messages.ResetCause.WATCHDOG, 0.141),
+        ([HANGS_DEAF], messages.ResetCause.WATCHDOG, 0.250),
+        ([HANGS, BEHIND_OPTIBOOT], messages.ResetCause.WATCHDOG, 0.141),
+        ([HANGS_DEAF, BEHIND_OPTIBOOT], messages.ResetCause.UNKNOWN, 0.250),
+    ],
+    ids=["hangs", "hangs with interrupts off", "hangs behind Optiboot", "hangs with interrupts off behind Optiboot"],
+)
+def test_a_hang_is_told(
+    tmp_path: Path, patches: list[tuple[str, bytes, bytes]], told: messages.ResetCause, reset_s: float
+) -> None:
+    """The watchdog warns after 125 ms and resets 16 ms later, or another 125 ms later if nobody heard it."""
+    board = power_on("avr", image=patched(tmp_path, *patches))
+    host = MinimalHost(board)
+    host.hello()
+    host.send(messages.Identify())
+    host.listen(reset_s - 0.003)
+    assert board.counters()["resets"] == 0
+    assert host.hello().reset_cause == told
+    assert board.counters()["resets"] == 1
+    board.reset(ResetCause.EXTERNAL)
+    behind = BEHIND_OPTIBOOT in patches
+    assert host.hello().reset_cause == (messages.ResetCause.UNKNOWN if behind else messages.ResetCause.EXTERNAL)
+
+
+@pytest.mark.parametrize("cause", [ResetCause.POWER, ResetCause.EXTERNAL, ResetCause.BROWN_OUT])
+def test_behind_optiboot_other_causes_are_unknown(tmp_path: Path, cause: ResetCause) -> None:
+    host = MinimalHost(power_on("avr", image=patched(tmp_path, BEHIND_OPTIBOOT)))
+    host.hello()
+    host.board.reset(cause)
+    assert host.hello().reset_cause == messages.ResetCause.UNKNOWN
+
+
+@pytest.mark.parametrize("pin_map", ["shieldbot", "shieldbot-quad"])
+def test_what_a_reset_leaves_alone_lies_where_no_bootloader_writes(pin_map: str) -> None:
+    """Optiboot's buffer is 0x100 to 0x1FF, its stack at the end of RAM (0x8FF)."""
+    noinit = find_symbol(resources.folder("images") / f"{pin_map}.elf", "noinit")
+    assert noinit.size == 32
+    assert noinit.address >= 0x200
+    assert noinit.address + noinit.size <= 0x900 - 64

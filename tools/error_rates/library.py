@@ -1,0 +1,95 @@
+"""The C of this folder, compiled with the firmware's frame.c for one end of the link and loaded.
+
+A protection of the frame can be taken away: from a copy of frame.c before it is compiled, or from the sender. That is
+how tests show what each of them is there for.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cffi
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+FIRMWARE = ROOT / "firmware" / "src"
+SOURCES = ("channel.c", "c_decoder.c", "wrong_bits.c")
+BUILT = ROOT / "build" / "error_rates"
+FLAGS = ("-std=gnu11", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-shared", "-fPIC")
+# The end that receives -> what compiles frame.c for it.
+ENDS = {"board": (), "host": ("-DFRAME_OF_HOST",)}
+
+
+class Ablation(NamedTuple):
+    """How to build the frame without one of its protections.
+
+    Attributes:
+        replaced: texts of frame.c and what stands in their places.
+        flags: for the compiler.
+    """
+
+    replaced: tuple[tuple[str, str], ...] = ()
+    flags: tuple[str, ...] = ()
+
+
+ABLATIONS = {
+    "checksum": Ablation((("memcmp(check, &decoder->bytes[size], CHECK_BYTES) == 0", "true"),)),
+    "exact length": Ablation((("frame_accepted_length(id) != (int16_t)(size - 3)", "frame_accepted_length(id) < 0"),)),
+    "stuffing": Ablation(((" && unstuff(decoder->bytes, size)", " && (unstuff(decoder->bytes, size), true)"),)),
+    "session seed": Ablation(
+        (("message_is_handshake(id) ? FRAME_SEED : session", "FRAME_SEED + 0u * (id + session)"),)
+    ),
+    "leading delimiter": Ablation((), ("-DCHANNEL_WITHOUT_LEADING_DELIMITER",)),
+}
+
+
+@cache
+def ffi() -> cffi.FFI:
+    """The declarations of interface.cdef."""
+    declared = cffi.FFI()
+    declared.cdef((HERE / "interface.cdef").read_text(encoding="utf-8"))
+    return declared
+
+
+@cache
+def library(end: str, without: str = "") -> Any:
+    """The functions of interface.cdef, compiled for the receiver at `end`.
+
+    Args:
+        end: "board" or "host".
+        without: the protection to take away, one of ABLATIONS; "" for none.
+
+    Raises:
+        ValueError: frame.c does not hold what the ablation replaces.
+    """
+    ablation = ABLATIONS[without] if without else Ablation()
+    text = (FIRMWARE / "link" / "frame.c").read_text(encoding="utf-8")
+    for before, after in ablation.replaced:
+        if text.count(before) != 1:
+            raise ValueError(f"without {without}: frame.c does not hold {before!r} once")
+        text = text.replace(before, after)
+    folder = BUILT / "-".join([end, *without.split()])
+    folder.mkdir(parents=True, exist_ok=True)
+    frame = folder / "frame.c"
+    frame.write_text(text, encoding="utf-8")
+    return ffi().dlopen(str(compiled(folder, [*ENDS[end], *ablation.flags], frame)))
+
+
+def compiled(folder: Path, flags: list[str], frame: Path) -> Path:
+    """The shared library; compiled anew only when a source has changed, and never while another process reads it."""
+    sources = [*(HERE / name for name in SOURCES), frame]
+    seen = [*sources, *HERE.glob("*.h"), FIRMWARE / "generated" / "messages.h", *(FIRMWARE / "link").glob("*.h")]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in seen) + repr(flags).encode()).hexdigest()[:16]
+    target = folder / f"{digest}.so"
+    if not target.exists():
+        partial = folder / f"{digest}.{os.getpid()}.so"
+        includes = [f"-I{HERE}", f"-I{FIRMWARE}"]
+        command = ["cc", *FLAGS, *flags, *includes, *map(str, sources), "-lm", "-o", str(partial)]
+        subprocess.run(command, check=True)
+        partial.replace(target)
+    return target

@@ -1,0 +1,109 @@
+"""Spoilt streams of frames (channel.h) through the decoders in C and in Python."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from hashlib import sha256
+from typing import Any
+
+from tools.error_rates.library import ffi, library
+from tools.error_rates.statistics import LOST_ALLOWED, RATE_ALLOWED, upper_bound
+
+# The faults in the order of channel_fault, as people call them.
+FAULTS = (
+    "bit errors, 1e-4",
+    "bit errors, 3e-3",
+    "bytes dropped",
+    "bytes inserted",
+    "bytes doubled",
+    "bursts",
+    "truncation",
+    "concatenation",
+    "noise",
+    "earlier session",
+    "foreign frames",
+)
+SESSION_ROUNDS = 1000
+
+
+@dataclass
+class Tally:
+    """What a receiver made of some rounds; the counts are those of channel_tally."""
+
+    receiver: str
+    fault: str
+    rounds: int = 0
+    sent: int = 0
+    damaged: int = 0
+    accepted: int = 0
+    wrong: int = 0
+    lost: int = 0
+    excess: int = 0
+
+    def add(self, counts: Any) -> None:
+        """Adds the counts of a channel_tally or another Tally."""
+        for field in fields(self)[2:]:
+            setattr(self, field.name, getattr(self, field.name) + int(getattr(counts, field.name)))
+
+    @property
+    def wrong_bound(self) -> float:
+        """Rate of wrong frames per damaged frame that is not exceeded, at 95 % confidence."""
+        return upper_bound(self.wrong, self.damaged) if self.damaged else 1.0
+
+    @property
+    def lost_rate(self) -> float:
+        """Untouched frames lost per damaged frame."""
+        return self.lost / self.damaged if self.damaged else 0.0
+
+    @property
+    def met(self) -> bool:
+        """Whether everything asked for is shown."""
+        return self.wrong_bound <= RATE_ALLOWED and self.lost_rate <= LOST_ALLOWED and self.excess == 0
+
+    def row(self) -> dict[str, object]:
+        """Everything, for JSON."""
+        return {**asdict(self), "wrong_bound": self.wrong_bound, "lost_rate": self.lost_rate, "met": self.met}
+
+
+def pooled(tallies: list[Tally]) -> Tally:
+    """All faults of one receiver together."""
+    total = Tally(tallies[0].receiver, "all")
+    for tally in tallies:
+        total.add(tally)
+    return total
+
+
+def seed_of(receiver: str, fault: int, part: int) -> int:
+    """Start of the random numbers: fixed, and another one for each receiver, fault and part of the run."""
+    return int.from_bytes(sha256(f"{receiver}/{fault}/{part}".encode()).digest()[:8], "little")
+
+
+def through_c(end: str, fault: int, rounds: int, part: int = 0, without: str = "") -> Tally:
+    """Rounds through the decoder in C at that end ("board" or "host"), if wanted without one of its protections."""
+    tally = Tally(f"C, {end}'s end", FAULTS[fault])
+    counts = ffi().new("channel_tally *")
+    library(end, without).c_decoder_run(fault, rounds, seed_of(tally.receiver, fault, part), counts)
+    tally.add(counts)
+    return tally
+
+
+def through_python(fault: int, rounds: int, part: int = 0) -> Tally:
+    """Rounds through the Python library's decoder."""
+    from boebot.link.frame import Decoder
+
+    tally = Tally("Python", FAULTS[fault])
+    lib, buffer = library("host"), ffi().buffer
+    line, spoilt = ffi().new("channel *"), ffi().new("channel_round *")
+    counts = ffi().new("channel_tally *")
+    lib.channel_start(line, seed_of(tally.receiver, fault, part))
+    for number in range(rounds):
+        if number % SESSION_ROUNDS == 0:
+            lib.channel_session(line, 0)
+            decoder = Decoder(line.seed)
+            decoder.feed(b"\0")
+        lib.channel_send(line, fault, spoilt)
+        for message_id, sequence, payload in decoder.feed(buffer(spoilt.wire, spoilt.size)[:]):
+            lib.channel_accept(spoilt, message_id, sequence, payload, len(payload))
+        lib.channel_count(spoilt, counts)
+    tally.add(counts)
+    return tally

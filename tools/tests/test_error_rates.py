@@ -1,0 +1,100 @@
+"""What the frame's protections let through (tools/error_rates): here a part, all of it in `make soak`.
+
+Here: every set of one and two wrong bits in all messages, of three in frames of up to 28 bytes on the line, random
+ones beyond; streams through the decoders in C until the allowed rate is shown for all faults together, some through
+Python and the image. There: every set of three wrong bits, and the allowed rate for every single fault.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from boebot.link import messages
+from tools.error_rates import library, wrong_bits
+from tools.error_rates.statistics import LOST_ALLOWED, RATE_ALLOWED, trials_needed, upper_bound
+from tools.error_rates.streams import FAULTS, Tally, pooled, through_c, through_python
+
+ENDS = tuple(library.ENDS)
+SHORT = 28  # wire bytes up to which all sets of three wrong bits are tried here
+SAMPLES = 5000
+
+
+def test_bound_is_that_of_clopper_and_pearson() -> None:
+    """Against the rule of three and values of their table (events, trials, bound at 95 %)."""
+    assert upper_bound(0, 1_000_000) == pytest.approx(3e-6, rel=2e-3)
+    for events, trials, bound in ((0, 10, 0.2589), (1, 10, 0.3942), (5, 10, 0.7776), (9, 10, 0.9949), (2, 50, 0.1206)):
+        assert upper_bound(events, trials) == pytest.approx(bound, abs=1e-4)
+    assert upper_bound(10, 10) == 1.0
+    assert [trials_needed(0), trials_needed(1)] == pytest.approx([3_141_000, 4_974_000], rel=1e-3)
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("bits", wrong_bits.BITS)
+def test_no_frame_with_up_to_five_wrong_bits_is_accepted(end: str, bits: int) -> None:
+    patterns = 0
+    for size in wrong_bits.lengths(end):
+        exhaustive = bits <= 2 or (bits == 3 and size <= SHORT)
+        tally = wrong_bits.measure(end, size, bits, 0 if exhaustive else SAMPLES)
+        assert (tally.accepted, tally.lost) == (0, 0), tally
+        patterns += tally.patterns
+    assert patterns > 0
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_every_message_is_among_the_lengths(end: str) -> None:
+    mine = {kind.ID for kind in wrong_bits.kinds(end)}
+    assert mine == {number for number in messages.MESSAGES if (number >= 0x80) == (end == "host")}
+    assert {kind.LENGTH + 8 for kind in wrong_bits.kinds(end)} == set(wrong_bits.lengths(end))
+
+
+def assert_nothing_lost(tallies: list[Tally]) -> None:
+    for tally in tallies:
+        assert tally.excess == 0, tally
+        assert tally.lost_rate <= LOST_ALLOWED, tally
+        assert tally.accepted > tally.rounds, "most neighbours of what was damaged arrived"
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_rate_of_wrong_frames_in_c(end: str) -> None:
+    tallies = [through_c(end, fault, 300_000) for fault in range(len(FAULTS))]
+    assert_nothing_lost(tallies)
+    assert pooled(tallies).wrong_bound <= RATE_ALLOWED, pooled(tallies)
+
+
+def test_python_accepts_no_wrong_frame() -> None:
+    tallies = [through_python(fault, 20_000) for fault in range(len(FAULTS))]
+    assert_nothing_lost(tallies)
+    assert pooled(tallies).damaged > 200_000 and pooled(tallies).wrong == 0
+
+
+# Without a protection -> the faults that then get through, and the least share of damaged frames that are accepted.
+GETS_THROUGH = {
+    "checksum": {"bit errors, 1e-4": 0.2, "bursts": 0.05, "earlier session": 0.5},
+    "exact length": {"foreign frames": 0.2},
+    "stuffing": {"foreign frames": 0.2},
+    "session seed": {"earlier session": 0.5},
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("protection", GETS_THROUGH)
+def test_without_a_protection_wrong_frames_get_through(protection: str, end: str) -> None:
+    for fault, least in GETS_THROUGH[protection].items():
+        tally = through_c(end, FAULTS.index(fault), 20_000, without=protection)
+        assert tally.wrong > least * tally.damaged, tally
+        assert not tally.met
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_without_the_leading_delimiter_neighbours_are_lost(end: str) -> None:
+    for fault in ("bit errors, 1e-4", "truncation", "noise"):
+        tally = through_c(end, FAULTS.index(fault), 20_000, without="leading delimiter")
+        assert tally.lost_rate > LOST_ALLOWED and not tally.met, tally
+
+
+def test_without_the_checksum_wrong_bits_get_through() -> None:
+    frame = library.ffi().new("wrong_bits_frame *", {"id": 0x10, "length": 8, "seed": 5})
+    for without, caught in (("", True), ("checksum", False)):
+        counts = library.ffi().new("wrong_bits_tally *")
+        library.library("board", without).wrong_bits_all(frame, 1, counts)
+        assert counts.patterns == 8 * 16 and (counts.accepted == 0) == caught
