@@ -61,19 +61,19 @@ def listen(transport: Transport, seconds: float) -> list[tuple[int, int, bytes]]
 
 @pytest.mark.parametrize("tcp", PORTS)
 def test_client_meets_a_robot_that_just_started(tcp: int | None) -> None:
+    nonces: set[int] = set()
     with served(tcp) as url:
         for _ in range(2):  # a second client finds it as the first one did
             time.sleep(0.1)
             client = open_port(url, 500_000)
-            heard = listen(client, 0.5)
-            assert heard[0][0] == messages.Hello.ID
-            ticks = [messages.Telemetry.unpack(p).tick for kind, _, p in heard if kind == messages.Telemetry.ID]
-            assert ticks[0] <= 1
-            assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
-            assert 25 <= len(ticks) <= 55  # real time: 50
-            client.write(frame.encode(messages.HelloRequest.ID, 0, messages.HelloRequest(1).pack()))
-            assert any(kind == messages.Hello.ID for kind, _, _ in listen(client, 0.2))
+            hellos = [messages.Hello.unpack(payload) for kind, _, payload in listen(client, 1.0)]
+            assert 7 <= len(hellos) <= 12  # real time: one after the start, then ten a second
+            assert {(hello.reset_cause, hello.session) for hello in hellos} == {(messages.ResetCause.EXTERNAL, 0)}
+            nonces |= {hello.board_nonce for hello in hellos}
+            client.write(frame.encode(messages.Identify.ID, 0, b""))
+            assert any(kind == messages.Identity.ID for kind, _, _ in listen(client, 0.2))
             client.close()
+    assert len(nonces) == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals")
@@ -83,14 +83,14 @@ def test_the_client_sets_the_bit_rate_of_a_pty() -> None:
             client = open_port(url, baud)
             time.sleep(0.05)
             assert listen(client, 0.3) == []
-            client.write(frame.encode(messages.HelloRequest.ID, 0, messages.HelloRequest(1).pack()))
+            client.write(frame.encode(messages.Identify.ID, 0, b""))
             assert listen(client, 0.2) == []
             client.close()
             time.sleep(0.05)
         client = open_port(url, 500_000)
-        heard = listen(client, 0.3)
-        assert heard[0][0] == messages.Hello.ID
-        assert len(heard) > 10
+        heard = listen(client, 0.5)
+        assert {kind for kind, _, _ in heard} == {messages.Hello.ID}
+        assert len(heard) >= 3
         client.close()
 
 
@@ -99,20 +99,20 @@ def test_the_bit_rate_may_change_while_the_port_is_open() -> None:
     with served(None) as url, serial.Serial(url, 500_000, timeout=0.05) as port:
 
         def hear() -> int:
-            """Messages in 0.3 s, the first one perhaps cut."""
+            """Messages in 0.5 s, the first one perhaps cut."""
             port.reset_input_buffer()
-            decoder, end, count = frame.Decoder(), time.monotonic() + 0.3, 0
+            decoder, end, count = frame.Decoder(), time.monotonic() + 0.5, 0
             while time.monotonic() < end:
                 count += len(decoder.feed(port.read(64)))
             return count
 
-        assert hear() > 10
+        assert hear() >= 3
         port.baudrate = 115_200
         time.sleep(0.05)
         assert hear() == 0
         port.baudrate = 500_000
         time.sleep(0.05)
-        assert hear() > 10
+        assert hear() >= 3
 
 
 def test_client_that_does_not_read_stops_nobody() -> None:
