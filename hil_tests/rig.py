@@ -170,14 +170,14 @@ class Rig:
             self.drive(left, right)
             self.listen(min(0.05, end - self.transport.now()))
 
-    def flood(self, left: float, right: float, seconds: float) -> None:
+    def flood(self, setpoint: messages.SetpointSignal, seconds: float) -> None:
         """Saturates the line both ways for that long: set-points and a request, again and again without a gap, 50,000
-        bytes/s, so that answers and telemetry fill the other direction too."""
+        bytes/s, so that answers and telemetry fill the other direction too. Each set-point answers the newest tick."""
         wire = bytearray()
         request = self.numbered(messages.GetParameter, 0)
         for _ in range(round(seconds / TICK_S)):
             while len(wire) < LINE_BYTES_PER_TICK:
-                wire += self.encode(self.signal(left, right))
+                wire += self.encode(setpoint._replace(answers_tick=self.tick))
                 wire += b"".join(self.encode(request) for _ in range(3))
             self.transport.write(bytes(wire[:LINE_BYTES_PER_TICK]))
             del wire[:LINE_BYTES_PER_TICK]

@@ -37,7 +37,7 @@ def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> 
         period = CYCLES_PER_S // 1500 + pin  # not in step with each other or with the tick
         rig.board.square_wave(pin, period, seconds=1.0)
     before = len(rig.received)
-    rig.flood(0.3, -0.3, seconds=0.9)
+    rig.flood(messages.SetpointSignal(3000, -3000, 250, 0), seconds=0.9)
     assert len(rig.received) - before >= 0.95 * 0.9 * BYTES_PER_S, "the board's direction was not saturated"
     for pin, expected in ((LEFT, 1560 * CYCLES_PER_US), (RIGHT, 1560 * CYCLES_PER_US)):
         widths = rig.pulses(pin)[3:, 1]

@@ -313,6 +313,7 @@ class _Run:
             if link.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
+            restarted = link.board_resets != self.resets
             if not received:
                 if transport.now() - heard_s > SILENCE_S + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
@@ -324,10 +325,11 @@ class _Run:
                     due = tick + -tick % n
                     time_zero = -due * tick_s
                     self.clock_offset_s = host_s + (due - tick) * tick_s
-                elif tick <= last:  # the board was reset: its ticks begin afresh
+                elif restarted or tick <= last:  # the board was reset: its ticks begin afresh
+                    restarted = False
                     due = tick + -tick % n
                     time_zero = self._time_after_reset(times, host_s) - tick * tick_s
-                    self.resets += 1
+                    self.resets = link.board_resets
                 last = tick
                 if tick >= due or times:
                     telemetry_log.append(payload)

@@ -29,6 +29,7 @@ from boebot.boards import Truth
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
+from boebot.link.messages import AnswerStatus, EventKind, Latch, Status
 from boebot.parameters import parameters_of
 from boebot.robots import RobotDescription, load_robot
 
@@ -40,12 +41,6 @@ HELLO_TICKS, HELLO_SESSION_TICKS = 10, 20
 COUNTERS_TICKS = 64
 QUEUE = 4
 EEPROM_S = 0.2  # for all parameters
-Status, Latch, AnswerStatus, EventKind = (
-    messages.Status,
-    messages.Latch,
-    messages.AnswerStatus,
-    messages.EventKind,
-)
 Setpoint = messages.SetpointSignal | messages.SetpointSpeed | messages.SetpointCoast
 
 
@@ -247,7 +242,7 @@ class Peer:
             self._request(message)
 
     def _request(self, message: messages.Message) -> None:
-        number = message[0]
+        number: int = message.number  # type: ignore[union-attr]
         if number == self._request_number and self.protections.numbers:
             self.counts["duplicate"] += 1
             if self._last_answer is not None:
@@ -565,7 +560,7 @@ class InProcess:
         self._order = itertools.count()
         self._coming: list[tuple[float, int, str, bytes]] = []  # heap of what is under way
         self._free = {"board": 0.0, "host": 0.0}  # when the line in that direction is free
-        self._starts = peer.starts
+        self._calls: dict[int, Callable[[], None]] = {}
         peer.now = self.now
         self._schedule(0.0, "tick", b"")
 
@@ -612,11 +607,19 @@ class InProcess:
     def _schedule(self, at: float, what: str, data: bytes) -> None:
         heapq.heappush(self._coming, (at, next(self._order), what, data))
 
+    def at(self, when_s: float, call: Callable[[], None]) -> None:
+        """Calls that at that time, in the midst of whatever goes on."""
+        number = next(self._order)
+        self._calls[number] = call
+        heapq.heappush(self._coming, (when_s, number, "call", number.to_bytes(8, "big")))
+
     def _happen(self, what: str, data: bytes) -> None:
         if what == "board":
             self.peer.receive(data)
         elif what == "host":
             self._buffer.append((self._now, data))
+        elif what == "call":
+            self._calls.pop(int.from_bytes(data, "big"))()
         else:
             self.before_tick(self.peer.ticks)
             self.peer.tick()

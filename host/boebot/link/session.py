@@ -146,7 +146,10 @@ class Link:
         self._open_due = _NEVER
         self._greeted_s = 0.0  # when the last hello came
         self._foreign_since: float | None = None  # since when another host is known to have the board
-        self._last_tick = -1
+        self._replaced = False  # a hello said so; a late copy of an old one may have
+        self._last_tick = -1  # of the session before
+        self._last_heard_s = 0.0
+        self._latest_s = 0.0
         self._due = _NEVER  # when something is to be sent next
         self._requests = Requests()
         self._events = Events()
@@ -554,6 +557,8 @@ class Link:
         if self.sessions == 0:
             self.decoder.bad = self.decoder.lost = self.decoder.resynchronised = 0  # leftovers of another session
         self.is_open = True
+        self._foreign_since = None
+        self._replaced = False
         self.sessions += 1
         self._open_due = _NEVER
         self._requests.new_session()
@@ -569,6 +574,7 @@ class Link:
         self._telemetry = []
         if self.latest is not None:
             self._last_tick = int.from_bytes(self.latest[:4], "little")
+            self._last_heard_s = self._latest_s
         self.latest = None
         self._probes.clear()
         self._probe_due = _NEVER
@@ -627,6 +633,7 @@ class Link:
                     if self.latest is None:
                         self._hear_first_telemetry(payload, stamp)
                     self.latest = payload
+                    self._latest_s = stamp
                     time_us = int.from_bytes(payload[4:8], "little")
                     self._telemetry.append((payload, *self.clock.observe(time_us, stamp)))
         if len(self._telemetry) > _TELEMETRY_ROOM:
@@ -640,9 +647,10 @@ class Link:
                 self._refusing = False
 
     def _hear_first_telemetry(self, payload: bytes, now: float) -> None:
-        """Of a session: a count of ticks that is behind that of the session before tells of a reset."""
+        """Of a session: a count of ticks that has not gone on from that of the session before tells of a reset."""
         tick = int.from_bytes(payload[:4], "little")
-        if tick < self._last_tick:
+        passed = (now - self._last_heard_s) / self._tick_s
+        if self._last_tick >= 0 and tick < passed + self._last_tick / 2:  # after a reset at most `passed`
             self.board_resets += 1
             self.board_counters.restarted()
         self.clock.expect(tick * self._tick_s, now)
@@ -656,6 +664,7 @@ class Link:
         self._time_out_s = hello.session_time_out / 1000
         if hello.session and hello.session == self._session:
             self.hello = hello
+            self._replaced = False
             if not self.is_open:
                 self._opened(now)
         elif hello.session == 0 or hello.session in self._own_sessions:
@@ -677,6 +686,9 @@ class Link:
 
     def _hear_other_host(self, hello: messages.Hello, now: float) -> None:
         if self.is_open:
+            if not self._replaced:  # or a late copy of an earlier hello: the next one tells
+                self._replaced = True
+                return
             self.sessions_lost += 1
             self._end_session()
             self._session = 0

@@ -1,0 +1,199 @@
+"""The whole link, kit's end and board's, over a bad line: bit errors, copies, a stall, resets. Nothing is lost that
+must arrive, commands come in time, and what was held up moves nothing."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Iterator
+
+import pytest
+
+from boebot.boards import BoardRequest, BoardSession, open_board
+from boebot.link import messages
+from boebot.link.session import Link
+from boebot.robots import load_robot
+
+pytestmark = pytest.mark.emulated
+
+TICK_S = 0.010
+PING = messages.PARAMETERS["ping_period"]
+
+
+class BadLine:
+    """A transport that damages what it carries, both ways, and may hold back what goes to the board."""
+
+    realtime = False
+
+    def __init__(self, session: BoardSession, bit_errors: float = 0.0, copies: float = 0.0, seed: int = 1) -> None:
+        self._inner = session.transport
+        self.name = self._inner.name
+        self.bit_errors, self.copies = bit_errors, copies
+        self.stalled = False
+        self.held = bytearray()
+        self.flipped = 0
+        self._draw = random.Random(f"bad line {seed}")
+        self._next = self._gap()
+
+    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
+        return self._damage(self._inner.read(wait_s, quiet_s))
+
+    def write(self, data: bytes) -> None:
+        data = self._damage(data)
+        if self.copies and self._draw.random() < self.copies:
+            data += data
+        if self.stalled:
+            self.held += data
+        else:
+            self._inner.write(data)
+
+    def release(self) -> None:
+        """Lets all go that was held back."""
+        self.stalled = False
+        self._inner.write(bytes(self.held))
+        self.held.clear()
+
+    def now(self) -> float:
+        return self._inner.now()
+
+    def close(self) -> None:
+        self._inner.close()
+
+    def _gap(self) -> int:
+        """Bits until the next wrong one."""
+        return int(self._draw.expovariate(self.bit_errors)) if self.bit_errors else 1 << 62
+
+    def _damage(self, data: bytes) -> bytes:
+        bits = 8 * len(data)
+        if self._next >= bits:
+            self._next -= bits
+            return data
+        damaged = bytearray(data)
+        while self._next < bits:
+            damaged[self._next // 8] ^= 1 << self._next % 8
+            self.flipped += 1
+            self._next += 1 + self._gap()
+        self._next -= bits
+        return bytes(damaged)
+
+
+@pytest.fixture
+def board(board_url: str) -> Iterator[BoardSession]:
+    session = open_board(board_url, BoardRequest(robot=load_robot("shieldbot"), arena="empty", noise=False))
+    yield session
+    session.close()
+
+
+def listen(link: Link, seconds: float) -> None:
+    end = link.transport.now() + seconds
+    while link.transport.now() < end - 1e-9:
+        link.poll(end - link.transport.now())
+
+
+def pulses(board: BoardSession) -> int:
+    """How many pulses the servos' pins gave."""
+    log = board.board.pin_log()  # type: ignore[attr-defined]
+    return len(log[((log["pin"] == 13) | (log["pin"] == 12)) & (log["level"] == 1)])
+
+
+@pytest.mark.parametrize(("bit_errors", "copies"), [(1e-4, 0.0), (1e-3, 0.0), (1e-4, 0.3)])
+def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float, copies: float) -> None:
+    """Each sets another value and reads it back: nothing lost, nothing twice, nothing swapped. At 1e-4, 99 of 100
+    commands are answered within three ticks."""
+    line = BadLine(board, bit_errors, copies)
+    link = Link(line, record=False)
+    link.open()
+    latencies = []
+    draw = random.Random(5)
+    for index in range(300):
+        listen(link, draw.uniform(0.0, TICK_S))  # at every phase of the tick
+        value = 4 + index % 200
+        begun = line.now()
+        assert link.request(messages.SetParameter, PING.id, value, what="set").value == value
+        latencies.append(line.now() - begun)
+        if index % 10 == 0:
+            assert link.get_parameter("ping_period") == value
+    latencies.sort()
+    assert link.sessions == 1
+    assert line.flipped > (10 if bit_errors < 1e-3 else 100), "the line was bad"
+    if bit_errors <= 1e-4:
+        assert latencies[round(0.99 * len(latencies))] <= 3 * TICK_S, latencies[-10:]
+    listen(link, 1.5)
+    assert link.board_counters.values["bad"] > 0 and link.counters().bad > 0
+    if copies:
+        assert link.board_counters.values["duplicate"] > 50
+
+
+@pytest.mark.parametrize("bit_errors", [1e-4, 1e-3])
+def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float) -> None:
+    """A whisker is pressed and let go: every change is told, once."""
+    line = BadLine(board, bit_errors, seed=2)
+    link = Link(line, record=False)
+    link.open()
+    listen(link, 0.2)
+    link.events()
+    pressed = []
+    for _ in range(60):
+        for level, flags in ((0, 1), (2, 0)):
+            board.board.drive(5, level, board.board.cycle)  # type: ignore[attr-defined]
+            listen(link, 0.15)
+            pressed.append(flags)
+    listen(link, 0.5)
+    told = [event for event in link.events() if event.kind == messages.EventKind.WHISKERS]
+    assert [event.value & 0xFF for event in told] == pressed
+    assert all(a.time < b.time for a, b in itertools.pairwise(told))
+    assert link.sessions == 1
+
+
+@pytest.mark.parametrize("held_s", [2.0, 0.9])
+def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: float) -> None:
+    """The line to the board stalls with motion commands queued, and lets them go: whether the board has ended the
+    session meanwhile (2 s) or not, no pulse comes of them."""
+    line = BadLine(board)
+    link = Link(line, record=False)
+    link.open()
+    link.set_parameter("session_time_out", 1000)
+    link.arm()
+    listen(link, 0.05)
+    assert link.latest is not None
+    line.stalled = True
+    sessions = link.sessions
+    end = line.now() + held_s - 0.3
+    tick = 0
+    while line.now() < end:
+        listen(link, TICK_S)
+        if link.latest is not None:
+            tick = messages.Telemetry.unpack(link.latest).tick
+        link.send_signal(1.0, 1.0, 250, tick)
+    listen(link, 0.3)  # the last of them has outlived itself
+    assert len(line.held) > 500
+    line.release()
+    listen(link, 0.5)
+    assert pulses(board) == 0
+    assert (link.sessions == sessions) is (held_s < 1.0)
+    link.arm()
+    listen(link, 0.02)
+    link.send_signal(1.0, 1.0, 250, messages.Telemetry.unpack(link.latest).tick)
+    listen(link, 0.1)
+    assert pulses(board) > 0, "a fresh one moves it"
+
+
+@pytest.mark.parametrize("at_s", [0.0, 0.011, 0.137, 0.5])
+def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s: float) -> None:
+    line = BadLine(board)
+    link = Link(line, record=False)
+    link.open()
+    link.arm()
+    listen(link, at_s)
+    for cause in ("external", "brown_out", "watchdog"):
+        sessions = link.sessions
+        begun = line.now()
+        board.board.reset(cause)  # type: ignore[attr-defined]
+        link.submit(messages.GetParameter, PING.id, what="tell")  # under way as it happens
+        while link.sessions == sessions or link.latest is None:
+            link.poll(TICK_S)
+            assert line.now() - begun < 1.0
+        assert link.hello is not None
+        assert link.hello.reset_cause == messages.ResetCause[cause.upper()]
+        assert messages.Telemetry.unpack(link.latest).latch == messages.Latch.START
+    assert link.board_resets == link.sessions_lost == 3
