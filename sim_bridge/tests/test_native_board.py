@@ -11,6 +11,7 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
+from hil_tests.minimal_host import MinimalHost
 from sim_bridge import _core
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
@@ -41,28 +42,33 @@ def make() -> Iterator[Maker]:
         board.close()
 
 
-def setpoint(left: int, right: int, time_to_live: int = 2000, sequence: int = 0) -> bytes:
-    message = messages.SetpointSignal(left, right, time_to_live, 0)
-    return frame.encode(message.ID, sequence, message.pack())
+def drive(board: BoardAccess, left: int, right: int) -> MinimalHost:
+    """Opens a session, arms the motors and sends one set-point that lives for 2 s."""
+    host = MinimalHost(board)
+    host.open()
+    known = host.wait_for(messages.Telemetry, lambda now: now.supply > 0, 0.2, "a measured supply")
+    assert host.ask(messages.Arm, known.latches).status == messages.AnswerStatus.OK
+    now = host.wait_for(messages.Telemetry, lambda now: now.latch == 0, 0.2, "the end of the latch")
+    host.send(messages.SetpointSignal(left, right, 2000, now.tick & 0xFFFF))
+    return host
 
 
 def said(sent: list[SentByte]) -> list[tuple[int, int, bytes]]:
-    """The messages in what left the board."""
+    """The messages of the handshake in what left the board."""
     return frame.Decoder().feed(b"\0" + bytes(byte.byte for byte in sent))
 
 
-def telemetry(sent: list[SentByte]) -> messages.Telemetry:
-    """The last telemetry in what left the board."""
-    return messages.Telemetry.unpack([m for m in said(sent) if m[0] == messages.Telemetry.ID][-1][2])
+def telemetry(host: MinimalHost, seconds: float) -> messages.Telemetry:
+    """The last telemetry of the seconds to come."""
+    return [m for m in host.listen(seconds) if isinstance(m, messages.Telemetry)][-1]
 
 
 def test_boards_do_not_share_state(make: Maker) -> None:
     one, other = make(), make()
-    one.send(setpoint(5000, 5000))
-    for board in (one, other):
-        board.advance(10 * TICK)
-    assert telemetry(one.receive()).pulse_left == 1600 * 16
-    assert telemetry(other.receive()).pulse_left == 0
+    moving, still = drive(one, 5000, 5000), MinimalHost(other)
+    still.open()
+    assert telemetry(moving, 0.1).pulse_left == 1600 * 16
+    assert telemetry(still, 0.1).pulse_left == 0
 
 
 def test_says_hello_after_power_on(make: Maker) -> None:
@@ -78,23 +84,24 @@ def test_says_hello_after_power_on(make: Maker) -> None:
 @pytest.mark.parametrize("cause", list(ResetCause))
 def test_reset_starts_the_program_anew_and_time_goes_on(make: Maker, cause: ResetCause) -> None:
     board = make()
-    board.send(setpoint(5000, 5000))
+    host = drive(board, 5000, 5000)
     board.drive(WHISKER_LEFT, Level.LOW)
-    board.advance(20 * TICK)
-    board.receive()
+    assert telemetry(host, 0.1).pulse_left > 0
     board.log()
+    at = board.now
     board.reset(cause)
     board.run(1)
-    released = {edge.pin: edge.level for edge in board.log() if edge.cycle == 20 * TICK}
+    released = {edge.pin: edge.level for edge in board.log() if edge.cycle == at}
     assert released[SERVO_LEFT] == Level.LOW, "released by the reset, then made an output by the program"
-    board.advance(25 * TICK)
-    assert board.now == 25 * TICK
+    board.advance(at + 5 * TICK)
     sent = board.receive()
-    assert all(byte.cycle > 20 * TICK for byte in sent)
+    assert all(byte.cycle > at for byte in sent)
     hello = messages.Hello.unpack(said(sent)[0][2])
     assert messages.ResetCause(hello.reset_cause).name == cause.name
-    now = telemetry(sent)
-    assert now.tick < 5
+    assert hello.session == 0, "nor does the session outlive it"
+    host.open()
+    now = telemetry(host, 0.05)
+    assert now.tick < 20
     assert now.pulse_left == 0, "a set-point does not outlive a reset"
     assert now.whiskers == messages.Whiskers.LEFT, "what drives the pins from outside outlives it"
     assert board.counters()["resets"] == 1
@@ -111,11 +118,11 @@ def test_many_resets(make: Maker) -> None:
 
 def test_byte_in_flight_at_a_reset_is_lost(make: Maker) -> None:
     board = make()
-    board.advance(40_000 + 10 * BYTE + BYTE // 2)  # the first telemetry is leaving
+    board.advance(10 * BYTE + BYTE // 2)  # the first hello is leaving
     board.reset()
     board.run(20 * BYTE)
     cycles = [byte.cycle for byte in board.receive()]
-    assert 40_000 + 11 * BYTE not in cycles
+    assert 11 * BYTE not in cycles
     assert all(later - earlier >= BYTE for earlier, later in pairwise(cycles))
 
 
@@ -125,7 +132,7 @@ def test_bytes_take_ten_bit_times(make: Maker) -> None:
     cycles = [byte.cycle for byte in board.receive()]
     hello = messages.Hello.STRUCT.size + frame.FRAME_OVERHEAD
     assert cycles[:hello] == [BYTE * (i + 1) for i in range(hello)]
-    data = setpoint(1000, 1000)
+    data = frame.encode(messages.Identify.ID, 0, b"")
     before = board.counters()["bytes_in"]
     board.send(data, at=2 * TICK)
     board.advance(2 * TICK + BYTE * len(data) - 1)
@@ -137,24 +144,28 @@ def test_bytes_take_ten_bit_times(make: Maker) -> None:
 def test_wrong_line_rate_is_framing_errors_and_garbage(make: Maker) -> None:
     board = make()
     board.line_rate(115_200)
-    board.send(setpoint(5000, 5000))
-    board.advance(10 * TICK)
+    board.send(frame.encode(messages.Identify.ID, 0, b""))
+    board.advance(30 * TICK)
     counters = board.counters()
     assert counters["framing_errors"] == counters["bytes_in"] > 0
     assert said(board.receive()) == []
     board.line_rate(500_000)
-    board.run(2 * TICK)
-    now = telemetry(board.receive())
-    assert now.pulse_left == 0
+    board.run(20 * TICK)
+    assert {number for number, _, _ in said(board.receive())} == {messages.Hello.ID}, (
+        "what was garbled asked for nothing"
+    )
 
 
 def test_drive_replaces_what_was_queued_later(make: Maker) -> None:
     board = make()
+    host = MinimalHost(board)
+    host.open()
+    start = board.now
     for at in range(2 * TICK, 4 * TICK, MS):
-        board.drive(ENCODER_LEFT, Level(at // MS % 2), at=at)
-    board.drive(ENCODER_LEFT, Level.LOW, at=2 * TICK + 5 * MS)
-    board.advance(6 * TICK)
-    assert telemetry(board.receive()).encoder_left == 4  # changes at 1, 2, 3, 4 ms, and at 5 ms none is left but low
+        board.drive(ENCODER_LEFT, Level(at // MS % 2), at=start + at)
+    board.drive(ENCODER_LEFT, Level.LOW, at=start + 2 * TICK + 5 * MS)
+    # changes at 1, 2, 3, 4 ms, and at 5 ms none is left but low
+    assert telemetry(host, 0.06).encoder_left == 4
 
 
 def test_pin_states_follow_the_firmware(make: Maker) -> None:
@@ -168,13 +179,15 @@ def test_pin_states_follow_the_firmware(make: Maker) -> None:
 
 def run_in_pieces(board: BoardAccess, seed: int | None) -> tuple[list[Edge], list[SentByte]]:
     """A run of 30 ticks with everything going on, in one go or cut at random."""
-    board.send(setpoint(5000, 2000))
+    drive(board, 5000, 2000)
+    start = board.now
     for number in range(300):
-        board.drive(ENCODER_LEFT, Level(number % 2), at=TICK + number * 9001)
+        board.drive(ENCODER_LEFT, Level(number % 2), at=start + TICK + number * 9001)
     board.answer(pin=9, on=10, delay=100)  # the left IR receiver follows its LED
     rng = random.Random(seed)
-    while board.now < 30 * TICK:
-        board.advance(30 * TICK if seed is None else min(30 * TICK, board.now + 1 + rng.randrange(20_000)))
+    end = start + 30 * TICK
+    while board.now < end:
+        board.advance(end if seed is None else min(end, board.now + 1 + rng.randrange(20_000)))
     return board.log(), board.receive()
 
 

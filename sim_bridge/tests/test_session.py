@@ -13,6 +13,7 @@ import pytest
 from boebot.boards import BoardRequest
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
+from boebot.link.session import Link
 from boebot.robots import load_robot
 from sim_bridge.boards.board import Damage
 from sim_bridge.session import SimSession, open_native
@@ -32,25 +33,24 @@ def session() -> Iterator[SimSession]:
 
 
 def drive(session: SimSession, left: float, right: float, seconds: float) -> bytes:
-    """Sends motor signals every 50 ms; returns what the board said."""
-    heard = b""
+    """Opens a link, arms and sends motor signals every 50 ms; returns what the board said."""
+    link = Link(session.transport)
+    link.open()
+    link.arm()
     end = session.transport.now() + seconds
-    sequence = 0
     while session.transport.now() < end - 1e-9:
-        setpoint = messages.SetpointSignal(round(left * 1e4), round(right * 1e4), 250, 0)
-        session.transport.write(frame.encode(setpoint.ID, sequence & 0xFF, setpoint.pack()))
-        heard += session.transport.read(0.05, 0.05)
-        sequence += 1
-    return heard
+        payload = link.poll(0.05, 0.045)[-1][0]
+        link.send_signal(left, right, 250, messages.Telemetry.unpack(payload).tick)
+    link.close()
+    return b"".join(data for _, data in link.received)
 
 
 def test_board_says_hello_and_sends_a_message_per_tick(session: SimSession) -> None:
-    decoder = frame.Decoder()
-    heard = decoder.feed(session.transport.read(1.0, 1.0))
-    assert heard[0][0] == messages.Hello.ID
-    ticks = [messages.Telemetry.unpack(payload).tick for kind, _, payload in heard if kind == messages.Telemetry.ID]
-    assert ticks == list(range(len(ticks)))
-    assert len(ticks) in (99, 100)
+    link = Link(session.transport)
+    assert link.open().tick_rate == 100
+    ticks = [messages.Telemetry.unpack(payload).tick for payload, *_ in link.poll(1.0, 1.0)]
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+    assert len(ticks) in (99, 100, 101)
 
 
 def test_memory_is_within_reach(session: SimSession) -> None:
@@ -66,9 +66,9 @@ def test_memory_is_within_reach(session: SimSession) -> None:
 
 
 def test_each_read_brings_one_whole_message(session: SimSession) -> None:
-    session.transport.read(0.1, 0.1)
+    session.transport.read(0.08, 0.08)
     for _ in range(20):
-        assert len(frame.Decoder().feed(session.transport.read(0.03, 0.005))) == 1
+        assert [kind for kind, _, _ in frame.Decoder().feed(session.transport.read(0.3, 0.05))] == [messages.Hello.ID]
 
 
 def test_it_drives_straight_and_records_it(session: SimSession) -> None:
@@ -77,7 +77,7 @@ def test_it_drives_straight_and_records_it(session: SimSession) -> None:
     assert truth is not None
     assert truth.x[-1] == pytest.approx(3.0 * 0.15, abs=0.05)
     assert abs(truth.y[-1]) < 0.01
-    assert truth.time[-1] == pytest.approx(3.0, abs=0.02)
+    assert truth.time[-1] == pytest.approx(session.transport.now(), abs=0.02)
     assert not truth.contact.any()
     counters = session.counters()
     assert counters["distance"] == pytest.approx(np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005)
@@ -117,12 +117,12 @@ def test_sessions_side_by_side_share_nothing() -> None:
 def test_reset_starts_the_program_again(session: SimSession) -> None:
     drive(session, 0.5, 0.5, 0.5)
     before = session.sim.body().x
-    session.transport.read(0.0)
+    at = round(session.transport.now() * 1000) * MS
     session.board.reset("external")
     heard = frame.Decoder().feed(session.transport.read(0.2, 0.2))
     assert heard[0][0] == messages.Hello.ID
     assert session.board.counters()["resets"] == 1
-    assert session.board.reset_cycle == 500 * MS
+    assert session.board.reset_cycle == at
     assert session.sim.body().x > before  # the world went on
 
 
