@@ -13,7 +13,7 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 	--constraint requirements.lock
 
 FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[chS]' -o -name '*.def')
-CORE_SOURCES := $(shell find sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
+CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
 IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -98,7 +98,7 @@ compile_commands.json:
 
 clean:
 	@rm -rf build dist compile_commands.json host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
-	@find sim_bridge -name '*.so' -delete
+	@find host sim_bridge -name '*.so' -delete
 	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
 lock:

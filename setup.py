@@ -1,5 +1,7 @@
 """Builds what is not Python: the simulated world, the emulated boards, the firmware for this computer.
 
+* `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
+* `boebot.link.ports._reader`: the thread that reads a port (host/boebot/link/ports/build_reader.py), MIT.
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
 * `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
   GPL-3.0-or-later. Built where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything
@@ -40,9 +42,12 @@ WHEEL_DATA = {
     "boebot/data/images": ("build/images", ("*.elf", "*.hex")),
 }
 
+HAS_POLL = sys.platform not in ("win32", "darwin")  # for devices
 CFFI_MODULES = [
     f"{script}:ffi"
     for script, wanted in (
+        ("host/boebot/link/build_codec.py", True),
+        ("host/boebot/link/ports/build_reader.py", HAS_POLL),
         ("sim_bridge/build_core.py", True),
         ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),
     )
@@ -70,8 +75,9 @@ def firmware_sources() -> list[str]:
 
 
 def headers() -> list[str]:
-    """Every header of ours: when one changes, what includes it is compiled again."""
-    found = [*Path("sim_bridge").rglob("*.h"), *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
+    """Every header of ours, and frame.c, which the codec includes: a change of one compiles anew what may need it."""
+    found = [path for folder in ("sim_bridge", "host") for path in Path(folder).rglob("*.h")]
+    found += [FIRMWARE / "link" / "frame.c", *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
     return sorted(str(path) for path in found)
 
 

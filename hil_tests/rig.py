@@ -23,17 +23,29 @@ TICK_S = 0.010
 FRAME_CYCLES = 320_000  # 20 ms servo frame
 
 
+LINE_BYTES_PER_TICK = 500  # at 500,000 baud
+PROBE_S = 0.15  # a session lives as long as it hears of us; the least patience of a board is 0.2 s
+HOST_NONCE = 0x0A5A5A
+
+
 class Rig:
-    """Speaks frames with the board, one message at a time, without the kit's session layer."""
+    """Speaks frames with the board, one message at a time, without the kit's session layer: what is lost is not sent
+    again. It keeps the session open, though, and acknowledges events, unless told not to (`alive`, `acknowledges`)."""
 
     def __init__(self, session: BoardSession) -> None:
         self.session = session
         self.transport = session.transport
-        self.decoder = frame.Decoder()
+        self.decoder = frame.Decoder(frame.NO_SESSION)
         self.telemetry: list[messages.Telemetry] = []
         self.answers: list[Any] = []
         self.received = bytearray()
+        self.events: list[messages.Event] = []
+        self.hello: messages.Hello | None = None
+        self.seed = 0
+        self.alive = self.acknowledges = True
         self._sequence = 0
+        self._number = 0
+        self._probed = 0.0
 
     @classmethod
     def open(cls, url: str, robot: str = "shieldbot", arena: str = "empty", seed: int = 1, noise: bool = False) -> Rig:
@@ -58,16 +70,25 @@ class Rig:
     def send(self, message: Any) -> int:
         """Sends one message; returns its sequence number."""
         sequence = self._sequence
-        self._sequence = (sequence + 1) & 0xFF
-        self.transport.write(frame.encode(message.ID, sequence, message.pack()))
+        self.transport.write(self.encode(message))
         return sequence
+
+    def encode(self, message: Any) -> bytes:
+        """The message's frame, with the next sequence number and the session's seed."""
+        wire = frame.encode(message.ID, self._sequence, message.pack(), self.seed)
+        self._sequence = (self._sequence + 1) & 0xFF
+        return wire
 
     def listen(self, seconds: float) -> list[messages.Telemetry]:
         """Lets time pass; returns the telemetry that came meanwhile."""
         before = len(self.telemetry)
         end = self.transport.now() + seconds
         while (left := end - self.transport.now()) > 1e-9:
-            self._take(self.transport.read(left, left))
+            if self.alive and self.seed and self.transport.now() >= self._probed + PROBE_S:
+                self._probed = self.transport.now()
+                self.send(messages.ClockProbe(0))
+            wait = min(left, PROBE_S) if self.alive else left
+            self._take(self.transport.read(wait, wait))
         return self.telemetry[before:]
 
     def _take(self, data: bytes) -> None:
@@ -76,18 +97,44 @@ class Rig:
             message = messages.MESSAGES[message_id].unpack(payload)
             if isinstance(message, messages.Telemetry):
                 self.telemetry.append(message)
+            elif isinstance(message, messages.Event):
+                self.events.append(message)
+                if self.acknowledges:
+                    self.send(messages.Acknowledge(message.number))
             else:
+                if isinstance(message, messages.Hello):
+                    self.hello = message
                 self.answers.append(message)
 
-    def ask(self, request: Any, answer: type[_M], within_s: float = 0.1) -> _M:
-        """Sends a request and returns the answer."""
-        self.send(request)
+    def ask(self, question: Any, answer: type[_M], within_s: float = 0.1) -> _M:
+        """Asks a question of the handshake, or sends a stop, and returns the answer."""
+        self.answers.clear()
+        self.send(question)
+        return self.next(answer, within_s)
+
+    def next(self, kind: type[_M], within_s: float = 0.1) -> _M:
+        """The next message of that kind, or one that has come since the last question."""
         found: _M = self.wait_for(
-            lambda: next((a for a in reversed(self.answers) if isinstance(a, answer)), None),
-            within_s,
-            answer.__name__,
+            lambda: next((a for a in reversed(self.answers) if isinstance(a, kind)), None), within_s, kind.__name__
         )
         return found
+
+    def request(self, kind: Any, *fields: int, within_s: float = 0.1) -> messages.Answer:
+        """Sends the next numbered request and returns its answer."""
+        self.answers.clear()
+        self.send(self.numbered(kind, *fields))
+        number = self._number
+        answer: messages.Answer = self.wait_for(
+            lambda: next((a for a in self.answers if isinstance(a, messages.Answer) and a.number == number), None),
+            within_s,
+            f"the answer to {kind.__name__}",
+        )
+        return answer
+
+    def numbered(self, kind: Any, *fields: int) -> Any:
+        """The next request of the session."""
+        self._number = (self._number + 1) & 0xFFFF
+        return kind(self._number, *fields)
 
     def wait_for(self, condition: Callable[[], Any], within_s: float, what: str) -> Any:
         """Listens until `condition()` is true; fails after `within_s` of the board's time."""
@@ -100,12 +147,21 @@ class Rig:
     def latest(self) -> messages.Telemetry:
         """The telemetry of a tick that begins from now on."""
         count = len(self.telemetry)
-        self.wait_for(lambda: len(self.telemetry) > count + 1, 3 * TICK_S, "telemetry")
+        self.wait_for(lambda: len(self.telemetry) > count + 1, 5 * TICK_S, "telemetry")
         return self.telemetry[-1]
 
+    @property
+    def tick(self) -> int:
+        """The tick of the newest telemetry, as a set-point names it."""
+        return self.telemetry[-1].tick & 0xFFFF if self.telemetry else 0
+
+    def signal(self, left: float, right: float, time_to_live_ms: int = 250) -> messages.SetpointSignal:
+        """Motor signals in [-1, 1], in answer to the newest telemetry."""
+        return messages.SetpointSignal(round(left * 1e4), round(right * 1e4), time_to_live_ms, self.tick)
+
     def drive(self, left: float, right: float, time_to_live_ms: int = 250) -> int:
-        """Sends motor signals in [-1, 1]."""
-        return self.send(messages.SetpointSignal(round(left * 1e4), round(right * 1e4), time_to_live_ms, 0))
+        """Sends motor signals in [-1, 1]; returns the sequence number."""
+        return self.send(self.signal(left, right, time_to_live_ms))
 
     def drive_for(self, left: float, right: float, seconds: float) -> None:
         """Sends motor signals every 50 ms for that long."""
@@ -114,21 +170,59 @@ class Rig:
             self.drive(left, right)
             self.listen(min(0.05, end - self.transport.now()))
 
-    def flood(self, setpoint: messages.SetpointSignal, seconds: float) -> None:
-        """Saturates the line both ways for that long: set-points and requests without a gap, 50,000 bytes/s, so that
-        answers and telemetry fill the other direction too."""
-        request = messages.GetParameter(0)
+    def flood(self, left: float, right: float, seconds: float) -> None:
+        """Saturates the line both ways for that long: set-points and a request, again and again without a gap, 50,000
+        bytes/s, so that answers and telemetry fill the other direction too."""
+        wire = bytearray()
+        request = self.numbered(messages.GetParameter, 0)
         for _ in range(round(seconds / TICK_S)):
-            wire = bytearray()
-            while len(wire) < 500:
-                wire += frame.encode(setpoint.ID, 0, setpoint.pack())
-                wire += frame.encode(request.ID, 0, request.pack()) * 3
-            self.transport.write(bytes(wire[:500]))  # the last frame is cut, and so refused
+            while len(wire) < LINE_BYTES_PER_TICK:
+                wire += self.encode(self.signal(left, right))
+                wire += b"".join(self.encode(request) for _ in range(3))
+            self.transport.write(bytes(wire[:LINE_BYTES_PER_TICK]))
+            del wire[:LINE_BYTES_PER_TICK]
             self.listen(TICK_S)
+        self.transport.write(bytes(wire))
 
-    def start(self) -> messages.Hello:
-        """Waits for the board to be up."""
-        return self.ask(messages.HelloRequest(messages.PROTOCOL_VERSION), messages.Hello, within_s=1.0)
+    def start(self, arm: bool = True) -> messages.Hello:
+        """Waits for the board to be up, opens a session and arms the motors."""
+        self.alive = True
+        self.open_session()
+        if arm:
+            self.arm()
+        assert self.hello is not None
+        return self.hello
+
+    def open_session(self) -> messages.Hello:
+        """Opens a session; another's has to end first. A lost frame is sent again."""
+
+        def free() -> messages.Hello | None:
+            heard = (a for a in self.answers if isinstance(a, messages.Hello) and a.session == 0)
+            return next(heard, None)
+
+        self.answers.clear()
+        self.seed = 0
+        self.decoder.seed = frame.NO_SESSION
+        hello = self.wait_for(free, 4.0, "a hello without a session")
+        seed = hello.board_nonce ^ HOST_NONCE
+        for _ in range(5):
+            self.send(messages.Open(messages.PROTOCOL_VERSION, hello.board_nonce, HOST_NONCE))
+            self.decoder.seed = self.seed = seed
+            self.listen(2 * TICK_S)
+            if self.hello is not None and self.hello.session == seed:
+                self._number = 0
+                return self.hello
+        raise AssertionError("the board opens no session")
+
+    def arm(self) -> None:
+        """Ends the latch that the newest telemetry tells of, and waits until a set-point would count."""
+        answer = self.request(messages.Arm, self.latest().latches)
+        assert answer.status == messages.AnswerStatus.OK, messages.AnswerStatus(answer.status)
+        self.latest()
+
+    def stop(self) -> None:
+        """Stops the motors until they are armed again."""
+        self.ask(messages.Stop(7), messages.Stopped)
 
     # ---- pins --------------------------------------------------------------------------------------------------------
 

@@ -21,19 +21,32 @@ def text(field: bytes) -> str:
     return field.rstrip(b"\0").decode()
 
 
-def test_handshake_names_version_schema_and_pin_map(rig: Rig) -> None:
-    hello = rig.start()
+def test_handshake_names_version_schema_and_robot(rig: Rig) -> None:
+    hello = rig.next(messages.Hello, within_s=0.3)
     assert hello.protocol_version == messages.PROTOCOL_VERSION
     assert hello.schema_hash == messages.SCHEMA_HASH
     assert hello.tick_rate == 100
-    assert text(hello.pin_map) == load_robot("shieldbot").pin_map
+    assert text(hello.robot) == "shieldbot"
+    assert hello.session == rig.seed
+    assert hello.session_time_out == 1000
     expected = messages.Devices.SERVOS | messages.Devices.ENCODERS | messages.Devices.WHISKERS
     assert hello.devices == expected | messages.Devices.INFRARED | messages.Devices.PING
 
 
-def test_identity_names_firmware_and_compiler(rig: Rig) -> None:
+def test_identity_names_firmware_compiler_and_pin_map(rig: Rig) -> None:
     identity = rig.ask(messages.Identify(), messages.Identity)
     assert text(identity.firmware_version) and text(identity.compiler)
+    assert text(identity.pin_map) == load_robot("shieldbot").pin_map
+
+
+def test_board_describes_every_message(rig: Rig) -> None:
+    hello = rig.next(messages.Hello, within_s=0.3)
+    told = {}
+    for index in range(len(messages.MESSAGES)):
+        said = rig.ask(messages.Describe(index, hello.board_nonce), messages.Description)
+        assert (said.index, said.count) == (index, len(messages.MESSAGES))
+        told[said.id] = (said.length, said.hash)
+    assert told == {number: (kind.LENGTH, messages.HASHES[number]) for number, kind in messages.MESSAGES.items()}
 
 
 def test_telemetry_comes_once_per_tick_with_board_time(rig: Rig) -> None:
@@ -53,17 +66,56 @@ def test_setpoint_is_acknowledged_by_its_sequence_number(rig: Rig) -> None:
 
 def test_parameter_is_set_read_and_refused_out_of_range(rig: Rig) -> None:
     spec = messages.PARAMETERS["servo_left_centre"]
-    answer = rig.ask(messages.SetParameter(spec.id, 24016), messages.Parameter)
-    assert (answer.value, answer.status) == (24016, messages.ParameterStatus.OK)
+    answer = rig.request(messages.SetParameter, spec.id, 24016)
+    assert (answer.value, answer.status) == (24016, messages.AnswerStatus.OK)
+    answer = rig.request(messages.SetParameter, spec.id, spec.maximum + 1)
+    assert (answer.value, answer.status) == (24016, messages.AnswerStatus.OUT_OF_RANGE)
+    assert rig.request(messages.GetParameter, spec.id).value == 24016
+    assert rig.request(messages.GetParameter, 250).status == messages.AnswerStatus.UNKNOWN_PARAMETER
+
+
+def test_request_that_comes_again_is_only_answered_again(rig: Rig) -> None:
+    spec = messages.PARAMETERS["ping_period"]
+    first = rig.numbered(messages.SetParameter, spec.id, 9)
+    rig.send(first)
+    rig.listen(0.05)
+    rig.request(messages.GetParameter, spec.id)
     rig.answers.clear()
-    answer = rig.ask(messages.SetParameter(spec.id, spec.maximum + 1), messages.Parameter)
-    assert (answer.value, answer.status) == (24016, messages.ParameterStatus.OUT_OF_RANGE)
-    rig.answers.clear()
-    answer = rig.ask(messages.GetParameter(spec.id), messages.Parameter)
-    assert answer.value == 24016
-    rig.answers.clear()
-    answer = rig.ask(messages.GetParameter(250), messages.Parameter)
-    assert answer.status == messages.ParameterStatus.UNKNOWN_PARAMETER
+    other = rig.numbered(messages.SetParameter, spec.id, 11)
+    for message in (first, other, other, first, other):
+        rig.send(message)
+        rig.listen(0.02)
+    answers = [(a.number, a.value) for a in rig.answers if isinstance(a, messages.Answer)]
+    assert answers == [(other.number, 11)] * 3, "an earlier one is not answered any more"
+    assert rig.request(messages.GetParameter, spec.id).value == 11
+
+
+def test_frames_of_an_earlier_session_are_refused(rig: Rig) -> None:
+    spec = messages.PARAMETERS["ping_period"]
+    wire = rig.encode(rig.numbered(messages.SetParameter, spec.id, 9)) + rig.encode(messages.Stop(1))
+    rig.send(messages.Close(rig.seed))
+    rig.start()
+    before = rig.latest().latches
+    rig.transport.write(wire)
+    rig.listen(0.1)
+    now = rig.latest()
+    assert now.latch == messages.Latch.NONE and now.latches == before
+    assert rig.request(messages.GetParameter, spec.id).value != 9
+
+
+def test_event_is_sent_again_until_it_is_acknowledged(rig: Rig) -> None:
+    rig.listen(0.1)
+    rig.acknowledges = False
+    rig.events.clear()
+    rig.stop()
+    rig.listen(0.2)
+    assert len(rig.events) >= 5 and len(set(rig.events)) == 1
+    assert (rig.events[0].kind, rig.events[0].value) == (messages.EventKind.LATCH, messages.Latch.STOP_COMMAND)
+    rig.send(messages.Acknowledge(rig.events[0].number))
+    rig.listen(0.02)
+    rig.events.clear()
+    rig.listen(0.2)
+    assert rig.events == []
 
 
 def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
@@ -73,15 +125,14 @@ def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
         rig.listen(0.01)
     # damaged set-points: one bit of each frame is wrong
     for _ in range(50):
-        damaged = bytearray(
-            frame.encode(messages.SetpointSignal.ID, 5, messages.SetpointSignal(9000, 9000, 2000, 0).pack())
-        )
+        damaged = bytearray(frame.encode(messages.SetpointSignal.ID, 5, rig.signal(0.9, 0.9, 2000).pack(), rig.seed))
         damaged[draw.randrange(1, len(damaged) - 1)] ^= 1 << draw.randrange(8)
         rig.transport.write(bytes(damaged))
         rig.listen(0.01)
     now = rig.latest()
     assert now.pulse_left == now.pulse_right == 0, "a damaged set-point moved the robot"
-    assert now.frames_bad > 0
+    counted = rig.next(messages.Counters, within_s=0.7)
+    assert counted.bad >= 50 and counted.resynchronised > 0
     sequence = rig.drive(0.0, 0.0)
     assert rig.latest().setpoint_sequence == sequence, "the board no longer listens"
     assert rig.decoder.bad == 0
@@ -89,11 +140,11 @@ def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
 
 @pytest.mark.parametrize("requests_per_tick", [1, 2, 5, 10, 20])
 @pytest.mark.parametrize(
-    "request_message", [messages.HelloRequest(1), messages.Identify(), messages.GetParameter(1)], ids=type_name
+    "request_message", [messages.Identify(), messages.ClockProbe(1), messages.GetParameter(2, 1)], ids=type_name
 )
 def test_requests_do_not_silence_telemetry(rig: Rig, request_message: Any, requests_per_tick: int) -> None:
     """Telemetry comes every tick, however many requests and wherever in the tick they fall."""
-    wire = frame.encode(request_message.ID, 0, request_message.pack()) * requests_per_tick
+    wire = frame.encode(request_message.ID, 0, request_message.pack(), rig.seed) * requests_per_tick
     rig.latest()
     for phase in range(5):
         before = len(rig.telemetry)

@@ -37,7 +37,7 @@ def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> 
         period = CYCLES_PER_S // 1500 + pin  # not in step with each other or with the tick
         rig.board.square_wave(pin, period, seconds=1.0)
     before = len(rig.received)
-    rig.flood(messages.SetpointSignal(3000, -3000, 250, 0), seconds=0.9)
+    rig.flood(0.3, -0.3, seconds=0.9)
     assert len(rig.received) - before >= 0.95 * 0.9 * BYTES_PER_S, "the board's direction was not saturated"
     for pin, expected in ((LEFT, 1560 * CYCLES_PER_US), (RIGHT, 1560 * CYCLES_PER_US)):
         widths = rig.pulses(pin)[3:, 1]
@@ -47,9 +47,9 @@ def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> 
 
 def test_speed_setpoint_scales_with_the_stored_maximum(rig: Rig) -> None:
     maximum = messages.PARAMETERS["wheel_speed_maximum"]
-    rig.send(messages.SetParameter(maximum.id, 2000))  # 0.2 m/s at full signal
+    rig.request(messages.SetParameter, maximum.id, 2000)  # 0.2 m/s at full signal
     for _ in range(5):
-        rig.send(messages.SetpointSpeed(1000, -500, 250, 0))
+        rig.send(messages.SetpointSpeed(1000, -500, 250, rig.tick))
         rig.listen(0.05)
     now = rig.latest()
     assert now.pulse_left == 1600 * CYCLES_PER_US
@@ -58,12 +58,15 @@ def test_speed_setpoint_scales_with_the_stored_maximum(rig: Rig) -> None:
 
 @pytest.mark.parametrize("time_to_live_ms", [60, 250, 1000])
 def test_dead_man_stops_the_pulses_after_the_time_to_live(rig: Rig, time_to_live_ms: int) -> None:
+    rig.latest()
     rig.drive(0.5, 0.5, time_to_live_ms)
-    sent = rig.transport.now() * CYCLES_PER_S
+    sent = rig.transport.now() * CYCLES_PER_S  # at most 3 ms after the start of the tick that it answers
     frames = rig.listen(time_to_live_ms / 1000 + 0.2)
     last = rig.pulses(LEFT)[-1]
     stopped_after = (last.sum() - sent) / CYCLES_PER_S
-    assert time_to_live_ms / 1000 - 0.025 <= stopped_after <= time_to_live_ms / 1000 + 0.035
+    assert time_to_live_ms / 1000 - 0.025 <= stopped_after <= time_to_live_ms / 1000 + 0.020, (
+        "a servo frame more at most"
+    )
     assert frames[-1].pulse_left == frames[-1].pulse_right == 0
     assert frames[-1].status & messages.Status.DEAD_MAN
     rig.drive(0.5, 0.5)
@@ -77,11 +80,12 @@ def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
     for step in range(21):
         rig.drive(1.0, 1.0, 2000)
         rig.listen(0.06 + step * 0.001)
-        rig.send(messages.Stop())
+        rig.send(messages.Stop(step))
         rig.listen(0.045)
         now = rig.latest()
         assert now.pulse_left == now.pulse_right == 0
-        assert now.status & messages.Status.STOPPED
+        assert now.latch == messages.Latch.STOP_COMMAND and now.status & messages.Status.LATCHED
+        rig.arm()
     widths = {pin: rig.pulses(pin)[:, 1] for pin in (LEFT, RIGHT)}
     assert np.all(np.abs(widths[LEFT] - 1700 * CYCLES_PER_US) <= EDGE_TOLERANCE)
     assert np.all(np.abs(widths[RIGHT] - 1300 * CYCLES_PER_US) <= EDGE_TOLERANCE)
@@ -94,6 +98,55 @@ def test_no_pulse_before_the_first_setpoint(rig: Rig) -> None:
 
 @pytest.mark.parametrize("signal", [-10001, 10001, 32767])
 def test_setpoint_out_of_range_is_refused(rig: Rig, signal: int) -> None:
-    rig.send(messages.SetpointSignal(signal, 0, 250, 0))
+    rig.send(messages.SetpointSignal(signal, 0, 250, rig.tick))
     rig.listen(0.05)
     assert rig.latest().pulse_left == 0
+
+
+def test_latched_motors_do_not_move_until_they_are_armed(board_url: str) -> None:
+    with Rig.open(board_url) as rig:
+        rig.start(arm=False)
+        assert rig.latest().latch == messages.Latch.START
+        rig.drive_for(1.0, 1.0, 0.2)
+        rig.arm()
+        rig.listen(0.1)
+        assert len(rig.pulses(LEFT)) == 0, "nor by what was sent before"
+        rig.drive_for(1.0, 1.0, 0.1)
+        rig.stop()
+        count = len(rig.pulses(LEFT))
+        assert count > 0
+        rig.drive_for(1.0, 1.0, 0.2)
+        assert len(rig.pulses(LEFT)) <= count + 1, "the pulse under way is whole, no other follows"
+
+
+def test_arm_that_does_not_know_of_the_latest_stop_is_refused(rig: Rig) -> None:
+    known = rig.latest().latches
+    rig.stop()
+    answer = rig.request(messages.Arm, known)
+    assert answer.status == messages.AnswerStatus.LATCHED_AGAIN
+    assert rig.latest().latch == messages.Latch.STOP_COMMAND
+    rig.arm()
+
+
+def test_end_of_the_session_stops_and_latches(rig: Rig) -> None:
+    rig.drive(0.5, 0.5, 2000)
+    rig.listen(0.1)
+    rig.send(messages.Close(rig.seed))
+    closed_at = rig.board.cycle
+    rig.alive = False
+    rig.listen(0.2)
+    assert (rig.pulses(LEFT)[-1].sum() - closed_at) / CYCLES_PER_S < 0.025
+    rig.start(arm=False)
+    assert rig.latest().latch == messages.Latch.SESSION_ENDED
+
+
+def test_silence_of_the_host_ends_the_session(rig: Rig) -> None:
+    """Though the set-point would live on: the board's patience ends first."""
+    rig.request(messages.SetParameter, messages.PARAMETERS["session_time_out"].id, 300)
+    rig.latest()
+    rig.drive(0.5, 0.5, 2000)
+    silent_from = rig.transport.now()
+    rig.alive = rig.acknowledges = False
+    rig.listen(0.6)
+    stopped_after = rig.pulses(LEFT)[-1].sum() / CYCLES_PER_S - silent_from
+    assert 0.28 <= stopped_after <= 0.34

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from boebot.link import frame, messages
+from boebot.link import messages
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 
 pytestmark = pytest.mark.emulated
@@ -99,13 +99,14 @@ def test_noise_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: st
     """With the UART saturated both ways: no tick missed, pulses exact, not a byte lost, and the noise reported."""
     with Rig.open(board_url, robot=noise.robot) as rig:
         rig.start()
-        setpoint = messages.SetpointSignal(3000, -3000, 250, 0)
-        request = messages.GetParameter(0)
-        block = frame.encode(setpoint.ID, 0, setpoint.pack()) + frame.encode(request.ID, 0, request.pack()) * 2
-        full = block * 14  # in a tick: 476 of 500 bytes come in, 435 go out
+        request = rig.numbered(messages.GetParameter, 0)
 
         def saturate() -> None:
-            rig.transport.write(full)
+            """In a tick: 456 of 500 bytes come in, as many go out."""
+            wire = b""
+            for _ in range(12):
+                wire += rig.encode(rig.signal(0.3, -0.3)) + rig.encode(request) * 2
+            rig.transport.write(wire)
             rig.listen(TICK_S)
 
         for _ in range(5):
@@ -137,11 +138,11 @@ def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: Rig) -> None:
     expected = 13_000  # us between edges
     rig.board.square_wave(16, period=2 * expected * CYCLES_PER_US, seconds=1.0)
     rig.listen(0.1)
-    everything = int(rig.ask(messages.GetParameter(devices.id), messages.Parameter).value)
-    rig.send(messages.SetParameter(devices.id, everything & ~int(messages.Devices.ENCODERS)))
+    everything = rig.request(messages.GetParameter, devices.id).value
+    rig.request(messages.SetParameter, devices.id, everything & ~int(messages.Devices.ENCODERS))
     rig.listen(0.1)
     assert rig.latest().edge_period_left == 0
-    rig.send(messages.SetParameter(devices.id, everything))
+    rig.request(messages.SetParameter, devices.id, everything)
     periods = {f.edge_period_left * 16 for f in rig.listen(0.2)}
     assert all(period == 0 or abs(period - expected) <= 16 for period in periods), periods
     assert max(periods) > 0

@@ -70,7 +70,7 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
             text=True,
         )
         try:
-            client.wait(timeout=1.5)
+            client.wait(timeout=3.0)
             pytest.fail("the run ended before the port vanished")
         except subprocess.TimeoutExpired:
             server.kill()

@@ -2,8 +2,8 @@
 
 One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group
 `boebot.boards` offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`,
-`serial:/dev/ttyUSB0?baud=250000`, `socket://localhost:5000`). The host library knows emulated boards only
-through the interfaces below; it never imports the simulator.
+`serial:/dev/ttyUSB0?baud=250000&reset=no`, `socket://localhost:5000`, `rfc2217://server:2217?baud=115200`). The host
+library knows emulated boards only through the interfaces below; it never imports the simulator.
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from boebot.errors import BoardError
-from boebot.link.transport import SerialTransport, SocketTransport, Transport
+from boebot.link.ports.rfc2217 import Rfc2217Transport
+from boebot.link.ports.serial_port import open_serial
+from boebot.link.ports.tcp import SocketTransport
+from boebot.link.transport import Transport
 
 if TYPE_CHECKING:
     import numpy as np
@@ -172,29 +175,66 @@ def find_server() -> Server:
 
 def is_live(url: str) -> bool:
     """Whether `url` names a port rather than an emulated board."""
-    return bool(re.match(r"(serial:|socket://|/|COM\d+$)", url))
+    return bool(re.match(r"(serial:|socket://|rfc2217://|/|COM\d+(\?|$)|\\\\\.\\)", url))
 
 
 def open_port(url: str, baud: int) -> Transport:
-    """Opens a serial port or a socket by URL.
+    """Opens a port by URL.
+
+        PORT or serial:PORT       its path, such as /dev/ttyACM0 or a pty's, or COM3
+        socket://HOST:PORT        a TCP connection
+        rfc2217://HOST:PORT       a serial port that another computer shares
+
+    Serial ports, shared ones too, take settings after a question mark, joined by `&`: `baud=RATE` (bit/s, else
+    `baud`) and `reset=no` (do not reset the board by DTR; boebot.link.ports.serial_port says how far that goes).
 
     Raises:
         BoardError: the URL is malformed, or the port is missing, busy, forbidden or refused.
     """
-    if url.startswith("socket://"):
-        match = re.fullmatch(r"socket://(\[[0-9a-fA-F:]+\]|[^:/\[\]]+):(\d{1,5})/?", url)
-        if match is None or not 0 < int(match[2]) < 65536:
-            raise BoardError(f"{url!r} is no socket address; expected socket://HOST:PORT")
-        return SocketTransport(match[1].strip("[]"), int(match[2]))
-    path, _, query = url.removeprefix("serial:").partition("?")
-    if query:
-        match = re.fullmatch(r"baud=(\d+)", query)
-        if match is None:
-            raise BoardError(f"{url!r} has an unknown setting {query!r}; expected baud=RATE")
-        baud = int(match[1])
-    if not path:
+    address, _, query = url.partition("?")
+    if address.startswith("socket://"):
+        if query:
+            raise BoardError(f"{url!r} has a setting {query!r}; a socket address takes none")
+        return SocketTransport(*_host_and_port(url, address, "socket"))
+    settings = _settings(url, query)
+    baud_given = "baud" in settings
+    if baud_given:
+        baud = int(settings["baud"])
+    reset = settings.get("reset", "yes") == "yes"
+    if address.startswith("rfc2217://"):
+        host, number = _host_and_port(url, address, "rfc2217")
+        return Rfc2217Transport(host, number, baud, baud_given=baud_given, reset=reset)
+    port = address.removeprefix("serial:")
+    if not port:
         raise BoardError(f"{url!r} names no port; expected serial:PORT, as in serial:/dev/ttyUSB0")
-    return SerialTransport(path, baud)
+    return open_serial(port, baud, baud_given=baud_given, reset=reset)
+
+
+_SETTINGS = {"baud": (r"\d{1,9}", "baud=RATE"), "reset": ("yes|no", "reset=yes or reset=no")}
+
+
+def _settings(url: str, query: str) -> dict[str, str]:
+    """The settings of a serial port."""
+    settings: dict[str, str] = {}
+    for part in query.split("&") if query else []:
+        key, _, value = part.partition("=")
+        if key not in _SETTINGS:
+            expected = ", ".join(form for _, form in _SETTINGS.values())
+            raise BoardError(f"{url!r} has an unknown setting {part!r}; expected {expected}")
+        pattern, form = _SETTINGS[key]
+        if not re.fullmatch(pattern, value):
+            raise BoardError(f"{url!r} has the setting {part!r}; expected {form}")
+        if key in settings:
+            raise BoardError(f"{url!r} has the setting {key!r} twice")
+        settings[key] = value
+    return settings
+
+
+def _host_and_port(url: str, address: str, scheme: str) -> tuple[str, int]:
+    match = re.fullmatch(scheme + r"://(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+):(\d{1,5})/?", address)
+    if match is None or not 0 < int(match[2]) < 65536:
+        raise BoardError(f"{url!r} is no {scheme} address; expected {scheme}://HOST:PORT")
+    return match[1].strip("[]"), int(match[2])
 
 
 def _default_baud(robot: RobotDescription) -> int:
@@ -207,7 +247,7 @@ def _unknown(url: str) -> str:
     emulated = ", ".join(kinds) if kinds else "none: the simulator is not installed"
     return (
         f"there is no board {url!r}; expected an emulated board ({emulated}), "
-        "a port such as /dev/ttyACM0, serial:PORT, or socket://HOST:PORT"
+        "a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, or rfc2217://HOST:PORT"
     )
 
 

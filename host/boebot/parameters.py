@@ -1,14 +1,22 @@
-"""What a robot's description says about the firmware's run-time parameters.
+"""What a robot's description says about the firmware's parameters, and what a board's parameters say about the robot.
 
-One image serves every robot with its pin map; what differs (servo centres, periods, devices on or off) the
-host sets after the handshake, and again after each reset.
+One image serves every robot with its pin map; what differs (servo centres, geometry, periods, devices on or off) are
+parameters. Where the board has saved its own, they win: somebody has calibrated this very robot, and the description is
+brought into line. Otherwise the host sets those of the description after each opening of a session.
 """
 
 from __future__ import annotations
 
-from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS
+from collections.abc import Mapping
+
+import msgspec
+
+from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS, Devices
 from boebot.link.session import Link
 from boebot.robots import RobotDescription
+
+# parameter -> the keys of the description that it stands for besides its `default_from`
+_ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",)}
 
 
 def parameters_of(robot: RobotDescription) -> dict[str, float]:
@@ -23,11 +31,38 @@ def parameters_of(robot: RobotDescription) -> dict[str, float]:
     return values
 
 
-def configure(link: Link, robot: RobotDescription) -> None:
-    """Sets the board's parameters to what the robot's description says.
+def configure(link: Link, robot: RobotDescription) -> RobotDescription:
+    """Brings board and description into line, as the module says.
+
+    Returns:
+        The robot as it is: its description, with what the board has saved in its place.
 
     Raises:
         BoardError: the board does not answer, or refuses one.
     """
+    assert link.hello is not None
+    if link.hello.parameters_saved:
+        return adapted(robot, {name: link.get_parameter(name) for name in parameters_of(robot)})
     for parameter, value in parameters_of(robot).items():
-        link.set_parameter(parameter, value)
+        if parameter != "baud_rate":  # the board speaks at the right one, or nothing would be heard
+            link.set_parameter(parameter, value)
+    return robot
+
+
+def adapted(robot: RobotDescription, values: Mapping[str, float]) -> RobotDescription:
+    """The robot with these parameters, in their units, in place of what its description says."""
+    body = robot.body
+    devices = dict(robot.device)
+    for parameter, value in values.items():
+        for source in (PARAMETERS[parameter].default_from, *_ALSO.get(parameter, ())):
+            owner, _, key = source.partition(".")
+            if owner == "body":
+                body = msgspec.structs.replace(body, **{key: round(value, 9)})
+            elif owner in devices:
+                kind = type(getattr(devices[owner], key))
+                devices[owner] = msgspec.structs.replace(devices[owner], **{key: kind(round(value, 9))})
+    for bit, left in DEVICE_OF_BIT.items():
+        for owner in {left, left.replace("_left", "_right")} & set(devices):
+            if not Devices(int(values.get("devices", bit))) & bit:
+                devices[owner] = msgspec.structs.replace(devices[owner], on=False)
+    return msgspec.structs.replace(robot, body=body, device=devices)

@@ -19,6 +19,7 @@ from boebot.devices.encoder import EDGE_PERIOD_SCALE, EncoderReader
 from boebot.devices.infrared import NEVER
 from boebot.devices.ping import PingReader
 from boebot.devices.servo import PULSE_SCALE_US
+from boebot.link.delivery import BoardEvent
 from boebot.link.messages import Infrared, Status, Telemetry, Whiskers
 from boebot.odometry import Odometry, WheelDirection
 
@@ -44,12 +45,16 @@ class Record:
     Attributes:
         telemetry: payloads, oldest first.
         times: the run's time (s) of each, by the board's clock.
+        stamps: (host time of the tick in s, its error bound in s) of each.
+        events: what the board told exactly once, oldest first.
         steps: (index into telemetry of the observation, command kind, left, right), one per step of the
         brain.
     """
 
     telemetry: list[bytes] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
+    stamps: list[tuple[float, float]] = field(default_factory=list)
+    events: list[BoardEvent] = field(default_factory=list)
     steps: list[tuple[int, str, float, float]] = field(default_factory=list)
 
 

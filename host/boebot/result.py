@@ -27,10 +27,13 @@ class RunResult:
         error: why the run ended before its time, or None.
         truth: what really happened, where somebody knows (simulated runs); no brain saw it.
         steps: steps of the brain. late_steps: brain periods that passed without one (live boards only).
-        resets: times the board restarted during the run.
+        resets: times the board restarted during the run. sessions_lost: times it had to be opened and armed again,
+            those included.
         lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
         run_time: length of the run by the board's clock. wall_time: by the wall clock.
         sent, received: (stamp in s on the transport's clock, bytes), oldest first.
+        link: what the two ends of the link counted, "host" and "board".
+        notices: what the user should know, in sentences.
         counters: what an emulated board counted.
     """
 
@@ -55,7 +58,10 @@ class RunResult:
     wall_time: float
     sent: list[tuple[float, bytes]]
     received: list[tuple[float, bytes]]
+    sessions_lost: int = 0
     identity: Identity | None = None
+    link: dict[str, dict[str, int]] = field(default_factory=dict)
+    notices: list[str] = field(default_factory=list)
     counters: dict[str, float] = field(default_factory=dict)
 
     # ---- arrays --------------------------------------------------------------------------------------------
@@ -164,6 +170,7 @@ class RunResult:
             "overruns": self.overruns,
             "dead_man_stops": self.dead_man_stops,
             "resets": self.resets,
+            "sessions_lost": self.sessions_lost,
             "real_time_factor": round(self.real_time_factor, 2),
             "firmware": None if self.identity is None else text(self.identity.firmware_version),
             "compiler": None if self.identity is None else text(self.identity.compiler),

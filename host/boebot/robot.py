@@ -44,8 +44,8 @@ class Command(NamedTuple):
     """What the brain wants of the motors."""
 
     kind: str
-    """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (motors off).
-    """
+    """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (no pulses: the wheels
+    turn freely)."""
     left: float
     right: float
 
@@ -155,6 +155,13 @@ class Observation:
     equipment: Equipment
     time: float
     """Seconds since the run began, by the board's clock."""
+    board_time: float = 0.0
+    """Seconds since the board was reset, by its clock: the start of the tick."""
+    host_time: float = 0.0
+    """The same instant on the host's clock, `time.monotonic()` (s; for a simulated board its own simulated clock)."""
+    host_time_error: float = float("inf")
+    """Error bound of `host_time` (s): the true instant lies within it, whatever the line's delays are, as long as the
+    board's clock keeps its rate."""
 
     @property
     def tick(self) -> int:
@@ -218,13 +225,15 @@ class Robot:
     The same object is handed to every step of a run; its sensors always show the newest observation.
     """
 
-    __slots__ = ("_chances", "_period", "command", "name", "observation", "random")
+    __slots__ = ("_chances", "_period", "command", "latched", "name", "observation", "random")
 
     def __init__(self, name: str, period: float, seed: int = 1) -> None:
         self.name: Final = name
         self._period = period
         self.observation: Observation
         self.command: Command = STOP
+        self.latched = False
+        """The motors are latched off by `emergency_stop`, until `arm`."""
         self.random = random.Random(f"brain {seed}")
         """A `random.Random` of the brain's own: the same run gives the same numbers."""
         self._chances: dict[tuple[float, float], float] = {}
@@ -315,8 +324,17 @@ class Robot:
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:
-        """Switches the motors off until the next command."""
+        """Switches the motors off until the next command: no pulses, the wheels turn freely."""
         self.command = STOP
+
+    def emergency_stop(self) -> None:
+        """Stops the motors and latches them off: no command moves them until `arm`."""
+        self.command = STOP
+        self.latched = True
+
+    def arm(self) -> None:
+        """Ends what `emergency_stop` began: the next command moves the motors again."""
+        self.latched = False
 
     # ---- chance --------------------------------------------------------------------------------------------
 

@@ -6,8 +6,9 @@ steps on the first telemetry whose tick has reached the next multiple of n, and 
 On a board in this process time stands still while the brain thinks, so that a run is a function of brain,
 robot, arena and seed; on a live board the newest telemetry counts.
 
-However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes), the motors are stopped and
-the record is complete up to there.
+A board that was reset, or that has not heard the host for too long, is configured and armed again, and the run goes
+on. However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes, a low supply, a stop from
+elsewhere), the motors are stopped and the record is complete up to there.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.brains import LoadedBrain
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
+from boebot.link.delivery import LatchedAgainError, SessionLostError
 from boebot.link.session import Link, text
+from boebot.link.session import Telemetry as Received
 from boebot.parameters import configure
 from boebot.record import Record
 from boebot.result import RunResult
@@ -35,8 +38,14 @@ DEFAULT_PERIOD = 0.05  # s
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
 TIME_TO_LIVE_LIMIT_MS = 2000
 SILENCE_S = 1.0  # a board that says nothing for so long is lost
+STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
+_ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PROGRESS_S = 0.1  # wall time between two reports of progress
+_PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
+_BYTES_TO_LIVE = 300
 _Telemetry = messages.Telemetry
+_LATCH = 34  # offset in telemetry
+_NOT_YET = 1 << 32  # no tick is later
 
 Progress = Callable[[float], None]
 """Called now and then with the seconds of the run that have passed."""
@@ -137,15 +146,15 @@ def _expect(name: str, value: object, expected: str, *kinds: type) -> None:
         raise BoebotError(f"{name} is {value!r}; expected {expected}")
 
 
-def check_time_to_live(period_s: float) -> int:
-    """The set-points' time to live (ms) at a brain period.
+def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
+    """The set-points' time to live (ms) at a brain period; at least `least_s`.
 
     Raises:
         BoebotError: the period is so long that the motors would stop between two steps.
     """
     if not (period_s > 0 and math.isfinite(period_s)):
         raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
-    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000))
+    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
     if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
         raise BoebotError(
             f"a brain period of {period_s * 1000:g} ms is too long; expected at most {TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
@@ -171,34 +180,39 @@ class _Run:
         self.brain = brain
         self.on = on
         self.progress = progress
-        self.time_to_live_ms = check_time_to_live(period_s)
         self.link = Link(session.transport)
-        hello = self.link.handshake()
+        hello = self.link.open()
         self.tick_s = 1.0 / hello.tick_rate
-        self.period_s = period_s
-        self.period_ticks = _whole_ticks(period_s, self.tick_s)
-        pin_map = text(hello.pin_map)
+        self.notices = self.link.notices
+        self.period_ticks = self._fitting_period(period_s, hello.telemetry_period)
+        self.telemetry_ticks = hello.telemetry_period
+        self.period_s = self.period_ticks * self.tick_s
+        self.time_to_live_ms = check_time_to_live(self.period_s, self._time_to_live_least())
+        self.identity = self.link.identity()
+        pin_map = text(self.identity.pin_map)
         if pin_map != request.robot.pin_map:
             raise ProtocolError(
                 f"the board at {session.transport.name} runs firmware for pin map {pin_map!r}, but robot "
                 f"{request.robot.name!r} needs {request.robot.pin_map!r}"
             )
         self.seconds = seconds
+        self.description = request.robot
         self.equipment = Equipment(request.robot, self.tick_s)
-        self.robot = Robot(request.robot.name, period_s, request.seed)
-        self.identity: messages.Identity | None = None
+        self.robot = Robot(request.robot.name, self.period_s, request.seed)
         self.record = Record()
         self.resets = 0
         self.late_steps = 0
         self.clock_offset_s = 0.0  # transport's clock at the run's time 0
+        self._session = 0  # of the link that was configured and armed
+        self._armed_tick = -1
+        self._halted = False  # by the brain's emergency stop
 
     def execute(self) -> RunResult:
         """The whole run."""
         error: BaseException | None = None
         started = wall.perf_counter()
         try:
-            configure(self.link, self.request.robot)
-            self.identity = self.link.identity()
+            self._make_ready()
             self.link.forget_telemetry()
             started = wall.perf_counter()
             self._loop()
@@ -210,6 +224,73 @@ class _Run:
                 self._stop_motors()
         return self._result(error, elapsed)
 
+    # ---- before the first step, and after each new session ---------------------------------------------------
+
+    def _fitting_period(self, period_s: float, telemetry_ticks: int) -> int:
+        """The brain's period in ticks, such that each step has telemetry of its own tick."""
+        ticks = _whole_ticks(period_s, self.tick_s)
+        fitting = -(-ticks // telemetry_ticks) * telemetry_ticks
+        if fitting != ticks:
+            self.notices.append(
+                f"the brain steps every {fitting * self.tick_s * 1000:g} ms, not every {period_s * 1000:g} ms: "
+                f"the board sends telemetry every {telemetry_ticks * self.tick_s * 1000:g} ms"
+            )
+        return fitting
+
+    def _time_to_live_least(self) -> float:
+        return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.byte_s
+
+    def _make_ready(self) -> None:
+        """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile."""
+        link = self.link
+        while self._session != link.sessions:
+            link.open()
+            session = link.sessions
+            try:
+                self.description = configure(link, self.request.robot)
+                if not self._halted:
+                    self._arm()
+            except SessionLostError:
+                continue
+            self._session = session
+        self.equipment = Equipment(self.description, self.tick_s)
+
+    def _arm(self) -> None:
+        for _ in range(_ARM_TRIES - 1):
+            with contextlib.suppress(LatchedAgainError):
+                self.link.arm()
+                break
+        else:
+            self.link.arm()
+        if self.link.latest is not None:
+            self._armed_tick = int.from_bytes(self.link.latest[:4], "little")
+
+    def _heed_emergency_stop(self) -> None:
+        """The brain has latched the motors off, or armed them again."""
+        if self.robot.latched and not self._halted:
+            self._halted = True
+            self.link.stop()
+        elif self._halted and not self.robot.latched:
+            with contextlib.suppress(SessionLostError):  # the new session is made ready in its turn
+                if self.link.is_open:
+                    self._arm()
+            self._halted = False
+
+    def _heed_latch(self, payload: bytes) -> None:
+        """The board has latched its motors off: a reason to end the run, unless a new session mends it.
+
+        Raises:
+            BoardError: the supply is low, or somebody else has stopped the robot.
+        """
+        telemetry, where = _Telemetry.unpack(payload), self.link.transport.name
+        if telemetry.latch == messages.Latch.SUPPLY_LOW:
+            raise BoardError(
+                f"the board at {where} has stopped its motors: its supply is low, {telemetry.supply / 1000:.2f} V; "
+                "charge or change the batteries"
+            )
+        if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
+            raise BoardError(f"the board at {where} has stopped its motors: a stop command came from elsewhere")
+
     def _loop(self) -> None:
         link, robot, transport = self.link, self.robot, self.session.transport
         poll, step, unpack = link.poll, self.brain.step, _Telemetry.STRUCT.unpack
@@ -218,34 +299,44 @@ class _Run:
         paced = self.request.realtime and not transport.realtime
         time_to_live_ms = self.time_to_live_ms
 
+        period = self.telemetry_ticks
+        host_stamps = self.record.stamps
         last = due = -1
         time_zero = 0.0  # run time at tick 0 of the board's present count
         end_s = self.seconds - tick_s / 2
-        wait_s, quiet_s = 2 * tick_s, 0.0
+        wait_s, quiet_s = (period + 1) * tick_s, 0.0
         heard_s = transport.now()
         started = next_progress = wall.perf_counter()
         started_s = heard_s
         while True:
-            payloads = poll(wait_s, quiet_s)
-            if not payloads:
-                if transport.now() - heard_s > SILENCE_S:
+            received = poll(wait_s, quiet_s)
+            if link.sessions != self._session:
+                received = self._in_new_session(received)
+                equipment = self.equipment
+            if not received:
+                if transport.now() - heard_s > SILENCE_S + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
-                wait_s, quiet_s = 2 * tick_s, 0.0
+                wait_s, quiet_s = (period + 1) * tick_s, 0.0
                 continue
-            for payload in payloads:
+            for payload, board_s, host_s, bound_s in received:  # noqa: B007
                 tick = int.from_bytes(payload[:4], "little")
                 if due < 0:
                     due = tick + -tick % n
                     time_zero = -due * tick_s
-                    self.clock_offset_s = transport.now() - _AIR_S + (due - tick) * tick_s
+                    self.clock_offset_s = host_s + (due - tick) * tick_s
                 elif tick <= last:  # the board was reset: its ticks begin afresh
                     due = tick + -tick % n
-                    time_zero = self._time_after_reset(times, transport.now()) - tick * tick_s
-                    self._again_after_reset()
+                    time_zero = self._time_after_reset(times, host_s) - tick * tick_s
+                    self.resets += 1
                 last = tick
                 if tick >= due or times:
                     telemetry_log.append(payload)
                     times.append(tick * tick_s + time_zero)
+                    host_stamps.append((host_s, bound_s))
+            if payload[_LATCH] and last > self._armed_tick:
+                self._heed_latch(payload)
+            if events := link.events():
+                self.record.events += events
             heard_s = transport.now()
             time_s = times[-1] if times else 0.0
             if time_s >= end_s:
@@ -260,47 +351,53 @@ class _Run:
                 if self.progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + _PROGRESS_S
                     self.progress(time_s)
-                robot.observation = Observation(_Telemetry._make(unpack(payload)), equipment, time_s)
+                robot.observation = Observation(
+                    _Telemetry._make(unpack(payload)), equipment, time_s, board_s, host_s, bound_s
+                )
                 try:
                     step(robot)
                 except (Exception, SystemExit) as error:
                     raise BrainError(brains.explain(error, self.brain.path)) from error
+                if robot.latched or self._halted:
+                    self._heed_emergency_stop()
                 kind, left, right = robot.command
                 if kind == "signal":
                     link.send_signal(left, right, time_to_live_ms, last)
                 elif kind == "speed":
                     link.send_speed(left, right, time_to_live_ms, last)
                 else:
-                    link.send_stop()
+                    link.send_coast(time_to_live_ms, last)
                 steps.append((len(times) - 1, kind, left, right))
                 due = last - last % n + n
             ahead_ticks = min(due - last, (self.seconds - time_s) / tick_s)
-            wait_s, quiet_s = (ahead_ticks + 2) * tick_s, (ahead_ticks - 0.5) * tick_s
+            wait_s, quiet_s = (ahead_ticks + period + 1) * tick_s, (ahead_ticks - 0.5) * tick_s
 
-    def _time_after_reset(self, times: list[float], now_s: float) -> float:
-        """The run's time of a tick just received: whole ticks; the board's outage by the transport's clock."""
-        passed_s = round((now_s - _AIR_S - self.clock_offset_s) / self.tick_s) * self.tick_s
+    def _in_new_session(self, received: list[Received]) -> list[Received]:
+        """Makes the board ready again; returns the telemetry of the new session."""
+        self._armed_tick = _NOT_YET
+        self._make_ready()
+        if self._halted:
+            self._armed_tick = -1
+        return [*received, *self.link.fetch_telemetry()]
+
+    def _time_after_reset(self, times: list[float], host_s: float) -> float:
+        """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
+        passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
         return max(passed_s, times[-1] + self.tick_s) if times else 0.0
 
-    def _again_after_reset(self) -> None:
-        """The board restarted: its parameters are its defaults again."""
-        self.resets += 1
-        configure(self.link, self.request.robot)
-
     def _stop_motors(self) -> None:
-        """Tells the board to stop and waits until it says so; a board that has gone stops by its dead-man."""
+        """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
+        dead-man."""
         with contextlib.suppress(BoebotError, KeyboardInterrupt):
-            for _ in range(3):
-                self.link.send_stop()
-                for payload in self.link.poll(4 * self.tick_s, 2.5 * self.tick_s):
-                    if _Telemetry.unpack(payload).status & messages.Status.STOPPED:
-                        return
+            self.link.stop_and_confirm(STOP_LIMIT_S)
+            self.record.events += self.link.events()
+            self.link.close()
 
     def _result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         link = self.link
         return RunResult(
             brain=self.brain.name,
-            robot=self.request.robot,
+            robot=self.description,
             board=self.on,
             description=self.session.description,
             arena=self.request.arena,
@@ -314,6 +411,7 @@ class _Run:
             steps=len(self.record.steps),
             late_steps=self.late_steps,
             resets=self.resets,
+            sessions_lost=link.sessions_lost,
             lost_frames=link.decoder.lost,
             bad_frames=link.decoder.bad,
             run_time=self.record.times[-1] if self.record.times else 0.0,
@@ -321,13 +419,10 @@ class _Run:
             sent=link.sent,
             received=link.received,
             identity=self.identity,
+            link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
+            notices=self.notices,
             counters=dict(self.session.counters()),
         )
-
-
-# From a tick's start to the moment its telemetry has been read: work, 43 bytes at 500,000 baud and the pause
-# after them. The true path is joined to the telemetry with it; pictures need no more than this.
-_AIR_S = 0.0012
 
 
 def _whole_ticks(period_s: float, tick_s: float) -> int:

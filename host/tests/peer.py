@@ -1,67 +1,206 @@
-"""A stand-in for a board: speaks the protocol from the other end and drives a point about a square room.
+"""A model of the board, written from PROTOCOL.md alone: the protocol's other end, and a point that drives about a
+square room.
 
-It is written from PROTOCOL.md for the host's own tests, which need no simulator. `InProcess` lets it live in
-simulated time; `Pty` puts it on a real pseudo-terminal, in a thread.
+The host's own tests use it, which need no simulator. `InProcess` lets it live in simulated time behind a line that may
+lose, double, delay and damage what it carries (channel.py); `Pty` puts it on a real pseudo-terminal, in a thread. Each
+of its protections can be switched off, so that a test can show what it is good for.
 """
 
 from __future__ import annotations
 
 import contextlib
+import heapq
+import itertools
 import math
 import os
+import random
 import select
 import threading
 import time
 import tty
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
+from channel import Channel
 
 from boebot.boards import Truth
 from boebot.errors import BoardError
-from boebot.link import frame, messages
+from boebot.link import messages
+from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
+from boebot.parameters import parameters_of
 from boebot.robots import RobotDescription, load_robot
 
 TICK_S = 0.01
-TELEMETRY_AFTER_S = 0.001  # from a tick's start to the end of its telemetry on the wire
+BYTE_S = 2e-5  # 500,000 baud
 ROOM_M = 1.5
+NONCES = 1 << 21
+HELLO_TICKS, HELLO_SESSION_TICKS = 10, 20
+COUNTERS_TICKS = 64
+QUEUE = 4
+EEPROM_S = 0.2  # for all parameters
+Status, Latch, AnswerStatus, EventKind = (
+    messages.Status,
+    messages.Latch,
+    messages.AnswerStatus,
+    messages.EventKind,
+)
+Setpoint = messages.SetpointSignal | messages.SetpointSpeed | messages.SetpointCoast
+
+
+@dataclass(frozen=True)
+class Protections:
+    """What keeps the board from doing what it should not."""
+
+    numbers: bool = True  # requests that come again are not carried out again
+    seed: bool = True  # frames of other sessions have another checksum
+    age: bool = True  # set-points that answer an old tick are refused
+    latches: bool = True  # an arm that knows nothing of the latest latching is refused
+    nonce: bool = True  # an open with a nonce of earlier times is dropped
+
+
+def name_of(parameter: int) -> str:
+    """The parameter's name by its number."""
+    return next(name for name, spec in messages.PARAMETERS.items() if spec.id == parameter)
 
 
 class Peer:
-    """The board's side. Feed it bytes with `receive`; `tick()` makes one control tick and returns what it
-    sends.
+    """The board's side. Feed it bytes with `receive`; `tick()` makes one control tick; `take()` gives its frames.
+
+    Attributes:
+        now: what its clock is made from (s); set by the harness.
+        drift, first_us, first_tick: of its clock, and where time and ticks begin after a reset.
+        parameters: in force, by number, in counts.
+        carried_out: requests carried out, in order, as (session, message).
+        setpoints: those that arrived, and `setpoint_ticks`, when; `accepted`, those that count.
+        starts: how often it was started. openings: sessions that were opened.
     """
 
-    def __init__(self, robot: RobotDescription | None = None) -> None:
+    def __init__(self, robot: RobotDescription | None = None, protections: Protections | None = None) -> None:
         self.robot = robot or load_robot("shieldbot")
+        self.protections = protections or Protections()
         self.protocol_version = messages.PROTOCOL_VERSION
         self.schema_hash = messages.SCHEMA_HASH
+        self.described: dict[int, tuple[int, int]] = {
+            number: (kind.LENGTH, messages.HASHES[number]) for number, kind in messages.MESSAGES.items()
+        }
         self.pin_map = self.robot.pin_map
         self.tick_rate = 100
         self.answers = True
-        self.parameters: dict[int, int] = {}
-        self.setpoints: list[messages.SetpointSignal | messages.SetpointSpeed | messages.Stop] = []
+        self.now: Callable[[], float] = lambda: 0.0
+        self.drift = 0.0
+        self.first_us = 0
+        self.first_tick = 0
+        self.first_number = 0  # of requests and events in each session: to start near their roll-over
+        self.supply_mv = 5000
+        self.telemetry_period = 1
+        self.saved: dict[int, int] | None = None
+        self.carried_out: list[tuple[int, messages.Message]] = []
+        self.setpoints: list[Setpoint] = []
         self.setpoint_ticks: list[int] = []
+        self.accepted: list[Setpoint] = []
+        self.stops = 0
+        self.openings: list[int] = []
         self.x = self.y = ROOM_M / 2
         self.heading = 0.3
         self.path: list[tuple[float, float, float, float, bool]] = []
         self.starts = 0
+        self._random = random.Random("peer")
+        self._frames: list[bytes] = []
         self.reset()
+
+    # ---- starts and sessions -----------------------------------------------------------------------------------------
 
     def reset(self) -> None:
         """Power on."""
-        self.ticks = 0
         self.starts += 1
-        self.decoder = frame.Decoder(frame.TO_BOARD)
-        self._sequence = 0
-        self._out = b""
+        self.ticks = self.first_tick
+        self._reset_s = self.now()
+        self.decoder = Decoder(NO_SESSION, to_board=True)
+        self.session = 0
+        self.parameters = dict(self.saved) if self.saved is not None else self.defaults()
+        self._sequence = self._random.randrange(256)
+        self._frames = []
         self._edges = [0.0, 0.0]
+        self._touching = False
+        self.latch, self.latches = Latch.START, 1
+        self.supply_measured = False
+        self.supply_is_low = False
+        self.status = Status(0)
         self.command = (0.0, 0.0)
-        self.live_until = 0
-        self.status = messages.Status.STOPPED
+        self._coasting = True
+        self._in_force: tuple[int, int, int] | None = None  # tick that it answers, sequence, last tick of its life
+        self._armed_tick = self.ticks
         self._setpoint_sequence = 0
+        self._saving_until: float | None = None
+        self._save_answer: int | None = None
+        self.counts = dict.fromkeys(messages.Counters._fields, 0)
+        self._new_nonce()
+        self._begin_numbers()
         if self.answers:
             self._hello()
+
+    def defaults(self) -> dict[int, int]:
+        """The image's parameters."""
+        values = {spec.id: spec.minimum for spec in messages.PARAMETERS.values()}
+        ordinary = {
+            "time_to_live": 250,
+            "encoder_limit": 80,
+            "telemetry_period": 1,
+            "session_time_out": 1000,
+            "retry_time": 0,
+            "supply_minimum": 4200,
+            "bandgap": 1100,
+        }
+        for name, value in (parameters_of(self.robot) | ordinary).items():
+            spec = messages.PARAMETERS[name]
+            values[spec.id] = round(value / spec.scale) if name not in ordinary else int(value)
+        return values
+
+    def parameter(self, name: str) -> int:
+        """A parameter in force, in counts."""
+        return self.parameters[messages.PARAMETERS[name].id]
+
+    def _new_nonce(self) -> None:
+        self.nonce = self._random.randrange(1, NONCES)
+
+    def _begin_numbers(self) -> None:
+        self._request_number = self.first_number
+        self._last_answer: messages.Answer | None = None
+        self._event_number = self.first_number
+        self._event: messages.Event | None = None
+        self._event_sent_s = 0.0
+        self._events: deque[tuple[int, int, int]] = deque()
+
+    def _open(self, message: messages.Open) -> None:
+        seed = message.board_nonce ^ message.host_nonce
+        if seed == self.session and seed:
+            self._hello()
+            return
+        if message.protocol_version != self.protocol_version or seed in (0, SEED):
+            return
+        if self.protections.nonce and message.board_nonce != self.nonce:
+            return
+        self._latch(Latch.SESSION_ENDED)
+        self.session = seed
+        self.openings.append(seed)
+        self.decoder.seed = seed if self.protections.seed else SEED
+        self._begin_numbers()
+        if self._save_answer is not None:
+            self._save_answer = None
+        self._new_nonce()
+        self._heard_s = self.now()
+        self._hello()
+
+    def _end_session(self) -> None:
+        self.session = 0
+        self.decoder.seed = NO_SESSION
+        self._latch(Latch.SESSION_ENDED)
+        self._new_nonce()
+        self._hello()
+
+    # ---- what comes --------------------------------------------------------------------------------------------------
 
     def receive(self, data: bytes) -> None:
         """Takes bytes from the host."""
@@ -69,63 +208,273 @@ class Peer:
             message = messages.MESSAGES[message_id].unpack(payload)
             if not self.answers:
                 continue
-            if isinstance(message, messages.HelloRequest):
-                self._hello()
-            elif isinstance(message, messages.Identify):
-                self._send(messages.Identity(b"0.1.0", b"peer", 0, 0))
-            elif isinstance(message, messages.SetParameter):
-                self.parameters[message.parameter] = message.value
-                self._send(messages.Parameter(message.parameter, message.value, 0))
-            elif isinstance(message, messages.GetParameter):
-                self._send(messages.Parameter(message.parameter, self.parameters.get(message.parameter, 0), 0))
-            elif isinstance(message, messages.SetpointSignal | messages.SetpointSpeed | messages.Stop):
-                self.setpoints.append(message)
-                self.setpoint_ticks.append(self.ticks)
-                self._setpoint_sequence = sequence
-                if isinstance(message, messages.Stop):
-                    self.command, self.status = (0.0, 0.0), messages.Status.STOPPED
-                else:
-                    full = 10000 if isinstance(message, messages.SetpointSignal) else 1700
-                    self.command = (message.left / full, message.right / full)
-                    self.live_until = self.ticks + math.ceil(message.time_to_live / 10)
-                    self.status = messages.Status.MOTORS_ENABLED
+            if isinstance(message, messages.Open | messages.Identify | messages.Describe):
+                self._handshake(message)
+            elif self.session:
+                self._heard_s = self.now()
+                self._take(message, sequence)
 
-    def answer(self) -> bytes:
-        """What was asked for since last time."""
-        out, self._out = self._out, b""
-        return out
+    def _handshake(self, message: messages.Open | messages.Identify | messages.Describe) -> None:
+        if isinstance(message, messages.Open):
+            self._open(message)
+        elif isinstance(message, messages.Identify):
+            self._send(messages.Identity(b"0.1.0", b"peer", self.pin_map.encode(), 0, 0))
+        elif message.board_nonce == self.nonce:
+            numbers = sorted(self.described)
+            number = numbers[message.index] if message.index < len(numbers) else 0
+            length, digest = self.described.get(number, (0, 0))
+            self._send(messages.Description(message.index, len(numbers), number, length, digest))
 
-    def tick(self) -> bytes:
-        """One control tick: moves the robot and returns its telemetry."""
-        if self.status == messages.Status.MOTORS_ENABLED and self.ticks > self.live_until:
-            self.command, self.status = (0.0, 0.0), messages.Status.DEAD_MAN
-        touching = self._move()
-        self.path.append((self.ticks * TICK_S, self.x, self.y, self.heading, touching))
+    def _take(self, message: messages.Message, sequence: int) -> None:
+        if isinstance(message, messages.Stop):
+            self.stops += 1
+            self._latch(Latch.STOP_COMMAND)
+            self._send(messages.Stopped(message.token))
+        elif isinstance(message, messages.Close):
+            if message.session == self.session:
+                self._end_session()
+        elif isinstance(message, Setpoint):
+            self.setpoints.append(message)
+            self.setpoint_ticks.append(self.ticks)
+            self._setpoint(message, sequence)
+        elif isinstance(message, messages.Acknowledge):
+            if self._event is not None and message.number == self._event.number:
+                self._event = None
+                self._send_event()
+        elif isinstance(message, messages.ClockProbe):
+            self._send(messages.ClockAnswer(message.token, self.board_us()))
+        else:
+            self._request(message)
+
+    def _request(self, message: messages.Message) -> None:
+        number = message[0]
+        if number == self._request_number and self.protections.numbers:
+            self.counts["duplicate"] += 1
+            if self._last_answer is not None:
+                self._send(self._last_answer)
+        elif number == (self._request_number + 1) % 65536 or (
+            number == self._request_number and not self.protections.numbers
+        ):
+            self._request_number = number
+            self._last_answer = None
+            self.carried_out.append((self.session, message))
+            status, value = self._carry_out(message)
+            if status is not None:
+                self._answer(number, status, value)
+        else:
+            self.counts["refused"] += 1
+
+    def _answer(self, number: int, status: int, value: int = 0) -> None:
+        self._last_answer = messages.Answer(number, status, value)
+        self._send(self._last_answer)
+
+    def _carry_out(self, message: messages.Message) -> tuple[int | None, int]:
+        """Status (None: the answer comes later) and value."""
+        saving = self._saving_until is not None
+        if isinstance(message, messages.GetParameter):
+            if message.parameter not in self.parameters:
+                return AnswerStatus.UNKNOWN_PARAMETER, 0
+            return AnswerStatus.OK, self.parameters[message.parameter]
+        if isinstance(message, messages.SetParameter):
+            return self._set(message, saving)
+        if isinstance(message, messages.ResetParameters):
+            if saving:
+                return AnswerStatus.BUSY, 0
+            self.parameters = self.defaults()
+            return AnswerStatus.OK, 0
+        if isinstance(message, messages.SaveParameters):
+            if saving:
+                return AnswerStatus.BUSY, 0
+            if self.supply_is_low or not self.supply_measured:
+                return AnswerStatus.SUPPLY_LOW, 0
+            self._saving_until = self.now() + EEPROM_S
+            self._save_answer = message.number
+            return None, 0
+        assert isinstance(message, messages.Arm)
+        if self.supply_is_low or not self.supply_measured:
+            return AnswerStatus.SUPPLY_LOW, 0
+        if message.latches != self.latches and self.protections.latches:
+            return AnswerStatus.LATCHED_AGAIN, 0
+        if self.latch != Latch.NONE:
+            self.latch = Latch.NONE
+            self._happened(EventKind.LATCH, Latch.NONE)
+        self._armed_tick = self.ticks
+        return AnswerStatus.OK, 0
+
+    def _set(self, message: messages.SetParameter, saving: bool) -> tuple[int, int]:
+        if message.parameter not in self.parameters:
+            return AnswerStatus.UNKNOWN_PARAMETER, 0
+        spec = messages.PARAMETERS[name_of(message.parameter)]
+        if saving:
+            return AnswerStatus.BUSY, self.parameters[message.parameter]
+        if not spec.minimum <= message.value <= spec.maximum:
+            return AnswerStatus.OUT_OF_RANGE, self.parameters[message.parameter]
+        self.parameters[message.parameter] = message.value
+        return AnswerStatus.OK, message.value
+
+    # ---- motion ------------------------------------------------------------------------------------------------------
+
+    def _latch(self, cause: Latch) -> None:
+        self.latches = (self.latches + 1) & 0xFF
+        if self.latch == Latch.NONE:
+            self.latch = cause
+            self._happened(EventKind.LATCH, cause)
+        self._rest()
+        self.status &= ~Status.DEAD_MAN
+
+    def _rest(self) -> None:
+        self.command, self._coasting, self._in_force = (0.0, 0.0), True, None
+        self.status &= ~Status.MOTORS_ENABLED
+
+    def _setpoint(self, message: Setpoint, sequence: int) -> None:
+        limit = 10000 if isinstance(message, messages.SetpointSignal) else 5000
+        wheels = () if isinstance(message, messages.SetpointCoast) else (message.left, message.right)
+        if self.latch != Latch.NONE or message.time_to_live > 2000 or any(abs(wheel) > limit for wheel in wheels):
+            self.counts["refused"] += 1
+            return
+        tick = self.ticks - 1  # the one that is being lived
+        age = (tick - message.answers_tick) & 0xFFFF
+        life = math.ceil((message.time_to_live or self.parameter("time_to_live")) / 1000 / TICK_S)
+        late = age >= life or (message.answers_tick - self._armed_tick) & 0xFFFF in (0, *range(0x8000, 0x10000))
+        if self._in_force is not None:
+            newer = (message.answers_tick - self._in_force[0] + 0x8000) % 0x10000 - 0x8000
+            later = (sequence - self._in_force[1] + 0x80) % 0x100 - 0x80
+            late = late or newer < 0 or (newer == 0 and later <= 0)
+        if late and self.protections.age:
+            self.counts["late"] += 1
+            return
+        self.accepted.append(message)
+        self._setpoint_sequence = sequence
+        self._in_force = (message.answers_tick, sequence, tick - age + life)
+        if not self.protections.age:
+            self._in_force = (message.answers_tick, sequence, tick + life)
+        self._coasting = not wheels
+        full = 10000 if isinstance(message, messages.SetpointSignal) else self.parameter("wheel_speed_maximum")
+        self.command = (wheels[0] / full, wheels[1] / full) if wheels else (0.0, 0.0)
+        self.status = self.status & ~Status.DEAD_MAN | Status.MOTORS_ENABLED
+
+    @property
+    def moving(self) -> bool:
+        """Whether a wheel is driven."""
+        return self.command != (0.0, 0.0)
+
+    # ---- time --------------------------------------------------------------------------------------------------------
+
+    def board_us(self) -> int:
+        """Its clock, as it goes over the wire."""
+        return (self.first_us + int((self.now() - self._reset_s) * (1 + self.drift) * 1e6)) & 0xFFFFFFFF
+
+    def tick(self) -> None:
+        """One control tick."""
+        if not self.answers:
+            self.ticks += 1
+            return
+        self._tick_us = self.board_us()
+        self._watch_supply()
+        if self._in_force is not None and self.ticks > self._in_force[2]:
+            answered = self._in_force[0]
+            self._rest()
+            self.status |= Status.DEAD_MAN
+            self._happened(EventKind.DEAD_MAN, answered)
+        if self.session and self.now() - self._heard_s > self.parameter("session_time_out") / 1000:
+            self._end_session()
+        self._end_saving()
+        self._move_and_feel()
+        self._send_on_its_own()
+        self.ticks = (self.ticks + 1) & 0xFFFFFFFF
+
+    def _watch_supply(self) -> None:
+        minimum = self.parameter("supply_minimum")
+        if self.supply_measured and self.supply_mv < minimum and not self.supply_is_low:
+            self.supply_is_low = True
+            self._latch(Latch.SUPPLY_LOW)
+        elif self.supply_mv >= minimum + 100:
+            self.supply_is_low = False
+        self.supply_measured = True
+
+    def _end_saving(self) -> None:
+        if self._saving_until is not None and self.now() >= self._saving_until:
+            self._saving_until = None
+            self.saved = dict(self.parameters)
+            if self._save_answer is not None:
+                self._answer(self._save_answer, AnswerStatus.OK)
+                self._save_answer = None
+
+    def _send_on_its_own(self) -> None:
+        period = max(self.telemetry_period, self.parameter("telemetry_period"))
+        if self.ticks % (max(HELLO_SESSION_TICKS, 4 * period) if self.session else HELLO_TICKS) == 0:
+            self._hello()
+        if not self.session:
+            return
+        if self._event is None:
+            self._send_event()
+        elif self.now() - self._event_sent_s >= (self.parameter("retry_time") / 1000 or 2 * TICK_S + 200 * BYTE_S):
+            self.counts["retransmitted"] += 1
+            self._event_sent_s = self.now()
+            self._send(self._event)
+        if self.ticks % period == 0:
+            self._send(self._telemetry())
+        if self.ticks % COUNTERS_TICKS == 0:
+            self.counts["good"], self.counts["bad"] = self.decoder.good, self.decoder.bad
+            self._send(messages.Counters(*(value & 0xFFFF for value in self.counts.values())))
+
+    def _telemetry(self) -> messages.Telemetry:
         ahead = self._ahead()
-        seen = 3 if ahead < 0.2 else 0
-        self._send(
-            messages.Telemetry(
-                tick=self.ticks,
-                time=self.ticks * 10_000 & 0xFFFFFFFF,
-                encoder_left=int(self._edges[0]),
-                encoder_right=int(self._edges[1]),
-                edge_period_left=0,
-                edge_period_right=0,
-                whiskers=3 if touching else 0,
-                infrared=seen,
-                infrared_age=self.ticks % 5,
-                ping_echo=round(ahead * 2 / 343.5 * 1e6) if ahead < 3.0 else 0,
-                ping_age=self.ticks % 5,
-                pulse_left=self._pulse(self.command[0], 200),
-                pulse_right=self._pulse(self.command[1], -200),
-                status=int(self.status),
-                setpoint_sequence=self._setpoint_sequence,
-                frames_bad=self.decoder.bad & 0xFF,
-                overruns=0,
-            )
+        status = self.status
+        if self.latch != Latch.NONE:
+            status |= Status.LATCHED
+        if self.supply_is_low:
+            status |= Status.SUPPLY_LOW
+        if self._saving_until is not None:
+            status |= Status.SAVING
+        return messages.Telemetry(
+            tick=self.ticks,
+            time=self._tick_us,
+            encoder_left=int(self._edges[0]),
+            encoder_right=int(self._edges[1]),
+            edge_period_left=0,
+            edge_period_right=0,
+            whiskers=3 if self._touching else 0,
+            infrared=3 if ahead < 0.2 else 0,
+            infrared_age=self.ticks % 5,
+            ping_echo=round(ahead * 2 / 343.5 * 1e6) if ahead < 3.0 else 0,
+            ping_age=self.ticks % 5,
+            pulse_left=self._pulse(self.command[0], 200),
+            pulse_right=self._pulse(self.command[1], -200),
+            supply=self.supply_mv if self.supply_measured else 0,
+            status=int(status),
+            latch=self.latch,
+            latches=self.latches,
+            setpoint_sequence=self._setpoint_sequence,
+            overruns=0,
         )
-        self.ticks += 1
-        return self.answer()
+
+    # ---- events ------------------------------------------------------------------------------------------------------
+
+    def _happened(self, kind: int, value: int) -> None:
+        """Something to be told exactly once."""
+        if not self.session:
+            return
+        us = self.board_us()
+        if len(self._events) + (self._event is not None) >= QUEUE:
+            self.counts["deferred"] += 1
+            for index, (waiting_kind, waiting_value, _) in enumerate(self._events):
+                if waiting_kind == kind:
+                    closed = waiting_value & 0xFF00 if kind == EventKind.WHISKERS else 0
+                    self._events[index] = (kind, value | closed, us)
+                    return
+        self._events.append((kind, value, us))  # in memory for one of each kind beyond the queue
+        if self._event is None:
+            self._send_event()
+
+    def _send_event(self) -> None:
+        if self._events and self._event is None:
+            self._event_number = (self._event_number + 1) % 65536
+            self._event = messages.Event(self._event_number, *self._events.popleft())
+            self._event_sent_s = self.now()
+            self._send(self._event)
+
+    # ---- world -------------------------------------------------------------------------------------------------------
 
     def truth(self) -> Truth:
         """Where the robot was."""
@@ -142,7 +491,7 @@ class Peer:
         )
 
     def _pulse(self, signal: float, gain_us: float) -> int:
-        return round((1500 + gain_us * signal) * 16) if self.status == messages.Status.MOTORS_ENABLED else 0
+        return 0 if self._coasting else round((1500 + gain_us * signal) * 16)
 
     def _ahead(self) -> float:
         """Distance to the wall ahead (m)."""
@@ -151,76 +500,102 @@ class Peer:
         reach_y = ((ROOM_M if dy > 0 else 0.0) - self.y) / dy if dy else math.inf
         return min(reach_x, reach_y)
 
-    def _move(self) -> bool:
-        """Advances the robot by a tick; returns whether it touches the wall."""
+    def _move_and_feel(self) -> None:
+        """Advances the robot by a tick."""
         left, right = (0.16 * signal * TICK_S for signal in self.command)
         self._edges = [edges + abs(way) / 0.00325 for edges, way in zip(self._edges, (left, right), strict=True)]
         self.heading += (right - left) / 0.105
         x = self.x + (left + right) / 2 * math.cos(self.heading)
         y = self.y + (left + right) / 2 * math.sin(self.heading)
         self.x, self.y = min(max(x, 0.07), ROOM_M - 0.07), min(max(y, 0.07), ROOM_M - 0.07)
-        return (self.x, self.y) != (x, y)
+        touching = (self.x, self.y) != (x, y)
+        if touching != self._touching:
+            self._happened(EventKind.WHISKERS, 0x0303 if touching else 0)
+        self._touching = touching
+        self.path.append((self.now(), self.x, self.y, self.heading, touching))
+
+    # ---- what goes ---------------------------------------------------------------------------------------------------
+
+    def take(self) -> list[bytes]:
+        """The frames that it sends, since last time."""
+        frames, self._frames = self._frames, []
+        return frames
 
     def _hello(self) -> None:
+        period = max(self.telemetry_period, self.parameter("telemetry_period"))
+        devices = self.parameter("devices")
         self._send(
             messages.Hello(
                 self.protocol_version,
                 self.schema_hash,
+                self.nonce,
+                self.session,
                 self.tick_rate,
-                31,
+                self.parameter("session_time_out"),
+                period,
+                self.starts,
                 messages.ResetCause.POWER,
-                self.pin_map.encode(),
+                int(self.saved is not None),
+                devices,
+                self.robot.name.encode(),
             )
         )
 
     def _send(self, message: messages.Message) -> None:
-        self._out += frame.encode(message.ID, self._sequence, message.pack())
+        seed = self.session if self.protections.seed else SEED
+        self._frames.append(encode(message.ID, self._sequence, message.pack(), seed))
         self._sequence = (self._sequence + 1) & 0xFF
 
 
 class InProcess:
-    """A board session in simulated time: transport and session in one."""
+    """A board session in simulated time: transport and session in one, with the line's time and what the channel does
+    to it."""
 
     name = "peer"
     realtime = False
     description = "stand-in board"
 
-    def __init__(self, peer: Peer) -> None:
+    def __init__(self, peer: Peer, channel: Channel | None = None) -> None:
         self.peer = peer
         self.closed = False
         self.before_tick: Callable[[int], None] = lambda _: None
+        self.channel = channel or Channel()
         self._now = 0.0
-        self._buffer = b""
-        self._next_tick_s = 0.0
+        self._buffer: list[tuple[float, bytes]] = []
+        self._order = itertools.count()
+        self._coming: list[tuple[float, int, str, bytes]] = []  # heap of what is under way
+        self._free = {"board": 0.0, "host": 0.0}  # when the line in that direction is free
+        self._starts = peer.starts
+        peer.now = self.now
+        self._schedule(0.0, "tick", b"")
 
     @property
     def transport(self) -> InProcess:
         return self
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
+        return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         end = self._now + wait_s
-        look = self._now + quiet_s
-        self._buffer += self.peer.answer()
+        look = self._now + min(quiet_s, wait_s)
+        self._collect()
         while True:
-            if self._buffer and self._now >= look:
-                data, self._buffer = self._buffer, b""
-                return data
-            event = self._next_tick_s + TELEMETRY_AFTER_S
-            if event > end and not (self._buffer and look <= end):
-                self._now = end
-                return b""
-            if self._buffer and look <= event:
+            due = self._coming[0][0]
+            if self._buffer and (self._now >= look or due > look):
                 self._now = max(self._now, look)
-                continue
-            self._now = max(self._now, event)
-            self.before_tick(self.peer.ticks)
-            self._buffer += self.peer.tick()
-            self._next_tick_s += TICK_S
+                pieces, self._buffer = self._buffer, []
+                return pieces
+            if due > end:
+                self._now = max(end, self._now)
+                return []
+            self._now = max(self._now, due)
+            self._happen(*heapq.heappop(self._coming)[2:])
 
     def write(self, data: bytes) -> None:
         if self.closed:
             raise BoardError("peer has gone")
-        self.peer.receive(data)
+        self._carry("board", data)
 
     def now(self) -> float:
         return self._now
@@ -234,12 +609,38 @@ class InProcess:
     def close(self) -> None:
         self.closed = True
 
+    def _schedule(self, at: float, what: str, data: bytes) -> None:
+        heapq.heappush(self._coming, (at, next(self._order), what, data))
+
+    def _happen(self, what: str, data: bytes) -> None:
+        if what == "board":
+            self.peer.receive(data)
+        elif what == "host":
+            self._buffer.append((self._now, data))
+        else:
+            self.before_tick(self.peer.ticks)
+            self.peer.tick()
+            self._schedule(self._now + TICK_S / (1 + self.peer.drift), "tick", b"")
+        self._collect()
+
+    def _collect(self) -> None:
+        for frame in self.peer.take():
+            self._carry("host", frame)
+
+    def _carry(self, way: str, frame: bytes) -> None:
+        """Puts a frame on the line; the channel says what becomes of it."""
+        self._free[way] = max(self._free[way], self._now) + len(frame) * BYTE_S
+        for at, data in self.channel.carry(way, frame, self._free[way]):
+            self._schedule(at, way, data)
+
 
 class Pty:
     """The peer behind a pseudo-terminal, ticking by the wall clock in a thread."""
 
     def __init__(self, peer: Peer) -> None:
         self.peer = peer
+        peer.now = time.monotonic
+        peer.reset()
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
@@ -261,12 +662,14 @@ class Pty:
             wait = next_tick - time.monotonic()
             if wait > 0 and select.select([self._master], [], [], wait)[0]:
                 self.peer.receive(os.read(self._master, 4096))
-                self._write(self.peer.answer())
+                self._write()
             if time.monotonic() >= next_tick:
-                self._write(self.peer.tick())
+                self.peer.tick()
+                self._write()
                 next_tick += TICK_S
 
-    def _write(self, data: bytes) -> None:
+    def _write(self) -> None:
+        data = b"".join(self.peer.take())
         if data and select.select([], [self._master], [], 0)[1]:  # nobody listens: the line's buffer is full
             os.write(self._master, data)
 
@@ -279,3 +682,8 @@ def pty(peer: Peer) -> Iterator[Pty]:
         yield served
     finally:
         served.unplug()
+
+
+def without(**protections: bool) -> Protections:
+    """All protections but those named, as in without(numbers=False)."""
+    return replace(Protections(), **protections)

@@ -1,18 +1,17 @@
-"""URLs of boards, and the sentences for those that lead nowhere."""
+"""URLs of boards: what they name, and the sentences for those that lead nowhere."""
 
 from __future__ import annotations
 
-import os
-import socket
-import threading
-from pathlib import Path
+from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
+from boebot import boards
 from boebot.boards import BoardRequest, board_kinds, is_live, open_board, open_port
 from boebot.errors import BoardError
 from boebot.robots import load_robot
-from peer import Peer, pty
+from lines import line
 
 REQUEST = BoardRequest(robot=load_robot("shieldbot"))
 
@@ -26,8 +25,11 @@ def test_emulated_boards_are_found_by_entry_point() -> None:
     [
         ("/dev/ttyACM0", True),
         ("COM3", True),
+        ("COM3?baud=115200", True),
+        (r"\\.\COM12", True),
         ("serial:/dev/ttyUSB0?baud=250000", True),
         ("socket://localhost:5000", True),
+        ("rfc2217://localhost:2217", True),
         ("native", False),
         ("COMET", False),
     ],
@@ -36,63 +38,85 @@ def test_ports_and_emulated_boards_are_told_apart(url: str, live: bool) -> None:
     assert is_live(url) is live
 
 
+@dataclass
+class Opened:
+    """Stands for a transport: what it was asked to open."""
+
+    asked: tuple[Any, ...]
+    settings: dict[str, Any] = field(default_factory=dict)
+    name: str = "port"
+
+
+@pytest.mark.parametrize(
+    ("url", "kind", "asked", "settings"),
+    [
+        ("/dev/ttyACM0", "open_serial", ("/dev/ttyACM0", 9600), {"baud_given": False, "reset": True}),
+        ("COM3", "open_serial", ("COM3", 9600), {"baud_given": False, "reset": True}),
+        ("serial:/dev/a?baud=250000", "open_serial", ("/dev/a", 250_000), {"baud_given": True, "reset": True}),
+        ("serial:COM7?reset=no&baud=9600", "open_serial", ("COM7", 9600), {"baud_given": True, "reset": False}),
+        ("/dev/a?reset=yes", "open_serial", ("/dev/a", 9600), {"baud_given": False, "reset": True}),
+        ("socket://[::1]:5000", "SocketTransport", ("::1", 5000), {}),
+        ("socket://robot.local:5000/", "SocketTransport", ("robot.local", 5000), {}),
+        ("rfc2217://h:2217", "Rfc2217Transport", ("h", 2217, 9600), {"baud_given": False, "reset": True}),
+        (
+            "rfc2217://[fe80::1]:1?reset=no&baud=115200",
+            "Rfc2217Transport",
+            ("fe80::1", 1, 115_200),
+            {"baud_given": True, "reset": False},
+        ),
+    ],
+)
+def test_url_names_a_port_and_its_settings(
+    url: str, kind: str, asked: tuple[Any, ...], settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: dict[str, Opened] = {}
+    for name in ("open_serial", "SocketTransport", "Rfc2217Transport"):
+
+        def note(*asked: Any, _name: str = name, **settings: Any) -> Opened:
+            return opened.setdefault(_name, Opened(asked, settings))
+
+        monkeypatch.setattr(boards, name, note)
+    open_port(url, 9600)
+    assert opened == {kind: Opened(asked, settings)}
+
+
 @pytest.mark.parametrize(
     ("url", "sentence"),
     [
         ("simulator", "there is no board 'simulator'; expected an emulated board"),
         ("/dev/does-not-exist", "there is no port /dev/does-not-exist"),
         ("serial:", "names no port"),
-        ("serial:/dev/ttyUSB0?parity=even", "unknown setting 'parity=even'; expected baud=RATE"),
-        ("socket://localhost", "no socket address"),
-        ("socket://localhost:70000", "no socket address"),
+        ("serial:?baud=9600", "names no port"),
+        (
+            "serial:/dev/ttyUSB0?parity=even",
+            "has an unknown setting 'parity=even'; expected baud=RATE, reset=yes or reset=no",
+        ),
+        ("serial:/dev/ttyUSB0?baud=9600&rtscts=1", "unknown setting 'rtscts=1'"),
+        ("serial:/dev/ttyUSB0?baud=fast", "has the setting 'baud=fast'; expected baud=RATE"),
+        ("serial:/dev/ttyUSB0?reset=maybe", "has the setting 'reset=maybe'; expected reset=yes or reset=no"),
+        ("serial:/dev/ttyUSB0?baud=9600&baud=9600", "has the setting 'baud' twice"),
+        ("serial:/dev/ttyUSB0?baud=4800", "at 4800 baud; expected 9600 to 1000000"),
+        ("rfc2217://localhost:2217?baud=2000000", "at 2000000 baud; expected 9600 to 1000000"),
+        ("rfc2217://localhost:2217?logging=debug", "unknown setting 'logging=debug'"),
+        ("socket://localhost", "is no socket address; expected socket://HOST:PORT"),
+        ("socket://localhost:70000", "is no socket address"),
+        ("socket://localhost:0", "is no socket address"),
+        ("socket://localhost:5000?baud=9600", "has a setting 'baud=9600'; a socket address takes none"),
+        ("rfc2217://:2217", "is no rfc2217 address; expected rfc2217://HOST:PORT"),
         ("/dev/null", "/dev/null is no serial port"),
     ],
 )
 def test_url_that_leads_nowhere_is_one_sentence(url: str, sentence: str) -> None:
-    with pytest.raises(BoardError, match=sentence):
+    with pytest.raises(BoardError) as refusal:
         open_board(url, REQUEST)
+    assert sentence in str(refusal.value)
 
 
-def test_folder_is_no_port(tmp_path: Path) -> None:
-    with pytest.raises(BoardError, match="no serial port"):
-        open_port(str(tmp_path), 500_000)
-
-
-@pytest.mark.skipif(os.name != "posix" or os.getuid() == 0, reason="for root nothing is forbidden")
-def test_forbidden_port_says_so(tmp_path: Path) -> None:
-    port = tmp_path / "port"
-    port.touch(mode=0o000)
-    with pytest.raises(BoardError, match="permission denied"):
-        open_port(str(port), 500_000)
-
-
-def test_port_is_opened_for_one_program_only() -> None:
-    with pty(Peer()) as served:
-        first = open_port(served.path, 500_000)
-        with pytest.raises(BoardError, match="is busy: another program has it open"):
-            open_port(f"serial:{served.path}", 500_000)
-        first.close()
-        open_port(f"serial:{served.path}?baud=250000", 500_000).close()
-
-
-def test_socket_carries_bytes_both_ways_and_its_end_is_noticed() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        transport = open_port(f"socket://127.0.0.1:{port}", 500_000)
-        connection, _ = server.accept()
-        transport.write(b"there")
-        assert connection.recv(100) == b"there"
-        connection.sendall(b"back")
-        assert transport.read(1.0) == b"back"
-        assert transport.read(0.01) == b""
-        threading.Timer(0.05, connection.close).start()
-        with pytest.raises(BoardError, match="has gone"):
-            transport.read(2.0)
-        transport.close()
-
-
-def test_closed_socket_refuses() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    with pytest.raises(BoardError, match="nobody listens there"):
-        open_port(f"socket://127.0.0.1:{port}", 500_000)
+def test_board_behind_a_port_has_the_robots_rate_unless_the_url_names_one() -> None:
+    with line() as board:
+        for query, rate in (("", 500_000), ("?baud=115200", 115_200)):
+            session = open_board(f"serial:{board.path}{query}", REQUEST)
+            assert session.description == f"board at {board.path}"
+            assert getattr(session.transport, "baud", None) == rate
+            assert session.truth() is None and session.counters() == {}
+            session.close()

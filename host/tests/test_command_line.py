@@ -16,8 +16,12 @@ from pathlib import Path
 import pytest
 
 from boebot import cli, runner
+from boebot.boards import BoardRequest
+from boebot.cli import link as link_command
+from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
 from boebot.interrupts import SIGNALS
+from boebot.link import messages
 from boebot.robot import Robot
 from peer import InProcess, Peer, Pty, pty
 
@@ -144,7 +148,11 @@ def test_new_brain_runs_and_is_never_overwritten(
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = boebot(capsys, "--version")
-    assert code == 0 and out.startswith("boebot ") and "protocol 1" in out
+    assert (
+        code == 0
+        and out.startswith("boebot ")
+        and f"protocol {messages.PROTOCOL_VERSION}, schema {messages.SCHEMA_HASH:08x}" in out
+    )
     code, out, _ = boebot(capsys, "--help")
     assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
 
@@ -181,7 +189,8 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
             process.send_signal(number)
         out, err = process.communicate(timeout=20)
         assert served.peer.command == (0.0, 0.0)
-        assert served.peer.status.name == "STOPPED", "by the stop message, not by the dead-man"
+        assert served.peer.stops, "by the stop message, not by the dead-man"
+        assert served.peer.latch != messages.Latch.NONE
     assert process.returncode == 130
     assert err == "boebot: interrupted\n"
     assert "interrupted" in out
@@ -329,6 +338,79 @@ def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.Capture
     assert code == 1
     assert err == f"boebot: {served.path} has gone: unplugged, or closed by the other side\n"
     assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 10
+
+
+# ---- link and parameters ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def board(monkeypatch: pytest.MonkeyPatch) -> InProcess:
+    """What `boebot link` and `boebot parameters` open."""
+    session = InProcess(Peer())
+
+    def opened(url: str, request: BoardRequest) -> InProcess:
+        session.closed = False
+        return session
+
+    for command in (link_command, parameters_command):
+        monkeypatch.setattr(command, "open_board", opened)
+    return session
+
+
+def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, "link", "--once", "--json")
+    seen = json.loads(out)
+    assert (code, err) == (0, "")
+    assert seen["host"]["good"] > 90 and seen["board_end"]["good"] > 1 and seen["host"]["bad"] == 0
+    assert 100 <= seen["frame_rate_hz"] <= 150
+    assert seen["round_trip_p50_ms"] == pytest.approx(0.52, abs=0.3), "10 bytes there and 14 back"
+    assert abs(seen["clock_drift_ppm"]) < 200 and seen["clock_bound_us"] < 500
+    board.read(0.01)
+    assert board.peer.session == 0 and board.peer.accepted == [], "closed, and nothing has moved"
+    code, out, _ = boebot(capsys, "link", "--once")
+    for name in ("round trip p99", "clock drift", "counted", "resynchronised", "deferred", "late"):
+        assert name in out
+
+
+def test_link_prints_an_object_every_second(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = boebot(capsys, "link", "--json", "--seconds", "3.5")
+    seen = [json.loads(line) for line in out.splitlines()]
+    assert len(seen) == 4
+    assert seen[-1]["host"]["good"] > seen[0]["host"]["good"] > 0
+
+
+def test_parameters_are_listed_set_saved_and_reset(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = boebot(capsys, "parameters", "list", "--json")
+    listed = json.loads(out)
+    assert code == 0 and listed["saved"] is False
+    assert [row["name"] for row in listed["parameters"]] == list(messages.PARAMETERS)
+    centre = next(row for row in listed["parameters"] if row["name"] == "servo_left_centre")
+    assert (centre["value"], centre["unit"], centre["least"], centre["greatest"]) == (1500.0, "us", 1400.0, 1600.0)
+    code, out, _ = boebot(capsys, "parameters", "set", "servo_right_gain", "-190.5")
+    assert (code, out) == (0, "servo_right_gain = -190.5 us\n")
+    assert boebot(capsys, "parameters", "save")[0] == 0
+    assert board.peer.saved is not None
+    assert boebot(capsys, "parameters", "reset")[0] == 0
+    assert json.loads(boebot(capsys, "parameters", "get", "servo_right_gain", "--json")[1])["value"] == -200.0
+    board.peer.reset()
+    assert boebot(capsys, "parameters", "get", "servo_right_gain")[1] == "servo_right_gain = -190.5 us\n"
+    assert "range" in boebot(capsys, "parameters", "list")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("get", "speed"), "there is no parameter 'speed'; expected one of devices, time_to_live"),
+        (("set", "ping_period", "300"), "parameter ping_period cannot be 300 ticks; expected 4 to 250"),
+        (("set", "wheel_radius", "nan"), "parameter wheel_radius cannot be nan m; expected 0.005 to 0.2"),
+    ],
+)
+def test_wrong_parameters_are_said_before_the_board_is_asked(
+    board: InProcess, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], sentence: str
+) -> None:
+    code, _, err = boebot(capsys, "parameters", *arguments)
+    assert code == 1 and sentence in err and err.count("\n") == 1
+    assert board.peer.openings == []
 
 
 # ---- teleop ----------------------------------------------------------------------------------------------------------

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from boebot.link import messages
 from boebot.link.session import Link
-from boebot.parameters import configure, parameters_of
+from boebot.parameters import adapted, configure, parameters_of
 from boebot.robots import load_robot
-from peer import InProcess, Peer
+from peer import InProcess, Peer, name_of
 
 
 def test_values_come_from_the_robot() -> None:
@@ -26,10 +26,27 @@ def test_values_come_from_the_robot() -> None:
 def test_board_is_told_all_of_them() -> None:
     peer = Peer()
     link = Link(InProcess(peer))
-    link.handshake()
+    link.open()
     robot = load_robot("shieldbot")
     configure(link, robot)
-    told = {name: peer.parameters[messages.PARAMETERS[name].id] for name in parameters_of(robot)}
+    told = {
+        name_of(message.parameter): message.value
+        for _, message in peer.carried_out
+        if isinstance(message, messages.SetParameter)
+    }
     assert told["servo_left_centre"] == 24000
     assert told["wheel_speed_maximum"] == 1700
-    assert set(told) == {name for name, spec in messages.PARAMETERS.items() if spec.default_from} | {"devices"}
+    described = {name for name, spec in messages.PARAMETERS.items() if spec.default_from} | {"devices"}
+    assert set(told) == described - {"baud_rate"}, "the rate at which it is heard is the right one"
+
+
+def test_description_gives_way_to_what_the_board_has_saved() -> None:
+    robot = load_robot("shieldbot")
+    without_encoders = messages.Devices.SERVOS | messages.Devices.WHISKERS
+    real = adapted(robot, {"servo_left_centre": 1512.25, "devices": float(without_encoders), "wheel_radius": 0.034})
+    assert real.device["servo_left"].centre_us == 1512.25  # type: ignore[union-attr]
+    assert real.device["servo_right"].centre_us == 1500.0  # type: ignore[union-attr]
+    assert real.body.wheel_radius_m == 0.034 and real.body.track_width_m == robot.body.track_width_m
+    assert [name for name in robot.device if robot.has(name) and not real.has(name)] == [
+        "encoder_left", "encoder_right", "infrared_left", "infrared_right", "ping",
+    ]  # fmt: skip

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import socket
+import struct
 import sys
 import threading
 import time
@@ -10,10 +14,11 @@ import pytest
 
 import boebot
 from boebot.errors import BoardError
+from boebot.link.ports.serial_port import SerialTransport
 from boebot.link.session import Link
-from boebot.link.transport import SerialTransport
 from boebot.robot import Robot
 from boebot.runner import execute
+from lines import line
 from peer import Peer, Pty, pty
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
@@ -62,21 +67,82 @@ def test_late_brain_skips_steps_and_says_so() -> None:
 
 
 def test_silent_port_is_given_up_in_time() -> None:
-    peer = Peer()
-    peer.answers = False
-    peer.reset()
-    peer.tick = lambda: b""  # type: ignore[method-assign]
-    with pty(peer) as served:
-        transport = SerialTransport(served.path)
-        with pytest.raises(BoardError, match=r"nothing answers at .* within 0\.5 s: is the robot on and flashed"):
-            Link(transport).handshake(timeout_s=0.5)
+    with line() as board:
+        transport = SerialTransport(board.path)
+        begun = time.monotonic()
+        with pytest.raises(BoardError, match=r"nothing answers at .* within 2 s: is the robot on and flashed"):
+            Link(transport).open()
+        assert time.monotonic() - begun < 2.3
         transport.close()
+
+
+class RatedPty(Pty):
+    """A board whose line has one bit rate: at any other, both sides get garbage."""
+
+    def __init__(self, peer: Peer, rate: int) -> None:
+        self.rate = rate
+        self.took = peer.take
+        peer.take = self.take_garbled  # type: ignore[method-assign]
+        super().__init__(peer)
+        self._receive = peer.receive
+        peer.receive = self.receive_garbled  # type: ignore[method-assign]
+
+    def at_its_rate(self) -> bool:
+        settings = bytearray(44)  # struct termios2
+        fcntl.ioctl(self._slave, 0x802C542A, settings)
+        return bool(struct.unpack_from("I", settings, 40)[0] == self.rate)
+
+    def take_garbled(self) -> list[bytes]:
+        frames = self.took()
+        return frames if self.at_its_rate() else [bytes(byte & 0xAA | 0x11 for byte in frame) for frame in frames]
+
+    def receive_garbled(self, data: bytes) -> None:
+        self._receive(data if self.at_its_rate() else bytes(byte & 0xAA for byte in data))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the rate")
+@pytest.mark.parametrize("rate", [9_600, 115_200, 250_000, 1_000_000])
+def test_rate_is_found_on_the_port_itself(rate: int) -> None:
+    served = RatedPty(Peer(), rate)
+    transport = SerialTransport(served.path)
+    link = Link(transport)
+    begun = time.monotonic()
+    link.open()
+    assert time.monotonic() - begun < 2.2
+    assert transport.baud == rate and served.at_its_rate()
+    transport.close()
+    served.unplug()
+
+
+def test_run_over_tcp() -> None:
+    """A pty's bytes carried over a socket, as `boebot serve --tcp` or a network adapter would."""
+    with pty(Peer()) as served, socket.create_server(("127.0.0.1", 0)) as server:
+        inner = SerialTransport(served.path)
+
+        def carry() -> None:
+            connection, _ = server.accept()
+            connection.setblocking(False)
+            with contextlib.suppress(OSError, BoardError):
+                while True:
+                    connection.sendall(inner.read(0.002))
+                    with contextlib.suppress(BlockingIOError):
+                        data = connection.recv(4096)
+                        if not data:
+                            return
+                        inner.write(data)
+
+        carrier = threading.Thread(target=carry)
+        carrier.start()
+        result = boebot.run(straight, on=f"socket://127.0.0.1:{server.getsockname()[1]}", seconds=0.5)
+        carrier.join(5)
+        inner.close()
+    assert result.lost_frames == result.bad_frames == 0 and result.distance > 0.02
 
 
 def test_request_round_trip_is_quick() -> None:
     with pty(Peer()) as served:
         link = Link(SerialTransport(served.path))
-        link.handshake()
+        link.open()
         begun = time.perf_counter()
         for _ in range(20):
             link.get_parameter("infrared_period")

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 import boebot
 from boebot import runner
 from boebot.errors import BoebotError
-from boebot.link import frame
+from boebot.link import frame, messages
 from boebot.report import picture, replay
 from boebot.result import RunResult
 from peer import InProcess, Peer
@@ -72,7 +72,9 @@ def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
 
 def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> None:
     received = (folder / "to_host.bin").read_bytes()
-    decoder = frame.Decoder()
+    greeting = frame.Decoder(frame.NO_SESSION)
+    hellos = [messages.Hello.unpack(payload) for number, _, payload in greeting.feed(received) if number == 0x80]
+    decoder = frame.Decoder(next(hello.session for hello in hellos if hello.session))
     telemetry = [payload for message_id, _, payload in decoder.feed(received) if message_id == 0x90]
     assert telemetry[-result.ticks - 5 :][: len(result.record.telemetry)][-1] in result.record.telemetry
     assert (decoder.bad, decoder.lost) == (0, 0)

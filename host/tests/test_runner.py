@@ -166,8 +166,8 @@ def test_run_that_ends_early_stops_the_motors_and_keeps_its_record(
 ) -> None:
     with pytest.raises(caught, match=sentence):
         boebot.run(fails_after(0.5, error), seconds=10, out=tmp_path)
-    assert isinstance(session.peer.setpoints[-1], messages.Stop)
-    assert session.peer.command == (0.0, 0.0) and session.closed
+    assert session.peer.stops >= 1 and session.peer.latch == messages.Latch.STOP_COMMAND
+    assert not session.peer.moving and session.closed
     rows = (tmp_path / "run.csv").read_text().splitlines()
     assert rows[-1].startswith("0.5000,")
     assert (tmp_path / "replay.html").exists()
@@ -238,17 +238,19 @@ def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> 
 
 
 def test_lost_and_damaged_frames_are_counted(session: InProcess) -> None:
-    whole = session.peer.tick
-    drop = iter([False] * 40 + [True] + [False] * 40 + [None])
+    whole = session.channel.carry
+    fates = {50: [], 91: [True], 130: []}  # by tick: lost, damaged, lost
 
-    def lossy() -> bytes:
-        data = whole()
-        fate = next(drop, False)
-        return b"" if fate else data[:5] + b"\xff" + data[6:] if fate is None else data
+    def lossy(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
+        is_telemetry = way == "host" and frame[2] == messages.Telemetry.ID
+        fate = fates.pop(session.peer.ticks, None) if is_telemetry else None
+        if fate is None:
+            return whole(way, frame, at_s)
+        return whole(way, frame[:5] + b"\xff" + frame[6:], at_s) if fate else []
 
-    session.peer.tick = lossy  # type: ignore[method-assign]
+    session.channel.carry = lossy  # type: ignore[method-assign]
     result = boebot.run(straight, seconds=2)
-    assert (result.lost_frames, result.bad_frames) == (2, 1)
+    assert (result.lost_frames, result.bad_frames) == (3, 1)
     assert result.steps == 40, "the brain stepped on"
 
 
@@ -261,8 +263,132 @@ def test_dead_man_stops_are_counted(session: InProcess) -> None:
 
 def test_nothing_commanded_means_motors_off(session: InProcess) -> None:
     result = boebot.run(lambda robot: None, seconds=1)
-    assert all(isinstance(message, messages.Stop) for message in session.peer.setpoints)
+    assert all(isinstance(message, messages.SetpointCoast) for message in session.peer.setpoints)
     assert result.distance == 0.0
+
+
+def test_stop_of_a_brain_latches_nothing(session: InProcess) -> None:
+    def stop_and_go(robot: Robot) -> None:
+        if 0.3 < robot.time < 0.6:
+            robot.stop()
+        else:
+            robot.drive(0.5, 0.5)
+
+    result = boebot.run(stop_and_go, seconds=1)
+    pulses = result.series.left_pulse_us
+    assert (pulses[35:60] == 0).all() and pulses[-1] == 1600
+    assert not result.series.raw["latch"].any()
+
+
+def test_emergency_stop_latches_until_the_brain_arms_again(session: InProcess) -> None:
+    def panic(robot: Robot) -> None:
+        robot.drive(0.5, 0.5)
+        if 0.3 < robot.time < 0.6:
+            robot.emergency_stop()
+        elif robot.time >= 0.8:
+            robot.arm()
+
+    result = boebot.run(panic, seconds=1.2)
+    latch, pulses = result.series.raw["latch"], result.series.left_pulse_us
+    assert (latch[37:80] == messages.Latch.STOP_COMMAND).all() and (pulses[37:80] == 0).all()
+    assert not latch[-20:].any() and pulses[-1] == 1600
+
+
+def test_low_supply_ends_the_run_and_names_the_voltage(session: InProcess) -> None:
+    def drop(tick: int) -> None:
+        if tick == 60:
+            session.peer.supply_mv = 3900
+
+    session.before_tick = drop
+    result = runner.execute(straight, seconds=5)
+    assert str(result.error) == (
+        "the board at peer has stopped its motors: its supply is low, 3.90 V; charge or change the batteries"
+    )
+    assert result.run_time < 1.0 and not session.peer.moving
+
+
+def test_run_does_not_begin_with_a_low_supply(session: InProcess) -> None:
+    session.peer.supply_mv = 3900
+    result = runner.execute(straight, seconds=5)
+    assert str(result.error) == "the board at peer does not arm its motors: its supply is low (3.90 V)"
+    assert session.peer.accepted == []
+
+
+def test_stop_from_elsewhere_ends_the_run(session: InProcess) -> None:
+    def stop(tick: int) -> None:
+        if tick == 60:
+            session.peer._latch(messages.Latch.STOP_COMMAND)
+
+    session.before_tick = stop
+    result = runner.execute(straight, seconds=5)
+    assert str(result.error) == "the board at peer has stopped its motors: a stop command came from elsewhere"
+    assert result.run_time < 1.0
+
+
+def test_session_that_the_board_ends_is_opened_and_armed_again(session: InProcess) -> None:
+    def forget(tick: int) -> None:
+        if tick == 60:
+            session.peer._end_session()
+
+    session.before_tick = forget
+    result = boebot.run(straight, seconds=2)
+    assert (result.sessions_lost, result.resets) == (1, 0)
+    assert result.run_time == pytest.approx(2.0)
+    assert result.series.left_pulse_us[-1] == 1600
+    assert np.flatnonzero(result.series.left_pulse_us == 0)[-1] < 70, "driving again within a tenth of a second"
+
+
+@pytest.mark.parametrize(("telemetry_ticks", "period", "stepping"), [(2, 0.05, 0.06), (5, 0.05, 0.05), (10, 0.01, 0.1)])
+def test_period_fits_the_telemetry(session: InProcess, telemetry_ticks: int, period: float, stepping: float) -> None:
+    session.peer.telemetry_period = telemetry_ticks
+    times: list[float] = []
+    result = boebot.run(lambda robot: times.append(robot.time), seconds=2, period=period)
+    assert np.diff(times) == pytest.approx(stepping)
+    assert result.period == pytest.approx(stepping)
+    assert len(result.notices) == (period != stepping)
+    if result.notices:
+        assert f"the brain steps every {stepping * 1000:g} ms, not every {period * 1000:g} ms" in result.notices[0]
+    assert result.late_steps == result.lost_frames == result.dead_man_stops == 0
+
+
+def test_set_points_outlive_three_periods_of_slow_telemetry(session: InProcess) -> None:
+    session.peer.telemetry_period = 20
+    boebot.run(straight, seconds=2)
+    assert {message.time_to_live for message in session.peer.accepted} == {606}  # 3 * 200 ms and 300 bytes
+
+
+def test_parameters_saved_on_the_board_win(session: InProcess) -> None:
+    peer = session.peer
+    saved = peer.defaults()
+    for name, counts in {"wheel_radius": 4000, "track_width": 12000, "encoder_counts": 32}.items():
+        saved[messages.PARAMETERS[name].id] = counts
+    peer.saved = saved
+    peer.reset()
+    result = boebot.run(straight, seconds=0.5)
+    assert not any(isinstance(message, messages.SetParameter) for _, message in peer.carried_out)
+    assert (result.robot.body.wheel_radius_m, result.robot.body.track_width_m) == (0.04, 0.12)
+    assert {result.robot.device[f"encoder_{side}"].edges_per_turn for side in ("left", "right")} == {32}  # type: ignore[union-attr]
+
+
+def test_observation_carries_board_and_host_time(session: InProcess) -> None:
+    errors: list[tuple[float, float]] = []
+    session.peer.drift = 1e-3
+
+    def look(robot: Robot) -> None:
+        seen = robot.observation
+        true_s = robot.tick * runner_tick_s(session)
+        assert seen.board_time == pytest.approx(true_s * (1 + session.peer.drift), abs=2e-6)
+        errors.append((abs(seen.host_time - true_s), seen.host_time_error))
+
+    boebot.run(look, seconds=8)
+    assert all(error <= bound for error, bound in errors)
+    assert max(error for error, _ in errors[100:]) < 100e-6
+    assert max(bound for _, bound in errors[100:]) < 500e-6
+
+
+def runner_tick_s(session: InProcess) -> float:
+    """Between two ticks, by the transport's clock."""
+    return 0.01 / (1 + session.peer.drift)
 
 
 def test_speeds_are_sent_as_speeds(session: InProcess) -> None:

@@ -1,37 +1,97 @@
-"""The session: handshake, refusals, requests, parameters."""
+"""The session: handshake, refusals, requests, events, stop, parameters, and what happens when it ends."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import pytest
+from channel import Channel, uniform
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import frame, messages
+from boebot.link import messages
+from boebot.link.delivery import LatchedAgainError, LinkTimes, SessionLostError, TakenOverError
 from boebot.link.session import Link, text
-from peer import InProcess, Peer
+from peer import InProcess, Peer, without
+
+Latch = messages.Latch
 
 
-def link_to(peer: Peer) -> Link:
-    return Link(InProcess(peer))
+def joined(peer: Peer | None = None, channel: Channel | None = None, **options: object) -> tuple[Link, Peer, InProcess]:
+    """A link with an open session, its board, and what is between them."""
+    peer = peer or Peer()
+    session = InProcess(peer, channel)
+    link = Link(session, **options)  # type: ignore[arg-type]
+    link.open()
+    return link, peer, session
 
 
-def test_handshake_with_a_board_that_has_just_started() -> None:
-    link = link_to(Peer())
-    hello = link.handshake()
-    assert hello.schema_hash == messages.SCHEMA_HASH
-    assert text(hello.pin_map) == "shieldbot"
-    assert link.sent == [], "a board that says hello need not be asked"
+def sent_kinds(link: Link) -> list[str]:
+    """Names of the messages that the host sent."""
+    return [messages.MESSAGES[frame[2]].NAME for _, frame in link.sent]
 
 
-def test_handshake_with_a_board_that_has_run_for_a_while() -> None:
+def listen(link: Link, seconds: float) -> list[int]:
+    """Lets time pass; the ticks of the telemetry that came."""
+    end = link.transport.now() + seconds
+    ticks: list[int] = []
+    while link.transport.now() < end - 1e-9:
+        ticks += [int.from_bytes(payload[:4], "little") for payload, *_ in link.poll(end - link.transport.now())]
+    return ticks
+
+
+def newest_tick(link: Link) -> int:
+    """Of the telemetry that has come."""
+    assert link.latest is not None
+    return int.from_bytes(link.latest[:4], "little")
+
+
+# ---- handshake -------------------------------------------------------------------------------------------------------
+
+
+def test_host_is_silent_until_the_hello() -> None:
+    peer = Peer()
+    peer.answers = False
+    peer.reset()
+    session = InProcess(peer)
+    link = Link(session)
+    with pytest.raises(BoardError, match="nothing answers"):
+        link.open(0.5)
+    assert link.sent == []
+
+
+@pytest.mark.parametrize("ran_for_s", [0.0, 0.25, 3.0])
+def test_opening_at_any_time(ran_for_s: float) -> None:
     peer = Peer()
     session = InProcess(peer)
-    session.read(1.0, 1.0)  # its hello has gone by
+    session.read(ran_for_s, ran_for_s)
     link = Link(session)
-    assert link.handshake().tick_rate == 100
-    assert link.decoder.lost == link.decoder.bad == 0
-    assert link.poll(0.05), "telemetry goes on"
+    hello = link.open()
+    assert hello.session == peer.session == peer.openings[-1]
+    assert text(hello.robot) == "shieldbot"
+    assert session.now() - ran_for_s < 0.13, "a hello every 10 ticks, and one in answer"
+    assert listen(link, 0.05), "telemetry flows"
+    assert link.counters().lost == link.counters().bad == 0
+    assert len(peer.openings) == 1
+
+
+def test_lost_open_and_lost_hello_are_made_good() -> None:
+    peer = Peer()
+    session = InProcess(peer)
+    whole = session.channel.carry
+    losses = {"board": 3, "host": 2}
+
+    def lossy(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
+        if losses[way] and link.sent:
+            losses[way] -= 1
+            return []
+        return whole(way, frame, at_s)
+
+    session.channel.carry = lossy  # type: ignore[method-assign]
+    link = Link(session)
+    link.open()
+    assert losses == {"board": 0, "host": 0}
+    assert len(peer.openings) == 1, "an open that comes again confirms"
 
 
 def test_other_protocol_version_is_refused_and_both_are_named() -> None:
@@ -39,15 +99,46 @@ def test_other_protocol_version_is_refused_and_both_are_named() -> None:
     peer.protocol_version = 9
     peer.reset()
     with pytest.raises(ProtocolError, match=rf"version 9.*version {messages.PROTOCOL_VERSION}"):
-        link_to(peer).handshake()
+        Link(InProcess(peer)).open()
 
 
-def test_other_schema_is_refused_and_both_are_named() -> None:
+def _shorter_event(peer: Peer) -> None:
+    peer.described[messages.Event.ID] = (5, 77)
+
+
+def _other_fields(peer: Peer) -> None:
+    peer.described[messages.Telemetry.ID] = (messages.Telemetry.LENGTH, 77)
+
+
+def _unknown_message(peer: Peer) -> None:
+    peer.described[0x55] = (3, 77)
+
+
+def _missing_message(peer: Peer) -> None:
+    del peer.described[messages.Arm.ID]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (_shorter_event, r"message event \(0xa1\) has 5 bytes there, 9 here"),
+        (_other_fields, r"the fields of message telemetry \(0x90\) differ"),
+        (_unknown_message, r"its message 0x55 is not known here"),
+        (_missing_message, r"it does not know message arm \(0x24\)"),
+        (lambda peer: None, "the messages agree, but flags, values or parameters differ"),
+    ],
+)
+def test_other_schema_is_refused_and_the_message_that_differs_is_named(
+    change: Callable[[Peer], None], sentence: str
+) -> None:
     peer = Peer()
     peer.schema_hash = 0xDEADBEEF
+    change(peer)
     peer.reset()
-    with pytest.raises(ProtocolError, match=rf"deadbeef.*{messages.SCHEMA_HASH:08x}"):
-        link_to(peer).handshake()
+    session = InProcess(peer)
+    with pytest.raises(ProtocolError, match=f"schema deadbeef, this kit with {messages.SCHEMA_HASH:08x}: {sentence}; "):
+        Link(session).open()
+    assert session.now() < 1.0
 
 
 def test_board_without_control_ticks_is_refused() -> None:
@@ -55,27 +146,33 @@ def test_board_without_control_ticks_is_refused() -> None:
     peer.tick_rate = 0
     peer.reset()
     with pytest.raises(ProtocolError, match="makes 0 control ticks in a second; expected more"):
-        link_to(peer).handshake()
+        Link(InProcess(peer)).open()
+
+
+def test_board_of_another_kind_in_mid_session_is_refused() -> None:
+    link, peer, _ = joined()
+    peer.schema_hash = 0xDEADBEEF
+    peer.reset()
+    with pytest.raises(ProtocolError, match="schema deadbeef"):
+        listen(link, 1.0)
 
 
 class Noise(InProcess):
     """Something that sends bytes of another kind."""
 
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        super().read(wait_s, quiet_s)
-        return b"Hello from another sketch\r\n"
+    data = b"Hello from another sketch\r\n"
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        super().read_stamped(wait_s, quiet_s)
+        return [(self.now(), self.data)]
 
 
-class Silence(InProcess):
-    """A port that nobody answers at."""
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        self._now += wait_s
-        return b""
+class Garbage(Noise):
+    data = bytes(range(128, 256)) + b"\0"
 
 
 class Mute(InProcess):
-    """A board that sends telemetry but answers nothing."""
+    """A board that hears nothing."""
 
     def write(self, data: bytes) -> None:
         del data
@@ -84,109 +181,514 @@ class Mute(InProcess):
 @pytest.mark.parametrize(
     ("kind", "error", "sentence"),
     [
-        (Silence, BoardError, "nothing answers"),
-        (Noise, ProtocolError, "does not speak this kit's protocol"),
-        (Mute, ProtocolError, "does not say hello"),
+        (Noise, ProtocolError, "does not speak this kit's protocol: other firmware, which says 'Hello from another"),
+        (Garbage, ProtocolError, "does not speak this kit's protocol .* no valid frame"),
+        (Mute, BoardError, "says hello, but does not hear us: no session within 2 s"),
     ],
 )
 def test_what_does_not_answer_is_told_apart(
     kind: Callable[[Peer], InProcess], error: type[BoebotError], sentence: str
 ) -> None:
     session = kind(Peer())
-    if kind is Mute:
-        session.read(0.5, 0.5)
     with pytest.raises(error, match=sentence):
-        Link(session).handshake()
-    assert session.now() < 2.0, "the verdict comes in time"
+        Link(session).open()
+    assert session.now() <= 2.01, "the verdict comes in time"
 
 
-def test_request_is_repeated_until_it_is_answered() -> None:
+def test_session_of_another_host_is_waited_for() -> None:
+    first, peer, session = joined()
+    second = Link(session)
+    second.open()
+    assert 1.0 < session.now() < 1.3, "after the board's patience with the first"
+    assert peer.session == second.hello.session  # type: ignore[union-attr]
+    del first
+
+
+def test_board_that_another_host_keeps_is_busy() -> None:
     peer = Peer()
     session = InProcess(peer)
     link = Link(session)
-    link.handshake()
-    losses = [True, True, False]
-    whole = session.write
-    session.write = lambda data: None if losses and losses.pop(0) else whole(data)  # type: ignore[method-assign]
+    session.read(0.05, 0.05)
+    peer._open(messages.Open(messages.PROTOCOL_VERSION, peer.nonce, 12345))
+
+    def keep(_: int) -> None:
+        peer._heard_s = session.now()
+
+    session.before_tick = keep
+    with pytest.raises(TakenOverError, match="the board at peer is busy: another program drives it"):
+        link.open()
+    assert link.sent == [], "and is not disturbed"
+    taking = Link(session, take_over=True)
+    taking.open()
+    assert peer.session == taking.hello.session  # type: ignore[union-attr]
+
+
+def test_host_that_was_replaced_gives_way() -> None:
+    link, peer, _ = joined()
+    peer._open(messages.Open(messages.PROTOCOL_VERSION, peer.nonce, 12345))
+    with pytest.raises(TakenOverError, match="another program has taken the board at peer"):
+        listen(link, 0.5)
+    assert peer.session == peer.openings[-1] and len(peer.openings) == 2
+
+
+def test_close_ends_the_session_at_once() -> None:
+    link, peer, session = joined()
+    link.arm()
+    link.close()
+    session.read(0.01, 0.01)
+    assert peer.session == 0 and peer.latch == Latch.SESSION_ENDED
+    begun = session.now()
+    assert Link(session).open() and session.now() - begun < 0.15
+
+
+# ---- ends and resets -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at_ms", [0, 3, 7, 50, 333])
+def test_reset_at_any_moment_and_the_traffic_resumes(at_ms: int) -> None:
+    link, peer, session = joined()
+    listen(link, 0.5 + at_ms / 1000)
+    reset_s = session.now()
+    peer.reset()
+    while link.sessions == 1 or not listen(link, 0.005):
+        listen(link, 0.001)
+        assert session.now() - reset_s < 1.0
+    assert session.now() - reset_s < 0.05, "the board says hello at once"
+    assert (link.sessions, link.board_resets, link.sessions_lost) == (2, 1, 1)
+    assert peer.latch == Latch.START
+
+
+def test_reset_during_a_request_is_said() -> None:
+    link, peer, _session = joined()
+    request = link.submit(messages.SetParameter, 7, 9, what="set parameter infrared_period")
+    peer.reset()
+    listen(link, 0.1)
+    assert isinstance(request.error, SessionLostError)
+    assert "whether it was done is not known" in str(request.error) or "it was not done" in str(request.error)
+    assert link.is_open and link.set_parameter("infrared_period", 9) == 9
+
+
+def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
+    link, peer, session = joined()
+    link.arm()
+    session.read(3.0, 3.0)
+    assert peer.session == 0 and peer.latch == Latch.SESSION_ENDED
+    assert listen(link, 0.2)
+    assert (link.sessions, link.board_resets) == (2, 0)
+    assert peer.latch == Latch.SESSION_ENDED, "not armed by itself"
+
+
+@pytest.mark.parametrize("time_out_ms", [200, 1000, 1500])
+def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
+    link, _peer, _session = joined()
+    link.set_parameter("session_time_out", time_out_ms)
+    before = len([kind for kind in sent_kinds(link) if kind == "clock_probe"])
+    listen(link, 6 + 20 * time_out_ms / 1000)
+    probes = [at for at, frame in link.sent if frame[2] == messages.ClockProbe.ID][before:]
+    late = [b - a for a, b in itertools.pairwise(probes)]
+    assert link.sessions == 1
+    assert max(late) <= time_out_ms / 4000, "at least four in that time"
+    assert len(set(late)) > len(late) / 2, "at irregular intervals"
+
+
+def test_late_hello_of_the_time_before_does_no_harm() -> None:
+    peer = Peer()
+    trace: list[tuple[float, str, bytes]] = []
+    link, peer, session = joined(peer, Channel(trace=trace))
+    hellos = [frame for _, way, frame in trace if way == "host" and frame[2] == messages.Hello.ID]
+    session._schedule(session.now() + 0.03, "host", hellos[0])
+    listen(link, 0.5)
+    assert link.sessions == 1
+
+
+def test_frames_of_an_earlier_session_are_refused() -> None:
+    link, peer, _session = joined()
+    link.arm()
+    link.send_signal(1.0, 1.0, 2000, peer.ticks)
+    old = [frame for _, frame in link.sent if frame[2] not in (messages.Open.ID,)]
+    peer.reset()
+    listen(link, 0.1)
+    link.arm()
+    good = peer.decoder.good
+    carried_out = len(peer.carried_out)
+    for frame in old:
+        peer.receive(frame)
+    assert (peer.decoder.good, len(peer.carried_out)) == (good, carried_out)
+    assert not peer.moving
+
+
+def test_frames_of_an_earlier_session_would_count_without_the_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the seed is good for: the test above fails without it."""
+    from boebot.link import session as module
+    from boebot.link.frame import SEED, Decoder, encode
+
+    monkeypatch.setattr(module, "encode", lambda number, sequence, payload, _: encode(number, sequence, payload, SEED))
+
+    class Seedless(Decoder):
+        seed = property(lambda self: SEED, lambda self, _: Decoder.seed.fset(self, SEED))  # type: ignore[attr-defined]
+
+    monkeypatch.setattr(module, "Decoder", Seedless)
+    link, peer, _session = joined(Peer(protections=without(seed=False)))
+    link.arm()
+    old = [frame for _, frame in link.sent if frame[2] == messages.Arm.ID]
+    peer.reset()
+    listen(link, 0.1)
+    good = peer.decoder.good
+    peer.receive(old[0])
+    assert peer.decoder.good == good + 1
+
+
+# ---- requests --------------------------------------------------------------------------------------------------------
+
+
+def test_request_is_repeated_until_it_is_answered_and_carried_out_once() -> None:
+    link, peer, session = joined()
+    whole = session.channel.carry
+    losses = [True, False, True, True, False]
+
+    def lossy(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
+        if frame[2] in (messages.SetParameter.ID, messages.Answer.ID) and losses and losses.pop(0):
+            return []
+        return whole(way, frame, at_s)
+
+    session.channel.carry = lossy  # type: ignore[method-assign]
     assert link.set_parameter("infrared_period", 7) == 7
-    assert peer.parameters == {messages.PARAMETERS["infrared_period"].id: 7}
+    assert [message for _, message in peer.carried_out] == [messages.SetParameter(1, 7, 7)]
+    assert link.counters().retransmitted >= 2 and peer.counts["duplicate"] >= 1
 
 
-def test_request_that_is_never_answered_ends_in_one_sentence() -> None:
-    session = InProcess(Peer())
+def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_heard() -> None:
+    link, peer, session = joined(times=LinkTimes(request_limit_s=0.5))
+    whole = session.channel.carry
+    session.channel.carry = lambda way, frame, at_s: (  # type: ignore[method-assign]
+        [] if frame[2] == messages.SetParameter.ID else whole(way, frame, at_s)
+    )
+    begun = session.now()
+    with pytest.raises(
+        BoardError, match=r"did not set parameter infrared_period within 0\.5 s, though asked \d+ times"
+    ):
+        link.set_parameter("infrared_period", 7)
+    assert session.now() - begun < 0.6
+    session.channel.carry = whole  # type: ignore[method-assign]
+    assert link.get_parameter("infrared_period") == 5
+    assert peer.parameter("infrared_period") == 5
+
+
+def test_retry_time_follows_from_tick_line_and_round_trips() -> None:
+    times = LinkTimes()
+    assert times.retry_after(0.01, 2e-5, 0.0) == pytest.approx(0.012)
+    assert times.retry_after(0.01, 2e-5, 0.030) == pytest.approx(0.045)
+    assert times.retry_after(0.01, 2e-5, 5.0) == pytest.approx(0.108)
+    assert times.retry_after(0.01, 10 / 9600, 0.0) == pytest.approx(0.01 + 1000 / 9600)
+    assert LinkTimes(retry_s=0.2).retry_after(0.01, 2e-5, 5.0) == 0.2
+
+
+def test_slow_line_is_not_flooded_with_retries() -> None:
+    """A round trip of 40 ms, as by Bluetooth: once it is known, answers are waited for."""
+    link, _, _ = joined(channel=Channel(to_board=uniform(0.019, 0.020), to_host=uniform(0.019, 0.020)))
+    listen(link, 1.0)
+    before = link.counters().retransmitted
+    for _ in range(10):
+        link.get_parameter("infrared_period")
+    assert link.counters().retransmitted == before
+
+
+def test_request_numbers_roll_over() -> None:
+    peer = Peer()
+    peer.first_number = 65533
+    session = InProcess(peer)
     link = Link(session)
-    link.handshake()
-    session.write = lambda data: None  # type: ignore[method-assign]
-    with pytest.raises(BoardError, match="did not say which image it runs, though asked 5 times"):
-        link.identity()
+    link._requests._number = 65533
+    link._requests.new_session = lambda: None  # type: ignore[method-assign]
+    link.open()
+    for value in range(4, 12):
+        assert link.set_parameter("ping_period", value) == value
+    numbers = [message[0] for _, message in peer.carried_out]
+    assert numbers == [65534, 65535, 0, 1, 2, 3, 4, 5]
 
 
-def test_telemetry_that_comes_during_a_request_is_kept() -> None:
-    session = InProcess(Peer())
-    link = Link(session)
-    link.handshake()
-    answers: list[bytes] = []
-    whole = session.write
-
-    def answer_late(data: bytes) -> None:
-        answers.append(data)
-        if len(answers) == 2:
-            whole(data)
-
-    session.write = answer_late  # type: ignore[method-assign]
-    link.identity()
-    ticks = [messages.Telemetry.unpack(payload).tick for payload in link.poll(0.02)]
-    assert len(ticks) >= 10 and ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+def test_too_many_waiting_requests_are_refused() -> None:
+    link, _, _ = joined()
+    for _ in range(32):
+        link.submit(messages.GetParameter, 7, what="tell")
+    with pytest.raises(BoardError, match="32 requests wait for the board already"):
+        link.submit(messages.GetParameter, 7, what="tell")
 
 
-@pytest.mark.parametrize("value", [1, 251, -5])
+@pytest.mark.parametrize("value", [1, 251, -5, float("nan"), float("inf")])
 def test_parameter_out_of_range_is_refused_before_it_is_sent(value: float) -> None:
-    link = link_to(Peer())
-    link.handshake()
+    link, peer, _ = joined()
     with pytest.raises(BoebotError, match=r"infrared_period cannot be .* ticks; expected 2 to 250"):
         link.set_parameter("infrared_period", value)
-    assert link.sent == []
+    assert peer.carried_out == []
 
 
 def test_unknown_parameter_is_named() -> None:
+    link, _, _ = joined()
     with pytest.raises(BoebotError, match="no parameter 'speed'; expected one of devices"):
-        link_to(Peer()).get_parameter("speed")
+        link.get_parameter("speed")
 
 
 def test_parameter_travels_in_its_unit() -> None:
-    peer = Peer()
-    link = link_to(peer)
-    link.handshake()
+    link, peer, _ = joined()
     assert link.set_parameter("servo_left_centre", 1499.5) == 1499.5
-    assert peer.parameters[messages.PARAMETERS["servo_left_centre"].id] == 23992
+    assert peer.parameter("servo_left_centre") == 23992
     assert link.get_parameter("servo_left_centre") == 1499.5
 
 
+def test_parameters_are_saved_and_reset() -> None:
+    link, peer, session = joined()
+    link.set_parameter("ping_period", 9)
+    begun = session.now()
+    link.save_parameters()
+    assert session.now() - begun >= 0.2, "answered when it is written"
+    assert peer.saved is not None
+    link.reset_parameters()
+    assert link.get_parameter("ping_period") != 9
+    peer.reset()
+    listen(link, 0.1)
+    assert link.get_parameter("ping_period") == 9 and link.hello is not None and link.hello.parameters_saved == 1
+
+
+def test_board_that_is_busy_writing_is_asked_again() -> None:
+    link, peer, session = joined()
+    saving = link.submit(messages.SaveParameters, what="save", limit_s=5.0)
+    listen(link, 0.005)
+    request = link.submit(messages.GetParameter, 7, what="tell")
+    listen(link, 0.1)
+    assert not saving.done and not request.done, "one at a time"
+    listen(link, 0.2)
+    assert saving.done and request.done
+    peer._saving_until = session.now() + 0.2
+    assert link.set_parameter("ping_period", 9) == 9
+    assert peer._saving_until is None
+
+
 @pytest.mark.parametrize(
-    ("status", "reason"), [(messages.ParameterStatus.OUT_OF_RANGE, "out of range"), (99, "status 99")]
+    ("status", "reason"), [(messages.AnswerStatus.OUT_OF_RANGE, "out of range"), (99, "status 99")]
 )
 def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) -> None:
-    peer = Peer()
-    link = link_to(peer)
-    link.handshake()
-    refusal = messages.Parameter(messages.PARAMETERS["devices"].id, 0, status)
-    peer.receive = lambda data: peer._send(refusal)  # type: ignore[method-assign]
+    link, peer, _ = joined()
+    peer._set = lambda message, saving: (status, 0)  # type: ignore[method-assign]
     with pytest.raises(BoardError, match=f"refuses parameter devices: {reason}"):
         link.set_parameter("devices", 3)
 
 
-def test_set_points_are_numbered_and_name_their_tick() -> None:
-    peer = Peer()
-    link = link_to(peer)
-    link.handshake()
+# ---- arming and stop -------------------------------------------------------------------------------------------------
+
+
+def test_armed_board_obeys_until_it_is_stopped() -> None:
+    link, peer, _session = joined()
+    ticks = listen(link, 0.02)
+    link.send_signal(0.5, 0.5, 250, ticks[-1])
+    listen(link, 0.02)
+    assert not peer.moving and peer.accepted == [], "latched"
+    link.arm()
+    ticks = listen(link, 0.02)
+    link.send_signal(0.5, 0.5, 250, ticks[-1])
+    listen(link, 0.01)
+    assert peer.moving
+    assert link.stop_and_confirm()
+    assert peer.latch == Latch.STOP_COMMAND and not peer.moving
+
+
+def test_stop_is_sent_again_until_it_is_confirmed() -> None:
+    link, peer, session = joined()
+    link.arm()
+    whole = session.channel.carry
+    losses = [True, True, False, True]
+
+    def lossy(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
+        if frame[2] in (messages.Stop.ID, messages.Stopped.ID) and losses and losses.pop(0):
+            return []
+        return whole(way, frame, at_s)
+
+    session.channel.carry = lossy  # type: ignore[method-assign]
+    begun = session.now()
+    assert link.stop_and_confirm()
+    assert peer.stops == 2 and session.now() - begun < 0.05, "again after a tick and 20 bytes"
+
+
+def test_stop_goes_before_a_request_under_way() -> None:
+    link, peer, session = joined()
+    session.channel.stalled = True
+    link.submit(messages.GetParameter, 7, what="tell")
+    listen(link, 0.1)
+    session.channel.stalled = False
+    link.stop()
+    listen(link, 0.003)
+    assert peer.stops == 1
+
+
+def test_stop_that_nobody_confirms_is_said() -> None:
+    link, _, session = joined()
+    session.channel.stalled = True
+    assert not link.stop_and_confirm(0.3)
+    assert link.stop_under_way
+
+
+def test_arm_does_not_undo_a_stop_that_it_does_not_know_of() -> None:
+    link, peer, _session = joined()
+    listen(link, 0.05)
+    peer._latch(Latch.STOP_COMMAND)
+    with pytest.raises(LatchedAgainError):
+        link.arm()
+    assert peer.latch != Latch.NONE
+    link.arm()
+    assert peer.latch == Latch.NONE, "now it knows"
+
+
+def test_arm_would_undo_it_without_the_count_of_latches() -> None:
+    link, peer, _ = joined(Peer(protections=without(latches=False)))
+    listen(link, 0.05)
+    peer._latch(Latch.STOP_COMMAND)
+    link.arm()
+    assert peer.latch == Latch.NONE
+
+
+def test_arm_is_refused_while_the_supply_is_low() -> None:
+    link, peer, _ = joined()
+    listen(link, 0.05)
+    peer.supply_mv = 3900
+    listen(link, 0.05)
+    with pytest.raises(BoardError, match=r"does not arm its motors: its supply is low \(3\.90 V\)"):
+        link.arm()
+
+
+# ---- events ----------------------------------------------------------------------------------------------------------
+
+
+def test_events_come_once_and_in_order_over_a_bad_line() -> None:
+    link, peer, _session = joined(
+        channel=Channel(loss=0.3, duplication=0.3, seed=7), times=LinkTimes(request_limit_s=9)
+    )
+    told: list[int] = []
+    heard: list[int] = []
+    for number in range(200):
+        peer._happened(messages.EventKind.DEAD_MAN, number)
+        told.append(number)
+        for _ in range(12):
+            listen(link, 0.01)
+            heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
+    listen(link, 1.0)
+    heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
+    assert link.sessions == 1
+    assert heard == sorted(set(heard)), "each once, in order"
+    assert len(heard) == len(told) - peer.counts["deferred"] and heard[-1] == told[-1]
+    assert link.counters().duplicate > 0
+
+
+def test_events_that_nobody_fetches_stay_with_the_board() -> None:
+    link, peer, _ = joined()
+    link._events.ROOM = 5  # type: ignore[misc]
+    for number in range(7):
+        peer._happened(messages.EventKind.DEAD_MAN, number)
+        listen(link, 0.05)
+    assert link.counters().held > 0
+    assert [event.value for event in link.events()] == [0, 1, 2, 3, 4]
+    listen(link, 0.1)
+    assert [event.value for event in link.events()] == [5, 6]
+
+
+def test_event_numbers_roll_over() -> None:
+    link, peer, _ = joined()
+    peer._event_number = link._events._last = 65533
+    for number in range(6):
+        peer._happened(messages.EventKind.DEAD_MAN, number)
+        listen(link, 0.05)
+    assert [event.value for event in link.events()] == list(range(6))
+    assert link._events._last == 3
+
+
+# ---- set-points and telemetry ----------------------------------------------------------------------------------------
+
+
+def test_set_points_name_their_tick() -> None:
+    link, peer, _ = joined()
     link.send_signal(0.5, -1.0, 250, 0x12345)
     link.send_speed(0.1, -0.05, 250, 0x12346)
-    link.send_stop()
+    link.send_coast(100, 0x12347)
+    listen(link, 0.02)
     assert peer.setpoints == [
         messages.SetpointSignal(5000, -10000, 250, 0x2345),
         messages.SetpointSpeed(1000, -500, 250, 0x2346),
-        messages.Stop(),
+        messages.SetpointCoast(100, 0x2347),
     ]
     assert peer.decoder.lost == 0
-    sent = frame.Decoder(frame.TO_BOARD).feed(b"".join(data for _, data in link.sent))
-    assert [sequence for _, sequence, _ in sent] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("protected", [True, False])
+def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
+    """The line stalls with motion commands queued and lets them all go at once; without the age they would count."""
+    channel = Channel()
+    peer = Peer(protections=without(age=protected))
+    link, peer, _session = joined(peer, channel)
+    link.set_parameter("session_time_out", 1500)
+    link.arm()
+    channel.stalled = True
+    for _ in range(100):
+        listen(link, 0.01)
+        link.send_signal(1.0, 1.0, 250, newest_tick(link))
+    for _ in range(40):
+        listen(link, 0.01)
+    channel.stalled = False
+    moved = False
+    for frame in channel.held:
+        peer.receive(frame)
+        moved |= peer.moving
+    assert peer.session and len(peer.setpoints) == 100
+    assert moved is not protected
+
+
+def test_telemetry_that_comes_during_a_request_is_kept() -> None:
+    link, _, session = joined()
+    session.channel.stalled = True
+    request = link.submit(messages.GetParameter, 7, what="tell")
+    while not request.done and session.now() < 0.2:
+        link._turn(0.2)
+    ticks = [int.from_bytes(payload[:4], "little") for payload, *_ in link.fetch_telemetry()]
+    assert len(ticks) >= 15 and ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+
+
+def test_telemetry_that_nobody_fetches_does_not_fill_the_memory() -> None:
+    link, _, _ = joined()
+    for _ in range(6000):
+        link._turn(link.transport.now() + 0.01)
+    assert len(link._telemetry) <= 4096 and link.counters().dropped > 500
+
+
+@pytest.mark.parametrize("first_tick", [0, 0xFFFF - 50, 0xFFFFFFFF - 50])
+def test_ticks_roll_over(first_tick: int) -> None:
+    peer = Peer()
+    peer.first_tick = first_tick
+    peer.reset()
+    link, peer, _ = joined(peer)
+    link.arm()
+    for _ in range(100):
+        listen(link, 0.01)
+        link.send_signal(0.1, 0.1, 250, newest_tick(link))
+    listen(link, 0.02)
+    assert len(peer.accepted) >= 98 and peer.counts["late"] <= 2
+
+
+def test_board_counters_are_unwrapped() -> None:
+    link, peer, _ = joined()
+    peer.counts["late"] = 65500
+    listen(link, 0.7)
+    peer.counts["late"] = 65536 + 20
+    listen(link, 0.7)
+    assert link.board_counters.values["late"] == 65556
+    before = link.board_counters.values["late"]
+    peer.reset()
+    listen(link, 0.1)
+    peer.counts["late"] = 3
+    listen(link, 0.7)
+    assert link.board_counters.values["late"] == before + 3
+
+
+def test_same_run_twice_is_the_same_to_the_last_byte() -> None:
+    traces: list[list[tuple[float, str, bytes]]] = [[], []]
+    for trace in traces:
+        link, _, _ = joined(channel=Channel(trace=trace))
+        listen(link, 2.0)
+    assert traces[0] == traces[1] and len(traces[0]) > 200

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import info, new, run, serve, teleop
+from boebot.cli import info, link, new, parameters, run, serve, teleop
 from boebot.link import messages
 
 app = typer.Typer(
@@ -24,6 +24,8 @@ app.command("run")(run.run)
 app.command("serve")(serve.serve)
 app.command("info")(info.info)
 app.command("teleop")(teleop.teleop)
+app.command("link")(link.link)
+app.add_typer(parameters.app, name="parameters")
 app.command("new")(new.new)
 
 

@@ -21,6 +21,8 @@ def end(result: RunResult, out: Path | None, as_json: bool) -> None:
     No error hides another: files are written even if nobody reads the table any more, and an error in writing them
     follows the run's own.
     """
+    for notice in result.notices:
+        output.say(notice)
     with interrupts.ignored():
         files: list[Path] = []
         unsaved: BoebotError | None = None

@@ -1,4 +1,5 @@
-"""`boebot info URL`: who is there. Firmware, compiler, image, devices, parameters, and one look at the sensors."""
+"""`boebot info URL`: who is there. The handshake, firmware, compiler, image, devices, parameters, and the state of the
+board."""
 
 from __future__ import annotations
 
@@ -25,27 +26,37 @@ def info(
     session = open_board(url, BoardRequest(robot=load_robot(robot), record=False))
     try:
         link = Link(session.transport, record=False)
-        hello = link.handshake()
+        hello = link.open()
         identity = link.identity()
         values: dict[str, Any] = {
             "board": session.description,
+            "robot": text(hello.robot),
             "protocol_version": hello.protocol_version,
             "schema": f"{hello.schema_hash:08x}",
             "firmware": text(identity.firmware_version),
             "compiler": text(identity.compiler),
-            "pin_map": text(hello.pin_map),
+            "pin_map": text(identity.pin_map),
             "image_size_bytes": identity.image_size or None,
             "image_hash": f"{identity.image_hash:08x}" if identity.image_size else None,
             "tick_rate_hz": hello.tick_rate,
+            "telemetry_period_ms": round(1000 * hello.telemetry_period / hello.tick_rate, 3),
+            "session_time_out_ms": hello.session_time_out,
+            "boot_counter": hello.boot_counter,
             "reset_cause": _name(messages.ResetCause, hello.reset_cause),
+            "parameters_saved": bool(hello.parameters_saved),
             "devices": [
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
             ],
         }
         parameters = {name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"}
         telemetry = _latest(link)
+        link.close()
     finally:
         session.close()
+    for notice in link.notices:
+        output.say(notice)
+    values["supply_v"] = telemetry.supply / 1000 or None
+    values["latch"] = _name(messages.Latch, telemetry.latch)
     values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)
     values["status"] = [flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name]
     if json:
@@ -59,11 +70,11 @@ def _latest(link: Link) -> messages.Telemetry:
     for _ in range(50):
         telemetry = link.poll(0.02)
         if telemetry:
-            return messages.Telemetry.unpack(telemetry[-1])
+            return messages.Telemetry.unpack(telemetry[-1][0])
     raise BoardError(f"the board at {link.transport.name} sends no telemetry")
 
 
-def _name(kind: type[messages.ResetCause], value: int) -> str:
+def _name(kind: type[messages.ResetCause] | type[messages.Latch], value: int) -> str:
     try:
         return kind(value).name.lower().replace("_", " ")
     except ValueError:

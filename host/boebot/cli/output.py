@@ -9,14 +9,21 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from boebot.runner import Progress
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of
-_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes)$")
+_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm)$")
+
+_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V"}
+
+
+def say(sentence: str) -> None:
+    """What a user should know, on standard error."""
+    print(f"boebot: {sentence}", file=sys.stderr, flush=True)
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -26,21 +33,41 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def print_table(values: Mapping[str, Any]) -> None:
     """Names, values and units as a table on standard output; what is not known is left out."""
-    from rich import box
     from rich.console import Console
+
+    Console().print(table(values))
+
+
+def table(values: Mapping[str, Any]) -> Any:
+    """The same as a `rich.table.Table`."""
+    from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
-    table.add_column(style="dim")
-    table.add_column(justify="right", overflow="fold")
-    table.add_column(style="dim")
+    rows = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
+    rows.add_column(style="dim")
+    rows.add_column(justify="right", overflow="fold")
+    rows.add_column(style="dim")
     for name, value in values.items():
         if value is None:
             continue
         match = _UNIT.search(name)
-        unit = match[1].replace("m_s", "m/s").replace("hz", "Hz") if match else ""
-        table.add_row(_UNIT.sub("", name).replace("_", " "), _text(value), unit)
-    Console().print(table)
+        unit = _UNITS.get(match[1], match[1]) if match else ""
+        rows.add_row(_UNIT.sub("", name).replace("_", " "), _text(value), unit)
+    return rows
+
+
+def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table with a header; the second column holds numbers."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    printed = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, title in enumerate(header):
+        printed.add_column(title, justify="right" if index == 1 else "left", overflow="fold", no_wrap=index < 2)
+    for row in rows:
+        printed.add_row(*row)
+    Console().print(printed)
 
 
 @contextlib.contextmanager

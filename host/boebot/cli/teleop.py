@@ -1,4 +1,5 @@
-"""`boebot teleop`: drives by keyboard. Keys act while they are held; let go, and the robot stops."""
+"""`boebot teleop`: drives by keyboard. Keys act while they are held; let go, and the robot stops. Space stops it and
+latches its motors off; moving again arms them."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ from boebot.runner import execute
 
 HOLD_S = 0.6  # a key counts as held so long: terminals begin to repeat it after half a second
 TURN = 0.35
-HELP = "arrows or W A S D drive, 1..9 set the speed, space stops, Q ends"
+HELP = "arrows or W A S D drive, 1..9 set the speed, space stops and latches, Q ends"
 _ARROWS = {"A": "w", "B": "s", "C": "d", "D": "a"}  # last byte of an arrow key's escape sequence
 _MOVES = {"w": (1.0, 1.0), "s": (-1.0, -1.0), "a": (-TURN, TURN), "d": (TURN, -TURN)}
 
@@ -50,8 +51,10 @@ class Keyboard:
             if key in _MOVES:
                 self._move = _MOVES[key]
                 self._until = time.monotonic() + HOLD_S
+                robot.arm()
             elif key == " ":
                 self._until = 0.0
+                robot.emergency_stop()
             elif key in "123456789":
                 self._speed = int(key) / 9
         if time.monotonic() < self._until:
@@ -77,7 +80,8 @@ def keys(typed: str) -> Iterator[str]:
 
 def sensors(robot: Robot) -> str:
     """One line about what the robot senses."""
-    parts = [f"{robot.time:7.1f} s", f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"]
+    drive = "stopped, latched  " if robot.latched else f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"
+    parts = [f"{robot.time:7.1f} s", drive]
     equipment = robot.observation.equipment
     if equipment.has("left_whisker") and equipment.has("right_whisker"):
         parts.append(

@@ -2,89 +2,23 @@
 
     wire = 00 · COBS(id, sequence, payload) · c2 c1 c0 · 00
 
-c2 c1 c0 are the CRC-21 of the stuffed bytes, seven bits to a byte under a set top bit, so that 00 occurs
-nowhere inside. A frame is accepted only if its length is exactly that of its id, its checksum is right and
-its stuffing ends exactly at the end. Damaged frames are counted and dropped; the next delimiter starts
-afresh.
-
-A CRC is linear: it is the XOR of what each byte contributes at its distance from the end. One table row per
-distance, walked by `map` and `reduce`, is about 1.6 times as fast in Python as the usual byte-by-byte loop.
-Rows hold the checksum already spread over its three bytes.
+The work is done by the firmware's own C (codec.h), so that both ends of the link agree by construction; the tests
+compare it with protocol/reference_frame.py. Damaged frames are counted and dropped; the next delimiter starts afresh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache, reduce
-from operator import getitem, xor
-
 from boebot.link import messages
+from boebot.link._codec import ffi, lib
 
-POLYNOMIAL = 0x1DBF6F  # CRC-21, 0x1edfb7 in Koopman's notation: Hamming distance 6 up to 1004 bits
-SEED = 0x155555
+SEED = 0x155555  # of the handshake's messages
+NO_SESSION = 0xFFFFFFFF  # seed of a decoder that accepts the handshake's messages only
 FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters counted
-LONGEST_PAYLOAD = 251  # beyond it COBS would need a second code byte
+LONGEST_PAYLOAD = max(message.LENGTH for message in messages.MESSAGES.values())
 
-# Messages of the handshake keep the constant seed: both ends understand each other before they share another.
-HANDSHAKE_IDS = frozenset(
-    kind.ID for kind in (messages.HelloRequest, messages.Hello, messages.Identify, messages.Identity)
-)
-TO_BOARD: dict[int, int] = {number: length for number, length in messages.LENGTHS.items() if number < 0x80}
-TO_HOST: dict[int, int] = {number: length for number, length in messages.LENGTHS.items() if number >= 0x80}
+_SLICE = lib.CODEC_SLICE  # bytes for one call into C
 
-_MASK = 0x1FFFFF
-_HELLO = messages.Hello.ID
-_MINIMUM = 6  # code byte, id, sequence, checksum
-
-
-def _spread(check: int) -> int:
-    """The 21 bits as the three bytes that go on the wire."""
-    return 0x808080 | (check & 0x1FC000) << 2 | (check & 0x3F80) << 1 | check & 0x7F
-
-
-def _byte_table() -> list[int]:
-    table = []
-    for byte in range(256):
-        register = byte << 13
-        for _ in range(8):
-            register = ((register << 1) ^ (POLYNOMIAL if register & 0x100000 else 0)) & _MASK
-        table.append(register)
-    return table
-
-
-_TABLE = _byte_table()
-_CODES = [bytes((length + 1,)) for length in range(254)]
-_plain_rows = [_TABLE]  # [distance from the end][byte] -> contribution to the CRC
-_spread_rows = [[_spread(value) ^ 0x808080 for value in _TABLE]]
-
-
-def _advance(register: int) -> int:
-    """The CRC register after one more zero byte."""
-    return _TABLE[register >> 13] ^ (register << 8 & _MASK)
-
-
-@cache
-def _rows(count: int) -> list[list[int]]:
-    """The table rows for `count` bytes, first byte first."""
-    while len(_plain_rows) < count:
-        _plain_rows.append([_advance(value) for value in _plain_rows[-1]])
-        _spread_rows.append([_spread(value) ^ 0x808080 for value in _plain_rows[-1]])
-    return _spread_rows[:count][::-1]
-
-
-@cache
-def _starts(seed: int) -> list[int]:
-    """[count] -> what the seed contributes to the checksum of `count` bytes, top bits set."""
-    registers = [seed]
-    for _ in range(LONGEST_PAYLOAD + 3):
-        registers.append(_advance(registers[-1]))
-    return [_spread(register) for register in registers]
-
-
-def checksum(stuffed: bytes, seed: int = SEED) -> int:
-    """CRC-21 of the stuffed bytes, spread over the low 24 bits as on the wire."""
-    count = len(stuffed)
-    return reduce(xor, map(getitem, _rows(count), stuffed), _starts(seed)[count])
+_Message = tuple[int, int, bytes]
 
 
 def encode(message_id: int, sequence: int, payload: bytes, seed: int = SEED) -> bytes:
@@ -93,81 +27,94 @@ def encode(message_id: int, sequence: int, payload: bytes, seed: int = SEED) -> 
     Args:
         message_id: 1..255.
         sequence: 0..255, one more than that of the frame before.
-        payload: at most 251 bytes.
+        payload: at most LONGEST_PAYLOAD bytes.
         seed: the session's checksum seed; handshake messages keep the constant one.
+
+    Raises:
+        ValueError: the payload is too long.
+        OverflowError: a number does not fit.
     """
-    blocks = (bytes((message_id, sequence)) + payload).split(b"\0")
-    stuffed = b"".join([_CODES[len(block)] + block for block in blocks])
-    if message_id in HANDSHAKE_IDS:
-        seed = SEED
-    return b"\0%b%b\0" % (stuffed, checksum(stuffed, seed).to_bytes(3, "big"))
+    length = len(payload)
+    if length > LONGEST_PAYLOAD:
+        raise ValueError(f"a payload of {length} bytes; expected at most {LONGEST_PAYLOAD}")
+    wire: bytes = ffi.unpack(lib.codec_encode(message_id, sequence, payload, length, seed), length + FRAME_OVERHEAD)
+    return wire
+
+
+def checksum(stuffed: bytes, seed: int = SEED) -> int:
+    """CRC-21 of stuffed bytes, spread over the low 24 bits as on the wire."""
+    check = bytearray(3)
+    lib.codec_check(ffi.from_buffer(check), stuffed, len(stuffed), seed)
+    return int.from_bytes(check, "big")
+
+
+class _Count:
+    """A counter of the C decoder as an attribute that may be set, too: to start it anew."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, decoder: Decoder, owner: type) -> int:
+        value: int = getattr(decoder.counts, self._name)
+        return value
+
+    def __set__(self, decoder: Decoder, value: int) -> None:
+        setattr(decoder.counts, self._name, value)
 
 
 class Decoder:
-    """Finds the frames in a stream of bytes, however it is cut into pieces.
+    """Finds the frames in a stream of bytes, however it is cut into pieces. One thread at a time.
 
     Attributes:
         good: frames accepted.
-        bad: frames refused: wrong length, checksum or stuffing.
-        lost: frames that never came, by the gaps in the sequence numbers.
+        bad: frames refused: length, checksum, stuffing, seed, or a message of the other direction.
+        resynchronised: times that a good frame followed bad ones.
+        lost: frames that never came, by the gaps in the sequence numbers. A hello of another start or session begins a
+            new count, and so does another seed.
     """
 
-    def __init__(self, lengths: Mapping[int, int] = TO_HOST, seed: int = SEED) -> None:
-        """Accepts the messages in `lengths` (id -> payload bytes)."""
-        self.good = 0
-        self.bad = 0
-        self.lost = 0
-        self.seed = seed
-        # id -> (bytes between the delimiters, checksum's start, rows), prepared once
-        self._kinds: dict[int, tuple[int, int, list[list[int]]]] = {}
-        for message_id, length in lengths.items():
-            start = _starts(SEED if message_id in HANDSHAKE_IDS else seed)[length + 3]
-            self._kinds[message_id] = (length + _MINIMUM, start, _rows(length + 3))
-        self._longest = max(lengths.values(), default=0) + _MINIMUM
-        self._rest = b""
-        self._synchronised = False  # by a delimiter; what precedes the first is the tail of a frame we joined late
-        self._next = -1  # sequence number expected, -1: any
+    good = _Count()
+    bad = _Count()
+    resynchronised = _Count()
+    lost = _Count()
 
-    def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:
+    def __init__(self, seed: int = SEED, *, to_board: bool = False) -> None:
+        """Accepts the messages to the host, or those to the board, with the session's `seed` (NO_SESSION: only those
+        of the handshake)."""
+        new, self._feed, self._set_seed = (
+            (lib.to_board_new, lib.to_board_feed, lib.to_board_seed)
+            if to_board
+            else (lib.to_host_new, lib.to_host_feed, lib.to_host_seed)
+        )
+        self._decoder = ffi.gc(new(seed), lib.codec_free)
+        if not self._decoder:
+            raise MemoryError("no memory for a decoder")
+        self.counts = lib.codec_counts_of(self._decoder)
+        self._seed = seed
+        self._found = found = ffi.new("codec_found *")
+        self._ids, self._sequences, self._ends, self._payloads = found.ids, found.sequences, found.ends, found.payloads
+
+    @property
+    def seed(self) -> int:
+        """The session's checksum seed."""
+        return self._seed
+
+    @seed.setter
+    def seed(self, seed: int) -> None:
+        self._set_seed(self._decoder, seed)
+        self._seed = seed
+
+    def feed(self, data: bytes) -> list[_Message]:
         """Takes bytes as they come; returns the messages that they complete as (id, sequence, payload)."""
-        pieces = (self._rest + data if self._rest else data).split(b"\0")
-        rest = pieces.pop()
-        # more than any frame without a delimiter: cannot become one, and need not be kept to be refused
-        self._rest = rest if len(rest) <= self._longest else rest[: self._longest + 1]
-        found = []
-        for piece in pieces:
-            if piece:
-                message = self._open(piece)
-                if message is not None:
-                    found.append(message)
-                elif self._synchronised:
-                    self.bad += 1
-            self._synchronised = True
-        return found
-
-    def _open(self, piece: bytes) -> tuple[int, int, bytes] | None:
-        """The message between two delimiters, or None."""
-        size = len(piece)
-        if size < _MINIMUM or piece[0] < 2:
-            return None
-        message_id = piece[1]
-        kind = self._kinds.get(message_id)
-        if kind is None or kind[0] != size:
-            return None
-        end = size - 3
-        if reduce(xor, map(getitem, kind[2], piece), kind[1]) != int.from_bytes(piece[end:], "big"):
-            return None
-        body = bytearray(piece)  # unstuffed in place: a code byte becomes the zero that it stands for
-        at = body[0]
-        while at < end:
-            step = body[at]
-            body[at] = 0
-            at += step
-        if at != end:
-            return None
-        sequence = body[2]
-        if sequence != self._next and self._next >= 0 and message_id != _HELLO:  # a hello starts a new count
-            self.lost += (sequence - self._next) & 0xFF
-        self._next = (sequence + 1) & 0xFF
-        self.good += 1
-        return message_id, sequence, bytes(body[3:end])
+        if len(data) > _SLICE:
+            slices = (data[start : start + _SLICE] for start in range(0, len(data), _SLICE))
+            return [message for piece in slices for message in self.feed(piece)]
+        count = self._feed(self._decoder, data, len(data), self._found)
+        if count == 0:
+            return []
+        if count == 1:
+            return [(self._ids[0], self._sequences[0], ffi.unpack(self._payloads, self._ends[0]))]
+        ids, sequences, ends = (ffi.unpack(numbers, count) for numbers in (self._ids, self._sequences, self._ends))
+        payloads = ffi.unpack(self._payloads, ends[-1])
+        cut = [payloads[start:end] for start, end in zip([0, *ends], ends, strict=False)]
+        return list(zip(ids, sequences, cut, strict=True))

@@ -1,25 +1,11 @@
-"""Ways for bytes to reach a board and come back: serial ports (and ptys, which look like them) and TCP
-sockets.
+"""What carries a board's bytes: the interface that the link is written against. A transport knows no frames.
 
-An in-process board brings a transport of its own with the same interface. A transport knows no frames.
+The ports of this computer are in boebot.link.ports; an in-process board brings a transport of its own.
 """
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import os
-import select
-import socket
-import time
-from typing import Protocol
-
-import serial
-
-from boebot.errors import BoardError
-
-_POSIX = os.name == "posix"
-_POLL_S = 0.001  # where the port cannot be waited for (Windows)
+from typing import Protocol, runtime_checkable
 
 
 class Transport(Protocol):
@@ -48,7 +34,7 @@ class Transport(Protocol):
         """Sends bytes.
 
         Raises:
-            BoardError: the board has gone.
+            BoardError: the board has gone, or takes no bytes.
         """
 
     def now(self) -> float:
@@ -58,134 +44,38 @@ class Transport(Protocol):
         """Gives the port back. May be called twice."""
 
 
-class SerialTransport:
-    """A serial port, opened for this process alone."""
+@runtime_checkable
+class Stamping(Protocol):
+    """A transport that knows when bytes arrived, not only when they were fetched."""
 
-    realtime = True
-
-    def __init__(self, port: str, baud: int = 500_000) -> None:
-        """Opens `port`.
-
-        Raises:
-            BoardError: missing, busy or forbidden.
-        """
-        self.name = port
-        try:
-            self._port = serial.Serial(port, baud, timeout=0, write_timeout=1.0, exclusive=True if _POSIX else None)
-        except (OSError, ValueError) as error:  # pyserial's SerialException is an OSError
-            raise BoardError(_why_not(port, baud, error)) from None
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        """What arrived, as soon as there is something, at the latest after `wait_s`."""
-        del quiet_s  # bytes wait in the operating system's buffer anyway
-        try:
-            if not _POSIX:
-                return self._poll(wait_s)
-            file = self._port.fileno()
-            ready, _, _ = select.select([file], [], [], wait_s)
-            if not ready:
-                return b""
-            data = os.read(file, 65536)
-        except (OSError, TypeError, ValueError):  # pyserial on a closed port: no file descriptor any more
-            data = b""
-        if not data:  # readable at its end: the other side is gone
-            raise BoardError(f"{self.name} has gone: unplugged, or closed by the other side")
-        return data
-
-    def _poll(self, wait_s: float) -> bytes:
-        end = time.monotonic() + wait_s
-        while True:
-            waiting: int = self._port.in_waiting
-            if waiting:
-                return bytes(self._port.read(waiting))
-            if time.monotonic() >= end:
-                return b""
-            time.sleep(_POLL_S)
-
-    def write(self, data: bytes) -> None:
-        """Sends bytes."""
-        try:
-            self._port.write(data)
-        except serial.SerialTimeoutException:
-            raise BoardError(f"{self.name} takes no bytes: its other side does not read") from None
-        except (OSError, TypeError, ValueError):
-            raise BoardError(f"{self.name} has gone: unplugged, or closed by the other side") from None
-
-    def now(self) -> float:
-        """The monotonic clock (s)."""
-        return time.monotonic()
-
-    def close(self) -> None:
-        """Closes the port."""
-        with contextlib.suppress(OSError):
-            self._port.close()
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        """As `read`, but in the pieces in which it came, oldest first, each with the instant at which it was there
+        (s, the transport's clock): at the arrival of its last byte or soon after, never before."""
 
 
-class SocketTransport:
-    """A TCP connection that carries a board's bytes."""
+@runtime_checkable
+class BaudSelectable(Protocol):
+    """A transport whose line has a bit rate that the host chooses."""
 
-    realtime = True
+    @property
+    def baud(self) -> int:
+        """The rate in use (bit/s)."""
 
-    def __init__(self, host: str, port: int, timeout_s: float = 2.0) -> None:
-        """Connects.
+    @property
+    def baud_given(self) -> bool:
+        """Whether the URL named the rate: then no other one is meant."""
+
+    def set_baud(self, rate: int) -> None:
+        """Another rate, from now on; what was received so far is forgotten.
 
         Raises:
-            BoardError: nobody listens there.
+            BoardError: the port does not run at that rate, or has gone.
         """
-        self.name = f"socket://{host}:{port}"
-        try:
-            self._socket = socket.create_connection((host, port), timeout_s)
-        except OSError as error:
-            reason = "nobody listens there" if isinstance(error, ConnectionRefusedError) else _reason(error)
-            raise BoardError(f"{self.name} cannot be opened: {reason}") from None
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        """What arrived, as soon as there is something, at the latest after `wait_s`."""
-        del quiet_s
-        try:
-            ready, _, _ = select.select([self._socket], [], [], wait_s)
-            if not ready:
-                return b""
-            data = self._socket.recv(65536)
-        except (OSError, ValueError):
-            data = b""
-        if not data:
-            raise BoardError(f"{self.name} has gone: closed by the other side")
-        return data
-
-    def write(self, data: bytes) -> None:
-        """Sends bytes."""
-        try:
-            self._socket.sendall(data)
-        except OSError:
-            raise BoardError(f"{self.name} has gone: closed by the other side") from None
-
-    def now(self) -> float:
-        """The monotonic clock (s)."""
-        return time.monotonic()
-
-    def close(self) -> None:
-        """Closes the connection."""
-        self._socket.close()
 
 
-def _why_not(port: str, baud: int, error: Exception) -> str:
-    """One sentence about a port that could not be opened."""
-    number = getattr(error, "errno", None)
-    text = str(error).lower()
-    if number == errno.ENOENT or "filenotfound" in text or "no such file" in text:
-        return f"there is no port {port}"
-    if number == errno.EACCES or "permission" in text:
-        return f"{port} may not be opened by this user: permission denied (on Linux, join the group of {port})"
-    if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text or "busy" in text:
-        return f"{port} is busy: another program has it open"
-    if "baud" in text:
-        return f"{port} does not run at {baud} baud"
-    if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR, errno.ENXIO) or "configure" in text:
-        return f"{port} is no serial port"
-    return f"{port} cannot be opened: {_reason(error)}"
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
+def stamped(transport: Transport, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+    """What arrived at any transport, in stamped pieces; where nobody stamped it, the stamp is now."""
+    if isinstance(transport, Stamping):
+        return transport.read_stamped(wait_s, quiet_s)
+    data = transport.read(wait_s, quiet_s)
+    return [(transport.now(), data)] if data else []

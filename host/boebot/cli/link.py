@@ -1,0 +1,131 @@
+"""`boebot link`: what both ends of the link count, how fast it is, and how well the board's clock is known, live."""
+
+from __future__ import annotations
+
+import json as json_module
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from boebot.boards import BoardRequest, open_board
+from boebot.cli import options, output
+from boebot.link.session import Link, text
+from boebot.link.transport import BaudSelectable
+from boebot.robots import load_robot
+
+_PERIOD_S = 1.0
+_WAIT_S = 0.05
+
+
+def link(
+    on: options.On = "native",
+    robot: options.RobotName = "shieldbot",
+    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after so long.")] = float("inf"),
+    once: Annotated[bool, typer.Option("--once", help="Print one look, after a second of listening, and end.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print a JSON object every second in place of the table.")
+    ] = False,
+) -> None:
+    """Watch the link: counters of both ends, round trips, the board's clock. Ctrl-C ends it; nothing moves."""
+    session = open_board(on, BoardRequest(robot=load_robot(robot), record=False, realtime=True))
+    try:
+        watched = Link(session.transport, record=False)
+        watched.open()
+        for notice in watched.notices:
+            output.say(notice)
+        if once:
+            seconds = min(seconds, _PERIOD_S)
+        if json:
+            _watch(watched, seconds, lambda look: print(json_module.dumps(look), flush=True), once)
+        else:
+            _show_table(watched, seconds, once)
+        watched.close()
+    finally:
+        session.close()
+
+
+def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None], once: bool) -> None:
+    """Polls for so long; shows a look every second, or only the last."""
+    now = watched.transport.now
+    begun = next_look = now()
+    next_look += _PERIOD_S
+    before = Rates(watched)
+    while True:
+        ended = now() - begun >= seconds
+        if now() >= next_look or ended:
+            if not once or ended:
+                show(look(watched, before))
+            before = Rates(watched)
+            next_look += _PERIOD_S
+        if ended:
+            return
+        watched.poll(max(min(next_look - now(), _WAIT_S), 0.0))
+        watched.events()
+
+
+class Rates:
+    """Counts at one moment, to tell how fast they grow."""
+
+    def __init__(self, watched: Link) -> None:
+        self.at_s = watched.transport.now()
+        self.good = watched.decoder.good
+
+
+def look(watched: Link, before: Rates) -> dict[str, Any]:
+    """All there is to be seen, by name, units in the names."""
+    hello, clock, trips = watched.hello, watched.clock, watched.round_trips
+    passed_s = watched.transport.now() - before.at_s
+    transport = watched.transport
+    return {
+        "time_s": round(transport.now(), 3),
+        "board": transport.name,
+        "robot": None if hello is None else text(hello.robot),
+        "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
+        "session": None if hello is None or not watched.is_open else f"{hello.session:06x}",
+        "telemetry_period_ms": None if hello is None else round(1000 * hello.telemetry_period / hello.tick_rate, 3),
+        "session_time_out_ms": None if hello is None else hello.session_time_out,
+        "frame_rate_hz": round((watched.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
+        "round_trip_p50_ms": _ms(trips.quantile(0.5)),
+        "round_trip_p99_ms": _ms(trips.quantile(0.99)),
+        "clock_offset_s": round(clock.offset, 6) if clock.probes else None,
+        "clock_drift_ppm": round(clock.drift * 1e6, 2) if clock.probes else None,
+        "clock_bound_us": round(clock.bound * 1e6, 1) if clock.probes else None,
+        "clock_restarts": clock.restarts,
+        "host": watched.counters().as_dict(),
+        "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
+    }
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds * 1000, 3)
+
+
+def _show_table(watched: Link, seconds: float, once: bool) -> None:
+    """The same as a table that stays in its place."""
+    from rich.console import Console
+    from rich.live import Live
+
+    console = Console()
+    if once or not console.is_terminal:
+        _watch(watched, seconds, lambda seen: console.print(_table(seen)), once)
+        return
+    with Live(console=console, auto_refresh=False) as live:
+        _watch(watched, seconds, lambda seen: live.update(_table(seen), refresh=True), once)
+
+
+def _table(seen: dict[str, Any]) -> Any:
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table
+
+    state = output.table({name: value for name, value in seen.items() if name not in ("host", "board_end")})
+    counted = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    counted.add_column("counted", style="dim")
+    counted.add_column("host", justify="right")
+    counted.add_column("board", justify="right")
+    board = seen["board_end"] or {}
+    for name in dict.fromkeys((*seen["host"], *board)):
+        cells = [f"{end[name]:,}" if name in end else "" for end in (seen["host"], board)]
+        counted.add_row(name.replace("_", " "), *cells)
+    return Group(state, counted)

@@ -1,0 +1,260 @@
+"""The board's clock against the host's: offset and drift with bounds that hold (protocol/PROTOCOL.md, "Clock").
+
+    host time of board time b:   h(b) = b + g + o + r (b - b0),   |r| <= 5500e-6
+
+Each message bounds the line from one side: a probe was sent, and had travelled, before the board's time in its
+answer; an answer or telemetry was received, less its way on the wire, after the time that it carries. In the plane of
+(o, r) a bound is a half plane; what all of them leave is a convex polygon, and the true line lies in it. The estimate
+is the polygon's centroid: the mean of all lines that fit, which for evenly distributed delays are equally likely. Its
+error bound at a board time is the distance to the farther one of the polygon's extremes there.
+
+A polygon never forgets, and rates wander. So two are kept, each begun half a window after the other; the older one
+speaks, and is replaced by the younger when its window is over. While the rate wanders by at most w (1/s), the line that
+is tangent at the end of a window W passes an old bound by at most w W^2 / 2: each bound is loosened by that much.
+"""
+
+from __future__ import annotations
+
+from boebot.link import messages
+from boebot.link.frame import FRAME_OVERHEAD
+
+Stamp = tuple[float, float, float]
+"""(board time in s since its reset, host time in s on the transport's clock, error bound of the host time in s)"""
+
+DRIFT_LIMIT = 5.5e-3  # of h's slope: clocks of +-5000 ppm, as ceramic resonators have at worst, and some to spare
+WANDER = 0.02e-6  # 1/s: the change of rate that the bound allows for; a resonator that warms up by 1 K in a minute
+WINDOW_S = 40.0
+RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and what is lost in rounding here
+_WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
+_WORTH_S = 1e-6
+_WORTH_MOST_S = 1e-3  # of the present bound
+_WRAP_US = 1 << 32
+_FAR_S = 1e4  # o at the beginning
+
+# A delimiter may be shared with the neighbour, so it is not counted: the frame needs at least so long.
+_PROBE_BYTES = messages.ClockProbe.LENGTH + FRAME_OVERHEAD - 1
+_ANSWER_BYTES = messages.ClockAnswer.LENGTH + FRAME_OVERHEAD - 1
+_TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD - 1
+
+_Polygon = list[tuple[float, float]]
+
+
+class BoardClock:
+    """Offset and drift of one board's clock.
+
+    Attributes:
+        restarts: times that the bounds contradicted each other: a clock that jumped or drifts beyond the limit.
+        probes: clock answers taken.
+    """
+
+    def __init__(self, byte_s: float = 0.0, wander: float = WANDER, window_s: float = WINDOW_S) -> None:
+        """Args:
+        byte_s: time that a byte needs on the line; 0 where that is not known, which loosens the bounds.
+        wander: greatest change of the clocks' relative rate (1/s).
+        window_s: how long a bound counts.
+        """
+        self._byte_s = byte_s
+        self._window_s = window_s
+        self._loosened_s = wander * window_s**2 / 2
+        self.restarts = 0
+        self.probes = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """A new session: the board may have been reset, or another one may be there."""
+        self._known = False
+        self._expected = False
+        self._us = 0  # newest board time, unwrapped
+        self._heard_s = 0.0  # host time of its receipt
+        self._polygons: list[_Polygon] = []  # older, younger
+        self._began: list[float] = []  # board times
+
+    @property
+    def known(self) -> bool:
+        """Whether anything was heard of the board's time."""
+        return self._known
+
+    @property
+    def drift(self) -> float:
+        """How much faster than the host's clock the board's runs, as a share: 100e-6 are 100 ppm."""
+        return 1.0 / (1.0 + self._slope) - 1.0 if self._known else 0.0
+
+    @property
+    def drift_bound(self) -> float:
+        """Error bound of `drift`."""
+        return self._slope_bound if self._known else DRIFT_LIMIT
+
+    @property
+    def offset(self) -> float:
+        """Host time of board time 0 by the newest estimate (s)."""
+        return self._middle - self._at_s * (1.0 + self._slope) if self._known else 0.0
+
+    @property
+    def bound(self) -> float:
+        """Error bound of the host time of the newest board time (s)."""
+        return self._bound if self._known else _FAR_S
+
+    def expect(self, board_s: float, heard_s: float) -> None:
+        """The board's time is about this (s) at that host time: from its count of ticks, which rolls over later."""
+        if not self._known:
+            self._expected = True
+            self._us, self._heard_s = round(board_s * 1e6), heard_s
+
+    def unwrap(self, raw_us: int, heard_s: float) -> int:
+        """Board time (us) since reset from its low 32 bits, heard at that host time: nearest to what is expected."""
+        if not (self._known or self._expected):
+            return raw_us
+        expected = self._us + int((heard_s - self._heard_s) * 1e6)
+        return raw_us + ((expected - raw_us + _WRAP_US // 2) // _WRAP_US) * _WRAP_US
+
+    def probe(self, sent_s: float, raw_us: int, received_s: float) -> None:
+        """Takes the board's time from the answer to a probe that was sent and answered at these host times."""
+        self.probes += 1
+        board_s = self._hear(raw_us, received_s)
+        received_s -= _ANSWER_BYTES * self._byte_s
+        sent_s += _PROBE_BYTES * self._byte_s - RESOLUTION_S
+        since_s = board_s - self._at_s
+        latest_wins = received_s - board_s < self._useful_below + since_s * self._useful_fastest
+        earliest_wins = sent_s - board_s > self._useful_above + since_s * self._useful_slowest
+        if latest_wins or since_s < 0:
+            self._bound_by(board_s, received_s, 1.0)
+        if earliest_wins or since_s < 0:
+            self._bound_by(board_s, sent_s, -1.0)
+        if latest_wins or earliest_wins:
+            self._refresh(board_s)
+
+    def observe(self, raw_us: int, received_s: float) -> Stamp:
+        """Takes the time of a telemetry message's tick, received at that host time; returns the tick's stamp."""
+        if not self._known:
+            board_s = self._hear(raw_us, received_s)
+            self._bound_by(board_s, received_s - _TELEMETRY_BYTES * self._byte_s, 1.0)
+            self._refresh(board_s)
+        expected = self._us + int((received_s - self._heard_s) * 1e6)
+        us = self._us = raw_us + ((expected - raw_us + 2147483648) // _WRAP_US) * _WRAP_US
+        self._heard_s = received_s
+        board_s = us * 1e-6
+        since_s = board_s - self._at_s
+        latest_s = received_s - _TELEMETRY_BYTES * self._byte_s
+        if latest_s - board_s < self._useful_below + since_s * self._useful_fastest:
+            self._bound_by(board_s, latest_s, 1.0)
+            self._refresh(board_s)
+            return board_s, self._middle, self._bound
+        return (
+            board_s,
+            self._middle + since_s * (1.0 + self._slope),
+            self._bound + abs(since_s) * self._slope_bound,
+        )
+
+    def at(self, board_s: float) -> Stamp:
+        """The stamp of a board time (s), unwrapped."""
+        since_s = board_s - self._at_s
+        return (
+            board_s,
+            self._middle + since_s * (1.0 + self._slope),
+            self._bound + abs(since_s) * self._slope_bound,
+        )
+
+    # ---- inside --------------------------------------------------------------------------------------------
+
+    def _hear(self, raw_us: int, received_s: float) -> float:
+        """Notes a board time; returns it unwrapped (s)."""
+        us = self.unwrap(raw_us, received_s)
+        self._us, self._heard_s = us, received_s
+        board_s = us * 1e-6
+        if not self._known:
+            self._known = True
+            self._zero = received_s - board_s  # g: keeps the polygon's numbers small
+            self._polygons = [_plane()]
+            self._began = [board_s]
+            self._refresh(board_s)
+        return board_s
+
+    def _bound_by(self, board_s: float, host_s: float, side: float) -> None:
+        """h(board_s) is at most (side 1) or at least (side -1) `host_s`."""
+        self._turn_window(board_s)
+        limit = host_s - board_s - self._zero + side * self._loosened_s
+        for index, polygon in enumerate(self._polygons):
+            cut = _cut(polygon, board_s - self._began[index], limit, side)
+            if len(cut) < 3:  # nothing is left: the clock has jumped, or drifts faster than it may
+                self.restarts += 1
+                self._polygons = [_cut(_plane(), 0.0, limit, side)]
+                self._began = [board_s]
+                return
+            self._polygons[index] = cut
+
+    def _turn_window(self, board_s: float) -> None:
+        if len(self._polygons) == 1:
+            if board_s - self._began[0] > self._window_s / 2:
+                self._polygons.append(_plane())
+                self._began.append(board_s)
+        elif board_s - self._began[0] > self._window_s:
+            self._polygons = [self._polygons[1], _plane()]
+            self._began = [self._began[1], board_s]
+
+    def _refresh(self, board_s: float) -> None:
+        """Estimate, bounds and what `observe` needs to know, for about this board time."""
+        x = board_s - self._began[0]
+        values = [o + r * x for o, r in self._polygons[0]]
+        slopes = [r for _, r in self._polygons[0]]
+        low, high = min(values), max(values)
+        slowest, fastest = min(slopes), max(slopes)
+        value, slope = _centroid(values, slopes)
+        if high - low > _FAR_S / 2:  # bounded from one side only
+            value, slope = high, 0.0
+        value = min(max(value, low), high)  # rounding, where the polygon is all but a point
+        slope = min(max(slope, slowest), fastest)
+        self._at_s = board_s
+        self._middle = board_s + self._zero + value
+        self._bound = max(high - value, value - low)
+        self._slope = slope
+        self._slope_bound = max(fastest - slope, slope - slowest)
+        if len(self._polygons) > 1:
+            x = board_s - self._began[1]
+            values = [o + r * x for o, r in self._polygons[1]]
+            slopes = [r for _, r in self._polygons[1]]
+            low, high = min(values), max(values)
+            slowest, fastest = min(slopes), max(slopes)
+        # a later bound between these cuts little or nothing off any polygon
+        loosened_s = self._loosened_s + _WORTH_S + _WORTH * min(self._bound, _WORTH_MOST_S)
+        self._useful_below = self._zero + high - loosened_s
+        self._useful_above = self._zero + low + loosened_s
+        self._useful_fastest = fastest
+        self._useful_slowest = slowest
+
+
+def _plane() -> _Polygon:
+    return [(-_FAR_S, -DRIFT_LIMIT), (_FAR_S, -DRIFT_LIMIT), (_FAR_S, DRIFT_LIMIT), (-_FAR_S, DRIFT_LIMIT)]
+
+
+def _centroid(x: list[float], y: list[float]) -> tuple[float, float]:
+    """Of the polygon with these corners; the middle of the extremes where it has no area."""
+    x0, y0 = x[0], y[0]
+    area = sum_x = sum_y = before_x = before_y = 0.0
+    for corner_x, corner_y in zip(x, y, strict=True):
+        corner_x -= x0
+        corner_y -= y0
+        doubled = before_x * corner_y - corner_x * before_y
+        area += doubled
+        sum_x += (before_x + corner_x) * doubled
+        sum_y += (before_y + corner_y) * doubled
+        before_x, before_y = corner_x, corner_y
+    if not area:
+        return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
+    return x0 + sum_x / (3 * area), y0 + sum_y / (3 * area)
+
+
+def _cut(polygon: _Polygon, x: float, limit: float, side: float) -> _Polygon:
+    """The part of the convex polygon in which side (o + r x) <= side limit (Sutherland and Hodgman 1974)."""
+    over = [side * (o + r * x - limit) for o, r in polygon]
+    if max(over) <= 0.0:
+        return polygon
+    kept: _Polygon = []
+    before, before_over = polygon[-1], over[-1]
+    for vertex, vertex_over in zip(polygon, over, strict=True):
+        if (vertex_over > 0.0) != (before_over > 0.0):
+            share = before_over / (before_over - vertex_over)
+            kept.append((before[0] + share * (vertex[0] - before[0]), before[1] + share * (vertex[1] - before[1])))
+        if vertex_over <= 0.0:
+            kept.append(vertex)
+        before, before_over = vertex, vertex_over
+    return kept

@@ -1,0 +1,67 @@
+"""What both ends of the link count. The board's counters are 16 bits wide and start anew with it; here they go on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+from boebot.link import messages
+
+_MODULUS = 65536
+
+
+@dataclass
+class HostCounters:
+    """What the host's end has counted since the link was made.
+
+    The decoder counts good, bad, resynchronised and lost frames; the rest is counted by the session.
+    """
+
+    good: int = 0
+    """frames accepted"""
+    bad: int = 0
+    """frames refused: length, checksum, stuffing or seed"""
+    resynchronised: int = 0
+    """times that a good frame followed bad ones"""
+    lost: int = 0
+    """frames that the board sent and that never came, by the gaps in their numbers"""
+    retransmitted: int = 0
+    """requests and stops sent again"""
+    duplicate: int = 0
+    """answers and events that came again and were only acknowledged"""
+    stray: int = 0
+    """answers and events that nobody waited for: out of order, or of no session"""
+    dropped: int = 0
+    """telemetry messages that nobody fetched"""
+    held: int = 0
+    """events left unacknowledged because nobody fetched those before"""
+    sessions: int = 0
+    """sessions opened"""
+    board_resets: int = 0
+    """times that the board came back with another nonce"""
+    sessions_lost: int = 0
+    """times that the board had ended the session, or another host had replaced it"""
+
+    def as_dict(self) -> dict[str, int]:
+        """By name."""
+        return asdict(self)
+
+
+class BoardCounters:
+    """The board's counters, unwrapped: they grow over the board's modulo 65536 and over its resets."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, int] = dict.fromkeys(messages.Counters._fields, 0)
+        self.received = 0
+        self._last: messages.Counters | None = None
+
+    def take(self, counters: messages.Counters) -> None:
+        """Adds what was counted since the message before."""
+        before = self._last or messages.Counters(*(0,) * len(counters))
+        for name, now, then in zip(counters._fields, counters, before, strict=True):
+            self.values[name] += (now - then) % _MODULUS
+        self._last = counters
+        self.received += 1
+
+    def restarted(self) -> None:
+        """The board was reset: it counts from 0 again."""
+        self._last = None

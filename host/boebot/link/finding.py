@@ -1,0 +1,172 @@
+"""Finding the board at a port: its baud rate, and what answers there if it is none of ours."""
+
+from __future__ import annotations
+
+from boebot.errors import BoardError, BoebotError, ProtocolError
+from boebot.link import messages
+from boebot.link.frame import SEED, checksum
+from boebot.link.transport import BaudSelectable, Transport
+
+RATES = (500_000, 115_200, 250_000, 1_000_000, 57_600, 38_400, 19_200, 9_600)
+_LISTEN_S = 0.15  # at each rate; a board without a session says hello every 0.1 s
+_LOOK_S = 0.02
+_SAMPLE = 2048  # bytes kept
+_CHECK_BYTES = 3
+_SHORTEST = 3 + _CHECK_BYTES  # code byte, id, sequence number
+_TEXT_LEAST = 8  # characters that make a text
+_TEXT_SHARE = 0.9
+_QUOTED = 40
+
+
+class Heard:
+    """What came from a port before any hello.
+
+    Attributes:
+        count: bytes, at all rates together.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._sample = bytearray()  # at the present rate
+        self._samples: list[tuple[int | None, bytes]] = []
+
+    def take(self, data: bytes) -> None:
+        """More bytes."""
+        self.count += len(data)
+        self._sample += data[: _SAMPLE - len(self._sample)]
+
+    def rate_changes(self, baud: int | None) -> None:
+        """What was heard so far was at that rate; from now on at another."""
+        if self._sample:
+            self._samples.append((baud, bytes(self._sample)))
+        self._sample.clear()
+
+    @property
+    def frames(self) -> bool:
+        """Whether something looked like a frame at the present rate."""
+        return any(_is_frame(piece) or _has_checksum(piece) for piece in _pieces(self._sample))
+
+    @property
+    def bytes_here(self) -> int:
+        """How many bytes came at the present rate."""
+        return len(self._sample)
+
+    def verdict(self, transport: Transport, limit_s: float, greeted: bool) -> BoebotError:
+        """Why there is no session: one sentence. `greeted`: the board has said hello."""
+        where = transport.name
+        baud = transport.baud if isinstance(transport, BaudSelectable) else None
+        self.rate_changes(baud)
+        if greeted:
+            return BoardError(f"the board at {where} says hello, but does not hear us: no session within {limit_s:g} s")
+        if not self.count:
+            return BoardError(f"nothing answers at {where} within {limit_s:g} s: is the robot on and flashed?")
+        for rate, sample in self._samples:
+            pieces = _pieces(sample)
+            if any(_is_frame(piece) for piece in pieces):
+                return ProtocolError(f"the board at {where} sends frames but does not say hello within {limit_s:g} s")
+            if any(_has_checksum(piece) for piece in pieces):
+                return ProtocolError(
+                    f"the board at {where} speaks another version of this protocol{_at(rate)}, this kit speaks version "
+                    f"{messages.PROTOCOL_VERSION}; flash the firmware that came with this kit"
+                )
+        for rate, sample in self._samples:
+            if said := _text(sample):
+                return ProtocolError(
+                    f"what answers at {where} does not speak this kit's protocol: other firmware, which says "
+                    f"{said!r}{_at(rate)}"
+                )
+        tried = "at no usual baud rate" if baud is not None else "or another baud rate"
+        return ProtocolError(
+            f"what answers at {where} does not speak this kit's protocol ({self.count} bytes, no valid frame): "
+            f"other firmware, {tried}"
+        )
+
+
+class BaudSearch:
+    """Which rate to listen at next, so that each has its turn before the time is over.
+
+    Attributes:
+        end_s: when the search is over (the transport's clock).
+        asked: the rate that the port was opened with; None: it has none.
+        baud: the rate in use.
+    """
+
+    def __init__(self, transport: Transport, limit_s: float) -> None:
+        now = transport.now()
+        self.end_s = now + limit_s
+        self.asked = self.baud = transport.baud if isinstance(transport, BaudSelectable) else None
+        others = [rate for rate in RATES if rate != self.asked]
+        self._order = others if self.asked is not None else []
+        self._next = 0
+        # silence is waited for at the rate that was asked for, as long as the others leave time
+        self._change_s = max(self.end_s - len(others) * _LISTEN_S - _LOOK_S, now + _LISTEN_S)
+        self._began_s = now
+
+    @property
+    def changed(self) -> bool:
+        """Whether the board was found at another rate than asked for."""
+        return self.baud != self.asked
+
+    def next_baud(self, now_s: float, heard: Heard) -> int | None:
+        """The rate to change to, or None: stay."""
+        if not self._order or heard.frames:
+            return None
+        garbage = heard.bytes_here > 0 and now_s - self._began_s >= _LISTEN_S
+        if now_s < self._change_s and not garbage:
+            return None
+        heard.rate_changes(self.baud)
+        self.baud = self._order[self._next % len(self._order)]
+        self._next += 1
+        if self._next == len(self._order):
+            self._order = [*self._order, self.asked] if self.asked is not None else self._order
+        self._began_s = now_s
+        self._change_s = now_s + _LISTEN_S
+        return self.baud
+
+    def look_again_s(self, now_s: float) -> float:
+        """When to ask again."""
+        return min(now_s + _LOOK_S, self.end_s)
+
+
+def _pieces(sample: bytes | bytearray) -> list[bytes]:
+    """What stands between two delimiters."""
+    return [piece for piece in bytes(sample).split(b"\0")[1:-1] if len(piece) >= _SHORTEST]
+
+
+def _is_frame(piece: bytes) -> bool:
+    """Whether it unstuffs to an id and a length of the table, whatever its seed."""
+    if any(byte < 0x80 for byte in piece[-_CHECK_BYTES:]):
+        return False
+    stuffed = piece[:-_CHECK_BYTES]
+    content = bytearray()
+    at = 0
+    while at < len(stuffed):
+        code = stuffed[at]
+        content += stuffed[at + 1 : at + code]
+        at += code
+        if at < len(stuffed):
+            content.append(0)
+    if at != len(stuffed) or len(content) < 2:
+        return False
+    kind = messages.MESSAGES.get(content[0])
+    return kind is not None and content[0] >= 0x80 and len(content) - 2 == kind.LENGTH
+
+
+def _has_checksum(piece: bytes) -> bool:
+    """Whether it carries a checksum with the handshake's seed: a frame of some version."""
+    if len(piece) > 255:
+        return False
+    return checksum(piece[:-_CHECK_BYTES], SEED) == int.from_bytes(piece[-_CHECK_BYTES:], "big")
+
+
+def _text(sample: bytes) -> str:
+    """What people could read of it; empty if that is little."""
+    readable = [byte for byte in sample if 32 <= byte < 127 or byte in b"\r\n\t"]
+    if len(sample) < _TEXT_LEAST or len(readable) < _TEXT_SHARE * len(sample):
+        return ""
+    lines = bytes(readable).decode("ascii").split()
+    return " ".join(lines)[:_QUOTED]
+
+
+def _at(baud: int | None) -> str:
+    return "" if baud is None else f" at {baud} baud"
