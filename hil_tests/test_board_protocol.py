@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+import reference_frame
 
-from protocol import reference_frame
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Level
 from sim_bridge.boards.emulated import avr_image, native_board, native_library

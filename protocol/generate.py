@@ -272,7 +272,8 @@ def python_message(message: schema.Message) -> list[str]:
     for field in message.fields:
         comment = field_comment(field)
         kind = "bytes" if field.text_length else "int"
-        lines.append(f"    {field.name}: {kind}" + (f"  # {comment}" if comment else ""))
+        shadows = "  # type: ignore[assignment]" if hasattr(tuple, field.name) else ""
+        lines.append(f"    {field.name}: {kind}{shadows}" + (f"  # {comment}" if comment else ""))
     if not message.fields:
         lines.append("    pass")
     return [

@@ -17,7 +17,7 @@ const char *codec_encode(uint8_t id, uint8_t sequence, const uint8_t *payload, u
 void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed) {
   crc21 crc = crc_start(seed);
   for (uint32_t i = 0; i < size; i++) {
-    crc = crc_byte(crc, stuffed[i]);
+    crc21_take(&crc, stuffed[i]);
   }
   crc_spread(crc, check);
 }

@@ -168,7 +168,7 @@ class Identify(_IdentifyFields):
 
 
 class _DescribeFields(NamedTuple):
-    index: int  # 0, 1, ... in order of ids
+    index: int  # type: ignore[assignment]  # 0, 1, ... in order of ids
     board_nonce: int  # as in the last hello; another one is refused
 
 
@@ -256,8 +256,8 @@ class Identity(_IdentityFields):
 
 
 class _DescriptionFields(NamedTuple):
-    index: int
-    count: int  # messages that the board knows
+    index: int  # type: ignore[assignment]
+    count: int  # type: ignore[assignment]  # messages that the board knows
     id: int
     length: int  # B; of the payload
     hash: int  # of the message, as in the table

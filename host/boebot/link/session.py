@@ -764,7 +764,8 @@ class Link:
             return ProtocolError(f"the board at {where} says that it makes 0 control ticks in a second; expected more")
         return ProtocolError(
             f"the board at {where} was built with message schema {hello.schema_hash:08x}, this kit with "
-            f"{messages.SCHEMA_HASH:08x}: {self._difference(hello.board_nonce)}; flash the firmware that came with this kit"
+            f"{messages.SCHEMA_HASH:08x}: {self._difference(hello.board_nonce)}; "
+            "flash the firmware that came with this kit"
         )
 
     def _difference(self, board_nonce: int) -> str:
