@@ -121,6 +121,20 @@ TEST_CASE("a save is answered when it is done, copies meanwhile are silent, and 
   CHECK((bench.telemetry().status & STATUS_SAVING) == 0);
 }
 
+TEST_CASE("the request after a save is dropped until the save was answered, so that no answer is left out") {
+  native_bench bench;
+  begin(bench);
+  bench.say(MSG_SAVE_PARAMETERS_ID, msg_save_parameters{1});
+  bench.run(2 * TICK);
+  get(bench, 2, PARAMETER_TIME_TO_LIVE);
+  CHECK(bench.count(MSG_ANSWER_ID) == 0);
+  bench.run_in_session(60 * TICK);
+  REQUIRE(bench.count(MSG_ANSWER_ID) == 1);
+  CHECK(bench.answer().number == 1);
+  get(bench, 2, PARAMETER_TIME_TO_LIVE);
+  CHECK(bench.answer().number == 2);
+}
+
 TEST_CASE("a new session while a save goes on: nobody is answered for it, and changes are told busy until it is done") {
   native_bench bench;
   begin(bench);
