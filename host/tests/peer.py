@@ -167,6 +167,7 @@ class Peer:
         self._event: messages.Event | None = None
         self._event_sent_s = 0.0
         self._events: deque[tuple[int, int, int]] = deque()
+        self._merged: dict[int, tuple[int, int, int]] = {}  # by kind: the latest that found no room in the queue
 
     def _open(self, message: messages.Open) -> None:
         seed = message.board_nonce ^ message.host_nonce
@@ -451,18 +452,19 @@ class Peer:
         if not self.session:
             return
         us = self.board_us()
-        if len(self._events) + (self._event is not None) >= QUEUE:
+        if len(self._events) + (self._event is not None) < QUEUE and not self._merged:
+            self._events.append((kind, value, us))
+        else:
             self.counts["deferred"] += 1
-            for index, (waiting_kind, waiting_value, _) in enumerate(self._events):
-                if waiting_kind == kind:
-                    closed = waiting_value & 0xFF00 if kind == EventKind.WHISKERS else 0
-                    self._events[index] = (kind, value | closed, us)
-                    return
-        self._events.append((kind, value, us))  # in memory for one of each kind beyond the queue
+            closed = self._merged[kind][1] & 0xFF00 if kind == EventKind.WHISKERS and kind in self._merged else 0
+            self._merged[kind] = (kind, value | closed, us)
         if self._event is None:
             self._send_event()
 
     def _send_event(self) -> None:
+        if self._merged and len(self._events) + (self._event is not None) < QUEUE:
+            oldest = min(self._merged, key=lambda kind: self._merged[kind][2])
+            self._events.append(self._merged.pop(oldest))
         if self._events and self._event is None:
             self._event_number = (self._event_number + 1) % 65536
             self._event = messages.Event(self._event_number, *self._events.popleft())

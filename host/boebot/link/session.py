@@ -146,7 +146,7 @@ class Link:
         self._open_due = _NEVER
         self._greeted_s = 0.0  # when the last hello came
         self._foreign_since: float | None = None  # since when another host is known to have the board
-        self._replaced = False  # a hello said so; a late copy of an old one may have
+        self._replaced_since = _NEVER  # a hello said so; a late copy of an old one may have
         self._last_tick = -1  # of the session before
         self._last_heard_s = 0.0
         self._latest_s = 0.0
@@ -558,7 +558,7 @@ class Link:
             self.decoder.bad = self.decoder.lost = self.decoder.resynchronised = 0  # leftovers of another session
         self.is_open = True
         self._foreign_since = None
-        self._replaced = False
+        self._replaced_since = _NEVER
         self.sessions += 1
         self._open_due = _NEVER
         self._requests.new_session()
@@ -634,6 +634,7 @@ class Link:
                         self._hear_first_telemetry(payload, stamp)
                     self.latest = payload
                     self._latest_s = stamp
+                    self._replaced_since = _NEVER
                     time_us = int.from_bytes(payload[4:8], "little")
                     self._telemetry.append((payload, *self.clock.observe(time_us, stamp)))
         if len(self._telemetry) > _TELEMETRY_ROOM:
@@ -664,7 +665,7 @@ class Link:
         self._time_out_s = hello.session_time_out / 1000
         if hello.session and hello.session == self._session:
             self.hello = hello
-            self._replaced = False
+            self._replaced_since = _NEVER
             if not self.is_open:
                 self._opened(now)
         elif hello.session == 0 or hello.session in self._own_sessions:
@@ -686,8 +687,9 @@ class Link:
 
     def _hear_other_host(self, hello: messages.Hello, now: float) -> None:
         if self.is_open:
-            if not self._replaced:  # or a late copy of an earlier hello: the next one tells
-                self._replaced = True
+            # a late copy of an earlier hello says the same, but then telemetry of ours goes on
+            self._replaced_since = min(self._replaced_since, now)
+            if now - self._replaced_since < self._tick_s * max(10, 2 * hello.telemetry_period):
                 return
             self.sessions_lost += 1
             self._end_session()
