@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from boebot.link import messages
 from boebot.runner import execute
 from hil_tests.rig import CYCLES_PER_US, Rig
 from tools.bench.figures import figure
@@ -17,9 +18,11 @@ def servo_width() -> float:
     with Rig.open("avr") as rig:
         rig.start()
         for signal in np.linspace(-1.0, 1.0, 9):
-            rig.flood(float(signal), float(signal), 0.1)  # the pulses that are under way when the set-point changes
+            counts = round(float(signal) * 1e4)
+            setpoint = messages.SetpointSignal(counts, counts, 250, 0)
+            rig.flood(setpoint, 0.1)  # the pulses that are under way when the set-point changes
             begun = rig.board.cycle
-            rig.flood(float(signal), float(signal), 1.0)
+            rig.flood(setpoint, 1.0)
             for pin, mirror in ((SERVO_LEFT, 1), (SERVO_RIGHT, -1)):
                 pulses = rig.pulses(pin)
                 widths = pulses[pulses[:, 0] > begun, 1]
