@@ -221,6 +221,31 @@ def test_interrupt_while_the_command_starts_is_no_traceback(after_s: float) -> N
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
 
 
+def test_interrupt_that_python_drops_comes_again() -> None:
+    """One that falls into a callback, as of a weak reference, is "ignored" by Python."""
+    code = """
+import signal, time, weakref
+import boebot.cli as cli
+
+class Thing:
+    pass
+
+def run():
+    thing = Thing()
+    watched = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+    del thing
+    time.sleep(20)
+    raise SystemExit("never interrupted")
+
+cli._run = run
+cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=20, preexec_fn=heed_signals, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
+
+
 def test_heavy_modules_wait_until_ctrl_c_is_caught() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", "import boebot.cli, sys; print(*sys.modules)"],

@@ -16,6 +16,7 @@ from boebot.errors import BoebotError
 from boebot.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
+_ASK_AGAIN_S = 0.02
 _ONE_PRESS_S = 0.5  # signals that follow one another faster than this are one wish
 
 _last_signal = float("-inf")
@@ -28,6 +29,7 @@ def main() -> NoReturn:
         for number in SIGNALS:  # motors are stopped and the record is written, whichever of them comes
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
                 signal.signal(number, _interrupt)
+        sys.unraisablehook = _ask_again
         code = _run()
     except KeyboardInterrupt as error:
         code = EXIT_INTERRUPTED
@@ -75,6 +77,15 @@ def _say(sentence: str, error: BaseException) -> None:
     with contextlib.suppress(OSError, ValueError):
         for text in (sentence, *getattr(error, "__notes__", ())):
             print(f"boebot: {text}", file=sys.stderr)
+
+
+def _ask_again(ignored: sys.UnraisableHookArgs) -> None:
+    """Python drops a KeyboardInterrupt that comes in a callback of its own, as while it imports: it comes again."""
+    if not issubclass(ignored.exc_type, KeyboardInterrupt) or not hasattr(signal, "setitimer"):
+        sys.__unraisablehook__(ignored)
+        return
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, _ASK_AGAIN_S)
 
 
 def _interrupt(*_: object) -> None:
