@@ -144,6 +144,14 @@ def test_clock_that_jumps_is_noticed_and_found_again() -> None:
     assert line.clock.restarts >= 1 and all(settled)
 
 
+def test_line_that_is_faster_than_its_rate_says_is_noticed() -> None:
+    """A pseudo-terminal has a rate that means nothing: messages that need no time on it contradict the bounds once."""
+    line = Line(100e-6, 1, uniform(0.0, 1e-4))
+    line.clock = BoardClock(10 / 9600)
+    settled = [abs(error) <= bound < 1e-3 for since_s, error, bound in line.run(10.0) if since_s > 2.0]
+    assert line.clock.restarts == 1 and all(settled)
+
+
 def test_nothing_is_claimed_before_both_sides_are_bounded() -> None:
     clock = BoardClock(BYTE_S)
     _, host_s, bound = clock.observe(5_000_000, 100.0)

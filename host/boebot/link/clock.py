@@ -49,7 +49,8 @@ class BoardClock:
 
     def __init__(self, byte_s: float = 0.0, wander: float = WANDER, window_s: float = WINDOW_S) -> None:
         """Args:
-        byte_s: time that a byte needs on the line; 0 where that is not known, which loosens the bounds.
+        byte_s: time that a byte needs on the line; 0 where that is not known, which loosens the bounds. Once the
+            bounds have contradicted each other it is not believed any more.
         wander: greatest change of the clocks' relative rate (1/s).
         window_s: how long a bound counts.
         """
@@ -111,14 +112,15 @@ class BoardClock:
         """Takes the board's time from the answer to a probe that was sent and answered at these host times."""
         self.probes += 1
         board_s = self._hear(raw_us, received_s)
-        received_s -= _ANSWER_BYTES * self._byte_s
-        sent_s += _PROBE_BYTES * self._byte_s - RESOLUTION_S
+        byte_s = self._byte_s
+        received_s -= _ANSWER_BYTES * byte_s
+        sent_s += _PROBE_BYTES * byte_s - RESOLUTION_S
         since_s = board_s - self._at_s
         latest_wins = received_s - board_s < self._useful_below + since_s * self._useful_fastest
         earliest_wins = sent_s - board_s > self._useful_above + since_s * self._useful_slowest
         if latest_wins or since_s < 0:
             self._bound_by(board_s, received_s, 1.0)
-        if earliest_wins or since_s < 0:
+        if (earliest_wins or since_s < 0) and self._byte_s == byte_s:
             self._bound_by(board_s, sent_s, -1.0)
         if latest_wins or earliest_wins:
             self._refresh(board_s)
@@ -177,6 +179,10 @@ class BoardClock:
             cut = _cut(polygon, board_s - self._began[index], limit, side)
             if len(cut) < 3:  # nothing is left: the clock has jumped, or drifts faster than it may
                 self.restarts += 1
+                if self._byte_s:  # perhaps the line has no such rate: a pty, or USB all the way
+                    self._byte_s = 0.0
+                    self._polygons, self._began = [_plane()], [board_s]
+                    return
                 self._polygons = [_cut(_plane(), 0.0, limit, side)]
                 self._began = [board_s]
                 return
