@@ -78,9 +78,10 @@ class native_bench {
 
   void run(uint64_t cycles) { run_to(machine.now + cycles); }
   void run_to(uint64_t cycle) {
-    while (attended_ && cycle > machine.now + PROBE_PERIOD) {
+    while (attended_ && cycle >= next_probe_) {
+      api_->advance(next_probe_);
       probe(0);
-      api_->advance(machine.now + PROBE_PERIOD);
+      next_probe_ = machine.now + PROBE_PERIOD;
     }
     api_->advance(cycle);
   }
@@ -184,7 +185,6 @@ class native_bench {
   void run_in_session(uint64_t cycles) {
     const bool before = attended_;
     attended_ = true;
-    probe(0);
     run(cycles);
     attended_ = before;
   }
@@ -279,6 +279,7 @@ class native_bench {
 
   const native_api *api_ = firmware_board_api();
   bool attended_ = false; /* the host probes the clock, so that the session stays open */
+  uint64_t next_probe_ = 0;
   uint64_t start_ = 0;
   uint64_t line_free_ = 0;
   host_decoder decoder_{};
