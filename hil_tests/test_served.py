@@ -45,6 +45,16 @@ def boebot(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, timeout=30)
 
 
+def test_served_board_answers_no_sooner_than_it_was_asked() -> None:
+    """Else the bounds of its clock would contradict each other."""
+    with served("native", "--pty") as (url, _):
+        done = boebot("link", "--on", url, "--seconds", "3", "--json")
+        assert done.returncode == 0, done.stderr
+        last = json.loads(done.stdout.splitlines()[-1])
+        assert last["clock_restarts"] == 0
+        assert 0 < last["clock_bound_us"] < 10_000
+
+
 @pytest.mark.parametrize(
     ("board", "where"), [("avr", ("--pty",)), ("native", ("--tcp", "0"))], ids=["avr-pty", "native-tcp"]
 )

@@ -13,6 +13,7 @@ import errno
 import os
 import select
 import socket
+import time
 import sys
 from collections.abc import Callable
 from typing import Protocol
@@ -22,6 +23,8 @@ from boebot.errors import BoardError
 from sim_bridge.session import Pace, SimSession, open_avr, open_native
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
+BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late
+BRISK_FOR_S = 0.004
 CHUNK = 4096
 BACKLOG = 65536  # bytes that wait for a client that does not read; older ones are lost
 
@@ -226,19 +229,24 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
     sim = session.sim
     pace = Pace(sim)
     baud = None
+    brisk_until = 0.0
     while running():
         if port.opened():
             session.board.reset("external")
         if (now := port.baud()) is not None and now != baud:
             session.transport.set_baud(now)
             baud = now
+        heard = b""
         while data := port.read():
-            sim.send(data)
+            heard += data
         cycles = pace.due()
-        sim.run(cycles, cycles)
+        sim.run(cycles, cycles)  # first: the board must not hear, let alone answer, before it was told
+        if heard:
+            sim.send(heard)
+            brisk_until = time.monotonic() + BRISK_FOR_S
         if data := sim.receive():
             port.write(data)
-        port.wait(IDLE_S)
+        port.wait(BRISK_S if time.monotonic() < brisk_until else IDLE_S)
 
 
 def serve(
