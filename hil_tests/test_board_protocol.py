@@ -557,17 +557,19 @@ def test_clock_probe_is_answered_between_its_sending_and_its_return(host: Host) 
 # ---- load ------------------------------------------------------------------------------------------------------------
 
 
-def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host) -> None:
+@pytest.mark.parametrize("setpoint", ["signals", "speeds"])
+def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host, setpoint: str) -> None:
     """Set-points and clock probes without a gap, 50,000 bytes/s, whose answers and telemetry fill the way back."""
+    kind = SIGNAL if setpoint == "signals" else SPEED
     host.start()
     first = host.next("telemetry")
     before = host.board.counters()
-    end = host.board.now + 3 * CYCLES_PER_S
+    end = host.board.now + 2 * CYCLES_PER_S
     while host.board.now < end:
         wire = bytearray()
         tick = host.last("telemetry").tick & 0xFFFF
         while len(wire) < 500:
-            wire += host.frame(SIGNAL, "<hhHH", 5000, -5000, 250, tick)
+            wire += host.frame(kind, "<hhHH", 5000, -5000, 250, tick)
             wire += host.frame(PROBE, "<H", 7) + host.frame(PROBE, "<H", 8)
         host.board.send(bytes(wire))
         host.run(len(wire) * 320)
@@ -580,3 +582,19 @@ def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host) -> None:
     counters = host.last("counters")
     assert (counters.overrun, counters.bad) == (0, 0)
     assert host.refused == 0
+
+
+@pytest.mark.parametrize("setpoint", ["signals", "speeds"])
+def test_line_full_of_set_points_misses_no_tick(host: Host, setpoint: str) -> None:
+    kind = SIGNAL if setpoint == "signals" else SPEED
+    host.start()
+    end = host.board.now + CYCLES_PER_S
+    while host.board.now < end:
+        tick = host.last("telemetry").tick & 0xFFFF
+        wire = b"".join(host.frame(kind, "<hhHH", 5000, -4321, 250, tick) for _ in range(31))
+        host.board.send(wire)
+        host.run(len(wire) * 320)
+    host.live(2 * TICK)
+    last = host.last("telemetry")
+    assert last.overruns == 0
+    assert host.board.counters()["resets"] == 0

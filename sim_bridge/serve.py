@@ -13,8 +13,8 @@ import errno
 import os
 import select
 import socket
-import time
 import sys
+import time
 from collections.abc import Callable
 from typing import Protocol
 

@@ -18,8 +18,9 @@ static uint8_t latch;   /* LATCH_... */
 static uint8_t latches; /* how often */
 static uint8_t
     state; /* STATUS_MOTORS_ENABLED: a set-point is in force; STATUS_DEAD_MAN: it has outlived itself; or 0 */
-static bool just_armed; /* set-points of ticks up to arm_tick might still look fresh */
-static uint16_t arm_tick;
+static bool ticks_are_over; /* set-points of ticks up to last_over are late, however long they shall live: */
+static uint16_t
+    last_over; /* the tick in which the motors were armed, or that of a set-point that has outlived itself */
 
 /* The last set-point that was accepted: */
 static uint32_t deadline;  /* schedule_time() at which it ends */
@@ -30,9 +31,14 @@ void safety_start(void) {
   latch = LATCH_START;
   latches = 1;
   state = 0;
-  just_armed = false;
+  ticks_are_over = false;
   last_sequence = 0;
   motion_off();
+}
+
+static void end_ticks(uint16_t up_to) {
+  last_over = up_to;
+  ticks_are_over = true;
 }
 
 /* Whether the set-point in force is newer than another one, or is that one. */
@@ -52,7 +58,8 @@ safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8
   }
   const uint32_t age = now.since + ticks * (uint32_t)SCHEDULE_TICK_US;
   const uint32_t life = (time_to_live != 0 ? time_to_live : parameters_u16(PARAMETER_TIME_TO_LIVE)) * 1000ul;
-  if (age >= life || has_newer(answers_tick, sequence) || (just_armed && (int16_t)(answers_tick - arm_tick) <= 0)) {
+  if (age >= life || has_newer(answers_tick, sequence) ||
+      (ticks_are_over && (int16_t)(answers_tick - last_over) <= 0)) {
     return SAFETY_LATE;
   }
   deadline = now.tick * SCHEDULE_TICK_US + now.since + (life - age);
@@ -87,8 +94,7 @@ uint8_t safety_arm(uint8_t known_latches) {
   }
   if (latch != LATCH_NONE) {
     latch = LATCH_NONE;
-    arm_tick = (uint16_t)schedule_instant_now().tick;
-    just_armed = true;
+    end_ticks((uint16_t)schedule_instant_now().tick);
     events_raise(EVENT_KIND_LATCH, LATCH_NONE);
   }
   return ANSWER_STATUS_OK;
@@ -100,17 +106,19 @@ void safety_task(void) {
   if (supply_low()) {
     safety_latch(LATCH_SUPPLY_LOW);
   }
-  if ((uint16_t)((uint16_t)schedule_tick() - arm_tick) > AGE_MAX + 1u) { /* before the difference rolls over */
-    just_armed = false;
+  if ((uint16_t)((uint16_t)schedule_tick() - last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
+    ticks_are_over = false;
   }
   if ((state & STATUS_MOTORS_ENABLED) == 0) {
     return;
   }
   if (!parameters_device_on(DEVICES_SERVOS)) {
     state = 0;
+    end_ticks(last_tick);
     motion_off();
   } else if ((int32_t)(schedule_time() - deadline) >= 0) {
     state = STATUS_DEAD_MAN;
+    end_ticks(last_tick);
     motion_off();
     events_raise(EVENT_KIND_DEAD_MAN, last_tick);
   }

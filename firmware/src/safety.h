@@ -18,7 +18,8 @@ void safety_start(void);
 
 typedef enum {
   SAFETY_ACCEPTED,
-  SAFETY_LATE,    /* its time to live has passed, or there is a newer one, or the motors were armed after its tick */
+  SAFETY_LATE, /* its time to live has passed, or there is a newer one, or its tick was over when the motors were armed or
+                    * stopped by themselves */
   SAFETY_REFUSED, /* latched, out of range, or the servos are switched off */
 } safety_verdict;
 

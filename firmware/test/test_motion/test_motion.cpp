@@ -1,5 +1,7 @@
 /* Motor signal or speed to servo pulse. */
 #include <doctest.h>
+#include <algorithm>
+#include <cmath>
 #include <initializer_list>
 
 #include <cstdlib>
@@ -58,4 +60,16 @@ TEST_CASE("speeds become signals, and too fast is full") {
   CHECK(motion_signal_of_speed(-1700, 1700) == -10000);
   CHECK(motion_signal_of_speed(5000, 1700) == 10000);
   CHECK(motion_signal_of_speed(-5000, 100) == -10000);
+}
+
+TEST_CASE("signals of speeds are right to half a count, whatever the maximum") {
+  for (int maximum = 100; maximum <= 5000; maximum += 7) {
+    double worst = 0;
+    for (int speed = -5000; speed <= 5000; speed += 3) {
+      const double exact = std::max(-10000.0, std::min(10000.0, 10000.0 * speed / maximum));
+      const auto is = motion_signal_of_speed(static_cast<int16_t>(speed), static_cast<int16_t>(maximum));
+      worst = std::max(worst, std::abs(is - exact));
+    }
+    CHECK(worst <= 0.53);
+  }
 }

@@ -165,6 +165,21 @@ TEST_CASE("a set-point that names no time to live has the parameter's") {
   CHECK((bench.telemetry().status & STATUS_DEAD_MAN) != 0);
 }
 
+TEST_CASE("a late copy of an older set-point is late too when the newer one has outlived itself") {
+  native_bench bench;
+  bench.start();
+  bench.run(12345);
+  const uint32_t older = bench.telemetry().tick;
+  bench.run_in_session(2 * TICK);
+  bench.signal(0, 0, 20, static_cast<uint16_t>(bench.telemetry().tick));
+  bench.run_in_session(5 * TICK);
+  REQUIRE((bench.telemetry().status & MOTION_BITS) == STATUS_DEAD_MAN);
+  bench.signal(5000, 5000, 2000, static_cast<uint16_t>(older));
+  bench.run_in_session(2 * TICK);
+  CHECK((bench.telemetry().status & MOTION_BITS) == STATUS_DEAD_MAN);
+  CHECK_FALSE(moves(bench));
+}
+
 TEST_CASE("the next set-point ends a dead-man stop") {
   native_bench bench;
   bench.start();
@@ -216,15 +231,14 @@ TEST_CASE("of one tick the later sequence number counts, across its roll-over; a
   CHECK(bench.counters().late == 2);
 }
 
-TEST_CASE("when the set-point in force has ended its order binds no more") {
+TEST_CASE("half a roll-over of the ticks after the last set-point the next one is accepted") {
   native_bench bench;
   bench.start();
   bench.run(10 * TICK);
-  const uint16_t tick = now_of(bench);
-  bench.signal(5000, 5000, 20, tick);
-  bench.run(5 * TICK);
+  bench.signal(5000, 5000, 20, now_of(bench));
+  bench.run_in_session(33000 * TICK); /* its tick is now ahead, by the sign of the difference */
   REQUIRE((bench.telemetry().status & STATUS_DEAD_MAN) != 0);
-  bench.signal(1000, 1000, 500, static_cast<uint16_t>(tick - 2));
+  bench.signal(1000, 1000, 500, now_of(bench));
   CHECK(moves(bench));
 }
 
