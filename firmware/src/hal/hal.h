@@ -93,7 +93,7 @@ void hal_supply_sample(void);
 /* The last complete one: bandgap * 1024 / supply, rounded down; 0: none yet. */
 uint16_t hal_supply_result(void);
 
-/* Queues bytes for sending. The caller has asked for room. */
+/* Queues bytes for sending. The caller has asked for room; as has who writes them to hal_serial_place() himself. */
 void hal_serial_send(const uint8_t *bytes, uint8_t count);
 
 /* Whether received bytes were lost since the last call. */
@@ -132,6 +132,15 @@ uint32_t hal_image_hash(void);
  *   void hal_serial_seen(void)                    zero bytes that wait now make it due no more,
  *   void hal_serial_again(void)                   or do again
  *   bool hal_serial_receive(uint8_t *byte)        takes the oldest; false if there is none
+ *   bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size)
+ *                                                 takes bytes up to a zero, which it takes and leaves out, and appends them
+ *                                                 to `bytes`; past size - 1 each takes the last place. False if all came
+ *                                                 before a zero. *count < size
+ *   uint8_t *hal_serial_place(void)               where the next byte to send goes,
+ *   uint8_t *hal_serial_beyond(place, count)      where the one `count` (less than 128) after that,
+ *   void hal_serial_put(&place, uint8_t byte)     writes there and moves on,
+ *   void hal_serial_put_before(&place, byte)      moves back and writes there
+ *   void hal_serial_queue(uint8_t count)          sends what was written from the first such place on
  *   bool hal_serial_room(uint8_t count)           whether `count` more bytes can be queued for sending; if not, the CPU
  *                                                 is woken when more can
  *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt with

@@ -1,6 +1,8 @@
 /* counters.c: see counters.h. */
 #include "link/counters.h"
 
+#include <string.h>
+
 #include "hal/hal.h"
 #include "link/link.h"
 #include "link/send.h"
@@ -19,6 +21,14 @@ void counters_start(void) {
   ticks = 0;
 }
 
+void counters_count_at(uint8_t offset) {
+  uint8_t *const at = (uint8_t *)&counters + offset;
+  uint16_t count = 0;
+  memcpy(&count, at, sizeof count);
+  count++;
+  memcpy(at, &count, sizeof count);
+}
+
 bool counters_bytes_lost(void) {
   const bool lost = bytes_lost;
   bytes_lost = false;
@@ -27,7 +37,7 @@ bool counters_bytes_lost(void) {
 
 void counters_task(void) {
   if (hal_serial_overrun()) {
-    counters.overrun++;
+    counters_count(overrun);
     bytes_lost = true;
   }
   ticks++;

@@ -3,6 +3,7 @@
 #define LINK_COUNTERS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "generated/messages.h"
 
@@ -14,6 +15,10 @@ extern "C" {
 extern msg_counters counters;
 
 void counters_start(void);
+
+/* Counts one, in the field of that name. */
+#define counters_count(field) counters_count_at(offsetof(msg_counters, field))
+void counters_count_at(uint8_t offset);
 
 /* In every tick: looks whether received bytes were lost; in a session sends the counters now and then. */
 void counters_task(void);

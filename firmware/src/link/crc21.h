@@ -56,7 +56,9 @@ typedef struct {
 
 /* crc21_take(crc, byte)                takes one byte in
  * crc21_take_all(crc, bytes, count)    takes bytes in, at least one
- * crc21_copy(crc, to, from, count)     takes bytes in, at least one, and copies them; both pointers move on */
+ * crc21_take_sent(crc, place, count)   takes bytes in, at least one, from a place of hal_serial_beyond() on, which moves on
+ * crc21_spread(crc)                    makes its 21 bits three bytes of seven, each with its top bit set
+ * crc21_align(seed)                    a seed in the top 21 of 24 bits; what is above them stays */
 #ifdef __AVR__
 /* 15 cycles for what is in `byte`, of the 320 that a byte has on the line; the compiler, which does not know that the table
  * is aligned, needs 30. */
@@ -73,30 +75,46 @@ typedef struct {
   "lpm %[low], Z                \n"
 #define CRC21_REGISTER [high] "+r"(crc->high), [middle] "+r"(crc->middle), [low] "+r"(crc->low)
 
-static inline __attribute__((always_inline)) void crc21_take(crc21 *crc, uint8_t byte) {
-  __asm__(CRC21_TAKE:CRC21_REGISTER : [byte] "r"(byte), [table] "i"(crc21_table) : "r30", "r31");
-}
-
 static inline __attribute__((always_inline)) void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count) {
   uint8_t byte;
-  __asm__("1: ld %[byte], %a[bytes]+ \n" CRC21_TAKE
-          "dec %[count]              \n"
-          "brne 1b                   \n"
-          : CRC21_REGISTER, [bytes] "+x"(bytes), [count] "+r"(count), [byte] "=&r"(byte)
-          : [table] "i"(crc21_table), "m"(*(const uint8_t(*)[256])bytes)
-          : "r30", "r31");
-}
-
-static inline __attribute__((always_inline)) void crc21_copy(crc21 *crc, uint8_t **to, const uint8_t **from,
-                                                             uint8_t count) {
-  uint8_t byte;
-  __asm__ volatile("1: ld %[byte], %a[from]+ \n" CRC21_TAKE
-                   "st %a[to]+, %[byte]      \n"
-                   "dec %[count]             \n"
-                   "brne 1b                  \n"
-                   : CRC21_REGISTER, [from] "+x"(*from), [to] "+y"(*to), [count] "+r"(count), [byte] "=&r"(byte)
+  __asm__ volatile("1: ld %[byte], %a[bytes]+ \n" CRC21_TAKE
+                   "dec %[count]              \n"
+                   "brne 1b                   \n"
+                   : CRC21_REGISTER, [bytes] "+x"(bytes), [count] "+r"(count), [byte] "=&r"(byte)
                    : [table] "i"(crc21_table)
                    : "r30", "r31", "memory");
+}
+
+static inline __attribute__((always_inline)) void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count) {
+  uint8_t byte;
+  __asm__ volatile("1: ld %[byte], %a[place]        \n" CRC21_TAKE
+                   "inc %A[place]                   \n"
+                   HAL_SEND_WRAP(place)
+                   "dec %[count]                    \n"
+                   "brne 1b                         \n"
+                   : CRC21_REGISTER, [place] "+x"(*place), [count] "+r"(count), [byte] "=&r"(byte)
+                   : [table] "i"(crc21_table), [mask] "M"(HAL_SEND_MASK)
+                   : "r30", "r31", "memory");
+}
+
+static inline __attribute__((always_inline)) void crc21_spread(crc21 *crc) {
+  __asm__(
+      "sec           \n"
+      "ror %[high]   \n"
+      "ror %[middle] \n"
+      "ror %[low]    \n"
+      "sec           \n"
+      "ror %[middle] \n"
+      "ror %[low]    \n"
+      "sec           \n"
+      "ror %[low]    \n"
+      : CRC21_REGISTER);
+}
+
+static inline __attribute__((always_inline)) uint32_t crc21_align(uint32_t seed) {
+#define CRC21_SHIFT "lsl %A[seed] \n rol %B[seed] \n rol %C[seed] \n"
+  __asm__(CRC21_SHIFT CRC21_SHIFT CRC21_SHIFT : [seed] "+r"(seed));
+  return seed;
 }
 #else
 static inline void crc21_take(crc21 *crc, uint8_t byte) {
@@ -110,12 +128,17 @@ static inline void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t coun
   } while (--count != 0);
 }
 
-static inline void crc21_copy(crc21 *crc, uint8_t **to, const uint8_t **from, uint8_t count) {
-  do {
-    crc21_take(crc, **from);
-    *(*to)++ = *(*from)++;
-  } while (--count != 0);
+static inline void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count) {
+  crc21_take_all(crc, *place, count);
+  *place += count;
 }
+
+static inline void crc21_spread(crc21 *crc) {
+  *crc = (crc21){(uint8_t)(0x80u | crc->high >> 1), (uint8_t)(0x80u | (uint8_t)(crc->high << 6) | crc->middle >> 2),
+                 (uint8_t)(0x80u | (uint8_t)(crc->middle << 5) | crc->low >> 3)};
+}
+
+static inline uint32_t crc21_align(uint32_t seed) { return (seed & 0xFF000000ul) | (seed << 3 & 0xFFFFFFul); }
 #endif
 
 #endif

@@ -18,7 +18,7 @@
 static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
   const safety_verdict verdict = safety_accept(time_to_live, answers_tick, sequence);
   if (verdict == SAFETY_LATE) {
-    counters.late++;
+    counters_count(late);
   }
   *refused = verdict == SAFETY_REFUSED;
   return verdict == SAFETY_ACCEPTED;
@@ -105,22 +105,22 @@ static void clock_probe(const uint8_t *payload) {
   send_message(MSG_CLOCK_ANSWER_ID, &answer, sizeof answer);
 }
 
-int8_t dispatch_answer_length(uint8_t id) {
+uint8_t dispatch_room(uint8_t id) {
   switch (id) {
     case MSG_IDENTIFY_ID:
-      return MSG_IDENTITY_LENGTH;
+      return SEND_RESERVE + MSG_IDENTITY_LENGTH;
     case MSG_DESCRIBE_ID:
-      return MSG_DESCRIPTION_LENGTH;
+      return SEND_RESERVE + MSG_DESCRIPTION_LENGTH;
     case MSG_CLOCK_PROBE_ID:
-      return MSG_CLOCK_ANSWER_LENGTH;
+      return SEND_RESERVE + MSG_CLOCK_ANSWER_LENGTH;
     case MSG_GET_PARAMETER_ID:
     case MSG_SET_PARAMETER_ID:
     case MSG_SAVE_PARAMETERS_ID:
     case MSG_RESET_PARAMETERS_ID:
     case MSG_ARM_ID:
-      return MSG_ANSWER_LENGTH;
+      return SEND_RESERVE + MSG_ANSWER_LENGTH;
     default:
-      return -1;
+      return 0;
   }
 }
 

@@ -13,9 +13,9 @@ extern "C" {
  * a value out of range, or nothing that can be done now. */
 bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload);
 
-/* Payload bytes of the answer for which a message of that id waits until there is room; -1: it does not wait. (A hello that
- * finds no room is said later.) */
-int8_t dispatch_answer_length(uint8_t id);
+/* Bytes of room for which a message of that id waits, for its answer and the next telemetry; 0: it does not wait. (A hello
+ * that finds no room is said later.) */
+uint8_t dispatch_room(uint8_t id);
 
 #ifdef __cplusplus
 }

@@ -13,67 +13,54 @@
 #define PLACES 4u
 #define KINDS (EVENT_KIND_DEAD_MAN + 1u)
 #define RETRY_BYTES 200u /* on the line, besides two ticks */
-#define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
+#define TICK (SCHEDULE_TICK_US / 500u)
+#define SLOT (TICK / SCHEDULE_SLOTS_PER_TICK)
 
-typedef struct {
-  uint8_t kind;
-  uint16_t value;
-  uint32_t time; /* schedule_time() */
-} happening;
+/* In the order in which they happened. The first is under way; behind the PLACES of the queue stands what found no room in
+ * it, at most one of each kind. Numbers are given when they are sent. */
+static msg_event queue[PLACES + KINDS];
+static msg_event *end;  /* behind the last */
+static uint16_t number; /* of the event under way, or of the next one */
+static bool sent;       /* it was sent at least once */
+static uint16_t wait;   /* half milliseconds until it is sent again */
 
-static happening queue[PLACES];
-static uint8_t first, count; /* queue[first] is under way */
-static uint16_t number;      /* of the event under way, or of the next one */
-static bool sent;            /* it was sent at least once */
-static uint16_t wait;        /* slots until it is sent again */
-static uint16_t retry_slots; /* from one sending to the next, as tick and line have it */
-
-/* What found no room: the latest of each kind. Everything in the queue is older. */
-static happening latest[KINDS];
-static uint8_t merged; /* bits: kinds that wait there */
-
-void events_start(void) {
-  first = 0;
-  count = 0;
-  number = 1;
+static void none_under_way(void) {
   sent = false;
   wait = 0;
-  merged = 0;
-  retry_slots = 2u * SCHEDULE_SLOTS_PER_TICK + (uint16_t)(send_time(RETRY_BYTES) / SLOT_US) + 1u;
 }
 
-static void append(const happening *what) {
-  queue[(uint8_t)(first + count) % PLACES] = *what;
-  count++;
+void events_start(void) {
+  end = queue;
+  number = 1;
+  none_under_way();
+}
+
+static void take_out(msg_event *event) {
+  for (end--; event != end; event++) {
+    event[0] = event[1];
+  }
 }
 
 void events_raise(uint8_t kind, uint16_t value) {
   if (!session_is_open()) {
     return;
   }
-  happening what = {kind, value, schedule_time()};
-  if (count < PLACES) {
-    append(&what);
-    return;
+  if (end >= queue + PLACES) {
+    counters_count(deferred);
   }
-  if (kind == EVENT_KIND_WHISKERS && (merged & 1u << kind) != 0) { /* the high byte: all that closed since */
-    what.value = (uint16_t)(value | (latest[kind].value & 0xFF00u));
-  }
-  latest[kind] = what;
-  merged = (uint8_t)(merged | 1u << kind);
-  counters.deferred++;
-}
-
-/* A place is free: it goes to the oldest of what waits beside the queue. */
-static void take_merged(void) {
-  uint8_t oldest = KINDS;
-  for (uint8_t kind = 0; kind < KINDS; kind++) {
-    if ((merged & 1u << kind) != 0 && (oldest == KINDS || (int32_t)(latest[kind].time - latest[oldest].time) < 0)) {
-      oldest = kind;
+  for (msg_event *event = queue + PLACES; event < end; event++) {
+    if (event->kind == kind) {           /* the new one has the latest value */
+      if (kind == EVENT_KIND_WHISKERS) { /* the high byte: all that closed since */
+        value = (uint16_t)(value | (event->value & 0xFF00u));
+      }
+      take_out(event);
+      break;
     }
   }
-  append(&latest[oldest]);
-  merged = (uint8_t)(merged & ~(1u << oldest));
+  msg_event *const event = end++;
+  event->kind = kind;
+  event->value = value;
+  event->time = schedule_time();
 }
 
 void events_acknowledge(uint16_t arrived) {
@@ -81,34 +68,28 @@ void events_acknowledge(uint16_t arrived) {
     return;
   }
   number++;
-  first = (uint8_t)(first + 1u) % PLACES;
-  count--;
-  sent = false;
-  wait = 0;
-  if (merged != 0) {
-    take_merged();
-  }
+  none_under_way();
+  take_out(queue);
 }
 
-/* Slots from one sending to the next, rounded up. */
+/* From one sending to the next, in half milliseconds. */
 static uint16_t retry_time(void) {
   const uint16_t wanted = parameters_u16(PARAMETER_RETRY_TIME); /* ms, up to 2000 */
-  return wanted == 0 ? retry_slots : (uint16_t)((wanted * 2u + 4u) / 5u);
+  return wanted != 0 ? (uint16_t)(wanted * 2u) : (uint16_t)(2u * TICK + send_half_ms(RETRY_BYTES));
 }
-_Static_assert(SLOT_US == 2500, "a slot is 5/2 ms");
 
 void events_task(void) {
-  if (wait > 0) {
-    wait--;
-  }
-  if (count == 0 || wait > 0 || !send_has_room(MSG_EVENT_LENGTH)) {
+  if (wait > SLOT) {
+    wait = (uint16_t)(wait - SLOT);
     return;
   }
-  const happening *what = &queue[first];
-  const msg_event event = {.number = number, .kind = what->kind, .value = what->value, .time = what->time};
-  send_message(MSG_EVENT_ID, &event, sizeof event);
+  if (end == queue || !send_has_room(MSG_EVENT_LENGTH)) {
+    return;
+  }
+  queue->number = number;
+  send_message(MSG_EVENT_ID, queue, sizeof *queue);
   if (sent) {
-    counters.retransmitted++;
+    counters_count(retransmitted);
   }
   sent = true;
   wait = retry_time();

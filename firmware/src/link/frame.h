@@ -45,7 +45,8 @@ static inline int16_t frame_accepted_length(uint8_t id) { return message_length_
 /* CRC-21 of `count` bytes, after `seed`. */
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count);
 
-/* Writes the frame of a message to `wire` (FRAME_SIZE_MAX bytes); returns its length. The session's seed is used but
+/* Writes the frame of a message to `wire` (FRAME_SIZE_MAX bytes, one after another as hal_serial_beyond() tells: on the
+ * board its send ring); returns its length. The session's seed is used but
  * for the messages of the handshake, which keep FRAME_SEED. length <= FRAME_PAYLOAD_MAX */
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed);
 
@@ -57,7 +58,7 @@ typedef struct {
   bool synchronised;       /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
   bool lost;               /* the last frame was refused */
   uint8_t count;           /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
-  uint8_t bytes[FRAME_INSIDE_MAX + 2u];
+  uint8_t bytes[FRAME_INSIDE_MAX + 2u]; /* the last place is for what is too long */
 } frame_decoder;
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed);

@@ -54,7 +54,7 @@ bool identity_send_hello(void) {
       .protocol_version = PROTOCOL_VERSION,
       .schema_hash = SCHEMA_HASH,
       .board_nonce = session_board_nonce(),
-      .session = session_seed(),
+      .session = session_is_open() ? session_seed() : 0u,
       .tick_rate = SCHEDULE_TICK_RATE,
       .session_time_out = parameters_u16(PARAMETER_SESSION_TIME_OUT),
       .telemetry_period = telemetry_period(),

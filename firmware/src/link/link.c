@@ -1,6 +1,9 @@
 /* link.c: see link.h. */
 #include "link/link.h"
 
+#include <stddef.h>
+#include <string.h>
+
 #include "link/counters.h"
 #include "link/dispatch.h"
 #include "link/frame.h"
@@ -12,8 +15,7 @@ static frame_decoder decoder;
 uint8_t link_room;
 
 void link_start(uint16_t baud) {
-  frame_decoder_start(&decoder, FRAME_NO_SESSION);
-  link_room = 0;
+  memset(&decoder, 0, sizeof decoder); /* its seed is the session's to set */
   send_start(baud);
   counters_start();
   telemetry_start_line();
@@ -25,69 +27,54 @@ void link_use_seed(uint32_t seed) {
   link_room = 0; /* a request of the session before is not carried out any more */
 }
 
-/* Takes bytes up to the end of a frame; false if they end before. frame_decode() in a loop would do the same, slower. */
-static bool take_frame(void) {
+bool link_take_frame(void) {
   hal_serial_seen();
-  uint8_t count = decoder.count;
-  uint8_t *to = &decoder.bytes[count];
-  uint8_t byte = 0;
-  while (hal_serial_receive(&byte)) {
-    if (byte != 0) {
-      if (count <= FRAME_INSIDE_MAX) {
-        *to++ = byte;
-        count++;
-      }
-    } else if (count == 0) {
-      decoder.synchronised = true; /* an empty frame is nothing */
-    } else {
-      decoder.count = count;
-      if (frame_decode_end(&decoder)) {
-        if (hal_serial_received()) {
-          hal_serial_again();
-        }
-        return true;
-      }
-      count = 0;
-      to = decoder.bytes;
+  for (;;) {
+    if (!hal_serial_receive_block(decoder.bytes, &decoder.count, sizeof decoder.bytes)) {
+      return false;
     }
+    if (decoder.count != 0 && frame_decode_end(&decoder)) {
+      break;
+    }
+    decoder.synchronised = true; /* by an empty frame too */
   }
-  decoder.count = count;
-  return false;
-}
-
-/* Room for a message's answer and the next telemetry; 0: it waits for none. */
-static uint8_t room_for(uint8_t id) {
-  const int8_t length = dispatch_answer_length(id);
-  return length < 0 ? 0u : SEND_ROOM((uint8_t)length);
+  if (hal_serial_received()) {
+    hal_serial_again();
+  }
+  return true;
 }
 
 void link_poll(void) {
-  if (!link_due()) {
+  if (hal_serial_due() == 0) {
     return;
   }
-  const uint8_t *payload = frame_payload(&decoder);
   if (link_room == 0) {
-    if (!take_frame()) {
+    if (!link_take_frame()) {
       return;
     }
     const uint8_t id = frame_id(&decoder);
     if (!message_is_handshake(id)) {
       session_heard();
     }
-    link_room = room_for(id);
-    if (link_room != 0 && !hal_serial_room(link_room)) {
-      hal_serial_again(); /* waits: it stays due */
-      return;
-    }
+    link_room = dispatch_room(id);
+  }
+  if (!hal_serial_room(link_room)) {
+    hal_serial_again(); /* waits: it stays due */
+    return;
   }
   link_room = 0;
-  if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), payload)) {
-    counters.refused++;
+  if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), frame_payload(&decoder))) {
+    counters_count(refused);
   }
 }
 
+/* The three stand in the same order in both. */
+#define COUNTS_FROM offsetof(frame_decoder, good)
+#define COUNTS_TO offsetof(msg_counters, good)
+#define SAME(field) (offsetof(frame_decoder, field) - COUNTS_FROM == offsetof(msg_counters, field) - COUNTS_TO)
+_Static_assert(SAME(bad) && SAME(resynchronised), "one copy");
+
 void link_count(msg_counters *into) {
-  into->good = decoder.good;
-  into->bad = decoder.bad;
-  into->resynchronised = decoder.resynchronised;
+  const uint8_t size = sizeof into->good + sizeof into->bad + sizeof into->resynchronised;
+  memcpy((uint8_t *)into + COUNTS_TO, (const uint8_t *)&decoder + COUNTS_FROM, size);
 }

@@ -19,15 +19,21 @@ void link_start(uint16_t baud);
  * forgotten. */
 void link_use_seed(uint32_t seed);
 
+/* Takes received bytes, up to the end of an accepted frame; false if they end before. A part of link_poll(). */
+bool link_take_frame(void);
+
 /* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits
  * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of
  * answers. A stop and set-points do not wait themselves. */
 void link_poll(void);
 
-extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room */
+extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */
 
 static inline __attribute__((always_inline)) bool link_due(void) {
-  return hal_serial_due() != 0 && (link_room == 0 || hal_serial_room(link_room));
+  if (hal_serial_due() == 0) {
+    return false;
+  }
+  return hal_serial_room(link_room);
 }
 
 /* Frames accepted and refused, and times that a good one followed bad ones, into the counters. */

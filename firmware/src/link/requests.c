@@ -11,90 +11,91 @@
 #include "safety.h"
 #include "storage.h"
 
-static msg_answer answer; /* to the last request that was carried out; its number is 0 at first, */
-static bool any;          /* when there was none */
-static bool saving;       /* it is a save that still goes on */
+/* Beside the statuses that are sent. */
+enum {
+  NO_REQUEST = 0xFE, /* there was none yet */
+  SAVING = 0xFF,     /* a save that still goes on */
+};
+
+static msg_answer answer; /* to the last request that was carried out */
 
 void requests_start(void) {
-  answer = (msg_answer){0};
-  any = false;
-  saving = false;
+  answer.number = 0;
+  answer.status = NO_REQUEST;
 }
 
-static void send_answer(void) { send_message(MSG_ANSWER_ID, &answer, sizeof answer); }
-
-static void get_parameter(const uint8_t *payload) {
-  msg_get_parameter message;
-  memcpy(&message, payload, sizeof message);
-  answer.status = message.parameter < PARAMETER_COUNT ? ANSWER_STATUS_OK : ANSWER_STATUS_UNKNOWN_PARAMETER;
-  answer.value = parameters_get(message.parameter);
-}
-
-static void set_parameter(const uint8_t *payload) {
-  msg_set_parameter message;
-  memcpy(&message, payload, sizeof message);
-  answer.status = parameters_set(message.parameter, message.value);
-  answer.value = parameters_get(message.parameter);
+static void send_answer(void) {
+  if (answer.status != SAVING) {
+    send_message(MSG_ANSWER_ID, &answer, sizeof answer);
+  }
 }
 
 /* What changes the parameters while they are being written would make a save of neither the old nor the new. */
-static bool must_wait(uint8_t id) {
-  return storage_busy() &&
-         (id == MSG_SET_PARAMETER_ID || id == MSG_SAVE_PARAMETERS_ID || id == MSG_RESET_PARAMETERS_ID);
+static inline bool must_wait(uint8_t id) {
+  if (id != MSG_SET_PARAMETER_ID && id != MSG_SAVE_PARAMETERS_ID && id != MSG_RESET_PARAMETERS_ID) {
+    return false;
+  }
+  return storage_busy();
 }
 
-static void carry_out(uint8_t id, const uint8_t *payload) {
-  answer.status = ANSWER_STATUS_OK;
-  answer.value = 0;
+#define NO_PARAMETER 0xFFu /* its value is 0 */
+
+/* Returns the answer's status and, in `about`, the parameter whose value it tells. */
+static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, uint8_t *about) {
   if (must_wait(id)) {
-    answer.status = ANSWER_STATUS_BUSY;
-    return;
+    return ANSWER_STATUS_BUSY;
   }
+  uint8_t status = ANSWER_STATUS_OK;
   switch (id) {
     case MSG_GET_PARAMETER_ID:
-      get_parameter(payload);
+      *about = payload[offsetof(msg_get_parameter, parameter)];
+      if (*about >= PARAMETER_COUNT) {
+        status = ANSWER_STATUS_UNKNOWN_PARAMETER;
+      }
       break;
-    case MSG_SET_PARAMETER_ID:
-      set_parameter(payload);
+    case MSG_SET_PARAMETER_ID: {
+      msg_set_parameter message;
+      memcpy(&message, payload, sizeof message);
+      *about = message.parameter;
+      status = parameters_set(message.parameter, message.value);
       break;
+    }
     case MSG_SAVE_PARAMETERS_ID:
-      answer.status = storage_save();
-      saving = answer.status == ANSWER_STATUS_OK;
+      status = storage_save();
+      if (status == ANSWER_STATUS_OK) {
+        status = SAVING;
+      }
       break;
     case MSG_RESET_PARAMETERS_ID:
       parameters_reset();
       break;
     default: /* MSG_ARM_ID */
-      answer.status = safety_arm(payload[offsetof(msg_arm, latches)]);
+      status = safety_arm(payload[offsetof(msg_arm, latches)]);
       break;
   }
+  return status;
 }
 
 bool requests_take(uint8_t id, const uint8_t *payload) {
   uint16_t number = 0; /* the first field of every request */
   memcpy(&number, payload, sizeof number);
-  if (any && number == answer.number) {
-    if (!saving) {
-      counters.duplicate++;
-      send_answer();
+  if (number == answer.number && answer.status != NO_REQUEST) {
+    if (answer.status != SAVING) {
+      counters_count(duplicate);
     }
-    return true;
-  }
-  if (number != (uint16_t)(answer.number + 1u) || saving) {
+  } else if (number == (uint16_t)(answer.number + 1u) && answer.status != SAVING) {
+    uint8_t about = NO_PARAMETER;
+    const uint8_t status = carry_out(id, payload, &about);
+    answer = (msg_answer){.number = number, .status = status, .value = parameters_get(about)};
+  } else {
     return false;
   }
-  any = true;
-  answer.number = number;
-  carry_out(id, payload);
-  if (!saving) {
-    send_answer();
-  }
+  send_answer();
   return true;
 }
 
 void requests_task(void) {
-  if (saving && !storage_busy() && send_has_room(MSG_ANSWER_LENGTH)) {
-    saving = false;
+  if (answer.status == SAVING && !storage_busy() && send_has_room(MSG_ANSWER_LENGTH)) {
     answer.status = storage_result();
     send_answer();
   }

@@ -2,28 +2,31 @@
 #include "link/send.h"
 
 #include "link/counters.h"
+#include "link/session.h"
+
+#define BYTE_US 100000u /* at 100 bit/s: 10 bits */
 
 static uint8_t next_sequence;
 static uint16_t baud_rate; /* 100 bit/s */
-static uint32_t session_seed;
 
 void send_start(uint16_t baud) {
   next_sequence = 0;
   baud_rate = baud;
-  session_seed = FRAME_SEED;
 }
-
-void send_use_seed(uint32_t seed) { session_seed = seed; }
 
 bool send_message(uint8_t id, const void *payload, uint8_t length) {
   const uint8_t sequence = next_sequence++;
   if (!hal_serial_room((uint8_t)(length + FRAME_OVERHEAD))) {
-    counters.dropped++;
+    counters_count(dropped);
     return false;
   }
-  uint8_t wire[FRAME_SIZE_MAX];
-  hal_serial_send(wire, frame_encode(wire, id, sequence, payload, length, session_seed));
+  hal_serial_queue(frame_encode(hal_serial_place(), id, sequence, payload, length, session_seed()));
   return true;
 }
 
-uint32_t send_time(uint16_t bytes) { return (uint32_t)bytes * UINT32_C(100000) / baud_rate; /* 10 bits each */ }
+bool send_has_room(uint8_t length) { return hal_serial_room((uint8_t)(length + SEND_RESERVE)); }
+
+uint32_t send_time(uint16_t bytes) { return (uint32_t)bytes * BYTE_US / baud_rate; }
+
+uint16_t send_half_ms(uint8_t bytes) { return (uint16_t)(bytes * (uint16_t)(BYTE_US / 500u)) / baud_rate; }
+_Static_assert(UINT8_MAX *(BYTE_US / 500u) <= UINT16_MAX, "in 16 bits");

@@ -14,49 +14,52 @@
 #include "safety.h"
 #include "schedule.h"
 
+#define TICK_MS (SCHEDULE_TICK_US / 1000u)
 #define HELLO_PERIOD_ALONE 10u /* ticks */
 #define HELLO_PERIOD_OPEN 20u  /* or, if that is longer, */
 #define HELLO_TELEMETRIES 4u   /* periods of the telemetry */
 
-static uint32_t seed;        /* of the session; 0: none is open */
+static uint32_t seed;        /* of the session, or FRAME_NO_SESSION */
 static uint32_t board_nonce; /* that the next opening must name */
-static uint16_t heard;       /* low half of the tick in which the last frame of the session came */
+static uint16_t silence;     /* ms since a frame of the session came, in whole ticks */
 static uint16_t hello_in;    /* ticks until the next hello; 0: it waits for room */
-
-static uint16_t hello_period(void) {
-  if (seed == 0) {
-    return HELLO_PERIOD_ALONE;
-  }
-  const uint16_t longer = HELLO_TELEMETRIES * telemetry_period();
-  return longer > HELLO_PERIOD_OPEN ? longer : HELLO_PERIOD_OPEN;
-}
 
 /* Says hello now or, where it would leave no room for the next telemetry, in a later tick. */
 static void say_hello(void) {
-  const bool room = seed == 0 ? hal_serial_room(MSG_HELLO_LENGTH + FRAME_OVERHEAD) : send_has_room(MSG_HELLO_LENGTH);
-  hello_in = room && identity_send_hello() ? hello_period() : 0u;
+  uint8_t room = MSG_HELLO_LENGTH + FRAME_OVERHEAD;
+  uint16_t period = HELLO_PERIOD_ALONE;
+  if (session_is_open()) {
+    room = MSG_HELLO_LENGTH + SEND_RESERVE;
+    const uint16_t telemetries = HELLO_TELEMETRIES * telemetry_period();
+    period = telemetries > HELLO_PERIOD_OPEN ? telemetries : HELLO_PERIOD_OPEN;
+  }
+  hello_in = 0;
+  if (hal_serial_room(room)) {
+    identity_send_hello();
+    hello_in = period;
+  }
 }
 
-/* Begins anew, with a session or, if new_seed is 0, without. */
+/* Begins anew, with a session or without (FRAME_NO_SESSION). */
 static void begin(uint32_t new_seed) {
   safety_latch(LATCH_SESSION_ENDED);
   seed = new_seed;
   board_nonce = reset_nonce();
-  link_use_seed(new_seed != 0 ? new_seed : FRAME_NO_SESSION);
-  send_use_seed(new_seed);
+  link_use_seed(new_seed);
   requests_start();
   events_start();
   telemetry_start();
+  session_heard();
 }
 
 void session_start(void) {
-  begin(0);
+  begin(FRAME_NO_SESSION);
   say_hello();
 }
 
 bool session_open(const msg_open *message) {
   const uint32_t wanted = message->board_nonce ^ message->host_nonce;
-  if (wanted == 0 || wanted > FRAME_SEED_MAX || wanted == FRAME_SEED) {
+  if (wanted == 0 || (wanted & ~FRAME_SEED_MAX) != 0 || wanted == FRAME_SEED) {
     return false;
   }
   if (wanted != seed) {
@@ -64,7 +67,6 @@ bool session_open(const msg_open *message) {
       return false;
     }
     begin(wanted);
-    session_heard();
   }
   say_hello();
   return true;
@@ -74,33 +76,23 @@ bool session_close(uint32_t of) {
   if (of != seed) {
     return false;
   }
-  begin(0);
-  say_hello();
+  session_start();
   return true;
 }
 
 uint32_t session_seed(void) { return seed; }
 
-bool session_is_open(void) { return seed != 0; }
+bool session_is_open(void) { return (uint8_t)(seed >> 24) == 0; /* seeds have 21 bits */ }
 
 uint32_t session_board_nonce(void) { return board_nonce; }
 
-void session_heard(void) { heard = (uint16_t)schedule_tick(); }
-
-static bool host_is_silent(void) {
-  const uint16_t ticks = (uint16_t)((uint16_t)schedule_tick() - heard);
-  return ticks > parameters_u16(PARAMETER_SESSION_TIME_OUT) / (SCHEDULE_TICK_US / 1000u);
-}
+void session_heard(void) { silence = 0; }
 
 void session_task(void) {
-  if (seed != 0 && host_is_silent()) {
-    begin(0);
-    hello_in = 0;
-  }
-  if (hello_in > 0) {
-    hello_in--;
-  }
-  if (hello_in == 0) {
+  silence = (uint16_t)(silence + TICK_MS); /* rolls over only without a session */
+  if (session_is_open() && silence > parameters_u16(PARAMETER_SESSION_TIME_OUT)) {
+    session_start();
+  } else if (hello_in == 0 || --hello_in == 0) {
     say_hello();
   }
 }

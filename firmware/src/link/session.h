@@ -21,7 +21,7 @@ bool session_open(const msg_open *message);
 /* The host leaves the session of that seed. False if it is not the one that is open. */
 bool session_close(uint32_t seed);
 
-/* Its seed; 0: none is open. */
+/* Its seed; FRAME_NO_SESSION: none is open. */
 uint32_t session_seed(void);
 bool session_is_open(void);
 

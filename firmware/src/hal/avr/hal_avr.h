@@ -120,8 +120,10 @@ static inline void hal_eeprom_interrupt(bool on) {
   }
 }
 
-/* The rings of serial_avr.c. Indices wrap as a byte, or by a mask; equal indices: empty. */
+/* The rings of serial_avr.c: 256 bytes from a multiple of 256 on, 128 from a multiple of 128 on. Heads and tails are low
+ * bytes of addresses; equal ones: empty. */
 #define HAL_SEND_RING 128u
+#define HAL_SEND_MASK (HAL_SEND_RING - 1u)
 #define HAL_RECEIVE_HEAD GPIOR1
 #define HAL_RECEIVE_TAIL OCR0B
 #define HAL_SEND_TAIL GPIOR2
@@ -173,10 +175,89 @@ static inline bool hal_serial_receive(uint8_t *byte) {
   return true;
 }
 
-static inline bool hal_serial_room(uint8_t count) {
-  const uint8_t queued = (uint8_t)((uint8_t)(hal_send_head - HAL_SEND_TAIL) & (HAL_SEND_RING - 1u));
-  return HAL_SEND_RING - 1u - queued >= count;
+/* The place at that low byte in a ring. */
+#define HAL_RING_PLACE(place, ring, low) __asm__("mov %A0, %1 \n ldi %B0, hi8(" #ring ")" : "=&d"(place) : "r"(low))
+
+/* 10 cycles a byte. */
+static inline __attribute__((always_inline)) bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count,
+                                                                           uint8_t size) {
+  for (;;) {
+    const uint8_t tail = HAL_RECEIVE_TAIL;
+    uint8_t left = (uint8_t)(HAL_RECEIVE_HEAD - tail);
+    if (left == 0) {
+      return false;
+    }
+    uint8_t *from;
+    HAL_RING_PLACE(from, hal_receive_ring, tail);
+    const uint8_t room = (uint8_t)(size - *count);
+    if (left > room) {
+      left = room;
+    }
+    uint8_t *to = bytes + *count;
+    uint8_t byte;
+    __asm__ volatile(
+        "1: ld %[byte], %a[from]   \n"
+        "inc %A[from]              \n"
+        "st %a[to]+, %[byte]       \n"
+        "tst %[byte]               \n"
+        "breq 2f                   \n"
+        "dec %[left]               \n"
+        "brne 1b                   \n"
+        "2:                        \n"
+        : [to] "+x"(to), [from] "+z"(from), [left] "+r"(left), [byte] "=&r"(byte)
+        :
+        : "memory");
+    HAL_RECEIVE_TAIL = (uint8_t)(uintptr_t)from;
+    uint8_t filled = (uint8_t)(to - bytes);
+    if (byte == 0 || filled == size) { /* without the zero; or the last place again */
+      filled--;
+    }
+    *count = filled;
+    if (byte == 0) {
+      return true;
+    }
+  }
 }
+
+static inline bool hal_serial_room(uint8_t count) {
+  const uint8_t queued = (uint8_t)((uint8_t)(hal_send_head - HAL_SEND_TAIL) & HAL_SEND_MASK);
+  return (uint8_t)(queued + count) < HAL_SEND_RING;
+}
+
+static inline __attribute__((always_inline)) uint8_t *hal_serial_place(void) {
+  uint8_t *place;
+  HAL_RING_PLACE(place, hal_send_ring, hal_send_head);
+  return place;
+}
+
+/* Brings the low byte of an address in the register pair of that name back into the send ring. */
+#define HAL_SEND_WRAP(pair) \
+  "andi %A[" #pair          \
+  "], %[mask] \n"           \
+  "ori %A[" #pair "], lo8(hal_send_ring) \n"
+
+static inline __attribute__((always_inline)) uint8_t *hal_serial_beyond(uint8_t *place, uint8_t count) {
+  __asm__("add %A[place], %[count] \n" HAL_SEND_WRAP(place)
+          : [place] "+d"(place)
+          : [count] "r"(count), [mask] "M"(HAL_SEND_MASK));
+  return place;
+}
+
+static inline __attribute__((always_inline)) void hal_serial_put(uint8_t **place, uint8_t byte) {
+  __asm__ volatile("st %a[place], %[byte] \n inc %A[place] \n" HAL_SEND_WRAP(place)
+                   : [place] "+e"(*place)
+                   : [byte] "r"(byte), [mask] "M"(HAL_SEND_MASK)
+                   : "memory");
+}
+
+static inline __attribute__((always_inline)) void hal_serial_put_before(uint8_t **place, uint8_t byte) {
+  __asm__ volatile("dec %A[place] \n" HAL_SEND_WRAP(place) "st %a[place], %[byte] \n"
+                   : [place] "+e"(*place)
+                   : [byte] "r"(byte), [mask] "M"(HAL_SEND_MASK)
+                   : "memory");
+}
+
+void hal_serial_queue(uint8_t count);
 
 /* Returns a fixed number of cycles after the timer has read `time`, whenever it was called. Far from it, received bytes
  * are taken meanwhile, for the receiver holds two and no more. Then the coarse loop ends within 256 cycles of it, the

@@ -38,7 +38,8 @@ static uint8_t receive_ring[RECEIVE_RING];
 static uint16_t receive_first, receive_count;
 static bool overrun;
 static bool zero_received;
-static uint64_t sender_free; /* cycle at which the last queued byte has left */
+static uint8_t to_send[SEND_RING]; /* from hal_serial_place() on */
+static uint64_t sender_free;       /* cycle at which the last queued byte has left */
 static bool eeprom_interrupt;
 static uint16_t supply_result;
 
@@ -222,6 +223,10 @@ bool hal_serial_room(uint8_t count) {
   next_room = sender_free - (SEND_RING - (uint64_t)count + 1u) * byte_cycles + 1u;
   return false;
 }
+
+uint8_t *hal_serial_place(void) { return to_send; }
+
+void hal_serial_queue(uint8_t count) { hal_serial_send(to_send, count); }
 
 void hal_serial_send(const uint8_t *bytes, uint8_t count) {
   const uint64_t start = sender_free > machine->now ? sender_free : machine->now;

@@ -71,7 +71,25 @@ uint8_t hal_serial_due(void);
 void hal_serial_seen(void);
 void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
+static inline bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size) {
+  uint8_t byte = 0;
+  while (hal_serial_receive(&byte)) {
+    if (byte == 0) {
+      return true;
+    }
+    bytes[*count] = byte;
+    if (*count < size - 1) {
+      (*count)++;
+    }
+  }
+  return false;
+}
 bool hal_serial_room(uint8_t count);
+uint8_t *hal_serial_place(void);
+static inline uint8_t *hal_serial_beyond(uint8_t *place, uint8_t count) { return place + count; }
+static inline void hal_serial_put(uint8_t **place, uint8_t byte) { *(*place)++ = byte; }
+static inline void hal_serial_put_before(uint8_t **place, uint8_t byte) { *--(*place) = byte; }
+void hal_serial_queue(uint8_t count);
 
 #define HAL_EEPROM_SIZE 1024u
 void hal_eeprom_wait(void);

@@ -1,0 +1,40 @@
+"""Builds programs for the ATmega328P from the firmware's sources, with the flags of the image (platformio.ini)."""
+
+from __future__ import annotations
+
+import configparser
+import shlex
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ROOT / "firmware" / "src"
+ENVIRONMENT = "env:uno"
+# What PlatformIO gives to every program for this chip without a framework.
+PLATFORM_FLAGS = ["-Os", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-ffunction-sections", "-fdata-sections"]
+PLATFORM_FLAGS += ["-Wl,--gc-sections", "-Wl,--relax"]
+
+
+def flags() -> list[str]:
+    """Those of the image for the Shield-Bot, for the compiler and the linker."""
+    project = configparser.ConfigParser(interpolation=None)
+    project.read(ROOT / "platformio.ini", encoding="utf-8")
+
+    def option(section: str, name: str) -> str:
+        text = project[section][name]
+        while "${" in text:
+            before, _, rest = text.partition("${")
+            reference, _, after = rest.partition("}")
+            text = before + option(*reference.split(".")) + after
+        return text
+
+    return [*PLATFORM_FLAGS, *shlex.split(option(ENVIRONMENT, "build_flags")), "-std=gnu11"]
+
+
+def build(image: Path, main: Path | None = None, extra: tuple[str, ...] = ()) -> Path:
+    """The firmware's ELF file at `image`, with `main` in place of its main.c. Raises CalledProcessError."""
+    own = SOURCES / "main.c"
+    firmware = [path for path in sorted(SOURCES.rglob("*.c")) if "native" not in path.parts]
+    sources = [str(main or path) if path == own else str(path) for path in firmware]
+    subprocess.run(["avr-gcc", *flags(), *extra, f"-I{SOURCES}", "-o", str(image), *sources], check=True)
+    return image

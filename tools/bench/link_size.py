@@ -1,0 +1,133 @@
+"""Flash and RAM of the link's modules in the linked image: `python -m tools.bench.link_size`.
+
+The image is built once more with debugging information, which changes nothing of it, and each of its
+symbols is counted for the source file (DWARF compilation unit) that defines it: functions, tables in
+flash, variables, and what initialises them. What a compiler inlines elsewhere counts there. What all
+of the firmware shares (the C library, the code that saves registers) belongs to no module.
+"""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from elftools.dwarf.dwarf_expr import DWARFExprParser
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from tools.bench.avr_program import SOURCES, build
+
+FRAME = ("link/frame.c",)
+DELIVERY = ("link/send.c", "link/requests.c", "link/events.c")
+SESSION = ("link/session.c", "link/link.c")
+COUNTED = FRAME + DELIVERY + SESSION  # what the 3 KB are for
+BESIDE = (
+    "link/counters.c",
+    "link/dispatch.c",
+    "link/identity.c",
+    "link/parameters.c",
+    "link/telemetry.c",
+    "hal/avr/serial_avr.c",
+)
+RINGS = ("hal_receive_ring", "hal_send_ring")
+DATA_SPACE = 0x800000  # where the linker puts RAM
+ADDRESS = 0x03  # DW_OP_addr
+
+
+@dataclass(frozen=True)
+class Size:
+    """In bytes. Initialised variables count in both."""
+
+    flash: int
+    ram: int
+
+
+def _files(elf: ELFFile) -> dict[int, str]:
+    """By address of a function or variable: the source file that defines it, from SOURCES on."""
+    dwarf = elf.get_dwarf_info()
+    found: dict[int, str] = {}
+    for unit in dwarf.iter_CUs():
+        expressions = DWARFExprParser(unit.structs)
+        top = unit.get_top_DIE()
+        source = top.attributes.get("DW_AT_name")
+        path = Path(source.value.decode() if source else "").resolve()
+        if not path.is_relative_to(SOURCES):
+            continue  # a library
+        name = path.relative_to(SOURCES).as_posix()
+        for entry in unit.iter_DIEs():
+            if entry.tag == "DW_TAG_subprogram" and "DW_AT_low_pc" in entry.attributes:
+                found[entry.attributes["DW_AT_low_pc"].value] = name
+            elif entry.tag == "DW_TAG_variable" and "DW_AT_location" in entry.attributes:
+                location = entry.attributes["DW_AT_location"]
+                if location.form == "DW_FORM_exprloc":
+                    operation = expressions.parse_expr(location.value)[0]
+                    if operation.op == ADDRESS:
+                        found[operation.args[0]] = name
+    return found
+
+
+def _modules_of_tables(elf: ELFFile) -> dict[int, str]:
+    """By address: the file whose local symbols stand around it, for tables that the compiler made without telling DWARF."""
+    table = elf.get_section_by_name(".symtab")
+    assert isinstance(table, SymbolTableSection)
+    found, file = {}, ""
+    for symbol in table.iter_symbols():
+        if symbol["st_info"]["type"] == "STT_FILE":
+            file = symbol.name
+        elif symbol["st_info"]["bind"] == "STB_LOCAL" and symbol["st_size"]:
+            found[symbol["st_value"]] = file
+    return found
+
+
+@functools.cache
+def sizes() -> dict[str, Size]:
+    """By source file, "" for what belongs to none: what it takes of the image. The rings are left out."""
+    with tempfile.TemporaryDirectory() as folder:
+        image = build(Path(folder) / "image.elf", extra=("-gdwarf-4",))
+        with image.open("rb") as file:
+            return _sizes(ELFFile(file))
+
+
+def _sizes(elf: ELFFile) -> dict[str, Size]:
+    files, tables = _files(elf), _modules_of_tables(elf)
+    by_name = {Path(name).name: name for name in files.values()}
+    data = elf.get_section_by_name(".data")
+    initialised = range(data["sh_addr"], data["sh_addr"] + data["sh_size"])
+    flash: Counter[str] = Counter()
+    ram: Counter[str] = Counter()
+    seen = set()
+    table = elf.get_section_by_name(".symtab")
+    assert isinstance(table, SymbolTableSection)
+    for symbol in table.iter_symbols():
+        address, size = symbol["st_value"], symbol["st_size"]
+        if not size or symbol.name in RINGS or address in seen or symbol["st_info"]["type"] == "STT_SECTION":
+            continue
+        seen.add(address)
+        module = files.get(address) or by_name.get(tables.get(address, ""), "")
+        if address < DATA_SPACE or address in initialised:
+            flash[module] += size
+        if address >= DATA_SPACE:
+            ram[module] += size
+    text = elf.get_section_by_name(".text")["sh_size"] + data["sh_size"]
+    flash[""] += text - sum(flash.values())  # vectors, start-up, libraries
+    return {module: Size(flash[module], ram[module]) for module in sorted({*flash, *ram})}
+
+
+def total(modules: tuple[str, ...] = COUNTED) -> Size:
+    """Of several source files together. Raises KeyError if the image has nothing of one of them."""
+    found = [sizes()[module] for module in modules]
+    return Size(sum(size.flash for size in found), sum(size.ram for size in found))
+
+
+if __name__ == "__main__":
+    for group, modules in (("frame", FRAME), ("delivery", DELIVERY), ("session", SESSION)):
+        for module in modules:
+            print(f"{module:24} {sizes()[module].flash:5} B flash {sizes()[module].ram:4} B RAM")
+        print(f"{'  ' + group:24} {total(modules).flash:5} B flash {total(modules).ram:4} B RAM")
+    print(f"{'  together':24} {total().flash:5} B flash {total().ram:4} B RAM\nbeside them:")
+    for module in BESIDE:
+        print(f"{module:24} {sizes()[module].flash:5} B flash {sizes()[module].ram:4} B RAM")
+    print(f"{'of no module':24} {sizes()[''].flash:5} B flash {sizes()[''].ram:4} B RAM")
