@@ -274,7 +274,7 @@ typedef struct __attribute__((packed)) {
 #define MSG_TELEMETRY_LENGTH 38u
 typedef struct __attribute__((packed)) {
   uint32_t tick; /* control ticks since reset */
-  uint32_t time; /* us; board time at the start of this tick since reset; rolls over after 71.6 min */
+  uint32_t time; /* us; board time at the start of this tick, since its clock started (some 0.15 s after reset); rolls over after 71.6 min */
   int32_t encoder_left; /* edges; edges since reset; signed only where the encoder knows direction */
   int32_t encoder_right; /* edges */
   uint16_t edge_period_left; /* 16 us; time between the last two edges; 0: none within 0.5 s */
@@ -326,7 +326,7 @@ typedef struct __attribute__((packed)) {
   uint16_t number; /* of the event: 1 for the first of a session, then one more each */
   uint8_t kind; /* event_kind */
   uint16_t value; /* see event_kind */
-  uint32_t time; /* us; board time since reset */
+  uint32_t time; /* us; board time */
 } msg_event;
 
 /* Answer to clock_probe. */
@@ -334,7 +334,7 @@ typedef struct __attribute__((packed)) {
 #define MSG_CLOCK_ANSWER_LENGTH 6u
 typedef struct __attribute__((packed)) {
   uint16_t token; /* of the probe */
-  uint32_t time; /* us; board time since reset at which the probe was worked on */
+  uint32_t time; /* us; board time at which the probe was worked on */
 } msg_clock_answer;
 
 /* Payload bytes of a message to the board, or -1 if there is no such message. */

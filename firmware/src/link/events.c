@@ -5,6 +5,7 @@
 
 #include "generated/messages.h"
 #include "link/counters.h"
+#include "link/link.h"
 #include "link/parameters.h"
 #include "link/send.h"
 #include "link/session.h"
@@ -83,7 +84,8 @@ void events_task(void) {
     wait = (uint16_t)(wait - SLOT);
     return;
   }
-  if (end == queue || !send_has_room(MSG_EVENT_LENGTH)) {
+  const bool others_wait = sent && link_room != 0; /* repetitions must not take the room that a message waits for */
+  if (end == queue || others_wait || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
   queue->number = number;

@@ -17,7 +17,7 @@
 #define TICK_MS (SCHEDULE_TICK_US / 1000u)
 #define HELLO_PERIOD_ALONE 10u /* ticks */
 #define HELLO_PERIOD_OPEN 20u  /* or, if that is longer, */
-#define HELLO_TELEMETRIES 4u   /* periods of the telemetry */
+#define HELLO_TELEMETRIES 4u   /* of the shortest periods of telemetry that the line allows */
 
 static uint32_t seed;        /* of the session, or FRAME_NO_SESSION */
 static uint32_t board_nonce; /* that the next opening must name */
@@ -30,7 +30,7 @@ static void say_hello(void) {
   uint16_t period = HELLO_PERIOD_ALONE;
   if (session_is_open()) {
     room = MSG_HELLO_LENGTH + SEND_RESERVE;
-    const uint16_t telemetries = HELLO_TELEMETRIES * telemetry_period();
+    const uint16_t telemetries = HELLO_TELEMETRIES * telemetry_line_period();
     period = telemetries > HELLO_PERIOD_OPEN ? telemetries : HELLO_PERIOD_OPEN;
   }
   hello_in = 0;

@@ -608,7 +608,7 @@ class Stopped(_StoppedFields):
 
 class _TelemetryFields(NamedTuple):
     tick: int  # control ticks since reset
-    time: int  # us; board time at the start of this tick since reset; rolls over after 71.6 min
+    time: int  # us; board time at the start of this tick, since its clock started (some 0.15 s after reset); rolls over after 71.6 min
     encoder_left: int  # edges; edges since reset; signed only where the encoder knows direction
     encoder_right: int  # edges
     edge_period_left: int  # 16 us; time between the last two edges; 0: none within 0.5 s
@@ -711,7 +711,7 @@ class _EventFields(NamedTuple):
     number: int  # of the event: 1 for the first of a session, then one more each
     kind: int  # event_kind
     value: int  # see event_kind
-    time: int  # us; board time since reset
+    time: int  # us; board time
 
 
 class Event(_EventFields):
@@ -736,7 +736,7 @@ class Event(_EventFields):
 
 class _ClockAnswerFields(NamedTuple):
     token: int  # of the probe
-    time: int  # us; board time since reset at which the probe was worked on
+    time: int  # us; board time at which the probe was worked on
 
 
 class ClockAnswer(_ClockAnswerFields):
