@@ -70,7 +70,6 @@ ROWS = (
     Row("no new parameters during a save", "link/requests.c", "if (must_wait(id))", "if (false)", "requests"),
     Row("an event is sent again", "link/events.c", "wait = retry_time();", "wait = UINT16_MAX;", "events"),
     Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
-    Row("no acknowledgement before the sending", "link/events.c", "|| !sent", "", "events"),
     Row("what finds the queue full is told later", "link/events.c", "merged | 1u << kind", "merged", "events"),
     Row("touches that were merged", "link/events.c", "kind == EVENT_KIND_WHISKERS", "false", "events"),
     Row("cells of the EEPROM are read back", "storage.c", "!= record.bytes[step_first]", "< 0", "storage"),
