@@ -46,7 +46,16 @@ class Row(NamedTuple):
 ROWS = (
     Row("a set-point's age by its tick", "safety.c", "age >= life || ", "", "safety"),
     Row("order of set-points", "safety.c", "|| has_newer(answers_tick, sequence) ", "", "safety"),
-    Row("set-points from before arming", "safety.c", "just_armed && (int16_t)(answers_tick", "false && (0", "safety"),
+    Row(
+        "set-points from before arming", "safety.c", "ticks_are_over && (int16_t)(answers_tick", "false && (0", "safety"
+    ),
+    Row(
+        "copies from before a dead-man stop",
+        "safety.c",
+        "STATUS_DEAD_MAN;\n    end_ticks(last_tick);",
+        "STATUS_DEAD_MAN;",
+        "safety",
+    ),
     Row("latch", "safety.c", "latch != LATCH_NONE || ", "", "safety"),
     Row("longest time to live", "safety.c", "time_to_live > TIME_TO_LIVE_MAX", "false", "safety"),
     Row("arm names the latch that it ends", "safety.c", "known_latches != latches", "false", "safety"),
@@ -70,7 +79,7 @@ ROWS = (
     Row("no new parameters during a save", "link/requests.c", "if (must_wait(id))", "if (false)", "requests"),
     Row("an event is sent again", "link/events.c", "wait = retry_time();", "wait = UINT16_MAX;", "events"),
     Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
-    Row("what finds the queue full is told later", "link/events.c", "merged | 1u << kind", "merged", "events"),
+    Row("what finds the queue full is told later", "link/events.c", "counters_count(deferred);", "return;", "events"),
     Row("touches that were merged", "link/events.c", "kind == EVENT_KIND_WHISKERS", "false", "events"),
     Row("cells of the EEPROM are read back", "storage.c", "!= record.bytes[step_first]", "< 0", "storage"),
     Row("the mark is void during a write", "storage.c", "= MARK_VOID;", "= MARK_VALID;", "storage"),
