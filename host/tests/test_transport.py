@@ -229,6 +229,29 @@ def test_no_thread_or_descriptor_is_left_behind() -> None:
         assert count() == before
 
 
+@pytest.mark.skipif(not HAS_THREAD, reason="not built on this system")
+def test_port_that_gets_no_thread_is_one_sentence_and_no_crash() -> None:
+    """In a process of its own: what is asked here has crashed it. There is room for the port, not for the pipe."""
+    script = (
+        "import gc, os, resource\n"
+        "from boebot.errors import BoardError\n"
+        "from boebot.link.ports.descriptor import DescriptorTransport\n"
+        "master, slave = os.openpty()\n"
+        "used = max(int(name) for name in os.listdir('/dev/fd'))\n"
+        "resource.setrlimit(resource.RLIMIT_NOFILE, (used, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))\n"
+        "released = []\n"
+        "try:\n"
+        "    DescriptorTransport('port', slave, lambda: released.append(1))\n"
+        "except BoardError as error:\n"
+        "    print(error)\n"
+        "gc.collect()\n"
+        "print(released)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "port cannot be read: no memory, no file or no thread for it\n[1]\n"
+
+
 def test_switch_interval_is_short_while_a_port_is_open_and_then_as_before() -> None:
     before = sys.getswitchinterval()
     try:

@@ -48,10 +48,11 @@ class DescriptorTransport:
         self._descriptor = descriptor
         self._reader: Any = None
         if thread and HAS_THREAD:
-            self._reader = ffi.gc(lib.reader_start(descriptor), lib.reader_free)
-            if not self._reader:
+            reader = lib.reader_start(descriptor)
+            if reader == ffi.NULL:  # never to be given to reader_free
                 release()
-                raise BoardError(f"{name} cannot be read: no memory or no thread for it")
+                raise BoardError(f"{name} cannot be read: no memory, no file or no thread for it")
+            self._reader = ffi.gc(reader, lib.reader_free)
             self._bytes = ffi.new("uint8_t[]", _READ_BYTES)
             self._view = memoryview(ffi.buffer(self._bytes))
             self._times = ffi.new("double[]", _CHUNKS)

@@ -12,7 +12,7 @@
 /* python: begin */
 typedef struct reader reader;
 
-/* Starts the thread. The descriptor stays the caller's, and open until reader_stop. NULL: no memory or no thread. */
+/* Starts the thread. The descriptor stays the caller's, and open until reader_stop. NULL: no memory, no pipe or no thread. */
 reader *reader_start(int descriptor);
 
 /* Waits at most wait_s seconds for the first chunk, then takes whole chunks as long as they fit into `room` bytes and
