@@ -217,6 +217,32 @@ def test_ctrl_c_ends_a_long_wait(board: Line) -> None:
     assert b"KeyboardInterrupt" in errors
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.parametrize("thread", THREADS)
+@pytest.mark.parametrize("ending", ["ends", "closes", "forgets"])
+def test_forked_child_leaves_its_parents_port_alone(board: Line, thread: bool, ending: str) -> None:
+    transport = SerialTransport(board.path, thread=thread)
+    board.send(b"one")
+    assert transport.read(5.0) == b"one"
+    child = os.fork()
+    if child == 0:
+        signal.alarm(5)  # one that hangs is killed
+        if ending == "ends":
+            transport._close_once()  # as Python does at its end
+        elif ending == "closes":
+            transport.close()
+        else:
+            transport._close_once.detach()
+            transport._reader = None  # its memory is freed
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    board.send(b"two")
+    assert transport.read(5.0) == b"two"
+    with pytest.raises(BoardError, match="busy"):
+        SerialTransport(board.path)
+    transport.close()
+
+
 def test_no_thread_or_descriptor_is_left_behind() -> None:
     def count() -> tuple[int, int]:
         return len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))  # noqa: PTH208
