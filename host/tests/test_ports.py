@@ -18,10 +18,11 @@ from pathlib import Path
 
 import pytest
 import serial
+from serial import rfc2217
 
 from boebot.boards import open_port
 from boebot.errors import BoardError
-from boebot.link.ports import lock_file
+from boebot.link.ports import lock_file, serial_port
 from boebot.link.ports.lock_file import LockFile, PortBusyError, lock_name
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import SerialTransport
@@ -240,6 +241,21 @@ def test_reset_switches_dtr_off_and_on_in_case_it_was_left_on(board: Line, monke
     transport.close()
     assert not transport.resets_board, "a pty has no DTR"
     assert False not in switched, "Linux switches DTR on at opening; off and on again would be a reset"
+
+
+@pytest.mark.parametrize("when", ["pulse_dtr", "_keep_dtr_at_close"])
+def test_ctrl_c_while_a_port_is_opened_leaves_it_free(
+    board: Line, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(serial_port, when, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            open_port(board.path, 500_000)
+    assert not any((place / lock_name(board.path)).exists() for place in lock_file.USUAL_FOLDERS)
+    open_port(board.path, 500_000).close()
 
 
 # ---- bit rates ------------------------------------------------------------------------------------------------------
@@ -471,6 +487,25 @@ def test_shared_port_is_reset_or_not() -> None:
             transport.close()
             assert transport.resets_board is reset
             assert server.serial.dtr_was[: len(expected)] == expected
+
+
+def test_server_that_refuses_to_switch_dtr_shares_its_port_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = rfc2217.PortManager._telnet_process_subnegotiation
+    off = rfc2217.COM_PORT_OPTION + rfc2217.SET_CONTROL + rfc2217.SET_CONTROL_DTR_OFF
+
+    def refusing(manager: rfc2217.PortManager, asked: bytes) -> None:
+        if asked == off:
+            manager.rfc2217_send_subnegotiation(rfc2217.SERVER_SET_CONTROL, rfc2217.SET_CONTROL_DTR_ON)
+        else:
+            real(manager, asked)
+
+    monkeypatch.setattr(rfc2217.PortManager, "_telnet_process_subnegotiation", refusing)
+    with rfc2217_server() as (server, board):
+        transport = Rfc2217Transport("127.0.0.1", server.port)
+        assert not transport.resets_board
+        board.send(b"!")
+        assert transport.read(2.0) == b"!"
+        transport.close()
 
 
 def test_shared_port_that_goes_away_is_noticed() -> None:

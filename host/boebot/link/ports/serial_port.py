@@ -70,22 +70,23 @@ class SerialTransport(DescriptorTransport):
     ) -> None:
         """As `open_serial`."""
         check_baud(port, baud)
-        lock = take_lock(port)
         device = configured(port, baud, reset)
         device.exclusive = True
+        release = _releaser(device, take_lock(port))
         try:
             device.open()
             descriptor = device.fileno()
             _keep_for_us_alone(descriptor)
             _keep_dtr_at_close(descriptor, keep=not reset)
             self.resets_board = pulse_dtr(device) if reset else _has_dtr(descriptor)
-        except (OSError, ValueError, termios.error) as error:  # pyserial's SerialException is an OSError
-            device.close()
-            lock.release()
-            raise BoardError(why_not(port, baud, error)) from None
-        self._device = device
-        self.baud_given = baud_given
-        super().__init__(port, descriptor, _releaser(device, lock), thread)
+            self._device = device
+            self.baud_given = baud_given
+            super().__init__(port, descriptor, release, thread)
+        except BaseException as error:  # Ctrl-C, too: the lock must not stay with this process
+            release()
+            if isinstance(error, (OSError, ValueError, termios.error)):  # pyserial's SerialException is an OSError
+                raise BoardError(why_not(port, baud, error)) from None
+            raise
 
     @property
     def baud(self) -> int:
@@ -122,8 +123,11 @@ class WindowsSerialTransport(PolledTransport):
         try:
             device.open()
             self.resets_board = reset and pulse_dtr(device)
-        except (OSError, ValueError) as error:
-            raise BoardError(why_not(port, baud, error)) from None
+        except BaseException as error:
+            device.close()
+            if isinstance(error, (OSError, ValueError)):
+                raise BoardError(why_not(port, baud, error)) from None
+            raise
         super().__init__(port, device, baud_given=baud_given, gone="unplugged, or closed by the other side")
 
 
@@ -145,12 +149,12 @@ def configured(port: str, baud: int, reset: bool) -> serial.Serial:
 
 
 def pulse_dtr(device: serial.SerialBase) -> bool:
-    """Switches DTR off and on. False: the port has no such line (a pty)."""
+    """Switches DTR off and on. False: the port has no such line (a pty), or its RFC 2217 server refuses."""
     try:
         device.dtr = False
         time.sleep(_DTR_OFF_S)
         device.dtr = True
-    except OSError:
+    except (OSError, ValueError):  # pyserial's word for a refusal by a server
         return False
     return True
 
