@@ -91,6 +91,42 @@ def test_lock_of_a_dead_process_is_taken_over(folder: Path, content: bytes) -> N
     assert not list(folder.iterdir())
 
 
+def test_lock_that_an_earlier_process_of_this_number_left_is_taken_over(folder: Path) -> None:
+    """As in a container, where numbers begin at 1."""
+    (folder / "LCK..ttyACM0").write_bytes(b"%10d\n" % os.getpid())
+    lock = LockFile("/dev/ttyACM0")
+    with pytest.raises(PortBusyError) as busy:
+        LockFile("/dev/ttyACM0")
+    assert busy.value.owner == os.getpid()
+    lock.release()
+    assert not list(folder.iterdir())
+    LockFile("/dev/ttyACM0").release()
+
+
+def test_one_of_two_threads_gets_the_lock_and_nothing_is_left(folder: Path) -> None:
+    both = threading.Barrier(2)
+    for _ in range(200):
+        got: list[LockFile] = []
+        failed: list[BaseException] = []
+
+        def take(got: list[LockFile] = got, failed: list[BaseException] = failed) -> None:
+            both.wait()
+            try:
+                got.append(LockFile("/dev/ttyACM0"))
+            except BaseException as error:
+                failed.append(error)
+
+        threads = [threading.Thread(target=take) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(got) == 1 and [type(error) for error in failed] == [PortBusyError]
+        assert [path.name for path in folder.iterdir()] == ["LCK..ttyACM0"]
+        got[0].release()
+        assert not list(folder.iterdir())
+
+
 def test_lock_of_a_living_process_in_old_binary_form_counts(folder: Path) -> None:
     (folder / "LCK..ttyACM0").write_bytes(struct.pack("<I", os.getppid()))
     with pytest.raises(PortBusyError) as busy:
