@@ -26,7 +26,7 @@ from boebot.link.ports import lock_file, serial_port
 from boebot.link.ports.lock_file import LockFile, PortBusyError, lock_name
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import SerialTransport
-from boebot.link.transport import BaudSelectable, Stamping
+from boebot.link.transport import BaudSelectable, CountsOverruns, Stamping
 from lines import Line, line, rfc2217_server
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
@@ -353,6 +353,30 @@ def test_rates_that_do_not_go_are_named(board: Line, monkeypatch: pytest.MonkeyP
         SerialTransport(board.path, 250_000)
     monkeypatch.undo()
     SerialTransport(board.path, 250_000).close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+def test_bytes_that_a_driver_lost_are_counted_from_the_opening(board: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    transport = SerialTransport(board.path)
+    assert isinstance(transport, CountsOverruns) and transport.overruns == 0, "a pty does not count"
+    transport.close()
+    counts = {"overrun": 3, "buf_overrun": 4}
+    real = fcntl.ioctl
+
+    def ioctl(descriptor: int, request: int, *arguments: bytearray) -> object:
+        if request != 0x545D:  # TIOCGICOUNT: cts dsr rng dcd rx tx frame overrun parity brk buf_overrun ...
+            return real(descriptor, request, *arguments)
+        struct.pack_into("20i", arguments[0], 0, *[1] * 7, counts["overrun"], 1, 1, counts["buf_overrun"], *[1] * 9)
+        return 0
+
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
+    transport = SerialTransport(board.path)
+    assert transport.overruns == 0
+    counts["overrun"] += 20
+    counts["buf_overrun"] += 1
+    assert transport.overruns == 21
+    transport.close()
+    assert transport.overruns == 0
 
 
 # ---- ports that cannot be opened ------------------------------------------------------------------------------------

@@ -15,6 +15,8 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import struct
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -31,6 +33,9 @@ from boebot.link.transport import Transport
 BAUD_MIN, BAUD_MAX = 9_600, 1_000_000
 POSIX = os.name == "posix"
 _DTR_OFF_S = 0.01  # the board's capacitor needs microseconds
+_TIOCGICOUNT = 0x545D  # Linux: struct serial_icounter_struct, 20 ints
+_ICOUNTER = struct.Struct("20i")
+_OVERRUN, _BUF_OVERRUN = 7, 10  # in the port's own buffer, in the driver's
 _BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 _NO_TERMINAL = (errno.ENOTTY, errno.EINVAL, errno.EISDIR, errno.ENXIO, errno.ENODEV)
 
@@ -81,6 +86,7 @@ class SerialTransport(DescriptorTransport):
             self.resets_board = pulse_dtr(device) if reset else _has_dtr(descriptor)
             self._device = device
             self.baud_given = baud_given
+            self._overruns_before = _overruns(descriptor)
             super().__init__(port, descriptor, release, thread)
         except BaseException as error:  # Ctrl-C, too: the lock must not stay with this process
             release()
@@ -107,6 +113,11 @@ class SerialTransport(DescriptorTransport):
                 self._device.baudrate = before
             raise BoardError(f"{self.name} does not run at {rate} baud") from None
         self._forget_received()
+
+    @property
+    def overruns(self) -> int:
+        """Bytes lost since the opening because a buffer was full, where the driver counts them (Linux); else 0."""
+        return 0 if self._closed else max(_overruns(self._descriptor) - self._overruns_before, 0)
 
     def _gone(self) -> str:
         return f"{self.name} has gone: unplugged, or closed by the other side"
@@ -224,6 +235,18 @@ def _has_dtr(descriptor: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def _overruns(descriptor: int) -> int:
+    """What the driver has counted since it was loaded; 0 where it does not count: a pty."""
+    counts = bytearray(_ICOUNTER.size)
+    try:
+        if sys.platform == "linux":
+            fcntl.ioctl(descriptor, _TIOCGICOUNT, counts)
+    except OSError:
+        return 0
+    fields: tuple[int, ...] = _ICOUNTER.unpack(counts)
+    return fields[_OVERRUN] + fields[_BUF_OVERRUN]
 
 
 def _keep_dtr_at_close(descriptor: int, *, keep: bool) -> None:
