@@ -370,9 +370,10 @@ def test_period_fits_the_telemetry(session: InProcess, telemetry_ticks: int, per
     result = boebot.run(lambda robot: times.append(robot.time), seconds=2, period=period)
     assert np.diff(times) == pytest.approx(stepping)
     assert result.period == pytest.approx(stepping)
-    assert len(result.notices) == (period != stepping)
-    if result.notices:
-        assert f"the brain steps every {stepping * 1000:g} ms, not every {period * 1000:g} ms" in result.notices[0]
+    said = [notice for notice in result.notices if notice.startswith("the brain steps every")]
+    assert len(said) == (period != stepping)
+    if said:
+        assert f"the brain steps every {stepping * 1000:g} ms, not every {period * 1000:g} ms" in said[0]
     assert result.late_steps == result.lost_frames == result.dead_man_stops == 0
 
 

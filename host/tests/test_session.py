@@ -676,6 +676,19 @@ def test_late_telemetry_is_counted() -> None:
     assert link.counters().late - late <= 4, "those that were under way"
 
 
+@pytest.mark.parametrize(("line_ticks", "parameter"), [(1, 1), (5, 1), (5, 2), (2, 5), (5, 5)])
+def test_telemetry_thinner_than_its_parameter_is_told(line_ticks: int, parameter: int) -> None:
+    peer = Peer()
+    peer.telemetry_period = line_ticks  # as its line allows
+    peer.parameters[messages.PARAMETERS["telemetry_period"].id] = parameter
+    link, _, _ = joined(peer)
+    told = (
+        f"the board at peer sends telemetry every {10 * line_ticks} ms, not every {10 * parameter} ms as its parameter "
+        "telemetry_period says: its line is slow"
+    )
+    assert link.notices == ([told] if line_ticks > parameter else [])
+
+
 def test_both_ends_count_by_the_same_eight_names() -> None:
     same = {"good", "bad", "resynchronised", "retransmitted", "duplicate", "overrun", "dropped", "late"}
     assert same == set(HostCounters().as_dict()) & set(messages.Counters._fields)

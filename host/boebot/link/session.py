@@ -51,6 +51,7 @@ _SIGNAL = messages.SetpointSignal
 _SPEED = messages.SetpointSpeed
 _COAST = messages.SetpointCoast
 _TIME_OUT = messages.PARAMETERS["session_time_out"]
+_PERIOD = messages.PARAMETERS["telemetry_period"]
 
 _NONCES = 1 << 21
 _BAUD = 500_000  # assumed for time-outs where the transport cannot tell
@@ -217,6 +218,7 @@ class Link:
             self._turn(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
         if search.changed:
             self._tell_baud(search)
+        self._tell_thinning()
         assert self.hello is not None
         return self.hello
 
@@ -602,6 +604,23 @@ class Link:
                 f"the board at {where} speaks at {search.baud} baud, not at {search.asked} as asked for"
             )
         self.notices.append(f"the board at {where} speaks at {search.baud} baud, not at {search.asked}")
+
+    def _tell_thinning(self) -> None:
+        """Where the line is slow the board sends telemetry less often than its parameter says."""
+        assert self.hello is not None
+        ticks = self.hello.telemetry_period
+        if ticks <= _PERIOD.minimum:
+            return
+        request = self.submit(messages.GetParameter, _PERIOD.id, what="tell parameter telemetry_period")
+        while not request.done:
+            self._turn(_NEVER)
+        answer = request.answer  # if there is none, whatever is asked next will tell why
+        if answer is not None and answer.status == messages.AnswerStatus.OK and answer.value < ticks:
+            sent_ms, wanted_ms = (1000 * count * self._tick_s for count in (ticks, answer.value))
+            self.notices.append(
+                f"the board at {self.transport.name} sends telemetry every {sent_ms:g} ms, not every {wanted_ms:g} ms "
+                "as its parameter telemetry_period says: its line is slow"
+            )
 
     def _learn_baud(self) -> None:
         baud = self.transport.baud if isinstance(self.transport, BaudSelectable) else 0
