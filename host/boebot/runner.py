@@ -37,7 +37,8 @@ from boebot.robots import RobotDescription, load_robot
 DEFAULT_PERIOD = 0.05  # s
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
 TIME_TO_LIVE_LIMIT_MS = 2000
-SILENCE_S = 1.0  # a board that says nothing for so long is lost
+SILENCE_S = 3.0  # a board that says nothing for so long is lost; after a reset its boot loader waits for up to 2 s
+SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
 STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PROGRESS_S = 0.1  # wall time between two reports of progress
@@ -305,6 +306,7 @@ class _Run:
         time_zero = 0.0  # run time at tick 0 of the board's present count
         end_s = self.seconds - tick_s / 2
         wait_s, quiet_s = (period + 1) * tick_s, 0.0
+        silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
         heard_s = transport.now()
         started = next_progress = wall.perf_counter()
         started_s = heard_s
@@ -315,8 +317,8 @@ class _Run:
                 equipment = self.equipment
             restarted = link.board_resets != self.resets
             if not received:
-                if transport.now() - heard_s > SILENCE_S + period * tick_s:
-                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {SILENCE_S:g} s")
+                if transport.now() - heard_s > silence_s + period * tick_s:
+                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
                 wait_s, quiet_s = (period + 1) * tick_s, 0.0
                 continue
             for payload, board_s, host_s, bound_s in received:  # noqa: B007

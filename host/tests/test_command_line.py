@@ -22,6 +22,7 @@ from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
 from boebot.interrupts import SIGNALS
 from boebot.link import messages
+from boebot.link.session import Link
 from boebot.robot import Robot
 from peer import InProcess, Peer, Pty, pty
 
@@ -402,6 +403,34 @@ def test_link_prints_an_object_every_second(board: InProcess, capsys: pytest.Cap
     seen = [json.loads(line) for line in out.splitlines()]
     assert len(seen) == 4
     assert seen[-1]["host"]["good"] > seen[0]["host"]["good"] > 0
+
+
+def test_link_says_that_telemetry_is_thinned(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    board.peer.telemetry_period = 5
+    _, out, err = boebot(capsys, "link", "--once", "--json")
+    assert "sends telemetry every 50 ms, not every 10 ms" in err
+    assert json.loads(out)["telemetry_period_ms"] == 50
+
+
+def test_link_refuses_to_watch_for_less_than_no_time(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, "link", "--json", "--seconds", "-1")
+    assert (code, out) == (2, "") and "seconds" in err
+    assert board.peer.openings == []
+
+
+def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -> None:
+    watched = Link(board)
+    watched.open()
+    while watched.transport.now() < 1.0:
+        watched.poll(0.01)
+    before = link_command.Rates(watched)
+    assert link_command.look(watched, before)["clock_bound_us"] < 500
+    board.peer.reset()
+    while watched.sessions == 1:
+        watched.poll(0.001)
+    seen = link_command.look(watched, before)
+    assert watched.clock.probes > 0
+    assert (seen["clock_bound_us"], seen["clock_offset_s"], seen["clock_drift_ppm"]) == (None, None, None)
 
 
 def test_parameters_are_listed_set_saved_and_reset(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:

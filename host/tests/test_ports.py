@@ -18,14 +18,15 @@ from pathlib import Path
 
 import pytest
 import serial
+from serial import rfc2217
 
 from boebot.boards import open_port
 from boebot.errors import BoardError
-from boebot.link.ports import lock_file
+from boebot.link.ports import lock_file, serial_port
 from boebot.link.ports.lock_file import LockFile, PortBusyError, lock_name
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import SerialTransport
-from boebot.link.transport import BaudSelectable, Stamping
+from boebot.link.transport import BaudSelectable, CountsOverruns, Stamping
 from lines import Line, line, rfc2217_server
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
@@ -88,6 +89,42 @@ def test_lock_of_a_dead_process_is_taken_over(folder: Path, content: bytes) -> N
     assert (folder / "LCK..ttyACM0").read_bytes() == b"%10d\n" % os.getpid()
     lock.release()
     assert not list(folder.iterdir())
+
+
+def test_lock_that_an_earlier_process_of_this_number_left_is_taken_over(folder: Path) -> None:
+    """As in a container, where numbers begin at 1."""
+    (folder / "LCK..ttyACM0").write_bytes(b"%10d\n" % os.getpid())
+    lock = LockFile("/dev/ttyACM0")
+    with pytest.raises(PortBusyError) as busy:
+        LockFile("/dev/ttyACM0")
+    assert busy.value.owner == os.getpid()
+    lock.release()
+    assert not list(folder.iterdir())
+    LockFile("/dev/ttyACM0").release()
+
+
+def test_one_of_two_threads_gets_the_lock_and_nothing_is_left(folder: Path) -> None:
+    both = threading.Barrier(2)
+    for _ in range(200):
+        got: list[LockFile] = []
+        failed: list[BaseException] = []
+
+        def take(got: list[LockFile] = got, failed: list[BaseException] = failed) -> None:
+            both.wait()
+            try:
+                got.append(LockFile("/dev/ttyACM0"))
+            except BaseException as error:
+                failed.append(error)
+
+        threads = [threading.Thread(target=take) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(got) == 1 and [type(error) for error in failed] == [PortBusyError]
+        assert [path.name for path in folder.iterdir()] == ["LCK..ttyACM0"]
+        got[0].release()
+        assert not list(folder.iterdir())
 
 
 def test_lock_of_a_living_process_in_old_binary_form_counts(folder: Path) -> None:
@@ -242,6 +279,21 @@ def test_reset_switches_dtr_off_and_on_in_case_it_was_left_on(board: Line, monke
     assert False not in switched, "Linux switches DTR on at opening; off and on again would be a reset"
 
 
+@pytest.mark.parametrize("when", ["pulse_dtr", "_keep_dtr_at_close"])
+def test_ctrl_c_while_a_port_is_opened_leaves_it_free(
+    board: Line, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(serial_port, when, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            open_port(board.path, 500_000)
+    assert not any((place / lock_name(board.path)).exists() for place in lock_file.USUAL_FOLDERS)
+    open_port(board.path, 500_000).close()
+
+
 # ---- bit rates ------------------------------------------------------------------------------------------------------
 
 
@@ -301,6 +353,30 @@ def test_rates_that_do_not_go_are_named(board: Line, monkeypatch: pytest.MonkeyP
         SerialTransport(board.path, 250_000)
     monkeypatch.undo()
     SerialTransport(board.path, 250_000).close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+def test_bytes_that_a_driver_lost_are_counted_from_the_opening(board: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    transport = SerialTransport(board.path)
+    assert isinstance(transport, CountsOverruns) and transport.overruns == 0, "a pty does not count"
+    transport.close()
+    counts = {"overrun": 3, "buf_overrun": 4}
+    real = fcntl.ioctl
+
+    def ioctl(descriptor: int, request: int, *arguments: bytearray) -> object:
+        if request != 0x545D:  # TIOCGICOUNT: cts dsr rng dcd rx tx frame overrun parity brk buf_overrun ...
+            return real(descriptor, request, *arguments)
+        struct.pack_into("20i", arguments[0], 0, *[1] * 7, counts["overrun"], 1, 1, counts["buf_overrun"], *[1] * 9)
+        return 0
+
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
+    transport = SerialTransport(board.path)
+    assert transport.overruns == 0
+    counts["overrun"] += 20
+    counts["buf_overrun"] += 1
+    assert transport.overruns == 21
+    transport.close()
+    assert transport.overruns == 0
 
 
 # ---- ports that cannot be opened ------------------------------------------------------------------------------------
@@ -471,6 +547,25 @@ def test_shared_port_is_reset_or_not() -> None:
             transport.close()
             assert transport.resets_board is reset
             assert server.serial.dtr_was[: len(expected)] == expected
+
+
+def test_server_that_refuses_to_switch_dtr_shares_its_port_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = rfc2217.PortManager._telnet_process_subnegotiation
+    off = rfc2217.COM_PORT_OPTION + rfc2217.SET_CONTROL + rfc2217.SET_CONTROL_DTR_OFF
+
+    def refusing(manager: rfc2217.PortManager, asked: bytes) -> None:
+        if asked == off:
+            manager.rfc2217_send_subnegotiation(rfc2217.SERVER_SET_CONTROL, rfc2217.SET_CONTROL_DTR_ON)
+        else:
+            real(manager, asked)
+
+    monkeypatch.setattr(rfc2217.PortManager, "_telnet_process_subnegotiation", refusing)
+    with rfc2217_server() as (server, board):
+        transport = Rfc2217Transport("127.0.0.1", server.port)
+        assert not transport.resets_board
+        board.send(b"!")
+        assert transport.read(2.0) == b"!"
+        transport.close()
 
 
 def test_shared_port_that_goes_away_is_noticed() -> None:

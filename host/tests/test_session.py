@@ -10,6 +10,7 @@ from channel import Channel, uniform
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
+from boebot.link.counters import HostCounters
 from boebot.link.delivery import LatchedAgainError, LinkTimes, SessionLostError, TakenOverError
 from boebot.link.session import Link, text
 from peer import InProcess, Peer, without
@@ -656,6 +657,48 @@ def test_telemetry_that_nobody_fetches_does_not_fill_the_memory() -> None:
     for _ in range(6000):
         link._turn(link.transport.now() + 0.01)
     assert len(link._telemetry) <= 4096 and link.counters().dropped > 500
+
+
+def test_late_telemetry_is_counted() -> None:
+    """Later than three periods of 10 ms after its tick; the line itself takes 0.9 ms."""
+    channel = Channel()
+    link, _, _ = joined(channel=channel)
+    listen(link, 2.0)
+    channel.to_host = lambda _: 0.025
+    listen(link, 0.5)
+    assert link.counters().late == 0
+    channel.to_host = lambda _: 0.035
+    listen(link, 0.5)
+    late = link.counters().late
+    assert 45 <= late <= 50
+    channel.to_host = lambda _: 0.0
+    listen(link, 0.5)
+    assert link.counters().late - late <= 4, "those that were under way"
+
+
+@pytest.mark.parametrize(("line_ticks", "parameter"), [(1, 1), (5, 1), (5, 2), (2, 5), (5, 5)])
+def test_telemetry_thinner_than_its_parameter_is_told(line_ticks: int, parameter: int) -> None:
+    peer = Peer()
+    peer.telemetry_period = line_ticks  # as its line allows
+    peer.parameters[messages.PARAMETERS["telemetry_period"].id] = parameter
+    link, _, _ = joined(peer)
+    told = (
+        f"the board at peer sends telemetry every {10 * line_ticks} ms, not every {10 * parameter} ms as its parameter "
+        "telemetry_period says: its line is slow"
+    )
+    assert link.notices == ([told] if line_ticks > parameter else [])
+
+
+def test_both_ends_count_by_the_same_eight_names() -> None:
+    same = {"good", "bad", "resynchronised", "retransmitted", "duplicate", "overrun", "dropped", "late"}
+    assert same == set(HostCounters().as_dict()) & set(messages.Counters._fields)
+
+
+def test_overruns_are_those_that_the_transport_knows_of() -> None:
+    link, _, session = joined()
+    assert link.counters().overrun == 0
+    session.overruns = 7  # type: ignore[attr-defined]
+    assert link.counters().overrun == 7
 
 
 @pytest.mark.parametrize("first_tick", [0, 0xFFFF - 50, 0xFFFFFFFF - 50])

@@ -217,6 +217,32 @@ def test_ctrl_c_ends_a_long_wait(board: Line) -> None:
     assert b"KeyboardInterrupt" in errors
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.parametrize("thread", THREADS)
+@pytest.mark.parametrize("ending", ["ends", "closes", "forgets"])
+def test_forked_child_leaves_its_parents_port_alone(board: Line, thread: bool, ending: str) -> None:
+    transport = SerialTransport(board.path, thread=thread)
+    board.send(b"one")
+    assert transport.read(5.0) == b"one"
+    child = os.fork()
+    if child == 0:
+        signal.alarm(5)  # one that hangs is killed
+        if ending == "ends":
+            transport._close_once()  # as Python does at its end
+        elif ending == "closes":
+            transport.close()
+        else:
+            transport._close_once.detach()
+            transport._reader = None  # its memory is freed
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    board.send(b"two")
+    assert transport.read(5.0) == b"two"
+    with pytest.raises(BoardError, match="busy"):
+        SerialTransport(board.path)
+    transport.close()
+
+
 def test_no_thread_or_descriptor_is_left_behind() -> None:
     def count() -> tuple[int, int]:
         return len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))  # noqa: PTH208
@@ -227,6 +253,29 @@ def test_no_thread_or_descriptor_is_left_behind() -> None:
         for _ in range(50):
             SerialTransport(board.path).close()
         assert count() == before
+
+
+@pytest.mark.skipif(not HAS_THREAD, reason="not built on this system")
+def test_port_that_gets_no_thread_is_one_sentence_and_no_crash() -> None:
+    """In a process of its own: what is asked here has crashed it. There is room for the port, not for the pipe."""
+    script = (
+        "import gc, os, resource\n"
+        "from boebot.errors import BoardError\n"
+        "from boebot.link.ports.descriptor import DescriptorTransport\n"
+        "master, slave = os.openpty()\n"
+        "used = max(int(name) for name in os.listdir('/dev/fd'))\n"
+        "resource.setrlimit(resource.RLIMIT_NOFILE, (used, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))\n"
+        "released = []\n"
+        "try:\n"
+        "    DescriptorTransport('port', slave, lambda: released.append(1))\n"
+        "except BoardError as error:\n"
+        "    print(error)\n"
+        "gc.collect()\n"
+        "print(released)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "port cannot be read: no memory, no file or no thread for it\n[1]\n"
 
 
 def test_switch_interval_is_short_while_a_port_is_open_and_then_as_before() -> None:

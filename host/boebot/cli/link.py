@@ -21,7 +21,7 @@ _WAIT_S = 0.05
 def link(
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
-    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after so long.")] = float("inf"),
+    seconds: Annotated[float, typer.Option(metavar="S", min=0, help="End by itself after so long.")] = float("inf"),
     once: Annotated[bool, typer.Option("--once", help="Print one look, after a second of listening, and end.")] = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object every second in place of the table.")
@@ -88,9 +88,9 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "frame_rate_hz": round((watched.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
         "round_trip_p50_ms": _ms(trips.quantile(0.5)),
         "round_trip_p99_ms": _ms(trips.quantile(0.99)),
-        "clock_offset_s": round(clock.offset, 6) if clock.probes else None,
-        "clock_drift_ppm": round(clock.drift * 1e6, 2) if clock.probes else None,
-        "clock_bound_us": round(clock.bound * 1e6, 1) if clock.probes else None,
+        "clock_offset_s": round(clock.offset, 6) if clock.bounded else None,
+        "clock_drift_ppm": round(clock.drift * 1e6, 2) if clock.bounded else None,
+        "clock_bound_us": round(clock.bound * 1e6, 1) if clock.bounded else None,
         "clock_restarts": clock.restarts,
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,

@@ -95,6 +95,11 @@ class BoardClock:
         """Error bound of the host time of the newest board time (s)."""
         return self._bound if self._known else _FAR_S
 
+    @property
+    def bounded(self) -> bool:
+        """Whether the newest board time's host time is known from both sides: a probe was answered."""
+        return self._known and self._bound < _FAR_S / 4
+
     def expect(self, board_s: float, heard_s: float) -> None:
         """The board's time is about this (s) at that host time: from its count of ticks, which rolls over later."""
         if not self._known:

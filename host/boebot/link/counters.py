@@ -13,7 +13,9 @@ _MODULUS = 65536
 class HostCounters:
     """What the host's end has counted since the link was made.
 
-    The decoder counts good, bad, resynchronised and lost frames; the rest is counted by the session.
+    Eight of them have the board's names, so that both ends stand side by side: good, bad, resynchronised,
+    retransmitted, duplicate, overrun, dropped, late. What happens at only one end differs in what it is about: each says
+    so. The decoder counts good, bad, resynchronised and lost frames, the transport overrun, the session the rest.
     """
 
     good: int = 0
@@ -30,14 +32,20 @@ class HostCounters:
     """answers and events that came again and were only acknowledged"""
     stray: int = 0
     """answers and events that nobody waited for: out of order, or of no session"""
+    overrun: int = 0
+    """bytes lost in this computer, by a full buffer of the serial port or of its driver, where the operating system
+    counts them (Linux), else 0; the thread that reads a port drops none. The board counts ticks, not bytes"""
     dropped: int = 0
-    """telemetry messages that nobody fetched"""
+    """telemetry messages that nobody fetched. At the board: messages not sent for want of room on the line"""
+    late: int = 0
+    """telemetry messages received more than three telemetry periods after their tick, by the clock's estimate, since
+    that is bounded: what a brain makes of them is too old. At the board: set-points refused for the same reason"""
     held: int = 0
     """events left unacknowledged because nobody fetched those before"""
     sessions: int = 0
     """sessions opened"""
     board_resets: int = 0
-    """times that the board came back with another nonce"""
+    """times that a new session's count of ticks had not gone on from that of the session before"""
     sessions_lost: int = 0
     """times that the board had ended the session, or another host had replaced it"""
 

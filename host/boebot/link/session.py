@@ -40,7 +40,7 @@ from boebot.link.delivery import (
     TakenOverError,
 )
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
-from boebot.link.transport import BaudSelectable, Stamping, Transport
+from boebot.link.transport import BaudSelectable, CountsOverruns, Stamping, Transport
 
 _M = TypeVar("_M")
 Telemetry = tuple[bytes, float, float, float]
@@ -51,6 +51,7 @@ _SIGNAL = messages.SetpointSignal
 _SPEED = messages.SetpointSpeed
 _COAST = messages.SetpointCoast
 _TIME_OUT = messages.PARAMETERS["session_time_out"]
+_PERIOD = messages.PARAMETERS["telemetry_period"]
 
 _NONCES = 1 << 21
 _BAUD = 500_000  # assumed for time-outs where the transport cannot tell
@@ -58,6 +59,7 @@ _BITS_PER_BYTE = 10
 _LOOK_S = 0.02  # how often the opening looks up
 _OTHER_HOST_S = 0.3  # besides its patience; the board says hello every 0.2 s
 _STOP_BYTES = 20
+_PERIODS_LATE = 3  # telemetry that comes later than so many of its periods after its tick is counted
 _SHORTEST_S = 1e-4  # a wait that rounds to nothing would never end on a clock that only waits advance
 _NEVER = math.inf
 _PATIENCE_S = 1.0  # a board that says no hello for so long while we ask has gone: silence again until it does
@@ -134,6 +136,8 @@ class Link:
         self._sequence = 0
         self._telemetry: list[Telemetry] = []
         self._dropped = 0
+        self._late = 0
+        self._late_after_s = _NEVER  # three telemetry periods
         self._take_over = take_over
         self._wanted = False  # a session
         self._refusing = False
@@ -214,6 +218,7 @@ class Link:
             self._turn(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
         if search.changed:
             self._tell_baud(search)
+        self._tell_thinning()
         assert self.hello is not None
         return self.hello
 
@@ -244,7 +249,9 @@ class Link:
             retransmitted=requests.retransmitted + self._stopping.retransmitted,
             duplicate=requests.duplicate + events.duplicate,
             stray=requests.stray + events.stray,
+            overrun=self.transport.overruns if isinstance(self.transport, CountsOverruns) else 0,
             dropped=self._dropped,
+            late=self._late,
             held=events.held,
             sessions=self.sessions,
             board_resets=self.board_resets,
@@ -598,6 +605,23 @@ class Link:
             )
         self.notices.append(f"the board at {where} speaks at {search.baud} baud, not at {search.asked}")
 
+    def _tell_thinning(self) -> None:
+        """Where the line is slow the board sends telemetry less often than its parameter says."""
+        assert self.hello is not None
+        ticks = self.hello.telemetry_period
+        if ticks <= _PERIOD.minimum:
+            return
+        request = self.submit(messages.GetParameter, _PERIOD.id, what="tell parameter telemetry_period")
+        while not request.done:
+            self._turn(_NEVER)
+        answer = request.answer  # if there is none, whatever is asked next will tell why
+        if answer is not None and answer.status == messages.AnswerStatus.OK and answer.value < ticks:
+            sent_ms, wanted_ms = (1000 * count * self._tick_s for count in (ticks, answer.value))
+            self.notices.append(
+                f"the board at {self.transport.name} sends telemetry every {sent_ms:g} ms, not every {wanted_ms:g} ms "
+                "as its parameter telemetry_period says: its line is slow"
+            )
+
     def _learn_baud(self) -> None:
         baud = self.transport.baud if isinstance(self.transport, BaudSelectable) else 0
         self.byte_s = _BITS_PER_BYTE / (baud or _BAUD)
@@ -636,7 +660,10 @@ class Link:
                     self._latest_s = stamp
                     self._replaced_since = _NEVER
                     time_us = int.from_bytes(payload[4:8], "little")
-                    self._telemetry.append((payload, *self.clock.observe(time_us, stamp)))
+                    observed = self.clock.observe(time_us, stamp)
+                    self._telemetry.append((payload, *observed))
+                    if stamp - observed[1] > self._late_after_s and self.clock.bounded:
+                        self._late += 1
         if len(self._telemetry) > _TELEMETRY_ROOM:
             self._dropped += len(self._telemetry) - _TELEMETRY_ROOM
             del self._telemetry[:-_TELEMETRY_ROOM]
@@ -665,6 +692,7 @@ class Link:
         self._time_out_s = hello.session_time_out / 1000
         if hello.session and hello.session == self._session:
             self.hello = hello
+            self._late_after_s = _PERIODS_LATE * hello.telemetry_period * self._tick_s
             self._replaced_since = _NEVER
             if not self.is_open:
                 self._opened(now)

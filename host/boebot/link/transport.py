@@ -73,6 +73,15 @@ class BaudSelectable(Protocol):
         """
 
 
+@runtime_checkable
+class CountsOverruns(Protocol):
+    """A transport that knows of bytes that were lost before it could read them."""
+
+    @property
+    def overruns(self) -> int:
+        """How many since it was opened, as far as the operating system counts them."""
+
+
 def stamped(transport: Transport, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
     """What arrived at any transport, in stamped pieces; where nobody stamped it, the stamp is now."""
     if isinstance(transport, Stamping):

@@ -48,17 +48,18 @@ class DescriptorTransport:
         self._descriptor = descriptor
         self._reader: Any = None
         if thread and HAS_THREAD:
-            self._reader = ffi.gc(lib.reader_start(descriptor), lib.reader_free)
-            if not self._reader:
+            reader = lib.reader_start(descriptor)
+            if reader == ffi.NULL:  # never to be given to reader_free
                 release()
-                raise BoardError(f"{name} cannot be read: no memory or no thread for it")
+                raise BoardError(f"{name} cannot be read: no memory, no file or no thread for it")
+            self._reader = ffi.gc(reader, lib.reader_free)
             self._bytes = ffi.new("uint8_t[]", _READ_BYTES)
             self._view = memoryview(ffi.buffer(self._bytes))
             self._times = ffi.new("double[]", _CHUNKS)
             self._ends = ffi.new("uint32_t[]", _CHUNKS)
         switch_interval.shorten()
         self._closed = False
-        self._close_once = weakref.finalize(self, _close, self._reader, release)
+        self._close_once = weakref.finalize(self, _close, self._reader, release, os.getpid())
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """What arrived, as soon as there is something, at the latest after `wait_s`."""
@@ -163,9 +164,10 @@ class DescriptorTransport:
             raise BoardError(f"{self.name} takes no bytes: its other side does not read")
 
 
-def _close(reader: Any, release: Callable[[], None]) -> None:
-    """Ends the thread first: it must not see another file under its descriptor's number."""
-    if reader is not None:
+def _close(reader: Any, release: Callable[[], None], process: int) -> None:
+    """Ends the thread first: it must not see another file under its descriptor's number. A forked child has no such
+    thread, but its parent has, and keeps the port: the child only gives its copy of the descriptor back."""
+    if reader is not None and os.getpid() == process:
         lib.reader_stop(reader)
     with contextlib.suppress(OSError):
         release()

@@ -1,15 +1,22 @@
 """Lock files of serial ports, as UUCP began them and minicom, picocom and others heed them: LCK..NAME holds the owner's
 process number. They keep programs apart that do not lock the port itself, and tell who has it.
+
+Within this process a register keeps threads apart. What lies there in this process's name and is not in the register
+was left by another one of that number, as numbers come again soon in a container.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import tempfile
 from pathlib import Path
 
 USUAL_FOLDERS = (Path("/run/lock"), Path("/var/lock"))
+
+
+_held: dict[tuple[int, str], LockFile] = {}  # by process, for a forked child inherits it, and name
 
 
 class PortBusyError(Exception):
@@ -30,16 +37,15 @@ class LockFile:
             PortBusyError: a living process has it.
         """
         name = lock_name(port)
-        places = {folder.resolve(): None for folder in (*USUAL_FOLDERS, Path(tempfile.gettempdir()))}
-        for folder in places:  # a lock counts wherever it lies
-            owner = living_owner(folder / name)
-            if owner is not None:
-                raise PortBusyError(owner)
         self._path: Path | None = None
-        for folder in places:
-            with contextlib.suppress(OSError):  # no such folder, or not ours to write
-                self._path = take(folder / name)
-                return
+        self._key = (os.getpid(), name)
+        if _held.setdefault(self._key, self) is not self:
+            raise PortBusyError(os.getpid())
+        try:
+            self._path = _take_somewhere(name)
+        except BaseException:
+            del _held[self._key]
+            raise
 
     def release(self) -> None:
         """Removes the file. May be called twice."""
@@ -47,6 +53,21 @@ class LockFile:
         if path is not None and read_owner(path) == os.getpid():
             with contextlib.suppress(OSError):
                 path.unlink()
+        if _held.get(self._key) is self:
+            del _held[self._key]
+
+
+def _take_somewhere(name: str) -> Path | None:
+    """Makes the lock file where it may lie; None: nowhere."""
+    places = {folder.resolve(): None for folder in (*USUAL_FOLDERS, Path(tempfile.gettempdir()))}
+    for folder in places:  # a lock counts wherever it lies
+        owner = living_owner(folder / name)
+        if owner is not None:
+            raise PortBusyError(owner)
+    for folder in places:
+        with contextlib.suppress(OSError):  # no such folder, or not ours to write
+            return take(folder / name)
+    return None
 
 
 def lock_name(port: str) -> str:
@@ -62,7 +83,7 @@ def take(path: Path) -> Path:
         PortBusyError: a living process has made it first.
         OSError: the folder is missing or not ours to write.
     """
-    mine = path.with_name(f"{path.name}.{os.getpid()}")
+    mine = _beside(path)
     mine.write_text(f"{os.getpid():10d}\n", encoding="ascii")
     try:
         for _ in range(10):  # others may try at the same time
@@ -93,9 +114,9 @@ def read_owner(path: Path) -> int | None:
 
 
 def living_owner(path: Path) -> int | None:
-    """The process that a lock file names, if it lives."""
+    """The process that a lock file names, if it lives and is another one: who asks holds nothing of that name yet."""
     owner = read_owner(path)
-    if owner is None or owner <= 0:
+    if owner is None or owner <= 0 or owner == os.getpid():
         return None
     try:
         os.kill(owner, 0)
@@ -106,9 +127,14 @@ def living_owner(path: Path) -> int | None:
     return owner
 
 
+def _beside(path: Path) -> Path:
+    """A name in the same folder that nobody else has, whatever containers share that folder."""
+    return path.with_name(f"{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
+
+
 def _remove_stale(path: Path) -> None:
     """Removes a dead process's lock; one that somebody living has made in its place meanwhile is put back."""
-    aside = path.with_name(f"{path.name}.stale.{os.getpid()}")
+    aside = _beside(path)
     with contextlib.suppress(FileNotFoundError):
         path.rename(aside)
         if living_owner(aside) is not None:

@@ -27,6 +27,7 @@ typedef struct {
 struct reader {
   int descriptor;
   bool terminal;
+  pid_t process; /* whose thread it is: a forked child has a copy of all this, but no thread */
   int wake[2]; /* a pipe: a byte in it ends the thread */
   pthread_t thread;
   bool running;
@@ -50,6 +51,8 @@ static struct timespec instant(double seconds) {
   const double whole = floor(seconds);
   return (struct timespec){.tv_sec = (time_t)whole, .tv_nsec = (long)((seconds - whole) * 1e9)};
 }
+
+static bool is_ours(const reader *self) { return self->process == getpid(); }
 
 static uint32_t smaller(uint32_t a, uint32_t b) { return a < b ? a : b; }
 
@@ -138,6 +141,7 @@ reader *reader_start(int descriptor) {
   }
   self->descriptor = descriptor;
   self->terminal = isatty(descriptor) == 1;
+  self->process = getpid();
   prepare_lock(self);
   self->running = start_thread(self) == 0;
   if (!self->running) {
@@ -161,6 +165,9 @@ int reader_take(reader *self, double wait_s, uint8_t *bytes, uint32_t room, doub
                 int chunk_room) {
   int taken = 0;
   uint32_t at = 0;
+  if (!is_ours(self)) {
+    return -1;
+  }
   pthread_mutex_lock(&self->lock);
   if (self->chunk_head == self->chunk_tail && !self->ended && wait_s > 0) {
     const struct timespec until = instant(seconds_now() + wait_s);
@@ -185,6 +192,9 @@ int reader_take(reader *self, double wait_s, uint8_t *bytes, uint32_t room, doub
 }
 
 void reader_forget(reader *self) {
+  if (!is_ours(self)) {
+    return;
+  }
   pthread_mutex_lock(&self->lock);
   self->tail = self->head;
   self->chunk_tail = self->chunk_head;
@@ -193,6 +203,9 @@ void reader_forget(reader *self) {
 }
 
 void reader_stop(reader *self) {
+  if (!is_ours(self)) {
+    return;
+  }
   pthread_mutex_lock(&self->lock);
   const bool running = self->running;
   self->running = false;
@@ -207,6 +220,12 @@ void reader_stop(reader *self) {
 }
 
 void reader_free(reader *self) {
+  if (!is_ours(self)) { /* the thread may have held the lock at the fork: it can be neither taken nor destroyed */
+    close(self->wake[0]);
+    close(self->wake[1]);
+    free(self);
+    return;
+  }
   reader_stop(self);
   close(self->wake[0]);
   close(self->wake[1]);

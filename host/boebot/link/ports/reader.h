@@ -2,7 +2,9 @@
  *
  * The thread never needs Python's global lock. It reads into a ring; reader_take hands out what is there, in the chunks
  * in which it came, each with the instant at which its read had returned: never before a byte of it had arrived. When the
- * ring is full the thread waits, and the operating system keeps what comes. POSIX; one thread takes at a time. */
+ * ring is full the thread waits, and the operating system keeps what comes. POSIX; one thread takes at a time.
+ *
+ * In a forked child there is no such thread: there reader_take returns -1, and the rest leaves the parent's alone. */
 #ifndef READER_H
 #define READER_H
 
@@ -12,7 +14,7 @@
 /* python: begin */
 typedef struct reader reader;
 
-/* Starts the thread. The descriptor stays the caller's, and open until reader_stop. NULL: no memory or no thread. */
+/* Starts the thread. The descriptor stays the caller's, and open until reader_stop. NULL: no memory, no pipe or no thread. */
 reader *reader_start(int descriptor);
 
 /* Waits at most wait_s seconds for the first chunk, then takes whole chunks as long as they fit into `room` bytes and

@@ -46,7 +46,11 @@ class Rfc2217Transport(PolledTransport):
             within(TIMEOUT_S, lambda: _open(device), lambda _: device.close())
         except (OSError, ValueError) as error:
             raise BoardError(_why_not(name, host, baud, error)) from None
-        self.resets_board = reset and pulse_dtr(device)
+        try:
+            self.resets_board = reset and pulse_dtr(device)
+        except BaseException:  # Ctrl-C
+            device.close()
+            raise
         super().__init__(name, device, baud_given=baud_given, gone="closed by the other side")
 
     def set_baud(self, rate: int) -> None:

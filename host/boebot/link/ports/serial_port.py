@@ -15,6 +15,8 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import struct
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -31,6 +33,9 @@ from boebot.link.transport import Transport
 BAUD_MIN, BAUD_MAX = 9_600, 1_000_000
 POSIX = os.name == "posix"
 _DTR_OFF_S = 0.01  # the board's capacitor needs microseconds
+_TIOCGICOUNT = 0x545D  # Linux: struct serial_icounter_struct, 20 ints
+_ICOUNTER = struct.Struct("20i")
+_OVERRUN, _BUF_OVERRUN = 7, 10  # in the port's own buffer, in the driver's
 _BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 _NO_TERMINAL = (errno.ENOTTY, errno.EINVAL, errno.EISDIR, errno.ENXIO, errno.ENODEV)
 
@@ -70,22 +75,24 @@ class SerialTransport(DescriptorTransport):
     ) -> None:
         """As `open_serial`."""
         check_baud(port, baud)
-        lock = take_lock(port)
         device = configured(port, baud, reset)
         device.exclusive = True
+        release = _releaser(device, take_lock(port))
         try:
             device.open()
             descriptor = device.fileno()
             _keep_for_us_alone(descriptor)
             _keep_dtr_at_close(descriptor, keep=not reset)
             self.resets_board = pulse_dtr(device) if reset else _has_dtr(descriptor)
-        except (OSError, ValueError, termios.error) as error:  # pyserial's SerialException is an OSError
-            device.close()
-            lock.release()
-            raise BoardError(why_not(port, baud, error)) from None
-        self._device = device
-        self.baud_given = baud_given
-        super().__init__(port, descriptor, _releaser(device, lock), thread)
+            self._device = device
+            self.baud_given = baud_given
+            self._overruns_before = _overruns(descriptor)
+            super().__init__(port, descriptor, release, thread)
+        except BaseException as error:  # Ctrl-C, too: the lock must not stay with this process
+            release()
+            if isinstance(error, (OSError, ValueError, termios.error)):  # pyserial's SerialException is an OSError
+                raise BoardError(why_not(port, baud, error)) from None
+            raise
 
     @property
     def baud(self) -> int:
@@ -107,6 +114,11 @@ class SerialTransport(DescriptorTransport):
             raise BoardError(f"{self.name} does not run at {rate} baud") from None
         self._forget_received()
 
+    @property
+    def overruns(self) -> int:
+        """Bytes lost since the opening because a buffer was full, where the driver counts them (Linux); else 0."""
+        return 0 if self._closed else max(_overruns(self._descriptor) - self._overruns_before, 0)
+
     def _gone(self) -> str:
         return f"{self.name} has gone: unplugged, or closed by the other side"
 
@@ -122,8 +134,11 @@ class WindowsSerialTransport(PolledTransport):
         try:
             device.open()
             self.resets_board = reset and pulse_dtr(device)
-        except (OSError, ValueError) as error:
-            raise BoardError(why_not(port, baud, error)) from None
+        except BaseException as error:
+            device.close()
+            if isinstance(error, (OSError, ValueError)):
+                raise BoardError(why_not(port, baud, error)) from None
+            raise
         super().__init__(port, device, baud_given=baud_given, gone="unplugged, or closed by the other side")
 
 
@@ -145,12 +160,12 @@ def configured(port: str, baud: int, reset: bool) -> serial.Serial:
 
 
 def pulse_dtr(device: serial.SerialBase) -> bool:
-    """Switches DTR off and on. False: the port has no such line (a pty)."""
+    """Switches DTR off and on. False: the port has no such line (a pty), or its RFC 2217 server refuses."""
     try:
         device.dtr = False
         time.sleep(_DTR_OFF_S)
         device.dtr = True
-    except OSError:
+    except (OSError, ValueError):  # pyserial's word for a refusal by a server
         return False
     return True
 
@@ -220,6 +235,18 @@ def _has_dtr(descriptor: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def _overruns(descriptor: int) -> int:
+    """What the driver has counted since it was loaded; 0 where it does not count: a pty."""
+    counts = bytearray(_ICOUNTER.size)
+    try:
+        if sys.platform == "linux":
+            fcntl.ioctl(descriptor, _TIOCGICOUNT, counts)
+    except OSError:
+        return 0
+    fields: tuple[int, ...] = _ICOUNTER.unpack(counts)
+    return fields[_OVERRUN] + fields[_BUF_OVERRUN]
 
 
 def _keep_dtr_at_close(descriptor: int, *, keep: bool) -> None:
