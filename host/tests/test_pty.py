@@ -34,7 +34,7 @@ def test_run_over_a_port() -> None:
         assert served.peer.command == (0.0, 0.0), "the motors are stopped at the end"
     assert result.truth is None and result.contacts == 0
     assert result.lost_frames == result.bad_frames == result.dead_man_stops == 0
-    assert 0.9 < result.wall_time < 2.0
+    assert 0.5 < result.wall_time < 2.0, "at the pace of the board, which catches up where this computer was busy"
     assert result.distance > 0.05, "by odometry"
 
 
