@@ -11,12 +11,13 @@ from __future__ import annotations
 import functools
 import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from elftools.dwarf.dwarf_expr import DWARFExprParser
 from elftools.elf.elffile import ELFFile
-from elftools.elf.sections import SymbolTableSection
+from elftools.elf.sections import Symbol, SymbolTableSection
 
 from tools.bench.avr_program import SOURCES, build
 
@@ -69,12 +70,23 @@ def _files(elf: ELFFile) -> dict[int, str]:
     return found
 
 
-def _modules_of_tables(elf: ELFFile) -> dict[int, str]:
-    """By address: the file whose local symbols stand around it, for tables that the compiler made without telling DWARF."""
+def _symbols(elf: ELFFile) -> Iterator[Symbol]:
     table = elf.get_section_by_name(".symtab")
     assert isinstance(table, SymbolTableSection)
+    yield from table.iter_symbols()
+
+
+def _span(elf: ELFFile, name: str) -> range:
+    """The addresses of a section."""
+    section = elf.get_section_by_name(name)
+    assert section is not None
+    return range(section["sh_addr"], section["sh_addr"] + section["sh_size"])
+
+
+def _modules_of_tables(elf: ELFFile) -> dict[int, str]:
+    """By address: the file that a local symbol belongs to, for tables that the compiler made without telling DWARF."""
     found, file = {}, ""
-    for symbol in table.iter_symbols():
+    for symbol in _symbols(elf):
         if symbol["st_info"]["type"] == "STT_FILE":
             file = symbol.name
         elif symbol["st_info"]["bind"] == "STB_LOCAL" and symbol["st_size"]:
@@ -94,14 +106,11 @@ def sizes() -> dict[str, Size]:
 def _sizes(elf: ELFFile) -> dict[str, Size]:
     files, tables = _files(elf), _modules_of_tables(elf)
     by_name = {Path(name).name: name for name in files.values()}
-    data = elf.get_section_by_name(".data")
-    initialised = range(data["sh_addr"], data["sh_addr"] + data["sh_size"])
+    initialised = _span(elf, ".data")
     flash: Counter[str] = Counter()
     ram: Counter[str] = Counter()
     seen = set()
-    table = elf.get_section_by_name(".symtab")
-    assert isinstance(table, SymbolTableSection)
-    for symbol in table.iter_symbols():
+    for symbol in _symbols(elf):
         address, size = symbol["st_value"], symbol["st_size"]
         if not size or symbol.name in RINGS or address in seen or symbol["st_info"]["type"] == "STT_SECTION":
             continue
@@ -111,8 +120,8 @@ def _sizes(elf: ELFFile) -> dict[str, Size]:
             flash[module] += size
         if address >= DATA_SPACE:
             ram[module] += size
-    text = elf.get_section_by_name(".text")["sh_size"] + data["sh_size"]
-    flash[""] += text - sum(flash.values())  # vectors, start-up, libraries
+    image = len(_span(elf, ".text")) + len(initialised)
+    flash[""] += image - sum(flash.values())  # vectors, start-up, libraries
     return {module: Size(flash[module], ram[module]) for module in sorted({*flash, *ram})}
 
 

@@ -52,7 +52,7 @@ static inline __attribute__((always_inline)) void cobs_put_all(cobs_stuffing *se
 }
 
 /* Takes the stuffing off in place; false unless it ends exactly at the end. count > 0 */
-static inline bool cobs_take_off(uint8_t *bytes, uint8_t count) {
+static inline bool unstuff(uint8_t *bytes, uint8_t count) {
   uint8_t step = *bytes;
   while (step < count) {
     count = (uint8_t)(count - step);

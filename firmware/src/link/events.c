@@ -25,7 +25,7 @@ static uint16_t number; /* of the event under way, or of the next one */
 static bool sent;       /* it was sent at least once */
 static uint16_t wait;   /* half milliseconds until it is sent again */
 
-static void none_under_way(void) {
+static __attribute__((noinline)) void none_under_way(void) {
   sent = false;
   wait = 0;
 }

@@ -21,14 +21,6 @@ static __attribute__((noinline)) uint32_t aligned_seed(uint8_t id, uint32_t sess
 }
 _Static_assert(FRAME_NO_SESSION > 0xFFFFFFul && FRAME_SEED_MAX << 3 <= 0xFFFFFFul, "seeds and none");
 
-/* The three bytes that follow the stuffed ones. */
-static inline void crc_spread(crc21 crc, uint8_t *check) {
-  crc21_spread(&crc);
-  check[0] = crc.high;
-  check[1] = crc.middle;
-  check[2] = crc.low;
-}
-
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
   crc21 crc = crc_start(seed);
   if (count > 0) {
@@ -57,14 +49,15 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
 }
 
 /* Whether what was collected is a message; leaves it unstuffed. What is too long to be one has no id of that length. */
-static inline bool accept(uint32_t seed, uint8_t *bytes, uint8_t count) {
+static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t count) {
   if (count < INSIDE_MIN || bytes[0] < 2) {
     return false;
   }
   const uint8_t id = bytes[1];
-  if ((uint8_t)((uint8_t)frame_accepted_length(id) + INSIDE_MIN - count) != 0) { /* in 8 bits */
+  if ((uint8_t)frame_accepted_length(id) != (uint8_t)(count - INSIDE_MIN)) {
     return false;
   }
+  const uint32_t seed = decoder->seed;
   const uint32_t aligned = aligned_seed(id, seed);
   if ((uint8_t)(aligned >> 24) != 0) {
     return false;
@@ -73,11 +66,13 @@ static inline bool accept(uint32_t seed, uint8_t *bytes, uint8_t count) {
   const uint8_t size = (uint8_t)(count - CHECK_BYTES);
   crc21_take_all(&crc, bytes, size);
   crc21_spread(&crc);
+  const uint8_t expected[CHECK_BYTES] = {crc.high, crc.middle, crc.low};
   const uint8_t *const check = bytes + size;
-  if (check[0] != crc.high || check[1] != crc.middle || check[2] != crc.low) {
-    return false;
+  /* branches, for a value made of them takes 14 bytes more */
+  if (check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2] && unstuff(bytes, size)) {
+    return true;
   }
-  return cobs_take_off(bytes, size);
+  return false;
 }
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
@@ -90,17 +85,17 @@ bool frame_decode_end(frame_decoder *decoder) {
   if (count == 0) {
     return false;
   }
-  if (accept(decoder->seed, decoder->bytes, count)) {
-    decoder->good++;
-    if (decoder->lost) {
-      decoder->lost = false;
-      decoder->resynchronised++;
+  if (!accept(decoder, decoder->bytes, count)) {
+    if (synchronised) {
+      decoder->bad++;
+      decoder->lost = true;
     }
-    return true;
+    return false;
   }
-  if (synchronised) {
-    decoder->bad++;
-    decoder->lost = true;
+  decoder->good++;
+  if (decoder->lost) {
+    decoder->lost = false;
+    decoder->resynchronised++;
   }
-  return false;
+  return true;
 }

@@ -19,5 +19,8 @@ void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t
   for (uint32_t i = 0; i < size; i++) {
     crc21_take(&crc, stuffed[i]);
   }
-  crc_spread(crc, check);
+  crc21_spread(&crc);
+  check[0] = crc.high;
+  check[1] = crc.middle;
+  check[2] = crc.low;
 }
