@@ -488,8 +488,8 @@ def test_parameter_outlasts_the_reset_at_opening_only_if_it_is_saved_with_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     def value(url: str) -> float:
-        number: float = json.loads(boebot(capsys, "parameters", "get", "ping_period", "--on", url, "--json")[1])["value"]
-        return number
+        _, out, _ = boebot(capsys, "parameters", "get", "ping_period", "--on", url, "--json")
+        return float(json.loads(out)["value"])
 
     with served() as url:
         default = value(url)
