@@ -184,9 +184,19 @@ class Series:
 
     @cached_property
     def overruns(self) -> int:
-        """Control ticks overrun during the run; the board's counter has 8 bits."""
+        """Control ticks overrun during the run; the board's counter has 8 bits and begins afresh with it."""
         counter = self.raw["overruns"]
-        return int(np.diff(counter).astype(np.uint8).sum()) if len(counter) else 0
+        if not len(counter):
+            return 0
+        more = np.diff(counter, prepend=counter[0]).astype(np.uint8)
+        more[self._restarted] = counter[self._restarted]
+        return int(more.sum())
+
+    @cached_property
+    def _restarted(self) -> Bools:
+        """Where the board was reset since the tick before; its count of ticks rolls over after 2^32."""
+        ticks = self.raw["tick"]
+        return np.asarray(np.diff(ticks, prepend=ticks[:1]).astype(np.int32) < 0, dtype=np.bool_)
 
     def _flag(self, name: str, bit: int) -> Bools:
         return np.asarray(self.raw[name] & bit, dtype=np.bool_)
@@ -205,10 +215,9 @@ class Series:
         device = self._robot.device.get(f"encoder_{side}")
         if not len(self) or not isinstance(device, robots.Encoder | robots.QuadratureEncoder):
             return np.zeros(len(self))
-        counts = self.raw[f"encoder_{side}"].astype(np.int64)
-        edges = np.diff(counts, prepend=counts[0])
-        restarted = np.diff(self.raw["tick"].astype(np.int64), prepend=0) < 0
-        edges[restarted] = 0  # counts began afresh
+        counts = self.raw[f"encoder_{side}"]  # 32 bits, and so are their differences: counts roll over
+        edges = np.diff(counts, prepend=counts[0]).astype(np.int32).astype(np.int64)
+        edges[self._restarted] = 0  # counts began afresh
         metres_per_edge = EncoderReader(
             side == "left", device.edges_per_turn, self._robot.body.wheel_radius_m, directed=True
         ).metres_per_edge
@@ -219,7 +228,7 @@ class Series:
                 [direction.update(float(s), float(t)) for s, t in zip(signal, steps, strict=True)],
                 dtype=np.int64,
             )
-        return edges * metres_per_edge
+        return np.asarray(edges * metres_per_edge, dtype=np.float64)
 
 
 def onsets(flags: Bools) -> int:

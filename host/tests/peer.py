@@ -87,6 +87,8 @@ class Peer:
         self.drift = 0.0
         self.first_us = 0
         self.first_tick = 0
+        self.first_edges = (0, 0)  # of the encoders, 32 bits with sign
+        self.overruns = 0  # modulo 256
         self.first_number = 0  # of requests and events in each session: to start near their roll-over
         self.supply_mv = 5000
         self.telemetry_period = 1
@@ -426,8 +428,8 @@ class Peer:
         return messages.Telemetry(
             tick=self.ticks,
             time=self._tick_us,
-            encoder_left=int(self._edges[0]),
-            encoder_right=int(self._edges[1]),
+            encoder_left=_signed(self.first_edges[0] + int(self._edges[0])),
+            encoder_right=_signed(self.first_edges[1] + int(self._edges[1])),
             edge_period_left=0,
             edge_period_right=0,
             whiskers=3 if self._touching else 0,
@@ -442,7 +444,7 @@ class Peer:
             latch=self.latch,
             latches=self.latches,
             setpoint_sequence=self._setpoint_sequence,
-            overruns=0,
+            overruns=self.overruns % 256,
         )
 
     # ---- events ------------------------------------------------------------------------------------------------------
@@ -542,6 +544,11 @@ class Peer:
         seed = self.session if self.protections.seed else SEED
         self._frames.append(encode(message.ID, self._sequence, message.pack(), seed))
         self._sequence = (self._sequence + 1) & 0xFF
+
+
+def _signed(count: int) -> int:
+    """As a counter of 32 bits with sign has it."""
+    return (count + 2**31) % 2**32 - 2**31
 
 
 class InProcess:

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from boebot import cli, runner
-from boebot.boards import BoardRequest
+from boebot.boards import BoardRequest, board_kinds
 from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
@@ -449,6 +449,74 @@ def test_parameters_are_listed_set_saved_and_reset(board: InProcess, capsys: pyt
     board.peer.reset()
     assert boebot(capsys, "parameters", "get", "servo_right_gain")[1] == "servo_right_gain = -190.5 us\n"
     assert "range" in boebot(capsys, "parameters", "list")[1]
+
+
+def test_set_and_reset_save_in_the_same_session(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    number = messages.PARAMETERS["ping_period"].id
+    default = board.peer.parameter("ping_period")
+    code, out, err = boebot(capsys, "parameters", "set", "ping_period", "8")
+    assert (code, out, board.peer.saved) == (0, "ping_period = 8 ticks\n", None)
+    assert "ping_period lasts only until this command ends, and its emulated board; --save keeps it" in err
+    _, out, err = boebot(capsys, "parameters", "set", "ping_period", "9", "--save", "--json")
+    assert (json.loads(out)["value"], json.loads(out)["saved"]) == (9, True)
+    assert "the EEPROM of the emulated board 'native' ends with this command" in err and "--save" not in err
+    assert board.peer.saved is not None and board.peer.saved[number] == 9
+    assert boebot(capsys, "parameters", "reset", "--save")[1] == "all parameters are reset and saved\n"
+    assert board.peer.saved[number] == default
+
+
+@contextlib.contextmanager
+def served() -> Iterator[str]:
+    """The port of an emulated robot that another process serves; opening it resets the robot."""
+    command = [sys.executable, "-m", "boebot", "serve", "--on", "native", "--pty", "--json"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heed_signals)
+    assert server.stdout is not None
+    try:
+        announced = ""
+        while not announced.endswith("}\n"):
+            line = server.stdout.readline()
+            assert line, "it does not serve"
+            announced += line
+        yield json.loads(announced)["url"]
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=10)
+
+
+@pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
+def test_parameter_outlasts_the_reset_at_opening_only_if_it_is_saved_with_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def value(url: str) -> float:
+        _, out, _ = boebot(capsys, "parameters", "get", "ping_period", "--on", url, "--json")
+        return float(json.loads(out)["value"])
+
+    with served() as url:
+        default = value(url)
+        assert default not in (7, 8)
+        _, _, err = boebot(capsys, "parameters", "set", "ping_period", "7", "--on", url)
+        assert f"opening {url} has reset the board" in err
+        assert "ping_period lasts only until the board's next reset; --save keeps it" in err
+        code, _, err = boebot(capsys, "parameters", "save", "--on", url)
+        assert code == 0 and "what was set and not saved is lost" in err
+        assert value(url) == default
+        code, _, err = boebot(capsys, "parameters", "set", "ping_period", "8", "--save", "--on", url)
+        assert code == 0 and "lasts only" not in err and "EEPROM" not in err
+        assert value(url) == 8
+        assert boebot(capsys, "parameters", "reset", "--on", url)[0] == 0
+        assert value(url) == 8, "the reset was not saved"
+        assert boebot(capsys, "parameters", "reset", "--save", "--on", url)[0] == 0
+        assert value(url) == default
+
+
+def test_board_that_the_opening_does_not_reset_is_not_said_to_be(capsys: pytest.CaptureFixture[str]) -> None:
+    with pty(Peer()) as port:
+        time.sleep(0.7)
+        _, _, err = boebot(capsys, "parameters", "set", "ping_period", "7", "--on", port.path)
+        assert "lasts only" in err and "has reset" not in err
+        assert boebot(capsys, "parameters", "save", "--on", port.path)[2] == ""
+        assert port.peer.saved is not None
+        assert port.peer.saved[messages.PARAMETERS["ping_period"].id] == 7
 
 
 @pytest.mark.parametrize(

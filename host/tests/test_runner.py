@@ -437,6 +437,38 @@ def test_progress_is_reported(session: InProcess) -> None:
     assert reported and all(0 <= passed <= 1 for passed in reported)
 
 
+def test_encoder_counts_roll_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 2^31 - 1, and for a wheel that is taken to turn backwards, too."""
+    plain, near = Peer(), Peer()
+    near.first_edges = (2**31 - 20, 2**31 - 30)
+
+    def turn(robot: Robot) -> None:
+        robot.drive(0.3, -0.3) if robot.time > 1 else robot.drive(0.3, 0.3)
+
+    expected = run_on(plain, turn, monkeypatch, seconds=3).series.wheel_travel
+    result = run_on(near, turn, monkeypatch, seconds=3)
+    left, right = result.series.raw["encoder_left"], result.series.raw["encoder_right"]
+    assert left[0] > 0 > left[-1] and right[0] > 0 > right[-1], "they did"
+    for travel, same in zip(result.series.wheel_travel, expected, strict=True):
+        assert travel == pytest.approx(same), "as without the roll-over"
+
+
+def test_overruns_are_counted_over_their_roll_over_and_over_resets(session: InProcess) -> None:
+    def overrun(tick: int) -> None:
+        if session.peer.starts == starts and 50 <= tick < 60:
+            session.peer.overruns += 1
+        elif session.peer.starts == starts and tick == 100:
+            session.peer.reset()
+            session.peer.overruns = 3
+
+    starts = session.peer.starts
+    session.peer.overruns = 250
+    session.before_tick = overrun
+    result = runner.execute(straight, seconds=3)
+    assert (result.error, result.resets) == (None, 1)
+    assert result.overruns == 10 + 3
+
+
 def test_realtime_run_takes_its_time(session: InProcess) -> None:
     result = boebot.run(straight, seconds=0.4, realtime=True)
     assert 0.35 < result.wall_time < 0.8

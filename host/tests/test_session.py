@@ -521,6 +521,43 @@ def test_stop_goes_before_a_request_under_way() -> None:
     assert peer.stops == 1
 
 
+def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> None:
+    channel = Channel(trace=[])
+    link, peer, _ = joined(channel=channel)
+    link._stopping.token = 253
+    for stops in range(1, 5):
+        assert link.stop_and_confirm() and peer.stops == stops
+    assert channel.trace is not None
+    assert [messages.MESSAGES[frame[2]].NAME for _, _, frame in channel.trace].count("stop") == 4, "none again"
+    assert link._stopping.token == 1
+    link._stopping.begin()
+    link._stopping.tries, link._stopping.last_s = 1, 1e9  # it is on its way
+    for token in (254, 255, 0, 1):
+        link._hear_stopped(messages.Stopped(token).pack(), 0.0)
+        assert link.stop_under_way
+    link._hear_stopped(messages.Stopped(2).pack(), 0.0)
+    assert not link.stop_under_way
+
+
+def test_probe_tokens_roll_over() -> None:
+    link, _, _ = joined()
+    listen(link, 0.5)
+    link._probe_token = 0xFFFF - 3
+    answered: list[int] = []
+    hear = link._handlers[messages.ClockAnswer.ID]
+
+    def watch(payload: bytes, now: float) -> None:
+        answered.append(messages.ClockAnswer.unpack(payload).token)
+        hear(payload, now)
+
+    link._handlers[messages.ClockAnswer.ID] = watch
+    probes = link.clock.probes
+    listen(link, 0.5)
+    assert answered[:8] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 3, 4]
+    assert link.clock.probes - probes == len(answered), "each of them told the clock something"
+    assert len(link._probes) <= 1, "none is taken for another"
+
+
 def test_stop_that_nobody_confirms_is_said() -> None:
     link, _, session = joined()
     session.channel.stalled = True

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
 from typing import Annotated, Any
 
 import typer
 
-from boebot.boards import BoardRequest, open_board
+from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import options, output
 from boebot.link import messages
 from boebot.link.session import Link, parameter_counts, parameter_spec
@@ -19,19 +20,55 @@ app = typer.Typer(help="List, read, set, save and reset the board's parameters."
 Name = Annotated[str, typer.Argument(metavar="NAME", help="As `boebot parameters list` names it.")]
 
 
+Save = Annotated[bool, typer.Option("--save", help="Also write all parameters to the board's EEPROM, at once.")]
+
+_TELEMETRY_S = 1.0  # how long to wait for the first telemetry
+
+
 @contextlib.contextmanager
-def _link(on: str, robot: str) -> Iterator[Link]:
-    """A session with the board, for as long as the block lasts. Nothing moves."""
+def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
+    """A session with the board, for as long as the block lasts. Nothing moves. Where parameters are to be changed, a
+    reset by the opening is told: it forgets those that were set before and not saved."""
+    begun_s = time.monotonic()
     session = open_board(on, BoardRequest(robot=load_robot(robot), record=False))
     try:
         link = Link(session.transport, record=False)
         link.open()
         for notice in link.notices:
             output.say(notice)
+        if changes and is_live(on) and _was_reset_since(link, begun_s):
+            output.say(
+                f"opening {link.transport.name} has reset the board: it has the parameters that were saved, or its "
+                "image's defaults; what was set and not saved is lost"
+            )
         yield link
         link.close()
     finally:
         session.close()
+
+
+def _was_reset_since(link: Link, begun_s: float) -> bool:
+    """Whether a live board's ticks began after that instant of the monotonic clock; False if it sends none."""
+    end_s = link.transport.now() + _TELEMETRY_S
+    while link.latest is None and link.transport.now() < end_s:
+        link.poll(_TELEMETRY_S / 20)
+    if link.latest is None or link.hello is None:
+        return False
+    up_s = int.from_bytes(link.latest[:4], "little") / link.hello.tick_rate
+    return up_s <= link.transport.now() - begun_s
+
+
+def _save(link: Link, on: str) -> None:
+    link.save_parameters()
+    if not is_live(on):
+        output.say(f"the EEPROM of the emulated board {on!r} ends with this command, and what is saved in it, too")
+
+
+def _tell_how_long(what: str, on: str, saved: bool) -> None:
+    """What is set and not saved does not last."""
+    if not saved:
+        until = "until the board's next reset" if is_live(on) else "until this command ends, and its emulated board"
+        output.say(f"{what} only {until}; --save keeps it")
 
 
 def described(name: str, value: float) -> dict[str, Any]:
@@ -97,33 +134,44 @@ def set_one(
     value: Annotated[float, typer.Argument(metavar="VALUE", help="In the parameter's unit.")],
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
+    save: Save = False,
     json: options.Json = False,
 ) -> None:
-    """Set a parameter until the board's next reset; `save` keeps it."""
+    """Set a parameter until the board's next reset; --save keeps it. Opening a port resets most boards."""
     parameter_counts(name, value)
-    with _link(on, robot) as link:
+    with _link(on, robot, changes=True) as link:
         now = link.set_parameter(name, value)
-    _show(name, now, json)
-
-
-@app.command()
-def save(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
-    """Write all parameters to the board's EEPROM: they outlast resets and power cuts."""
-    with _link(on, robot) as link:
-        link.save_parameters()
-    _done("saved", json)
-
-
-@app.command()
-def reset(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
-    """All parameters to the image's defaults; what is saved stays until `save`."""
-    with _link(on, robot) as link:
-        link.reset_parameters()
-    _done("reset", json)
-
-
-def _done(what: str, as_json: bool) -> None:
-    if as_json:
-        output.print_json({what: True})
+        if save:
+            _save(link, on)
+    if json:
+        output.print_json(described(name, now) | {"saved": save})
     else:
-        print(f"all parameters are {what}")
+        _show(name, now, False)
+    _tell_how_long(f"{name} lasts", on, save)
+
+
+@app.command("save")
+def save_all(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
+    """Write all parameters to the board's EEPROM: they outlast resets and power cuts."""
+    with _link(on, robot, changes=True) as link:
+        _save(link, on)
+    if json:
+        output.print_json({"saved": True})
+    else:
+        print("all parameters are saved")
+
+
+@app.command("reset")
+def reset_all(
+    on: options.On = "native", robot: options.RobotName = "shieldbot", save: Save = False, json: options.Json = False
+) -> None:
+    """All parameters to the image's defaults, until the board's next reset; --save keeps that."""
+    with _link(on, robot, changes=True) as link:
+        link.reset_parameters()
+        if save:
+            _save(link, on)
+    if json:
+        output.print_json({"reset": True, "saved": save})
+    else:
+        print(f"all parameters are reset{' and saved' if save else ''}")
+    _tell_how_long("the reset of the parameters lasts", on, save)

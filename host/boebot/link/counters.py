@@ -14,8 +14,8 @@ class HostCounters:
     """What the host's end has counted since the link was made.
 
     Eight of them have the board's names, so that both ends stand side by side: good, bad, resynchronised,
-    retransmitted, duplicate, overrun, dropped, late. What happens at only one end differs in what it is about: each says
-    so. The decoder counts good, bad, resynchronised and lost frames, the transport overrun, the session the rest.
+    retransmitted, duplicate, overrun, dropped, late. Where they are about other things at the other end they say so.
+    The decoder counts good, bad, resynchronised and lost frames, the transport overrun, the session the rest.
     """
 
     good: int = 0

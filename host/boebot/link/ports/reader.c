@@ -28,7 +28,7 @@ struct reader {
   int descriptor;
   bool terminal;
   pid_t process; /* whose thread it is: a forked child has a copy of all this, but no thread */
-  int wake[2]; /* a pipe: a byte in it ends the thread */
+  int wake[2];   /* a pipe: a byte in it ends the thread */
   pthread_t thread;
   bool running;
 
