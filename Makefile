@@ -27,7 +27,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and all of the link's error rates"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -59,8 +59,9 @@ bench:
 
 SECONDS ?= 3600
 soak:
-	@$(SIDE_BY_SIDE) ready-run
+	@$(SIDE_BY_SIDE) ready-bench
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
+	@$(PYTHON_VENV) -m tools.bench.saturation 60
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000

@@ -5,6 +5,7 @@ Every wait is in the board's own time and says what it waits for.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, TypeVar
@@ -120,16 +121,20 @@ class Rig:
         return found
 
     def request(self, kind: Any, *fields: int, within_s: float = 0.1) -> messages.Answer:
-        """Sends the next numbered request and returns its answer."""
+        """Sends the next numbered request, again if it or its answer is lost, and returns the answer."""
         self.answers.clear()
-        self.send(self.numbered(kind, *fields))
-        number = self._number
-        answer: messages.Answer = self.wait_for(
-            lambda: next((a for a in self.answers if isinstance(a, messages.Answer) and a.number == number), None),
-            within_s,
-            f"the answer to {kind.__name__}",
-        )
-        return answer
+        request = self.numbered(kind, *fields)
+
+        def answer() -> messages.Answer | None:
+            heard = (a for a in self.answers if isinstance(a, messages.Answer) and a.number == request.number)
+            return next(heard, None)
+
+        for _ in range(4):
+            self.send(request)
+            with contextlib.suppress(AssertionError):
+                found: messages.Answer = self.wait_for(answer, within_s, "")
+                return found
+        raise AssertionError(f"waited in vain for the answer to {kind.__name__}")
 
     def numbered(self, kind: Any, *fields: int) -> Any:
         """The next request of the session."""
