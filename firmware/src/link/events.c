@@ -84,8 +84,8 @@ void events_task(void) {
     wait = (uint16_t)(wait - SLOT);
     return;
   }
-  const bool others_wait = sent && link_room != 0; /* repetitions must not take the room that a message waits for */
-  if (end == queue || others_wait || !send_has_room(MSG_EVENT_LENGTH)) {
+  /* Repetitions must not take the room that a message waits for. */
+  if (end == queue || link_room != 0 || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
   queue->number = number;

@@ -15,8 +15,8 @@ extern "C" {
 /* The next frame is the first; the line carries `baud` * 100 bit/s. */
 void send_start(uint16_t baud);
 
-/* Sends a message with the seed of the open session; false if there is no room. A message that is not sent leaves a gap in the sequence numbers, so that
- * the host can count it, and is counted here. */
+/* Sends a message with the seed of the open session; false if there is no room. A message that is not sent leaves a gap
+ * in the sequence numbers, so that the host can count it, and is counted here. */
 bool send_message(uint8_t id, const void *payload, uint8_t length);
 
 /* Whether there is room for a message with a payload of that length and, after it, for the next telemetry, which is never

@@ -22,15 +22,15 @@
 static uint32_t seed;        /* of the session, or FRAME_NO_SESSION */
 static uint32_t board_nonce; /* that the next opening must name */
 static uint16_t silence;     /* ms since a frame of the session came, in whole ticks */
-static uint16_t hello_in;    /* ticks until the next hello; 0: it waits for room */
+static uint8_t hello_in;     /* ticks until the next hello; 0: it waits for room */
 
 /* Says hello now or, where it would leave no room for the next telemetry, in a later tick. */
 static void say_hello(void) {
   uint8_t room = MSG_HELLO_LENGTH + FRAME_OVERHEAD;
-  uint16_t period = HELLO_PERIOD_ALONE;
+  uint8_t period = HELLO_PERIOD_ALONE;
   if (session_is_open()) {
     room = MSG_HELLO_LENGTH + SEND_RESERVE;
-    const uint16_t telemetries = HELLO_TELEMETRIES * telemetry_line_period();
+    const uint8_t telemetries = (uint8_t)(HELLO_TELEMETRIES * telemetry_line_period()); /* 40 on the slowest line */
     period = telemetries > HELLO_PERIOD_OPEN ? telemetries : HELLO_PERIOD_OPEN;
   }
   hello_in = 0;
