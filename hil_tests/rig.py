@@ -121,7 +121,8 @@ class Rig:
         return found
 
     def request(self, kind: Any, *fields: int, within_s: float = 0.1) -> messages.Answer:
-        """Sends the next numbered request, again if it or its answer is lost, and returns the answer."""
+        """Sends the next numbered request, again if it or its answer is lost, and returns the answer. Each repetition
+        comes at another phase of the tick: what the board misses in one phase of each tick it hears in another."""
         self.answers.clear()
         request = self.numbered(kind, *fields)
 
@@ -134,6 +135,7 @@ class Rig:
             with contextlib.suppress(AssertionError):
                 found: messages.Answer = self.wait_for(answer, within_s, "")
                 return found
+            self.listen(0.37 * TICK_S)
         raise AssertionError(f"waited in vain for the answer to {kind.__name__}")
 
     def numbered(self, kind: Any, *fields: int) -> Any:
@@ -199,7 +201,7 @@ class Rig:
         return self.hello
 
     def open_session(self) -> messages.Hello:
-        """Opens a session; another's has to end first. A lost frame is sent again."""
+        """Opens a session; another's has to end first. A lost frame is sent again, at another phase of the tick."""
 
         def free() -> messages.Hello | None:
             heard = (a for a in self.answers if isinstance(a, messages.Hello) and a.session == 0)
@@ -217,6 +219,7 @@ class Rig:
             if self.hello is not None and self.hello.session == seed:
                 self._number = 0
                 return self.hello
+            self.listen(0.37 * TICK_S)
         raise AssertionError("the board opens no session")
 
     def arm(self) -> None:
