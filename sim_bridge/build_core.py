@@ -28,6 +28,7 @@ HEADERS = [
     "boards/script_board.h",
     "boards/board_access.h",
     "boards/native/native_board.h",
+    "logs.h",
     "loop.h",
 ]
 # What headers cannot say in a form that cffi reads.
@@ -47,7 +48,8 @@ SOURCES = [
     "boards/board_access.c",
     "boards/script_board.c",
     "boards/native/*.c",
-    "loop.c",
+    "logs.c",
+    "loop*.c",
 ]
 # No fused multiply-add: the same bits on every machine.
 WINDOWS = sys.platform == "win32"

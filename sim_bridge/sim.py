@@ -57,7 +57,7 @@ class Sim:
             raise MemoryError("simulation")
         # the board outlives the simulation, whichever of the two Python lets go of first
         self.handle = ffi.gc(handle, lambda handle, board=board: lib.sim_destroy(handle))
-        _done(lib.sim_add_robot(handle, board.address, imperfections.body_parameters(robot.body), x, y, heading))
+        _done(lib.sim_add_robot(handle, 0, board.address, imperfections.body_parameters(robot.body), x, y, heading))
         _done(lib.sim_add_battery(handle, 0, _battery_channel(robot), imperfections.battery_parameters()))
         for name, device in robot.device.items():
             if device.on:
@@ -102,7 +102,7 @@ class Sim:
         Raises:
             BoardError: the board's program crashed.
         """
-        if lib.sim_run(self.handle, cycles, quiet):
+        if lib.sim_run(self.handle, lib.SIM_ANY, cycles, quiet):
             fault = lib.board_fault(self.board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
             raise BoardError(f"the {self.board.description} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")

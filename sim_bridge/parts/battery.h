@@ -24,8 +24,7 @@ typedef struct {
 /* python: end */
 
 typedef struct {
-  part_place place;
-  uint8_t channel; /* analog channel 0..5, or PART_NO_PIN */
+  part part;
   battery_parameters parameters;
   double drawn_as;
   double pack_v;
@@ -34,12 +33,7 @@ typedef struct {
 
 #define BATTERY_NOMINAL_V 5.0
 
+/* A battery that is measured at analog channel 0..5, or at none (PART_NO_PIN). */
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters);
-
-/* `servo_a`: what the servos draw in this step of `dt` seconds. */
-void battery_step(battery *self, double servo_a, double dt);
-
-/* Voltage at the analog pin, sampled now. */
-double battery_sample(battery *self);
 
 #endif

@@ -23,43 +23,47 @@ double infrared_range_share(uint32_t period_cycles) {
   return sqrt(s / 0.97);
 }
 
-void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
-                   const infrared_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->led_pin = led_pin;
-  self->receiver_pin = receiver_pin;
-  self->parameters = *parameters;
-  part_drive(&self->place, 0, receiver_pin, BOARD_HIGH);
-}
-
 static void look(infrared *self, uint64_t cycle, uint32_t period) {
   const infrared_parameters *p = &self->parameters;
   const part_mount mount = {p->x, p->y, p->heading, p->beam};
-  const double spread = 1.0 + p->range_sigma * noise_next_normal(&self->place.noise); /* (3.1) */
-  const int falsely = noise_next_uniform(&self->place.noise) < p->false_hit;
+  const part_pose from = part_pose_at(&self->part, &mount, cycle);
+  const double spread = 1.0 + p->range_sigma * noise_next_normal(&self->part.noise); /* (3.1) */
+  const int falsely = noise_next_uniform(&self->part.noise) < p->false_hit;
   self->reach = p->range_m * infrared_range_share(period) * (spread > 0.0 ? spread : 0.0);
-  self->distance = part_look(&self->place, &mount, p->rays, self->reach, 0.0);
+  self->distance = part_look(&self->part, &from, p->beam, p->rays, self->reach, 0.0);
   self->seen = (uint8_t)(falsely || self->distance >= 0.0);
   self->burst_cycle = cycle;
   self->bursts++;
+  part_log_look(&self->part, cycle, LOOK_INFRARED, &from, p->beam, self->reach, self->distance);
 }
 
-int infrared_edge(infrared *self, uint64_t cycle, uint8_t level) {
-  if (level != BOARD_HIGH) return 0;
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  infrared *self = (infrared *)base;
+  (void)pin;
+  if (level != BOARD_HIGH) return;
   const uint64_t period = cycle - self->last_rise;
   self->last_rise = cycle;
   if (period < PERIOD_MINIMUM || period > PERIOD_MAXIMUM) {
     self->carrier_cycles = 0;
     self->seen = 0;
-    return 0;
+    return;
   }
   self->carrier_cycles++;
-  const int recognised = self->carrier_cycles == CYCLES_TO_HEAR;
-  if (recognised) look(self, cycle, (uint32_t)period);
+  if (self->carrier_cycles == CYCLES_TO_HEAR) look(self, cycle, (uint32_t)period);
   if (self->seen) { /* low from now on takes back the end that was queued a period ago */
-    part_drive(&self->place, cycle, self->receiver_pin, BOARD_LOW);
-    part_drive(&self->place, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
+    part_drive(base, cycle, self->receiver_pin, BOARD_LOW);
+    part_drive(base, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
   }
-  return recognised;
+}
+
+static const part_operations OPERATIONS = {.edge = edge};
+
+void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
+                   const infrared_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  const part_pin pins[] = {{led_pin, PART_HEARS}, {receiver_pin, PART_DRIVES | PART_PULLED_UP}};
+  part_join(&self->part, &OPERATIONS, place, pins, 2);
+  self->receiver_pin = receiver_pin;
+  self->parameters = *parameters;
+  part_drive(&self->part, 0, receiver_pin, BOARD_HIGH);
 }

@@ -23,8 +23,7 @@ double infrared_range_share(uint32_t period_cycles);
 /* python: end */
 
 typedef struct {
-  part_place place;
-  uint8_t led_pin;
+  part part;
   uint8_t receiver_pin;
   infrared_parameters parameters;
   uint64_t last_rise;
@@ -38,8 +37,5 @@ typedef struct {
 
 void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
                    const infrared_parameters *parameters);
-
-/* The board does `level` to the LED's pin from `cycle` on. Returns 1 if a burst was recognised just now. */
-int infrared_edge(infrared *self, uint64_t cycle, uint8_t level);
 
 #endif

@@ -24,8 +24,7 @@ typedef struct {
 enum { PING_ANSWER_WORLD = -1, PING_ANSWER_NONE = -2 };
 
 typedef struct {
-  part_place place;
-  uint8_t pin;
+  part part;
   ping_parameters parameters;
   uint8_t high;
   uint64_t rise;
@@ -38,7 +37,7 @@ typedef struct {
 
 void ping_init(ping *self, const part_place *place, uint8_t pin, const ping_parameters *parameters);
 
-/* The board does `level` to the pin from `cycle` on. Returns 1 if that was a trigger. */
-int ping_edge(ping *self, uint64_t cycle, uint8_t level);
+/* The Ping that this part is, or NULL. */
+ping *ping_of(part *base);
 
 #endif

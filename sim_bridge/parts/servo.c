@@ -22,15 +22,9 @@ double servo_curve(const servo_parameters *p, double pulse_us) {
   return p->mount * turn * p->wheel_radius;
 }
 
-void servo_init(servo *self, const part_place *place, uint8_t pin, const servo_parameters *parameters, double dt) {
-  memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->pin = pin;
-  self->parameters = *parameters;
-  self->lag_share = parameters->lag_s > 0.0 ? 1.0 - number_exp(-dt / parameters->lag_s) : 1.0;
-}
-
-void servo_edge(servo *self, uint64_t cycle, uint8_t level) {
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  servo *self = (servo *)base;
+  (void)pin;
   const uint8_t high = level == BOARD_HIGH;
   if (high == self->high) return;
   self->high = high;
@@ -47,11 +41,29 @@ void servo_edge(servo *self, uint64_t cycle, uint8_t level) {
   self->target = servo_curve(&self->parameters, width);
 }
 
-double servo_torque(servo *self, uint64_t cycle, double wheel_speed, double supply) {
-  if (self->pulses == 0 || cycle > self->last_pulse + HOLD_CYCLES) {
-    self->reference = wheel_speed;
-    return motor_coasting(&self->parameters.motor, wheel_speed);
+/* The torque of the coming step, by the wheel's speed and the supply as it begins. */
+static void before_step(part *base) {
+  servo *self = (servo *)base;
+  const chassis *c = base->chassis;
+  chassis_wheel *wheel = &base->chassis->wheel[self->side];
+  const motor_parameters *motor = &self->parameters.motor;
+  wheel->powered = self->pulses > 0;
+  if (self->pulses == 0 || c->since > self->last_pulse + HOLD_CYCLES) {
+    self->reference = wheel->speed;
+    wheel->torque = motor_coasting(motor, wheel->speed);
+    return;
   }
-  self->reference += self->lag_share * (self->target * supply - self->reference);
-  return motor_regulated(&self->parameters.motor, self->reference, wheel_speed, supply);
+  self->reference += self->lag_share * (self->target * c->supply - self->reference);
+  wheel->torque = motor_regulated(motor, self->reference, wheel->speed, c->supply);
+}
+
+static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step};
+
+void servo_init(servo *self, const part_place *place, uint8_t pin, int side, const servo_parameters *parameters,
+                double dt) {
+  memset(self, 0, sizeof *self);
+  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS}, 1);
+  self->side = side;
+  self->parameters = *parameters;
+  self->lag_share = parameters->lag_s > 0.0 ? 1.0 - number_exp(-dt / parameters->lag_s) : 1.0;
 }

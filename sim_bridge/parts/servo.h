@@ -29,8 +29,8 @@ double servo_curve(const servo_parameters *p, double pulse_us);
 /* python: end */
 
 typedef struct {
-  part_place place;
-  uint8_t pin;
+  part part;
+  int side; /* 0 left, 1 right */
   servo_parameters parameters;
   double lag_share; /* of the way to the target made in one world step */
   uint8_t high;
@@ -42,12 +42,8 @@ typedef struct {
   double reference; /* m/s, lagging behind it */
 } servo;
 
-void servo_init(servo *self, const part_place *place, uint8_t pin, const servo_parameters *parameters, double dt);
-
-/* The board does `level` to the pin from `cycle` on. */
-void servo_edge(servo *self, uint64_t cycle, uint8_t level);
-
-/* Torque on the wheel for the world step that begins at `cycle`. `supply`: share of the nominal voltage. */
-double servo_torque(servo *self, uint64_t cycle, double wheel_speed, double supply);
+/* A servo that turns the wheel of `side` (0 left, 1 right); `dt`: the world's step, s. */
+void servo_init(servo *self, const part_place *place, uint8_t pin, int side, const servo_parameters *parameters,
+                double dt);
 
 #endif

@@ -362,7 +362,7 @@ def test_several_robots_share_a_run_and_do_not_disturb_each_other() -> None:
         scripts = [lib.script_board_new() for _ in range(count)]
         for number, script in enumerate(scripts):
             address = int(lib.script_board_address(script))
-            assert lib.sim_add_robot(sim, address, body, 0.5 * number, 0.5 * number, 0.3) == number
+            assert lib.sim_add_robot(sim, number, address, body, 0.5 * number, 0.5 * number, 0.3) == 0
             assert lib.sim_add_battery(sim, number, 255, imperfections.battery_parameters()) == 0
             for side, (name, pin) in enumerate((("servo_left", 13), ("servo_right", 12))):
                 device = description.device[name]
@@ -375,7 +375,7 @@ def test_several_robots_share_a_run_and_do_not_disturb_each_other() -> None:
                     lib.script_board_edge(script, frame * 20 * MS + 100 * pin, pin, 1)
                 for pin, width in ((12, 1400 - 20 * number), (13, 1650)):
                     lib.script_board_edge(script, frame * 20 * MS + 100 * pin + width * US, pin, 0)
-        assert lib.sim_run(sim, CLOCK_HZ, CLOCK_HZ) == 0
+        assert lib.sim_run(sim, lib.SIM_ANY, CLOCK_HZ, CLOCK_HZ) == 0
         states = []
         for number in range(count):
             state = ffi.new("body_state *")
