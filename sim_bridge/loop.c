@@ -41,9 +41,11 @@ static void record(robot *r, uint64_t cycle) {
 }
 
 void robot_update_supply(robot *self) {
-  double volts = BOARD_NOMINAL_VOLTS;
-  if (self->battery != NULL) volts = self->battery->regulated_v;
-  self->chassis.supply = self->held_supply > 0.0 ? self->held_supply : volts / BOARD_NOMINAL_VOLTS;
+  chassis *c = &self->chassis;
+  const int held = self->held_supply > 0.0;
+  const supply *s = self->battery == NULL || held ? NULL : &self->battery->supply;
+  c->supply = s == NULL ? (held ? self->held_supply : 1.0) : s->board_v / BOARD_NOMINAL_VOLTS;
+  c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
 }
 
 /* Motors say their torque for the step that begins at `begin`. */

@@ -87,6 +87,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
       .y = y,
       .heading = heading,
       .supply = 1.0,
+      .servo_supply = 1.0,
       .recording = self->record_cycles > 0,
       .looks = &r->looks,
   };
@@ -138,7 +139,7 @@ static int join(robot *r, part *p) {
   return SIM_OK;
 }
 
-int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_parameters *parameters) {
+int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !is_pin(pin) || !is_side(side)) return SIM_BAD_ARGUMENT;
   servo *s = new_part(r, sizeof *s);

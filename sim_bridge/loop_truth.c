@@ -50,7 +50,7 @@ uint64_t sim_edges_seen(const sim *self, int number) {
 
 double sim_pack_voltage(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
-  return r == NULL || r->battery == NULL ? 0.0 : r->battery->pack_v;
+  return r == NULL || r->battery == NULL ? 0.0 : r->battery->supply.pack_v;
 }
 
 double sim_supply_voltage(const sim *self, int number) {

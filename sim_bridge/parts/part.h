@@ -65,7 +65,9 @@ typedef struct {
   uint32_t step_cycles;            /* and takes that long */
   double x, y, heading;            /* pose at `since`; the body's state is that at the step's end */
   chassis_wheel wheel[2];          /* left, right */
-  double supply;                   /* share of the nominal voltage, of the rail that board and servos run on */
+  double supply;                   /* share of the nominal voltage, of the rail that the board runs on */
+  double servo_supply;             /* and of that of the servos */
+  int at_charger;                  /* 1: the body stands at a charging station */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
   int recording;                   /* 1: looks are logged */
   buffer *looks;                   /* sim_look */
