@@ -48,6 +48,31 @@ void robot_update_supply(robot *self) {
   c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
 }
 
+#define ROBOT_HEIGHT_M 0.1 /* of its upper edge above the floor; what it carries looks from below it */
+
+void sim_update_scene(sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    const robot *r = self->robots[i];
+    const body_state *s = &r->body.state;
+    self->movers[i] = (mover){
+        .x = s->x,
+        .y = s->y,
+        .cosine = s->cosine,
+        .sine = s->sine,
+        .vx = s->speed * s->cosine - s->lateral * s->sine,
+        .vy = s->speed * s->sine + s->lateral * s->cosine,
+        .turn_rate = s->turn_rate,
+        .radius = r->body.parameters.radius,
+        .height = ROBOT_HEIGHT_M,
+        .infrared_reflectance = 1.0,
+        .sound_reflectance = 1.0,
+        .id = robot_mover_id(r->number),
+    };
+  }
+  self->around.movers = self->movers;
+  self->around.movers_count = (size_t)self->robot_count;
+}
+
 /* Motors say their torque for the step that begins at `begin`. */
 static void prepare(robot *r, uint64_t begin) {
   chassis *c = &r->chassis;
@@ -90,6 +115,7 @@ static void step_world(sim *self) {
     body_advance(&r->body, self->arena, wheel[SIM_LEFT].torque, wheel[SIM_RIGHT].torque, self->dt);
   }
   self->world += self->step_cycles;
+  sim_update_scene(self);
   for (int i = 0; i < self->robot_count; i++) follow(self->robots[i], self->world);
 }
 

@@ -10,6 +10,7 @@ int sim_place(sim *self, int number, double x, double y, double heading) {
   r->chassis.x = x;
   r->chassis.y = y;
   r->chassis.heading = heading;
+  sim_update_scene(self);
   return SIM_OK;
 }
 

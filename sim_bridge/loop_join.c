@@ -18,6 +18,7 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->arena = where;
+  self->around.arena = where;
   self->seed = seed;
   self->step_cycles = step_cycles;
   self->record_cycles = record_cycles;
@@ -42,6 +43,7 @@ void sim_destroy(sim *self) {
   if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
+  free(self->movers);
   free(self);
 }
 
@@ -69,6 +71,9 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
   if (robots == NULL) return SIM_NO_MEMORY;
   self->robots = robots;
+  mover *movers = realloc(self->movers, (size_t)(self->robot_count + 1) * sizeof *movers);
+  if (movers == NULL) return SIM_NO_MEMORY;
+  self->movers = movers;
   robot *r = calloc(1, sizeof *r);
   if (r == NULL) return SIM_NO_MEMORY;
   r->sim = self;
@@ -80,7 +85,8 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   r->chassis = (chassis){
       .board = b,
       .body = &r->body,
-      .arena = self->arena,
+      .around = &self->around,
+      .self_id = robot_mover_id(number),
       .since = self->world,
       .step_cycles = self->step_cycles,
       .x = x,
@@ -96,6 +102,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   b->sink_context = r;
   b->op->analog(b, robot_on_analog, r);
   insert(self, r);
+  sim_update_scene(self);
   return SIM_OK;
 }
 

@@ -56,6 +56,8 @@ struct sim {
   uint64_t next_record;
   robot **robots; /* by increasing number */
   int robot_count;
+  mover *movers; /* obstacles on their way, then robots in the order of `robots`, as they stand at `world` */
+  scene around;
 };
 
 /* The robot of that number, or NULL. */
@@ -70,6 +72,12 @@ uint64_t line_idle_cycles(uint32_t baud);
 
 /* The voltage of the rail as it is now goes to whoever runs on it. */
 void robot_update_supply(robot *self);
+
+/* Puts the robots into the scene as they stand now. */
+void sim_update_scene(sim *self);
+
+/* The id of a robot among the movers; never 0. */
+static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }
 
 /* Queues the edges of a test's square waves up to `until`. */
 void robot_step_waves(robot *self, uint64_t until);

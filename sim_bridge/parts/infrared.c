@@ -30,7 +30,7 @@ static void look(infrared *self, uint64_t cycle, uint32_t period) {
   const double spread = 1.0 + p->range_sigma * noise_next_normal(&self->part.noise); /* (3.1) */
   const int falsely = noise_next_uniform(&self->part.noise) < p->false_hit;
   self->reach = p->range_m * infrared_range_share(period) * (spread > 0.0 ? spread : 0.0);
-  self->distance = part_look(&self->part, &from, p->beam, p->rays, self->reach, 0.0);
+  self->distance = part_look(&self->part, &from, p->beam, p->rays, INFRARED_HEIGHT_M, self->reach, 0.0);
   self->seen = (uint8_t)(falsely || self->distance >= 0.0);
   self->burst_cycle = cycle;
   self->bursts++;

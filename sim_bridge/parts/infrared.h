@@ -22,6 +22,8 @@ typedef struct {
 double infrared_range_share(uint32_t period_cycles);
 /* python: end */
 
+#define INFRARED_HEIGHT_M 0.06 /* above the floor */
+
 typedef struct {
   part part;
   uint8_t receiver_pin;

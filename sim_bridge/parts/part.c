@@ -35,21 +35,18 @@ part_pose part_pose_at(const part *self, const part_mount *mount, uint64_t cycle
                      .heading = heading + mount->heading};
 }
 
-double part_look(const part *self, const part_pose *from, double beam, int rays, double reach, double grazing_cosine) {
-  const arena *around = self->chassis->arena;
+double part_look(const part *self, const part_pose *from, double beam, int rays, double height, double reach,
+                 double grazing_cosine) {
+  const chassis *c = self->chassis;
   double nearest = -1.0;
   for (int i = 0; i < rays; i++) {
     const double share = rays > 1 ? (double)i / (double)(rays - 1) - 0.5 : 0.0; /* (3.10), (3.11) */
     double sine, cosine;
     number_sincos(from->heading + share * beam, &sine, &cosine);
-    size_t hit = 0;
-    const double d = arena_ray(around, from->x, from->y, cosine, sine, reach, &hit);
+    ray_hit hit;
+    const double d = scene_ray(c->around, from->x, from->y, cosine, sine, reach, height, c->self_id, &hit);
     if (d < 0.0 || (nearest >= 0.0 && d >= nearest)) continue;
-    if (grazing_cosine > 0.0) {
-      const arena_edge *e = &arena_edges(around)[hit];
-      const double normal = fabs(cosine * e->ey - sine * e->ex) / sqrt(e->length_squared);
-      if (normal < grazing_cosine) continue;
-    }
+    if (fabs(cosine * hit.normal_x + sine * hit.normal_y) < grazing_cosine) continue;
     nearest = d;
   }
   return nearest;

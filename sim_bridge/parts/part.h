@@ -15,9 +15,9 @@
 
 #include "../boards/board.h"
 #include "../logs.h"
-#include "../world/arena.h"
 #include "../world/body.h"
 #include "../world/noise.h"
+#include "../world/scene.h"
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
@@ -60,7 +60,8 @@ typedef struct {
 typedef struct {
   board *board;
   body *body;
-  const arena *arena;
+  const scene *around; /* arena, moving obstacles, robots: also this one, as `self_id` */
+  uint32_t self_id;
   uint64_t since;                  /* the world's step under way begins here */
   uint32_t step_cycles;            /* and takes that long */
   double x, y, heading;            /* pose at `since`; the body's state is that at the step's end */
@@ -131,9 +132,10 @@ typedef struct {
 /* (3.9): the mount's pose at that cycle, by linear interpolation within the step under way. */
 part_pose part_pose_at(const part *self, const part_mount *mount, uint64_t cycle);
 
-/* The nearest edge within `reach` among `rays` rays spread over the beam, (3.9)-(3.11), or -1. Surfaces met flatter than
- * `grazing_cosine` (cosine of the angle to their normal) send nothing back; 0: all do. */
-double part_look(const part *self, const part_pose *from, double beam, int rays, double reach, double grazing_cosine);
+/* The nearest surface within `reach` among `rays` rays spread over the beam, `height` above the floor, (3.9)-(3.11), or
+ * -1. Surfaces met flatter than `grazing_cosine` (cosine of the angle to their normal) send nothing back; 0: all do. */
+double part_look(const part *self, const part_pose *from, double beam, int rays, double height, double reach,
+                 double grazing_cosine);
 
 /* Logs what a range sensor of that kind (sim_look) saw. */
 void part_log_look(const part *self, uint64_t cycle, int kind, const part_pose *from, double beam, double reach,

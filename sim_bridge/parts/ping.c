@@ -18,7 +18,8 @@ static uint64_t echo(ping *self, const part_pose *from) {
   const double spread = 1.0 + p->sigma * noise_next_normal(&self->part.noise);
   const int missed = noise_next_uniform(&self->part.noise) < p->miss;
   self->distance =
-      missed ? -1.0 : part_look(&self->part, from, p->beam, p->rays, p->range_maximum_m, p->grazing_cosine);
+      missed ? -1.0
+             : part_look(&self->part, from, p->beam, p->rays, PING_HEIGHT_M, p->range_maximum_m, p->grazing_cosine);
   if (self->distance < 0.0) return ECHO_MAXIMUM;
   double d = self->distance * spread;
   if (d < p->range_minimum_m) d = p->range_minimum_m;

@@ -21,6 +21,8 @@ typedef struct {
 } ping_parameters;
 /* python: end */
 
+#define PING_HEIGHT_M 0.08 /* above the floor */
+
 enum { PING_ANSWER_WORLD = -1, PING_ANSWER_NONE = -2 };
 
 typedef struct {

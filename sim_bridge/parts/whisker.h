@@ -15,6 +15,8 @@ typedef struct {
 } whisker_parameters;
 /* python: end */
 
+#define WHISKER_HEIGHT_M 0.03 /* above the floor */
+
 typedef struct {
   part part;
   whisker_parameters parameters;

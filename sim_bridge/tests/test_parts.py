@@ -74,9 +74,9 @@ def test_robot_reaches_the_speed_of_the_curve(offset_us: float) -> None:
     robot.pulses(2.0, {LEFT: 1500 + offset_us, RIGHT: 1500 - offset_us})
     robot.run(2.0)
     expected = lib.servo_motor_curve(servo(), 1500 + offset_us)
-    a, gain, alpha = lib.body_a(imperfections.body_parameters(robot.sim.robot.body)), 1.2, 1.0
-    assert robot.sim.body().speed == pytest.approx(expected * 2 * a * gain / (2 * a * gain + alpha), rel=2e-3)
-    assert abs(robot.sim.body().heading) < 1e-9
+    a, gain, alpha = lib.body_a(imperfections.body_parameters(robot.robot.description.body)), 1.2, 1.0
+    assert robot.robot.body().speed == pytest.approx(expected * 2 * a * gain / (2 * a * gain + alpha), rel=2e-3)
+    assert abs(robot.robot.body().heading) < 1e-9
 
 
 def test_servo_lags() -> None:
@@ -84,7 +84,7 @@ def test_servo_lags() -> None:
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    truth = robot.sim.truth()
+    truth = robot.robot.truth()
     rise = float(np.interp(0.63 * truth["speed"][-1], truth["speed"], truth["time"]))
     assert 0.050 <= rise - 0.0017 <= 0.080
 
@@ -93,9 +93,9 @@ def test_without_pulses_it_rolls_out_and_is_free() -> None:
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    assert robot.sim.body().speed > 0.15
+    assert robot.robot.body().speed > 0.15
     robot.run(0.5)
-    assert abs(robot.sim.body().speed) < 0.001
+    assert abs(robot.robot.body().speed) < 0.001
 
 
 @pytest.mark.parametrize("width_us", [100, 400, 2600, 5000])
@@ -103,7 +103,7 @@ def test_what_is_no_pulse_is_ignored(width_us: float) -> None:
     robot = scripted()
     robot.pulses(0.5, {LEFT: width_us, RIGHT: width_us})
     robot.run(0.5)
-    assert robot.sim.body().distance == 0
+    assert robot.robot.body().distance == 0
 
 
 def test_pulse_that_a_reset_cuts_short_still_twitches() -> None:
@@ -112,7 +112,7 @@ def test_pulse_that_a_reset_cuts_short_still_twitches() -> None:
     robot.edge(1000, LEFT, 1)
     robot.edge(1000 + 700 * US, LEFT, 2)
     robot.run(0.1)
-    assert robot.sim.body().wheel_left < -0.01
+    assert robot.robot.body().wheel_left < -0.01
 
 
 def test_weak_supply_slows_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +120,7 @@ def test_weak_supply_slows_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
         robot = scripted()
         robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
         robot.run(1.0)
-        return float(robot.sim.body().speed)
+        return float(robot.robot.body().speed)
 
     full = speed()
     monkeypatch.setattr(imperfections, "BATTERY_FULL_V", 4.9)
@@ -156,7 +156,7 @@ def test_encoder_edges_are_the_wheels_angle(left_us: int, right_us: int) -> None
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1500 + left_us, RIGHT: 1500 - right_us})
     robot.run(1.0)
-    body = robot.sim.body()
+    body = robot.robot.body()
     for pin, angle in zip(ENCODERS, (body.wheel_left, body.wheel_right), strict=True):
         # The disc starts half way between two edges; those of the last 4 us are still to come.
         expected = abs(math.floor(angle * 64 / (2 * math.pi) + 0.5))
@@ -171,7 +171,7 @@ def test_encoder_edges_come_at_exact_times() -> None:
     robot.pulses(3.0, {LEFT: 1600, RIGHT: 1400})
     robot.run(3.0)
     periods = np.diff([cycle for cycle, _ in edges(robot, 16)][-20:])
-    expected = 2 * math.pi * WHEEL / 64 / robot.sim.body().speed * CLOCK_HZ
+    expected = 2 * math.pi * WHEEL / 64 / robot.robot.body().speed * CLOCK_HZ
     assert periods == pytest.approx(expected, abs=3)
 
 
@@ -202,7 +202,7 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
         assert change in (-1, 1)
         count += change
         state = following
-    assert abs(count - robot.sim.body().wheel_left * 128 / (2 * math.pi)) <= 1
+    assert abs(count - robot.robot.body().wheel_left * 128 / (2 * math.pi)) <= 1
     assert (count > 50) == forward
 
 
