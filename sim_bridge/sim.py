@@ -1,4 +1,4 @@
-"""The loop of boards and world (loop.h) as Python calls it: an arena and any number of robots of a description in it."""
+"""The loop of boards and world (loop.h) as Python calls it: an arena and the robots in it."""
 
 from __future__ import annotations
 
