@@ -180,6 +180,11 @@ static void crash(avr_board *b, const char *format, ...) {
   b->crashed = true;
 }
 
+void refuse(avr_board *b, const char *what) {
+  crash(b, "the program uses %s, which is not built, in cycle %llu", what, (unsigned long long)b->avr->cycle);
+  stop_core(b);
+}
+
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
   avr_board *b = param;
   (void)irq;

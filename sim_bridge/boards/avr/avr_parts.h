@@ -103,6 +103,7 @@ enum {
   REG_ADCL = 0x78,
   REG_ADCH = 0x79,
   REG_ADCSRA = 0x7A,
+  REG_ADCSRB = 0x7B,
   REG_ADMUX = 0x7C,
   REG_TWBR = 0xB8,
   REG_TWSR = 0xB9,
@@ -288,8 +289,11 @@ typedef struct {
   uint64_t done;          /* when the conversion ends */
   uint64_t band_gap_from; /* since when the band gap is switched to the converter */
   bool first;             /* the next conversion is the first since the converter was enabled */
+  bool begun;             /* its first clock edge is past: the channel is fixed */
   bool sampled;
-  uint16_t result; /* in the register, as ADLAR has it */
+  uint64_t hold;     /* when the input is held */
+  uint8_t selection; /* ADMUX of the conversion under way */
+  uint16_t result;   /* in the register, as ADLAR has it */
   uint16_t sample;
   bool locked; /* ADCL was read, ADCH not yet */
 } converter_state;
@@ -359,6 +363,8 @@ void clear_flag(avr_board *b, uint8_t vector);
 void enable_interrupt(avr_board *b, uint8_t vector, bool enabled);
 void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled` */
 void want_reset(avr_board *b, board_reset_cause cause);
+/* The program asks for a thing that is not built: the board stops, and says so. */
+void refuse(avr_board *b, const char *what);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
