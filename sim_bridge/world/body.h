@@ -73,18 +73,18 @@ typedef struct {
 
 typedef struct {
   body_parameters parameters;
-  uint32_t id;           /* of the mover that it is; different for all robots of a world */
-  double reach;          /* of the body and of what touches on it, m from the axle's middle */
-  double body_reach;     /* of the body alone */
-  double force_gain;     /* A / M */
-  double drag;           /* alpha / M */
-  double torque_gain;    /* B / I */
-  double turn_drag;      /* beta / I */
-  double per_radius;     /* 1 / r */
-  double spin;           /* I_w / r^2: mass of a wheel's turning at the rim */
-  double slip_spin;      /* the same of a slipping wheel */
-  double mass, inertia;  /* of body and wheels without the wheels' turning: what a force on a slipping body meets */
-  double half_load;      /* on a wheel, N */
+  uint32_t id;          /* of the mover that it is; different for all robots of a world */
+  double reach;         /* of the body and of what touches on it, m from the axle's middle */
+  double body_reach;    /* of the body alone */
+  double force_gain;    /* A / M */
+  double drag;          /* alpha / M */
+  double torque_gain;   /* B / I */
+  double turn_drag;     /* beta / I */
+  double per_radius;    /* 1 / r */
+  double spin;          /* I_w / r^2: mass of a wheel's turning at the rim */
+  double slip_spin;     /* the same of a slipping wheel */
+  double mass, inertia; /* of body and wheels without the wheels' turning: what a force on a slipping body meets */
+  double half_load;     /* on a wheel, N */
   body_state state;
   body_surroundings near;
 } body;
@@ -127,5 +127,12 @@ int body_segment_touches(body *self, const scene *around, double x0, double y0, 
 
 /* 1 if nothing of the arena is within the body's reach, without looking at it. */
 int body_is_clear(body *self, const arena *where);
+
+/* Renews the lists of near things when the body has moved by more than `share` of what they are good for. */
+void body_look_around(body *self, const arena *where, double share);
+
+/* Numbers of the near edges or discs; NULL: all of the arena's are to be looked at. */
+const uint32_t *body_near_edges(const body *self, const arena *where, size_t *count);
+const uint32_t *body_near_discs(const body *self, const arena *where, size_t *count);
 
 #endif

@@ -175,17 +175,16 @@ void contact_find(body *self, const scene *around, double elapsed, double margin
   const double dy = self->state.y - near->y;
   out->nearest = near->slack - sqrt(dx * dx + dy * dy); /* what is not in the list is farther than this */
   const arena_edge *edges = arena_edges(around->arena);
-  const size_t edge_count = body_near_edges(self, around->arena);
-  const uint32_t *list = edge_count == near->edge_count ? near->edges : NULL;
-  for (size_t i = 0; i < edge_count; i++) {
+  size_t count;
+  const uint32_t *list = body_near_edges(self, around->arena, &count);
+  for (size_t i = 0; i < count; i++) {
     const arena_edge *e = &edges[list != NULL ? list[i] : i];
     const capsule c = {.ax = e->ax, .ay = e->ay, .bx = e->ax + e->ex, .by = e->ay + e->ey};
     meet(out, self, &c, margin);
   }
   const arena_disc *discs = arena_discs(around->arena);
-  const size_t disc_count = body_near_discs(self, around->arena);
-  list = disc_count == near->disc_count ? near->discs : NULL;
-  for (size_t i = 0; i < disc_count; i++) {
+  list = body_near_discs(self, around->arena, &count);
+  for (size_t i = 0; i < count; i++) {
     const arena_disc *d = &discs[list != NULL ? list[i] : i];
     const capsule c = {.ax = d->x, .ay = d->y, .bx = d->x, .by = d->y, .rounding = d->radius, .one_end = 1};
     meet(out, self, &c, margin);
@@ -396,13 +395,14 @@ static void move_part(body *const bodies[], size_t count, const scene *around, d
   contacts found;
   for (size_t i = 0; i < count; i++) {
     body_state *s = &bodies[i]->state;
+    if (bodies[i]->parameters.outline == NULL) contact_turn(bodies[i], s->turn_rate * dt); /* never in the way */
     before[i].x = s->x;
     before[i].y = s->y;
-    contact_turn(bodies[i], s->turn_rate * dt); /* (3.18) */
     before[i].heading = s->heading;
     before[i].cosine = s->cosine;
     before[i].sine = s->sine;
-    s->x += (s->speed * s->cosine - s->lateral * s->sine) * dt; /* (3.19)-(3.22) */
+    if (bodies[i]->parameters.outline != NULL) contact_turn(bodies[i], s->turn_rate * dt); /* (3.18) */
+    s->x += (s->speed * s->cosine - s->lateral * s->sine) * dt;                            /* (3.19)-(3.22) */
     s->y += (s->speed * s->sine + s->lateral * s->cosine) * dt;
   }
   double deepest = 0.0;

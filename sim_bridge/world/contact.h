@@ -15,12 +15,12 @@
 #define CONTACT_DEPTH 1e-9 /* m: less is not put out */
 
 typedef struct {
-  body *other;         /* NULL: nothing that gives way */
-  double nx, ny;       /* direction from there to the body */
-  double px, py;       /* point of the core, in the body's frame */
-  double qx, qy;       /* point on the other side: in the arena, or in the other body's frame */
-  double vx, vy;       /* its velocity, if it does not give way */
-  double apart;        /* distance of the two points in contact: the roundings */
+  body *other;   /* NULL: nothing that gives way */
+  double nx, ny; /* direction from there to the body */
+  double px, py; /* point of the core, in the body's frame */
+  double qx, qy; /* point on the other side: in the arena, or in the other body's frame */
+  double vx, vy; /* its velocity, if it does not give way */
+  double apart;  /* distance of the two points in contact: the roundings */
 } contact;
 
 typedef struct {

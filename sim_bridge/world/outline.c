@@ -21,7 +21,8 @@ static int meet(const double *a, const double *b, const double *c, const double 
   const double c2 = cross(a, b, d);
   const double c3 = cross(c, d, a);
   const double c4 = cross(c, d, b);
-  if (((c1 > 0.0 && c2 < 0.0) || (c1 < 0.0 && c2 > 0.0)) && ((c3 > 0.0 && c4 < 0.0) || (c3 < 0.0 && c4 > 0.0))) return 1;
+  if (((c1 > 0.0 && c2 < 0.0) || (c1 < 0.0 && c2 > 0.0)) && ((c3 > 0.0 && c4 < 0.0) || (c3 < 0.0 && c4 > 0.0)))
+    return 1;
   return (c1 == 0.0 && between(a, b, c)) || (c2 == 0.0 && between(a, b, d)) || (c3 == 0.0 && between(c, d, a)) ||
          (c4 == 0.0 && between(c, d, b));
 }

@@ -12,7 +12,14 @@
 
 /* python: begin */
 enum { BODY_CORNERS_MAXIMUM = 32 };
-enum { OUTLINE_OK = 0, OUTLINE_CORNERS = -1, OUTLINE_NUMBER = -2, OUTLINE_EDGE = -3, OUTLINE_CROSSING = -4, OUTLINE_THIN = -5 };
+enum {
+  OUTLINE_OK = 0,
+  OUTLINE_CORNERS = -1,
+  OUTLINE_NUMBER = -2,
+  OUTLINE_EDGE = -3,
+  OUTLINE_CROSSING = -4,
+  OUTLINE_THIN = -5
+};
 
 /* Shared by all bodies of that kind; it must outlive them. */
 typedef struct {
