@@ -48,29 +48,10 @@ void robot_update_supply(robot *self) {
   c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
 }
 
-#define ROBOT_HEIGHT_M 0.1 /* of its upper edge above the floor; what it carries looks from below it */
-
 void sim_update_scene(sim *self) {
-  for (int i = 0; i < self->robot_count; i++) {
-    const robot *r = self->robots[i];
-    const body_state *s = &r->body.state;
-    self->movers[i] = (mover){
-        .x = s->x,
-        .y = s->y,
-        .cosine = s->cosine,
-        .sine = s->sine,
-        .vx = s->speed * s->cosine - s->lateral * s->sine,
-        .vy = s->speed * s->sine + s->lateral * s->cosine,
-        .turn_rate = s->turn_rate,
-        .radius = r->body.parameters.radius,
-        .height = ROBOT_HEIGHT_M,
-        .infrared_reflectance = 1.0,
-        .sound_reflectance = 1.0,
-        .id = robot_mover_id(r->number),
-    };
-  }
-  self->around.movers = self->movers;
-  self->around.movers_count = (size_t)self->robot_count;
+  mover *robots = self->movers + self->obstacles;
+  for (int i = 0; i < self->robot_count; i++) body_as_mover(&self->robots[i]->body, &robots[i]);
+  self->seen = (scene){self->arena, self->movers, self->obstacles + (size_t)self->robot_count};
 }
 
 /* Motors say their torque for the step that begins at `begin`. */
@@ -81,8 +62,8 @@ static void prepare(robot *r, uint64_t begin) {
   c->x = s->x;
   c->y = s->y;
   c->heading = s->heading;
-  c->wheel[SIM_LEFT] = (chassis_wheel){.speed = body_left_speed(&r->body)};
-  c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = body_right_speed(&r->body)};
+  c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
+  c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     if (p->op->before_step != NULL) p->op->before_step(p);
@@ -110,10 +91,12 @@ static void step_world(sim *self) {
   }
   for (int i = 0; i < self->robot_count; i++) prepare(self->robots[i], self->world);
   for (int i = 0; i < self->robot_count; i++) {
-    robot *r = self->robots[i];
-    const chassis_wheel *wheel = r->chassis.wheel;
-    body_advance(&r->body, self->arena, wheel[SIM_LEFT].torque, wheel[SIM_RIGHT].torque, self->dt);
+    const chassis_wheel *wheel = self->robots[i]->chassis.wheel;
+    self->torques[i][SIM_LEFT] = wheel[SIM_LEFT].torque;
+    self->torques[i][SIM_RIGHT] = wheel[SIM_RIGHT].torque;
   }
+  const scene obstacles = {self->arena, self->movers, self->obstacles};
+  body_step(self->bodies, (size_t)self->robot_count, &obstacles, self->torques, self->dt);
   self->world += self->step_cycles;
   sim_update_scene(self);
   for (int i = 0; i < self->robot_count; i++) follow(self->robots[i], self->world);

@@ -18,7 +18,6 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->arena = where;
-  self->around.arena = where;
   self->seed = seed;
   self->step_cycles = step_cycles;
   self->record_cycles = record_cycles;
@@ -43,7 +42,6 @@ void sim_destroy(sim *self) {
   if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
-  free(self->movers);
   free(self);
 }
 
@@ -61,19 +59,17 @@ static void insert(sim *self, robot *r) {
   int i = self->robot_count++;
   for (; i > 0 && self->robots[i - 1]->number > r->number; i--) self->robots[i] = self->robots[i - 1];
   self->robots[i] = r;
+  for (i = 0; i < self->robot_count; i++) self->bodies[i] = &self->robots[i]->body;
 }
 
 int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
                   double heading) {
   board *b = (board *)address;
   if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
-  if (number < 0 || sim_robot(self, number) != NULL) return SIM_BAD_ARGUMENT;
+  if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
   robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
   if (robots == NULL) return SIM_NO_MEMORY;
   self->robots = robots;
-  mover *movers = realloc(self->movers, (size_t)(self->robot_count + 1) * sizeof *movers);
-  if (movers == NULL) return SIM_NO_MEMORY;
-  self->movers = movers;
   robot *r = calloc(1, sizeof *r);
   if (r == NULL) return SIM_NO_MEMORY;
   r->sim = self;
@@ -81,11 +77,12 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   r->board = b;
   r->idle = line_idle_cycles(LINE_RATE);
   body_init(&r->body, parameters, 0.0);
+  r->body.id = robot_mover_id(number);
   body_place(&r->body, x, y, heading);
   r->chassis = (chassis){
       .board = b,
       .body = &r->body,
-      .around = &self->around,
+      .around = &self->seen,
       .self_id = robot_mover_id(number),
       .since = self->world,
       .step_cycles = self->step_cycles,
@@ -170,7 +167,7 @@ int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_
 static void widen_reach(body *b, double x, double y) {
   const double distance = sqrt(x * x + y * y);
   if (distance > b->reach) b->reach = distance;
-  b->near.slack = -1.0;
+  b->near.slack = -1.0; /* look around again */
 }
 
 int sim_add_whisker(sim *self, int number, uint8_t pin, const whisker_parameters *parameters) {

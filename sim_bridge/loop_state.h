@@ -8,6 +8,7 @@
 #include "parts/part.h"
 
 #define WAVES_MAXIMUM 4
+#define OBSTACLES_MAXIMUM 64
 
 /* A square wave that a test puts on a pin. */
 typedef struct {
@@ -56,8 +57,11 @@ struct sim {
   uint64_t next_record;
   robot **robots; /* by increasing number */
   int robot_count;
-  mover *movers; /* obstacles on their way, then robots in the order of `robots`, as they stand at `world` */
-  scene around;
+  body *bodies[BODY_MAXIMUM]; /* of the robots, in their order */
+  double torques[BODY_MAXIMUM][2];
+  mover movers[OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
+  size_t obstacles;
+  scene seen; /* arena and all movers */
 };
 
 /* The robot of that number, or NULL. */

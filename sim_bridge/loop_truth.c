@@ -29,8 +29,9 @@ uint64_t sim_hash(const sim *self) {
   uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
   for (int i = 0; i < self->robot_count; i++) {
     const body_state *s = &self->robots[i]->body.state;
-    const double state[] = {s->x,       s->y,          s->heading,     s->speed,    s->turn_rate,
-                            s->lateral, s->wheel_left, s->wheel_right, s->distance, (double)s->touching};
+    const double state[] = {
+        s->x,         s->y,          s->heading,     s->speed,    s->turn_rate,        s->lateral,         s->rim_left,
+        s->rim_right, s->wheel_left, s->wheel_right, s->distance, (double)s->touching, (double)s->slipping};
     uint8_t bytes[sizeof state];
     memcpy(bytes, state, sizeof state);
     for (size_t k = 0; k < sizeof bytes; k++) hash = (hash ^ bytes[k]) * 0x100000001b3u;

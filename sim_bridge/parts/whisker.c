@@ -1,7 +1,6 @@
 /* whisker.c: see whisker.h. */
 #include "whisker.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "../world/numbers.h"
@@ -25,32 +24,15 @@ static void change(whisker *self, uint64_t cycle, uint8_t level) {
   }
 }
 
-/* 1 if the wire meets an edge of the arena, or another robot or a moving obstacle. */
-static int touches(whisker *self) {
-  const chassis *c = self->part.chassis;
-  const whisker_parameters *p = &self->parameters;
-  if (body_segment_touches(c->body, c->around->arena, p->root_x, p->root_y, p->tip_x, p->tip_y)) return 1;
-  if (c->around->movers_count < 2) return 0; /* this robot alone */
-  const part_mount root = {.x = p->root_x, .y = p->root_y};
-  const part_mount tip = {.x = p->tip_x, .y = p->tip_y};
-  const part_pose from = part_pose_at(&self->part, &root, part_step_end(&self->part));
-  const part_pose to = part_pose_at(&self->part, &tip, part_step_end(&self->part));
-  const double dx = to.x - from.x, dy = to.y - from.y, length = sqrt(dx * dx + dy * dy);
-  for (size_t i = 0; i < c->around->movers_count && length > 0.0; i++) {
-    const mover *m = &c->around->movers[i];
-    if (m->id == c->self_id || m->height < WHISKER_HEIGHT_M) continue;
-    if (mover_ray(m, from.x, from.y, dx / length, dy / length, length, NULL) >= 0.0) return 1;
-  }
-  return 0;
-}
-
 static void step(part *base) {
   whisker *self = (whisker *)base;
   uint8_t pressed;
   if (self->held >= 0) {
     pressed = (uint8_t)self->held;
   } else {
-    pressed = (uint8_t)touches(self);
+    const whisker_parameters *p = &self->parameters;
+    const chassis *c = base->chassis;
+    pressed = (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y);
   }
   if (pressed == self->pressed) return;
   self->pressed = pressed;
