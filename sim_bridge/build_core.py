@@ -18,6 +18,7 @@ HEADERS = [
     "world/numbers.h",
     "world/noise.h",
     "world/arena.h",
+    "world/scene.h",
     "world/motor.h",
     "world/body.h",
     "parts/servo.h",
