@@ -23,7 +23,6 @@ double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
 
 /* Layer i of the bell is as wide as edge i, [0, 256]; edge 256 is 0. */
 double noise_layer_edge(int i);
-/* python: end */
 
 /* A device's own sequence: each draw takes the next step. */
 typedef struct {
@@ -35,6 +34,7 @@ typedef struct {
   uint8_t keyed;
   uint8_t on; /* 0: uniform gives 0.5 and normal gives 0, always */
 } noise_source;
+/* python: end */
 
 /* Right edges of the layers, the widest first. */
 extern const double noise_layer_edges[NOISE_LAYERS + 1];
