@@ -38,6 +38,9 @@ HEADERS = [
     "world/sensors/table_noise.h",
     "world/sensors/unit.h",
     "world/sensors/sample_hold.h",
+    "vehicles/model.h",
+    "vehicles/vehicle.h",
+    "vehicles/wander.h",
     "parts/whisker.h",
     "parts/infrared.h",
     "parts/ping.h",
@@ -61,6 +64,7 @@ int body_segment_touches(body *self, const arena *where, double x0, double y0, d
 SOURCES = [
     "world/*.c",
     "world/sensors/*.c",
+    "vehicles/*.c",
     "parts/*.c",
     "boards/board_access.c",
     "boards/script_board.c",
