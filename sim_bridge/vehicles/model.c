@@ -7,15 +7,16 @@
 
 static int positive(double value) { return value > 0.0 && isfinite(value); }
 
-vehicle_model *vehicle_model_new(const body_parameters *body, double dt) {
-  if (!positive(dt) || !positive(body->mass) || !positive(body->inertia) || !positive(body->radius)) return NULL;
-  if (!positive(body->half_track) || !positive(body->wheel_radius)) return NULL;
-  if (!(body->wheel_mass >= 0.0 && body->wheel_inertia >= 0.0)) return NULL;
-  if (!(body->linear_damping >= 0.0 && body->angular_damping >= 0.0)) return NULL;
-  if (!isfinite(body->wheel_mass + body->wheel_inertia + body->linear_damping + body->angular_damping)) return NULL;
+vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
+  const body_parameters *b = parameters;
+  if (!positive(dt) || !positive(b->mass) || !positive(b->inertia) || !positive(b->radius)) return NULL;
+  if (!positive(b->half_track) || !positive(b->wheel_radius)) return NULL;
+  if (!(b->wheel_mass >= 0.0 && b->wheel_inertia >= 0.0)) return NULL;
+  if (!(b->linear_damping >= 0.0 && b->angular_damping >= 0.0)) return NULL;
+  if (!isfinite(b->wheel_mass + b->wheel_inertia + b->linear_damping + b->angular_damping)) return NULL;
   vehicle_model *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
-  self->body = *body;
+  self->body = *b;
   self->dt = dt;
   self->noise = self->ends_at_collision = 1;
   return self;
@@ -171,7 +172,7 @@ int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p
   return done(self, s, s != NULL && odometer_check(p) == 0, 3);
 }
 
-int vehicle_model_add_table(vehicle_model *self, const beam_parameters *beam, const table_noise *table, double range,
+int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
                             double none, double period) {
   vehicle_sensor *s = added(self, SENSOR_TABLE, period, 1);
   int usable = 0;
@@ -179,7 +180,7 @@ int vehicle_model_add_table(vehicle_model *self, const beam_parameters *beam, co
     s->as.table.table = table;
     s->as.table.range = range;
     s->as.table.none = none;
-    usable = beam_init(&s->as.table.beam, beam) == 0 && positive(range) && isfinite(none) && table != NULL;
+    usable = beam_init(&s->as.table.beam, look) == 0 && positive(range) && isfinite(none) && table != NULL;
   }
   return done(self, s, usable, 1);
 }

@@ -43,7 +43,7 @@ typedef struct vehicle_model vehicle_model;
 
 /* A model that steps by `dt` seconds, without drive and sensors; NULL without memory or with a body whose mass, inertia,
  * radius, half track or wheel radius is not positive, or dt <= 0. */
-vehicle_model *vehicle_model_new(const body_parameters *body, double dt);
+vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt);
 void vehicle_model_destroy(vehicle_model *self);
 
 /* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the inductance if `full`. Servo: 1500 us
@@ -73,7 +73,7 @@ int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p
 
 /* A sensor known by its table: distance along one ray, angle of incidence at what it meets; `none` beyond `range`. The
  * table stays the caller's. */
-int vehicle_model_add_table(vehicle_model *self, const beam_parameters *beam, const table_noise *table, double range,
+int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
                             double none, double period);
 
 /* Whisker: a segment from (x0, y0) to (x1, y1) in the body's frame; reads 1 while it touches something. */
