@@ -2,6 +2,7 @@
 #include "loop_state.h"
 
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
+#define FIRST_OBSTACLE_ID 0x80000000u      /* among the movers; robots have those below */
 #define SLICE_CYCLES 4000u                 /* how often the line is looked at while bytes are coming */
 
 /* ---- what boards do and ask ---------------------------------------------------------------------------------------- */
@@ -49,9 +50,42 @@ void robot_update_supply(robot *self) {
 }
 
 void sim_update_scene(sim *self) {
+  if (self->obstacles > 0) {
+    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, FIRST_OBSTACLE_ID, self->movers);
+  }
   mover *robots = self->movers + self->obstacles;
   for (int i = 0; i < self->robot_count; i++) body_as_mover(&self->robots[i]->body, &robots[i]);
   self->seen = (scene){self->arena, self->movers, self->obstacles + (size_t)self->robot_count};
+}
+
+/* 1: the robot stands at the arena's charging station. */
+static int is_at_charger(const robot *r) {
+  const arena_charger *charger = arena_charger_of(r->sim->arena);
+  if (charger == NULL) return 0;
+  const double dx = r->body.state.x - charger->x, dy = r->body.state.y - charger->y;
+  return dx * dx + dy * dy <= charger->radius * charger->radius;
+}
+
+/* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
+static void exchange_light(sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    const robot *from = self->robots[i];
+    for (int k = 0; k < from->part_count; k++) {
+      infrared *sender = infrared_of(from->parts[k]);
+      infrared_burst burst;
+      infrared_light span;
+      if (sender == NULL || !infrared_take_burst(sender, &burst, &span)) continue;
+      span.from += self->step_cycles + PART_GUARD;
+      span.until += self->step_cycles + PART_GUARD;
+      for (int j = 0; j < self->robot_count; j++) {
+        const robot *to = self->robots[j];
+        for (int n = 0; j != i && n < to->part_count; n++) {
+          infrared *receiver = infrared_of(to->parts[n]);
+          if (receiver != NULL) infrared_see_burst(receiver, &burst, &span);
+        }
+      }
+    }
+  }
 }
 
 /* Motors say their torque for the step that begins at `begin`. */
@@ -62,6 +96,7 @@ static void prepare(robot *r, uint64_t begin) {
   c->x = s->x;
   c->y = s->y;
   c->heading = s->heading;
+  c->at_charger = is_at_charger(r);
   c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
   c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
   for (int i = 0; i < r->part_count; i++) {
@@ -89,6 +124,7 @@ static void step_world(sim *self) {
     for (int i = 0; i < self->robot_count; i++) record(self->robots[i], self->world);
     self->next_record += self->record_cycles;
   }
+  if (self->robot_count > 1) exchange_light(self);
   for (int i = 0; i < self->robot_count; i++) prepare(self->robots[i], self->world);
   for (int i = 0; i < self->robot_count; i++) {
     const chassis_wheel *wheel = self->robots[i]->chassis.wheel;

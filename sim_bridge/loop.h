@@ -53,8 +53,8 @@ int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor
 int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn);
 int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
 int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
-                     const infrared_parameters *parameters);
-int sim_add_ping(sim *self, int robot, uint8_t pin, const ping_parameters *parameters);
+                     const infrared_pair_parameters *parameters);
+int sim_add_ping(sim *self, int robot, uint8_t pin, const sonar_parameters *parameters);
 int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
 
 /* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from the board of that robot

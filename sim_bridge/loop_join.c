@@ -15,6 +15,7 @@ uint64_t line_idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t
 
 sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise) {
   if (where == NULL || step_cycles < 2 * PART_GUARD || record_cycles % step_cycles != 0) return NULL;
+  if (arena_moving_count(where) > OBSTACLES_MAXIMUM) return NULL;
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->arena = where;
@@ -23,6 +24,8 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
   self->record_cycles = record_cycles;
   self->noise = noise;
   self->dt = (double)step_cycles / BOARD_CLOCK_HZ;
+  self->obstacles = arena_moving_count(where);
+  sim_update_scene(self);
   return self;
 }
 
@@ -112,7 +115,7 @@ static int is_side(int side) { return side == SIM_LEFT || side == SIM_RIGHT; }
 static part_place place_of(robot *r, uint32_t device) {
   return (part_place){
       .chassis = &r->chassis,
-      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise},
+      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise != 0},
   };
 }
 
@@ -141,6 +144,13 @@ static int join(robot *r, part *p) {
     if (level != BOARD_LOW) p->op->edge(p, r->board->op->now(r->board), pin, level);
   }
   return SIM_OK;
+}
+
+/* The same for a part whose `_init` may have found its parameters to be bad. */
+static int join_if(robot *r, part *p, int status) {
+  if (status == 0) return join(r, p);
+  free(p);
+  return SIM_BAD_ARGUMENT;
 }
 
 int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
@@ -183,24 +193,22 @@ int sim_add_whisker(sim *self, int number, uint8_t pin, const whisker_parameters
 }
 
 int sim_add_infrared(sim *self, int number, uint8_t led_pin, uint8_t receiver_pin,
-                     const infrared_parameters *parameters) {
+                     const infrared_pair_parameters *parameters) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !is_pin(led_pin) || !is_pin(receiver_pin)) return SIM_BAD_ARGUMENT;
   infrared *i = new_part(r, sizeof *i);
   if (i == NULL) return SIM_NO_MEMORY;
   const part_place place = next_place(r, PART_INFRARED);
-  infrared_init(i, &place, led_pin, receiver_pin, parameters);
-  return join(r, &i->part);
+  return join_if(r, &i->part, infrared_init(i, &place, led_pin, receiver_pin, parameters));
 }
 
-int sim_add_ping(sim *self, int number, uint8_t pin, const ping_parameters *parameters) {
+int sim_add_ping(sim *self, int number, uint8_t pin, const sonar_parameters *parameters) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
   ping *p = new_part(r, sizeof *p);
   if (p == NULL) return SIM_NO_MEMORY;
   const part_place place = next_place(r, PART_PING);
-  ping_init(p, &place, pin, parameters);
-  return join(r, &p->part);
+  return join_if(r, &p->part, ping_init(p, &place, pin, parameters));
 }
 
 int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parameters *parameters) {

@@ -17,7 +17,7 @@
 #include "../logs.h"
 #include "../world/body.h"
 #include "../world/noise.h"
-#include "../world/scene.h"
+#include "../world/sensors/beam.h"
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
@@ -79,6 +79,13 @@ enum { LOOK_INFRARED = 0, LOOK_PING = 1 };
 
 typedef struct part part;
 
+/* A turret on the body: what is mounted on it turns with it. */
+typedef struct {
+  double x, y;   /* of its axis, in the body's frame, m */
+  double before; /* angle when the step under way begins, rad, counter-clockwise from straight ahead */
+  double angle;  /* and when it ends */
+} part_turret;
+
 /* What a kind of part does; NULL: nothing. */
 typedef struct {
   /* The board does `level` (LOW, HIGH, RELEASED, PULLED_UP) to a pin that the part hears, from `cycle` on. */
@@ -99,7 +106,8 @@ struct part {
   chassis *chassis;
   noise_source noise;
   part_pin pins[PART_PINS];
-  int off; /* 1: its pins were taken from it; it neither hears nor drives */
+  const part_turret *turret; /* that carries it; NULL: the body does */
+  int off;                   /* 1: its pins were taken from it; it neither hears nor drives */
 };
 
 /* Where a part is joined; the loop knows it when the part is made. */
@@ -117,28 +125,12 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
 /* End of the world's step under way. */
 static inline uint64_t part_step_end(const part *self) { return self->chassis->since + self->chassis->step_cycles; }
 
-/* Where something looks from, in the body's frame. */
-typedef struct {
-  double x, y;    /* m */
-  double heading; /* rad */
-  double beam;    /* full opening, rad */
-} part_mount;
+/* Where the body is at that cycle, by linear interpolation within the step under way, and what is around it; for a part
+ * on a turret, where a body would be that carries the part turned so. */
+viewpoint part_view(const part *self, uint64_t cycle);
 
-/* Pose of a mount in the arena. */
-typedef struct {
-  double x, y, heading;
-} part_pose;
-
-/* (3.9): the mount's pose at that cycle, by linear interpolation within the step under way. */
-part_pose part_pose_at(const part *self, const part_mount *mount, uint64_t cycle);
-
-/* The nearest surface within `reach` among `rays` rays spread over the beam, `height` above the floor, (3.9)-(3.11), or
- * -1. Surfaces met flatter than `grazing_cosine` (cosine of the angle to their normal) send nothing back; 0: all do. */
-double part_look(const part *self, const part_pose *from, double beam, int rays, double height, double reach,
-                 double grazing_cosine);
-
-/* Logs what a range sensor of that kind (sim_look) saw. */
-void part_log_look(const part *self, uint64_t cycle, int kind, const part_pose *from, double beam, double reach,
-                   double distance);
+/* Logs what a range sensor of that kind saw: `beam` as its parameters have it. */
+void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *beam,
+                   double reach, double distance);
 
 #endif
