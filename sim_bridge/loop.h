@@ -14,10 +14,14 @@
 
 #include "boards/board.h"
 #include "logs.h"
+#include "parts/analog_infrared.h"
 #include "parts/battery.h"
+#include "parts/compass.h"
 #include "parts/infrared.h"
+#include "parts/light_sensor.h"
 #include "parts/ping.h"
 #include "parts/servo.h"
+#include "parts/turret.h"
 #include "parts/whisker.h"
 #include "world/arena.h"
 #include "world/body.h"
@@ -55,6 +59,16 @@ int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters 
 int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
                      const infrared_pair_parameters *parameters);
 int sim_add_ping(sim *self, int robot, uint8_t pin, const sonar_parameters *parameters);
+/* The HMC5883L on the two-wire bus of those pins; the bus comes with its first device. */
+int sim_add_compass(sim *self, int robot, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters);
+int sim_add_analog_infrared(sim *self, int robot, uint8_t channel, const sharp_infrared_parameters *parameters);
+int sim_add_light_sensor(sim *self, int robot, uint8_t pin, const light_sensor_parameters *parameters);
+int sim_add_buzzer(sim *self, int robot, uint8_t pin);
+/* A position servo with its axis at (x, y) of the body's frame, m, and the sensor that it carries: the part that
+ * drives `pin` of the board, or is measured there. The sensor's place and heading are those with the turret straight
+ * ahead. */
+int sim_add_turret(sim *self, int robot, uint8_t pin, double x, double y, const motor_position_parameters *parameters);
+int sim_mount(sim *self, int robot, uint8_t turret_pin, uint8_t pin);
 int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
 
 /* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from the board of that robot
@@ -82,6 +96,10 @@ const sim_truth *sim_record(const sim *self, int robot, size_t *count);
 const sim_look *sim_looks(const sim *self, int robot, size_t *count);
 uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
 uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
+
+/* What buzzers sounded, oldest first; a tone that sounds is not yet in it. */
+const sim_tone *sim_tones(const sim *self, int robot, size_t *count);
+double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 where there is no turret */
 
 /* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */
 size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "loop_state.h"
+#include "parts/buzzer.h"
 #include "parts/encoder.h"
 
 #define BITS_PER_BYTE 10u
@@ -37,6 +38,7 @@ static void destroy_robot(robot *r) {
   buffer_free(&r->received);
   buffer_free(&r->truth);
   buffer_free(&r->looks);
+  buffer_free(&r->tones);
   edge_log_free(&r->edges);
   free(r);
 }
@@ -96,6 +98,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
       .servo_supply = 1.0,
       .recording = self->record_cycles > 0,
       .looks = &r->looks,
+      .tones = &r->tones,
   };
   memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
   b->sink = robot_on_edge;
@@ -225,4 +228,98 @@ int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parame
   battery_init(b, &place, channel, parameters);
   r->battery = b;
   return join(r, &b->part);
+}
+
+static two_wire *bus_at(const robot *r, uint8_t sda_pin, uint8_t scl_pin) {
+  for (int i = 0; i < r->part_count; i++) {
+    two_wire *bus = two_wire_of(r->parts[i]);
+    if (bus != NULL && bus->sda_pin == sda_pin && bus->scl_pin == scl_pin) return bus;
+  }
+  return NULL;
+}
+
+/* The bus at those pins, a new one if need be; NULL without memory. */
+static two_wire *bus_of(robot *r, uint8_t sda_pin, uint8_t scl_pin) {
+  two_wire *bus = bus_at(r, sda_pin, scl_pin);
+  if (bus != NULL) return bus;
+  bus = new_part(r, sizeof *bus);
+  if (bus == NULL) return NULL;
+  const part_place place = next_place(r, PART_TWO_WIRE);
+  two_wire_init(bus, &place, sda_pin, scl_pin);
+  join(r, &bus->part);
+  return bus;
+}
+
+int sim_add_compass(sim *self, int number, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(sda_pin) || !is_pin(scl_pin) || sda_pin == scl_pin) return SIM_BAD_ARGUMENT;
+  two_wire *bus = bus_of(r, sda_pin, scl_pin);
+  compass *c = bus == NULL ? NULL : new_part(r, sizeof *c);
+  if (c == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_COMPASS);
+  int status = compass_init(c, &place, parameters);
+  if (status == 0) status = two_wire_attach(bus, &c->device);
+  return join_if(r, &c->part, status);
+}
+
+int sim_add_analog_infrared(sim *self, int number, uint8_t channel, const sharp_infrared_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || channel >= BOARD_ANALOG_COUNT) return SIM_BAD_ARGUMENT;
+  analog_infrared *a = new_part(r, sizeof *a);
+  if (a == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_ANALOG_INFRARED);
+  return join_if(r, &a->part, analog_infrared_init(a, &place, channel, parameters));
+}
+
+int sim_add_light_sensor(sim *self, int number, uint8_t pin, const light_sensor_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
+  light_sensor *l = new_part(r, sizeof *l);
+  if (l == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_LIGHT_SENSOR);
+  return join_if(r, &l->part, light_sensor_init(l, &place, pin, parameters));
+}
+
+int sim_add_buzzer(sim *self, int number, uint8_t pin) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
+  buzzer *b = new_part(r, sizeof *b);
+  if (b == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_BUZZER);
+  buzzer_init(b, &place, pin);
+  return join(r, &b->part);
+}
+
+int sim_add_turret(sim *self, int number, uint8_t pin, double x, double y,
+                   const motor_position_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
+  turret *t = new_part(r, sizeof *t);
+  if (t == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_TURRET);
+  turret_init(t, &place, pin, x, y, parameters);
+  return join(r, &t->part);
+}
+
+turret *robot_turret(const robot *self, uint8_t pin) {
+  for (int i = 0; i < self->part_count; i++) {
+    turret *t = turret_of(self->parts[i]);
+    if (t != NULL && t->part.pins[0].pin == pin) return t;
+  }
+  return NULL;
+}
+
+int sim_mount(sim *self, int number, uint8_t turret_pin, uint8_t pin) {
+  robot *r = sim_robot(self, number);
+  turret *t = r == NULL ? NULL : robot_turret(r, turret_pin);
+  int mounted = 0;
+  for (int i = 0; t != NULL && i < r->part_count; i++) {
+    part *p = r->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || !(p->pins[k].role & (PART_DRIVES | PART_ANALOG))) continue;
+      p->turret = &t->carried;
+      mounted = 1;
+    }
+  }
+  return mounted ? SIM_OK : SIM_BAD_ARGUMENT;
 }

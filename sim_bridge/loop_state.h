@@ -39,6 +39,7 @@ typedef struct {
   uint64_t idle;      /* cycles without a byte after which the line is idle: two bytes' time */
   buffer truth;
   buffer looks;
+  buffer tones;
   edge_log edges;
   int touched; /* since the last row of the truth */
   uint64_t last_touch;
@@ -66,6 +67,9 @@ struct sim {
 
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);
+
+/* The turret on that pin, or NULL. */
+turret *robot_turret(const robot *self, uint8_t pin);
 
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);

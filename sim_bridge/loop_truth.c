@@ -20,6 +20,18 @@ const sim_look *sim_looks(const sim *self, int number, size_t *count) {
   return r == NULL ? NULL : (const sim_look *)(const void *)r->looks.data;
 }
 
+const sim_tone *sim_tones(const sim *self, int number, size_t *count) {
+  const robot *r = sim_robot(self, number);
+  *count = r == NULL ? 0 : r->tones.count / sizeof(sim_tone);
+  return r == NULL ? NULL : (const sim_tone *)(const void *)r->tones.data;
+}
+
+double sim_turret_angle(const sim *self, int number, uint8_t pin) {
+  const robot *r = sim_robot(self, number);
+  const turret *t = r == NULL ? NULL : robot_turret(r, pin);
+  return t == NULL ? 0.0 : t->motor.angle;
+}
+
 uint64_t sim_contacts(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r == NULL ? 0 : r->contacts;

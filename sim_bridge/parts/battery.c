@@ -5,12 +5,13 @@
 
 static void step(part *base) {
   battery *self = (battery *)base;
-  const chassis *c = base->chassis;
+  chassis *c = base->chassis;
   double servos_a = 0.0;
   for (int side = 0; side < 2; side++) {
     const chassis_wheel *wheel = &c->wheel[side];
     servos_a += supply_servo_current(&self->parameters.supply, wheel->powered, wheel->speed, wheel->torque);
   }
+  c->servos_a = servos_a;
   supply_step(&self->parameters.supply, &self->supply, servos_a, c->at_charger,
               (double)c->step_cycles / BOARD_CLOCK_HZ);
 }

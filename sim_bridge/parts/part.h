@@ -33,6 +33,12 @@ enum {
   PART_INFRARED = 31,
   PART_PING = 41,
   PART_BATTERY = 51,
+  PART_COMPASS = 61,
+  PART_ANALOG_INFRARED = 66,
+  PART_LIGHT_SENSOR = 71,
+  PART_TURRET = 76,
+  PART_TWO_WIRE = 81,
+  PART_BUZZER = 86,
   PART_KINDS = 100 /* more than all of them */
 };
 
@@ -67,10 +73,12 @@ typedef struct {
   double x, y, heading;            /* pose at `since`; the body's state is that at the step's end */
   chassis_wheel wheel[2];          /* left, right */
   double supply;                   /* share of the nominal voltage, of the rail that the board runs on */
+  double servos_a;                 /* that all servos drew in the step before, A */
   double servo_supply;             /* and of that of the servos */
   int at_charger;                  /* 1: the body stands at a charging station */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
   int recording;                   /* 1: looks are logged */
+  buffer *tones;                   /* sim_tone */
   buffer *looks;                   /* sim_look */
 } chassis;
 

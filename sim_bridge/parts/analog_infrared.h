@@ -1,0 +1,20 @@
+/* analog_infrared.h: Sharp GP2Y0A21 / GP2D12 at an analog pin: its voltage at the instant of the converter's sample
+ * (world/sensors/sharp_infrared: curve with fold-back, a new value every 38 ms, 7.6 ms late).
+ */
+#ifndef PART_ANALOG_INFRARED_H
+#define PART_ANALOG_INFRARED_H
+
+#include "../world/sensors/sharp_infrared.h"
+#include "part.h"
+
+typedef struct {
+  part part;
+  sharp_infrared sensor;
+  sharp_infrared_state state;
+} analog_infrared;
+
+/* Returns 0, or -1 for parameters that no sensor has. */
+int analog_infrared_init(analog_infrared *self, const part_place *place, uint8_t channel,
+                         const sharp_infrared_parameters *parameters);
+
+#endif

@@ -1,0 +1,24 @@
+/* buzzer.h: a piezo speaker: it hears its pin and logs what it sounds, one row per tone.
+ *
+ * A tone is a row of periods that are alike (BUZZER_LIKENESS); it ends with the last falling edge when the next edge does
+ * not come within its time, or with the edge at which another pitch begins. The world does not hear it.
+ */
+#ifndef PART_BUZZER_H
+#define PART_BUZZER_H
+
+#include "part.h"
+
+#define BUZZER_LIKENESS 0.03 /* relative: what a toggling interrupt may jitter */
+
+typedef struct {
+  part part;
+  uint8_t high;
+  uint64_t rise, fall; /* the last ones */
+  uint64_t begin;      /* first rise of the tone under way */
+  uint32_t periods;    /* of it; 0: silence, or one pulse so far */
+  uint64_t period;     /* its first one, cycles */
+} buzzer;
+
+void buzzer_init(buzzer *self, const part_place *place, uint8_t pin);
+
+#endif

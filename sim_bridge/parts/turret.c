@@ -1,0 +1,39 @@
+/* turret.c: see turret.h. */
+#include "turret.h"
+
+#include <string.h>
+
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  turret *self = (turret *)base;
+  (void)pin;
+  const uint8_t high = level == BOARD_HIGH;
+  if (high == self->high) return;
+  self->high = high;
+  if (high) {
+    self->rise = cycle;
+    return;
+  }
+  const double width = (double)(cycle - self->rise) * (1e6 / BOARD_CLOCK_HZ);
+  motor_position_pulse(&self->parameters, &self->motor, width);
+}
+
+static void step(part *base) {
+  turret *self = (turret *)base;
+  self->carried.before = self->motor.angle;
+  motor_position_step(&self->parameters, &self->motor, base->chassis->servo_supply,
+                      (double)base->chassis->step_cycles / BOARD_CLOCK_HZ);
+  self->carried.angle = self->motor.angle;
+}
+
+static const part_operations OPERATIONS = {.edge = edge, .step = step};
+
+turret *turret_of(part *base) { return base->op == &OPERATIONS ? (turret *)base : NULL; }
+
+void turret_init(turret *self, const part_place *place, uint8_t pin, double x, double y,
+                 const motor_position_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS}, 1);
+  self->parameters = *parameters;
+  motor_position_init(&self->motor, 0.0);
+  self->carried = (part_turret){.x = x, .y = y};
+}

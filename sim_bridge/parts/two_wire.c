@@ -1,0 +1,106 @@
+/* two_wire.c: see two_wire.h. */
+#include "two_wire.h"
+
+#include <string.h>
+
+static void pull(two_wire *self, int low, uint64_t cycle) {
+  if (self->pulling == low) return;
+  self->pulling = (uint8_t)low;
+  part_drive(&self->part, cycle + TWO_WIRE_DELAY_CYCLES, self->sda_pin, low ? BOARD_LOW : BOARD_HIGH);
+}
+
+static two_wire_device *find(const two_wire *self, uint8_t address) {
+  for (int i = 0; i < self->count; i++) {
+    if (self->devices[i]->address == address) return self->devices[i];
+  }
+  return NULL;
+}
+
+/* The eight bits of an address are in: 1 if somebody has it. */
+static int take_address(two_wire *self, uint64_t cycle) {
+  self->spoken_to = find(self, self->shift >> 1);
+  if (self->spoken_to == NULL) {
+    self->phase = TWO_WIRE_IGNORE;
+    return 0;
+  }
+  const int reading = self->shift & 1;
+  self->phase = reading ? TWO_WIRE_READ : TWO_WIRE_WRITE;
+  self->spoken_to->op->begin(self->spoken_to, reading, cycle);
+  return 1;
+}
+
+static void next_byte(two_wire *self, uint64_t cycle) {
+  self->bit = 0;
+  self->shift = self->phase == TWO_WIRE_READ ? self->spoken_to->op->read(self->spoken_to, cycle) : 0;
+}
+
+/* SCL has fallen: the next bit is put on SDA, whose clock is to come. */
+static void on_fall(two_wire *self, uint64_t cycle) {
+  if (self->bit == 8 && self->phase == TWO_WIRE_ADDRESS) {
+    pull(self, take_address(self, cycle), cycle);
+    return;
+  }
+  if (self->bit == 8 && self->phase == TWO_WIRE_WRITE) {
+    pull(self, self->spoken_to->op->write(self->spoken_to, self->shift, cycle), cycle);
+    return;
+  }
+  if (self->bit == 9) next_byte(self, cycle);
+  if (self->phase == TWO_WIRE_READ && self->bit < 8) {
+    pull(self, !(self->shift >> (7 - self->bit) & 1), cycle);
+  } else {
+    pull(self, 0, cycle);
+  }
+}
+
+/* SCL has risen: SDA is read. */
+static void on_rise(two_wire *self) {
+  if (self->phase == TWO_WIRE_IDLE || self->phase == TWO_WIRE_IGNORE) return;
+  if (self->bit < 8 && self->phase != TWO_WIRE_READ) self->shift = (uint8_t)(self->shift << 1 | self->sda);
+  if (self->bit == 8 && self->phase == TWO_WIRE_READ && self->sda && !self->pulling) {
+    self->phase = TWO_WIRE_IGNORE; /* the board does not acknowledge: that was the last byte */
+  }
+  self->bit++;
+}
+
+static void begin_or_end(two_wire *self, uint64_t cycle) {
+  self->phase = self->sda ? TWO_WIRE_IDLE : TWO_WIRE_ADDRESS;
+  self->bit = self->shift = 0;
+  pull(self, 0, cycle);
+}
+
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  two_wire *self = (two_wire *)base;
+  const uint8_t high = level != BOARD_LOW;
+  uint8_t *line = pin == self->sda_pin ? &self->sda : &self->scl;
+  if (*line == high) return;
+  *line = high;
+  if (pin == self->sda_pin) {
+    if (self->scl && !self->pulling) begin_or_end(self, cycle); /* START or STOP */
+  } else if (high) {
+    on_rise(self);
+  } else if (self->phase != TWO_WIRE_IDLE) {
+    on_fall(self, cycle);
+  }
+}
+
+static const part_operations OPERATIONS = {.edge = edge};
+
+two_wire *two_wire_of(part *base) { return base->op == &OPERATIONS ? (two_wire *)base : NULL; }
+
+int two_wire_attach(two_wire *self, two_wire_device *device) {
+  if (self->count == TWO_WIRE_DEVICES || find(self, device->address) != NULL) return -1;
+  self->devices[self->count++] = device;
+  return 0;
+}
+
+void two_wire_init(two_wire *self, const part_place *place, uint8_t sda_pin, uint8_t scl_pin) {
+  memset(self, 0, sizeof *self);
+  const uint8_t role = PART_HEARS | PART_DRIVES | PART_PULLED_UP;
+  const part_pin pins[] = {{sda_pin, role}, {scl_pin, role}};
+  part_join(&self->part, &OPERATIONS, place, pins, 2);
+  self->sda_pin = sda_pin;
+  self->scl_pin = scl_pin;
+  self->sda = self->scl = 1;
+  part_drive(&self->part, 0, sda_pin, BOARD_HIGH);
+  part_drive(&self->part, 0, scl_pin, BOARD_HIGH);
+}
