@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class Batch:
     def _shares(self) -> list[tuple[int, int]]:
         """First world and number of worlds of each thread."""
         borders = np.linspace(0, self.count, self.threads + 1).astype(int).tolist()
-        return [(a, b - a) for a, b in zip(borders, borders[1:], strict=False) if b > a]
+        return [(a, b - a) for a, b in pairwise(borders) if b > a]
 
     def _each(self, work: Any) -> None:
         """Calls work(first, count), which leaves the interpreter, for all shares."""

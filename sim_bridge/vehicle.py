@@ -1,8 +1,8 @@
 """Vehicles without boards: motor signals in, readings out, as the notes' simulator ARSim drives its robot.
 
-A `VehicleModel` says what a vehicle is made of; a `Vehicle` is one of them in one world. `batch.py` steps many worlds at
-once. Models are sim_bridge/vehicles/model.h, the order of events in a step is Fig. 3.1 of the notes (vehicle.h). Lengths
-in m, angles in rad, SI units; motor signals in [-1, 1], left and right.
+A `VehicleModel` says what a vehicle is made of; a `Vehicle` is one of them in one world. `batch.py` steps many worlds
+at once. Models are sim_bridge/vehicles/model.h, the order of events in a step is Fig. 3.1 of the notes (vehicle.h).
+Lengths in m, angles in rad, SI units; motor signals in [-1, 1], left and right.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class VehicleModel:
         self._sensor("sonar", name, parameters, period)
 
     def laser(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Laser range finder: first, step, rays, range, sigma, height. As many readings as rays, m; -1: beyond range."""
+        """Laser range finder: first, step, rays, range, sigma, height. A reading a ray, m; -1: beyond the range."""
         self._sensor("laser", name, parameters, period, count=int(parameters.get("rays", 0)))
 
     def compass(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
@@ -154,12 +154,12 @@ class VehicleModel:
         self._sensor("odometer", name, usual | parameters, count=3)
 
     def table(
-        self, name: str, look: Mapping[str, float], samples: Any, *, range: float, none: float, period: float = 0.0
+        self, name: str, look: Mapping[str, float], samples: Any, *, reach: float, none: float, period: float = 0.0
     ) -> None:
         """A sensor known by its table of samples (C handle table_noise): one ray of the beam `look`."""
         self._keep.append(samples)
         parameters = ffi.new("beam_parameters *", dict(look))
-        self._add(name, lib.vehicle_model_add_table(self.handle, parameters, samples, range, none, period))
+        self._add(name, lib.vehicle_model_add_table(self.handle, parameters, samples, reach, none, period))
 
     def whisker(self, name: str, root: tuple[float, float], tip: tuple[float, float]) -> None:
         """A whisker from `root` to `tip` on the body. One reading: 1 while it touches something."""
@@ -176,7 +176,7 @@ def arsim(
     odometer_sigma: float = 0.0,
     compass_sigma: float = 0.05,
 ) -> VehicleModel:
-    """The notes' default robot (THEORY sections 1.2, 1.5, 1.10, 3.6): 3 kg, two 12 V DC motors, IR sensors of three rays
+    """The notes' default robot (THEORY 1.2, 1.5, 1.10, 3.6): 3 kg, two 12 V DC motors, IR sensors of three rays
     on the body's circle at +-0.7854 rad, odometer, compass.
 
     Readings: infrared_left, infrared_right (infrared_0 ... where there are not two), odometer (x, y, heading), compass.
@@ -253,7 +253,7 @@ class Vehicle:
         self._body = lib.vehicles_body(self.handle, 0)
         self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle)
 
-    def __getitem__(self, name: str) -> float | memoryview:
+    def __getitem__(self, name: str) -> Any:
         """A reading by the name of its sensor: a number, or a view where the sensor has several."""
         where = self.model.names[name]
         return self.readings[where.start] if where.stop - where.start == 1 else self.readings[where]
