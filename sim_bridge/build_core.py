@@ -46,6 +46,7 @@ HEADERS = [
     "vehicles/wander.h",
     "parts/whisker.h",
     "parts/compass.h",
+    "parts/encoder.h",
     "parts/light_sensor.h",
     "parts/battery.h",
     "boards/script_board.h",

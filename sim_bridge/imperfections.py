@@ -57,6 +57,43 @@ SERVO_A_PER_N_M = 3.7  # 1 A at stall (chosen)
 BATTERY_DIVIDER = 0.5
 BATTERY_NOISE_V = 0.005
 
+# Encoder: an edge that the sensor does not see takes its neighbour with it; an extra one is a short flicker (chosen).
+ENCODER_MISSED = 0.0005
+ENCODER_EXTRA = 0.0005
+ENCODER_FLICKER_S = 0.0002
+
+SHARP_M = (0.06, 0.0)
+SHARP_HEIGHT_M = 0.08
+SHARP_REACH_M = 1.5  # 0.8 specified, beyond it less and less (chosen)
+SHARP_SPREAD = 0.01  # of the voltage (chosen)
+SHARP_GAIN_SPREAD = 0.03  # unit to unit (chosen)
+SHARP_PERIOD_S = 0.0383  # (data)
+SHARP_PERIOD_SPREAD_S = 0.0032  # 9.6 ms are three of them (data)
+SHARP_LATE_S = 0.0076  # (data)
+
+# Phototransistor and 10 nF: 1 to 2 ms in a room (data).
+LIGHT_M = (0.05, 0.04)
+LIGHT_HEADING_RAD = 0.5  # outwards (chosen)
+LIGHT_HEIGHT_M = 0.09
+LIGHT_NEAR_M = 0.05  # d0 of the notes
+LIGHT_AMBIENT = 1.0
+LIGHT_DECAY_S = 0.0015
+LIGHT_MAXIMUM_S = 0.2  # leakage (chosen)
+LIGHT_CHARGE_S = 2.2e-6  # 220 ohm and 10 nF
+LIGHT_THRESHOLD_V = 2.1  # falling, typical for the chip at 5 V (data)
+LIGHT_SPREAD = 0.01  # from reading to reading (chosen)
+LIGHT_GAIN_SPREAD = 0.1  # unit to unit (chosen)
+
+COMPASS_HORIZONTAL_G = 0.19  # central Europe
+COMPASS_DOWN_G = 0.45
+COMPASS_SIGMA = 0.01  # 2 mG of noise (data)
+COMPASS_BIAS_RAD = 0.05  # of the mounting (chosen)
+COMPASS_IRON = 0.2  # (chosen)
+COMPASS_PER_AMPERE = 0.05  # (chosen)
+
+TURRET_M = (0.045, 0.0)
+TURRET_CENTRE_SPREAD_US = 10.0  # (chosen)
+
 _DRAW = 1000  # the draws that make a robot have device numbers of their own
 
 
@@ -64,11 +101,11 @@ class Draw:
     """Draws one robot's peculiarities: always the same ones for the same seed, robot and device."""
 
     def __init__(self, seed: int, noise: bool, robot: int = 0) -> None:
-        self._seed, self._noise, self._robot = seed & (2**64 - 1), noise, robot
+        self._seed, self.noise, self._robot = seed & (2**64 - 1), noise, robot
 
     def __call__(self, device: int, what: int) -> float:
         """Standard normal; 0 without noise."""
-        if not self._noise:
+        if not self.noise:
             return 0.0
         value: float = lib.noise_normal(self._seed, self._robot, _DRAW + device, what)
         return value
@@ -183,3 +220,87 @@ def battery_parameters() -> Any:
             "noise_v": BATTERY_NOISE_V,
         },
     )
+
+
+def encoder_parameters(edges_per_turn: int) -> Any:
+    """A wheel encoder in C."""
+    return ffi.new(
+        "encoder_parameters *",
+        {
+            "edges_per_turn": edges_per_turn,
+            "missed": ENCODER_MISSED,
+            "extra": ENCODER_EXTRA,
+            "flicker_s": ENCODER_FLICKER_S,
+        },
+    )
+
+
+def analog_infrared_parameters(draw: Draw) -> Any:
+    """The Sharp sensor in C, looking straight ahead."""
+    return ffi.new(
+        "sharp_infrared_parameters *",
+        {
+            "beam": _beam(SHARP_M, 0.0, 0.0, SHARP_HEIGHT_M, 1),
+            "reach": SHARP_REACH_M,
+            "sigma": SHARP_SPREAD if draw.noise else 0.0,
+            "gain": 1.0 + SHARP_GAIN_SPREAD * draw(66, 0),
+            "period": SHARP_PERIOD_S + SHARP_PERIOD_SPREAD_S * draw(66, 1),
+            "late": SHARP_LATE_S,
+        },
+    )
+
+
+def light_parameters(side: int, draw: Draw) -> Any:
+    """The phototransistor of `side` (0 left, 1 right) in C."""
+    x, y = LIGHT_M
+    way = -1.0 if side else 1.0
+    return ffi.new(
+        "light_sensor_parameters *",
+        {
+            "light": {
+                "x": x,
+                "y": way * y,
+                "heading": way * LIGHT_HEADING_RAD,
+                "height": LIGHT_HEIGHT_M,
+                "near_distance": LIGHT_NEAR_M,
+                "ambient": LIGHT_AMBIENT,
+                "sigma": LIGHT_SPREAD if draw.noise else 0.0,
+                "gain": max(0.1, 1.0 + LIGHT_GAIN_SPREAD * draw(71 + side, 0)),
+            },
+            "decay_s": LIGHT_DECAY_S,
+            "maximum_s": LIGHT_MAXIMUM_S,
+            "charge_s": LIGHT_CHARGE_S,
+            "threshold_v": LIGHT_THRESHOLD_V,
+        },
+    )
+
+
+def compass_parameters(draw: Draw) -> Any:
+    """The HMC5883L in C; without noise it is not disturbed by iron and currents either."""
+    on = float(draw.noise)
+    return ffi.new(
+        "hmc5883l_parameters *",
+        {
+            "field": {
+                "sigma": COMPASS_SIGMA * on,
+                "bias": COMPASS_BIAS_RAD * draw(61, 0),
+                "iron_x": COMPASS_IRON * draw(61, 1),
+                "iron_y": COMPASS_IRON * draw(61, 2),
+                "current_x": COMPASS_PER_AMPERE * draw(61, 3),
+                "current_y": COMPASS_PER_AMPERE * draw(61, 4),
+            },
+            "horizontal_gauss": COMPASS_HORIZONTAL_G,
+            "down_gauss": COMPASS_DOWN_G,
+        },
+    )
+
+
+def turret_parameters(turret: robots.PositionServo, draw: Draw) -> Any:
+    """The turret's servo in C: the notes' standard servo, with this unit's offset."""
+    out = ffi.new("motor_position_parameters *")
+    lib.motor_position_default(out)
+    gain = turret.gain_us_per_rad
+    out.mount = math.copysign(1.0, gain)
+    out.us_per_rad = abs(gain)
+    out.centre_us = turret.centre_us + TURRET_CENTRE_SPREAD_US * draw(76, 0)
+    return out

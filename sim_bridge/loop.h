@@ -17,6 +17,7 @@
 #include "parts/analog_infrared.h"
 #include "parts/battery.h"
 #include "parts/compass.h"
+#include "parts/encoder.h"
 #include "parts/infrared.h"
 #include "parts/light_sensor.h"
 #include "parts/ping.h"
@@ -54,7 +55,7 @@ int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *
 
 /* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
 int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
-int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn);
+int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters);
 int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
 int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
                      const infrared_pair_parameters *parameters);

@@ -5,7 +5,6 @@
 
 #include "loop_state.h"
 #include "parts/buzzer.h"
-#include "parts/encoder.h"
 
 #define BITS_PER_BYTE 10u
 #define LINE_RATE 500000u /* bit/s, unless set */
@@ -166,13 +165,13 @@ int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_moto
   return join(r, &s->part);
 }
 
-int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn) {
+int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters) {
   robot *r = sim_robot(self, number);
-  if (r == NULL || !is_pin(pin_a) || !is_side(side) || edges_per_turn == 0) return SIM_BAD_ARGUMENT;
+  if (r == NULL || !is_pin(pin_a) || !is_side(side) || parameters->edges_per_turn == 0) return SIM_BAD_ARGUMENT;
   encoder *e = new_part(r, sizeof *e);
   if (e == NULL) return SIM_NO_MEMORY;
   const part_place place = place_of(r, PART_ENCODER_LEFT + (uint32_t)side);
-  encoder_init(e, &place, side, pin_a, pin_b, edges_per_turn);
+  encoder_init(e, &place, side, pin_a, pin_b, parameters);
   return join(r, &e->part);
 }
 

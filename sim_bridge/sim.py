@@ -15,11 +15,13 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.joining import done, join
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
+TONE = ("time", "duration", "frequency")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 Floats = NDArray[np.float64]
@@ -28,8 +30,8 @@ Floats = NDArray[np.float64]
 class Sim:
     """An arena and the robots in it, in lockstep with their boards. Seconds and SI units.
 
-    `robots` maps the number of each robot to it. A run is a function of arena, seed, robots by number, boards and
-    what is sent to them: neither the order in which robots are added nor the way a run is cut into calls matters.
+    A run is a function of arena, seed, robots by number, boards and what is sent to them: neither the order in which
+    robots are added nor the way a run is cut into calls matters.
     """
 
     def __init__(
@@ -49,14 +51,13 @@ class Sim:
         if step_cycles <= 0 or TICK_CYCLES % step_cycles:
             raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
         self.arena, self.seed, self.noise = arena, seed, noise
-        self.robots: dict[int, SimRobot] = {}
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        boards: list[EmulatedBoard] = []
-        # arena and boards outlive the simulation, whichever of them Python lets go of first
-        self.handle = ffi.gc(handle, lambda handle, keep=(arena, boards): lib.sim_destroy(handle))
-        self._boards = boards
+        self._members: dict[int, tuple[EmulatedBoard, robots.RobotDescription]] = {}
+        # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
+        # kept here leaves no cycle of references, in which the order would be anybody's guess.
+        self.handle = ffi.gc(handle, lambda handle, keep=(arena, self._members): lib.sim_destroy(handle))
 
     def add(
         self,
@@ -72,32 +73,48 @@ class Sim:
 
         Raises:
             ArenaError: that place is not free.
-            BoardError: the number is taken or negative.
+            BoardError: the number is taken or negative, or there are too many robots.
         """
         if number is None:
-            number = max(self.robots, default=-1) + 1
-        if number < 0 or number in self.robots:
+            number = max(self._members, default=-1) + 1
+        if number < 0 or number in self._members:
             raise BoardError(f"robot number {number} is taken or negative")
+        if len(self._members) == lib.BODY_MAXIMUM:
+            raise BoardError(f"a simulation takes {len(self._members)} robots at most")
         x, y, heading = self.arena.start if pose is None else pose
         if not self.is_free(x, y, description.body.radius_m):
             raise ArenaError(
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
         body = imperfections.body_parameters(description.body)
-        _done(lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading))
-        self._boards.append(board)
-        robot = SimRobot(self, number, board, description)
-        self.robots[number] = robot
-        return robot
+        done(lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading))
+        self._members[number] = board, description
+        join(self.handle, number, description, imperfections.Draw(self.seed, self.noise, number))
+        return self.robot(number)
+
+    def robot(self, number: int) -> SimRobot:
+        """The robot of that number.
+
+        Raises:
+            BoardError: there is none.
+        """
+        if number not in self._members:
+            raise BoardError(f"there is no robot number {number} in this simulation")
+        return SimRobot(self, number, *self._members[number])
+
+    @property
+    def robots(self) -> list[SimRobot]:
+        """All of them, by increasing number."""
+        return [self.robot(number) for number in sorted(self._members)]
 
     def is_free(self, x: float, y: float, radius: float, without: int | None = None) -> bool:
         """Whether a disc lies in free space, and on no robot (but `without`)."""
         if not self.arena.is_free(x, y, radius):
             return False
-        for number, robot in self.robots.items():
+        for robot in self.robots:
             body = robot.body()
             near = math.hypot(body.x - x, body.y - y) < radius + robot.description.body.radius_m
-            if near and number != without:
+            if near and robot.number != without:
                 return False
         return True
 
@@ -116,7 +133,7 @@ class Sim:
         """
         crashed = lib.sim_run(self.handle, lib.SIM_ANY if hear is None else hear.number, cycles, quiet)
         if crashed:
-            board = self.robots[crashed - 1].board
+            board, _ = self._members[crashed - 1]
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
             raise BoardError(f"the {board.description} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
@@ -128,12 +145,12 @@ class Sim:
     def close(self) -> None:
         """Frees the simulation, then the boards."""
         ffi.release(self.handle)
-        for board in self._boards:
+        for board, _ in self._members.values():
             board.close()
 
 
 class SimRobot:
-    """One robot of a simulation: its line, its truth, its logs. Made by `Sim.add`."""
+    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
 
     def __init__(self, sim: Sim, number: int, board: EmulatedBoard, description: robots.RobotDescription) -> None:
         self.sim, self.number, self.board, self.description = sim, number, board, description
@@ -141,37 +158,6 @@ class SimRobot:
         self._bytes = ffi.new("uint8_t[]", 65536)
         self._count = ffi.new("size_t *")
         self._body = ffi.new("body_state *")
-        draw = imperfections.Draw(sim.seed, sim.noise, number)
-        battery = imperfections.battery_parameters()
-        _done(lib.sim_add_battery(self._handle, number, _battery_channel(description), battery))
-        for name, device in description.device.items():
-            if device.on:
-                self._join(name, device, draw)
-
-    def _join(self, name: str, device: robots.Device, draw: imperfections.Draw) -> None:
-        """Joins a device to its pins; those without a part in the world are left alone."""
-        side = lib.SIM_RIGHT if name.endswith("right") else lib.SIM_LEFT
-        handle, number, body = self._handle, self.number, self.description.body
-        match device:
-            case robots.ContinuousServo():
-                servo = imperfections.servo_parameters(device, body, side, draw)
-                _done(lib.sim_add_servo(handle, number, side, robots.pin_number(device.pin), servo))
-            case robots.Encoder():
-                pin, edges = robots.pin_number(device.pin), device.edges_per_turn
-                _done(lib.sim_add_encoder(handle, number, side, pin, 255, edges))
-            case robots.QuadratureEncoder():
-                pin_a, pin_b = robots.pin_number(device.pin_a), robots.pin_number(device.pin_b)
-                _done(lib.sim_add_encoder(handle, number, side, pin_a, pin_b, device.edges_per_turn))
-            case robots.Whisker():
-                whisker = imperfections.whisker_parameters(device)
-                _done(lib.sim_add_whisker(handle, number, robots.pin_number(device.pin), whisker))
-            case robots.InfraredPair():
-                pair = imperfections.infrared_parameters(device)
-                led, receiver = robots.pin_number(device.led_pin), robots.pin_number(device.receiver_pin)
-                _done(lib.sim_add_infrared(handle, number, led, receiver, pair))
-            case robots.Ping():
-                ping = imperfections.ping_parameters(device)
-                _done(lib.sim_add_ping(handle, number, robots.pin_number(device.pin), ping))
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
@@ -224,19 +210,14 @@ class SimRobot:
         """Columns `TRUTH`, one row every 10 ms; empty without recording."""
         return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
 
+    def tones(self) -> dict[str, Floats]:
+        """Columns `TONE`, one row per tone that a buzzer has sounded."""
+        return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
+
+    def turret_angle(self, pin: int) -> float:
+        """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
+        return float(lib.sim_turret_angle(self._handle, self.number, pin))
+
     def looks(self) -> dict[str, Floats]:
         """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
         return self._rows(lib.sim_looks(self._handle, self.number, self._count), LOOK)
-
-
-def _done(status: int) -> None:
-    """Robot descriptions are checked when they are loaded; what fails here is memory or a mistake of ours."""
-    if status < 0:
-        raise MemoryError(f"simulation: error {status}")
-
-
-def _battery_channel(robot: robots.RobotDescription) -> int:
-    for device in robot.device.values():
-        if isinstance(device, robots.Battery) and device.on:
-            return robots.pin_number(device.pin) - 14
-    return 255

@@ -17,6 +17,19 @@ static double wheel_angle(const encoder *self) {
   return self->side == 0 ? s->wheel_left : s->wheel_right;
 }
 
+/* An edge of one channel at cycle `at`: as it is, or missed, or with a flicker after it. */
+static void show(encoder *self, uint64_t at, uint8_t pin, uint8_t level) {
+  const encoder_parameters *p = &self->parameters;
+  if (pin == PART_NO_PIN || self->part.chassis->driven[pin] == level) return; /* the one before it was missed */
+  if (p->missed > 0.0 && noise_next_uniform(&self->part.noise) < p->missed) return;
+  part_drive(&self->part, at, pin, level);
+  if (!(p->extra > 0.0) || noise_next_uniform(&self->part.noise) >= p->extra) return;
+  const double mean = p->flicker_s * BOARD_CLOCK_HZ;
+  const uint64_t off = at + 2u + (uint64_t)(mean * noise_next_uniform(&self->part.noise));
+  part_drive(&self->part, off, pin, (uint8_t)!level);
+  part_drive(&self->part, off + 2u + (uint64_t)(mean * noise_next_uniform(&self->part.noise)), pin, level);
+}
+
 static void step(part *base) {
   encoder *self = (encoder *)base;
   const chassis *c = base->chassis;
@@ -31,8 +44,8 @@ static void step(part *base) {
     if (!(share > 0.0)) share = 0.0;
     if (share > 1.0) share = 1.0;
     const uint64_t at = c->since + PART_GUARD + (uint64_t)(share * (double)c->step_cycles);
-    if (level_a(self, next) != level_a(self, self->index)) part_drive(base, at, self->pin_a, level_a(self, next));
-    if (level_b(next) != level_b(self->index)) part_drive(base, at, self->pin_b, level_b(next));
+    if (level_a(self, next) != level_a(self, self->index)) show(self, at, self->pin_a, level_a(self, next));
+    if (level_b(next) != level_b(self->index)) show(self, at, self->pin_b, level_b(next));
     self->index = next;
   }
 }
@@ -40,14 +53,15 @@ static void step(part *base) {
 static const part_operations OPERATIONS = {.step = step};
 
 void encoder_init(encoder *self, const part_place *place, int side, uint8_t pin_a, uint8_t pin_b,
-                  uint32_t edges_per_turn) {
+                  const encoder_parameters *parameters) {
   memset(self, 0, sizeof *self);
   const part_pin pins[] = {{pin_a, PART_DRIVES}, {pin_b, PART_DRIVES}};
   part_join(&self->part, &OPERATIONS, place, pins, 2);
   self->side = side;
   self->pin_a = pin_a;
   self->pin_b = pin_b;
-  self->edges_per_rad = (double)edges_per_turn / (2.0 * NUMBERS_PI);
+  self->parameters = *parameters;
+  self->edges_per_rad = (double)parameters->edges_per_turn / (2.0 * NUMBERS_PI);
   self->phase = noise_next_uniform(&self->part.noise); /* 0.5 without noise */
   self->position = wheel_angle(self) * self->edges_per_rad + self->phase;
   self->index = number_floor(self->position);

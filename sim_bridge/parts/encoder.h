@@ -2,18 +2,29 @@
  *
  * Each world step turns the wheel from one angle to the next; the edges in between are put on the pins at the cycles that
  * linear interpolation gives. `edges_per_turn` counts both edges of all channels. With two channels A leads B when the
- * wheel turns forward: (A, B) = 00, 10, 11, 01.
+ * wheel turns forward: (A, B) = 00, 10, 11, 01. A sensor too near or too far from its disc sees edges that are none, and
+ * misses some (section 7 of the hardware's fact sheet).
  */
 #ifndef PART_ENCODER_H
 #define PART_ENCODER_H
 
 #include "part.h"
 
+/* python: begin */
+typedef struct {
+  uint32_t edges_per_turn;
+  double missed;    /* probability that an edge of a channel is not seen; the next one then changes nothing; 0: never */
+  double extra;     /* probability that a channel flickers after an edge: two more edges; 0: never */
+  double flicker_s; /* how long such a flicker lasts, on average */
+} encoder_parameters;
+/* python: end */
+
 typedef struct {
   part part;
   int side; /* 0 left, 1 right */
   uint8_t pin_a;
   uint8_t pin_b; /* PART_NO_PIN: one channel */
+  encoder_parameters parameters;
   double edges_per_rad;
   double phase;    /* edges: where the disc stands at angle 0, in [0, 1) */
   double position; /* edges, at the end of the last step */
@@ -22,6 +33,6 @@ typedef struct {
 
 /* An encoder at the wheel of `side` (0 left, 1 right); its pins get their levels for the wheel's angle now. */
 void encoder_init(encoder *self, const part_place *place, int side, uint8_t pin_a, uint8_t pin_b,
-                  uint32_t edges_per_turn);
+                  const encoder_parameters *parameters);
 
 #endif

@@ -31,8 +31,7 @@ static void decay(light_sensor *self, uint64_t cycle, uint8_t pin) {
   const light_sensor_parameters *p = &self->parameters;
   const viewpoint from = part_view(&self->part, cycle);
   begin(self, cycle, 0);
-  self->irradiance =
-      phototransistor_read(&self->phototransistor, &from, self->lamps, self->lamp_count, &self->part.noise);
+  self->irradiance = phototransistor_read(&self->phototransistor, &from, &self->part.noise);
   const double seconds = phototransistor_decay_time(self->irradiance, p->decay_s, p->maximum_s);
   self->decay_per_s = (BOARD_NOMINAL_VOLTS - p->threshold_v) / seconds;
   const double above = self->volts - p->threshold_v;
@@ -68,13 +67,6 @@ int light_sensor_init(light_sensor *self, const part_place *place, uint8_t pin,
   if (phototransistor_init(&self->phototransistor, &p->light) != 0) return -1;
   if (!(p->decay_s > 0.0 && p->maximum_s >= p->decay_s && isfinite(p->maximum_s) && p->charge_s >= 0.0)) return -1;
   if (!(p->threshold_v > 0.0 && p->threshold_v < BOARD_NOMINAL_VOLTS)) return -1;
-  const arena *where = place->chassis->around->arena;
-  self->lamp_count = arena_light_count(where);
-  if (self->lamp_count > LIGHT_SENSOR_LAMPS) return -1;
-  for (size_t i = 0; i < self->lamp_count; i++) {
-    const arena_light *lamp = &arena_lights(where)[i];
-    self->lamps[i] = (light_source){lamp->x, lamp->y, lamp->power};
-  }
   part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
   self->parameters = *p;
   return 0;

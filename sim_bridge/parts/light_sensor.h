@@ -20,14 +20,10 @@ typedef struct {
 } light_sensor_parameters;
 /* python: end */
 
-#define LIGHT_SENSOR_LAMPS 16
-
 typedef struct {
   part part;
   light_sensor_parameters parameters;
   phototransistor phototransistor;
-  light_source lamps[LIGHT_SENSOR_LAMPS];
-  size_t lamp_count;
   uint8_t charging;
   double volts;       /* on the capacitor when `since` began */
   uint64_t since;     /* charging or decaying */
