@@ -43,7 +43,8 @@ struct message {
 class native_bench {
  public:
   native_machine machine{};
-  double volts = 5.0;
+  double volts = 5.0;            /* of the supply */
+  double analog[6] = {};         /* at A0 to A5 */
   std::vector<pin_edge> edges;   /* everything the firmware did to its pins */
   std::vector<message> messages; /* everything it said that is of this session or of the handshake */
   uint64_t bytes_out = 0;
@@ -61,7 +62,9 @@ class native_bench {
     std::memset(machine.eeprom, 0xFF, sizeof machine.eeprom);
     machine.edge = on_edge;
     machine.transmit = on_transmit;
-    machine.supply = [](native_machine *self, uint64_t) { return of(self).volts; };
+    machine.analog = [](native_machine *self, uint64_t, uint8_t channel) {
+      return channel == NATIVE_SUPPLY ? of(self).volts : of(self).analog[channel];
+    };
     host_decoder_start(&decoder_, FRAME_NO_SESSION);
     api_->start(&machine, reset_cause);
     schedule_start(first_tick);
