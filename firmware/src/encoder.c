@@ -54,6 +54,7 @@ static uint8_t watched;      /* port bits of the lines that count */
 static uint8_t limit;        /* edges of a line in a tick above which it is masked */
 static uint8_t phantoms;     /* interrupts of this tick without a change to be seen: pulses too short */
 static uint8_t awaited;      /* port bit of the other line whose change is awaited, or 0 */
+static uint8_t other_bit;    /* the same, also when it has come */
 static bool other_seen;      /* it has come, */
 static uint32_t other_edge;  /* at that schedule_now() */
 
@@ -69,7 +70,7 @@ static void listen(void) {
 void encoder_await_other(uint8_t bit) {
   encoder_poll();
   other_seen = false;
-  awaited = bit;
+  awaited = other_bit = bit;
   before = (uint8_t)((before & (uint8_t)~bit) | (PORT_BITS() & bit));
   listen();
 }
@@ -179,7 +180,7 @@ static uint8_t noisy_lines(uint8_t head) {
         lines |= line_bit[line];
       }
     }
-    other_edges = (uint8_t)(other_edges + (((bits ^ earlier) & awaited) != 0));
+    other_edges = (uint8_t)(other_edges + (((bits ^ earlier) & other_bit) != 0));
     bits = earlier;
   }
   lines &= watched;
@@ -237,7 +238,7 @@ void encoder_start(void) {
   hal_changes_head = hal_changes_tail = 0;
   hal_changes_resume();
   phantoms = 0;
-  awaited = 0;
+  awaited = other_bit = 0;
   other_seen = false;
   for (uint8_t side = LEFT; side < SIDES; side++) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
