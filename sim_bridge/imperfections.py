@@ -27,15 +27,18 @@ SERVO_TORQUE_N_M = 0.268  # stall (data)
 SERVO_COAST_N_S = 0.3  # unpowered gear train (chosen)
 SERVO_COAST_N_M = 0.05  # (chosen)
 
-LATERAL_GRIP = 0.7  # rubber tyre across its way (chosen)
+TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
 
 INFRARED_RAYS = 5
+INFRARED_HEIGHT_M = 0.06
+INFRARED_DIRECT_M = 2.0  # from where another robot's LED lights the receiver (chosen)
 INFRARED_SPREAD = 0.03  # of the range from burst to burst (chosen)
 INFRARED_FALSE_HIT = 0.001  # per burst (chosen)
 
 PING_RAYS = 7
+PING_HEIGHT_M = 0.08
 PING_SPREAD = 0.005  # of a reading (chosen)
 PING_MISS = 0.02  # (notes, p = 0.98)
 PING_GRAZING_RAD = 0.785  # surfaces met flatter than this to their normal send nothing back (chosen)
@@ -85,7 +88,8 @@ def body_parameters(body: robots.Body) -> Any:
             "wheel_inertia": body.wheel_inertia_kg_m2,
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
-            "lateral_grip": LATERAL_GRIP,
+            "grip": TYRE_GRIP,
+            "slip": 1,
         },
     )
 
@@ -96,7 +100,7 @@ def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int
     lean = 0.5 * SERVO_ASYMMETRY * draw(1 + side, 1)
     offset = SERVO_CENTRE_SPREAD_US * draw(1 + side, 2)
     return ffi.new(
-        "servo_parameters *",
+        "servo_motor_parameters *",
         {
             "mount": math.copysign(1.0, servo.gain_us),
             "wheel_radius": body.wheel_radius_m,
@@ -125,16 +129,13 @@ def whisker_parameters(whisker: robots.Whisker) -> Any:
 def infrared_parameters(pair: robots.InfraredPair) -> Any:
     """The IR pair in C."""
     return ffi.new(
-        "infrared_parameters *",
+        "infrared_pair_parameters *",
         {
-            "x": pair.position_m[0],
-            "y": pair.position_m[1],
-            "heading": pair.heading_rad,
-            "beam": pair.beam_rad,
-            "range_m": pair.range_m,
+            "beam": _beam(pair.position_m, pair.heading_rad, pair.beam_rad, INFRARED_HEIGHT_M, INFRARED_RAYS),
+            "range": pair.range_m,
             "range_sigma": INFRARED_SPREAD,
             "false_hit": INFRARED_FALSE_HIT,
-            "rays": INFRARED_RAYS,
+            "direct": INFRARED_DIRECT_M,
         },
     )
 
@@ -142,21 +143,24 @@ def infrared_parameters(pair: robots.InfraredPair) -> Any:
 def ping_parameters(ping: robots.Ping) -> Any:
     """The Ping))) in C."""
     return ffi.new(
-        "ping_parameters *",
+        "sonar_parameters *",
         {
-            "x": ping.position_m[0],
-            "y": ping.position_m[1],
-            "heading": ping.heading_rad,
-            "beam": ping.beam_rad,
-            "range_minimum_m": ping.range_min_m,
-            "range_maximum_m": ping.range_max_m,
-            "temperature_c": TEMPERATURE_C,
+            "beam": _beam(ping.position_m, ping.heading_rad, ping.beam_rad, PING_HEIGHT_M, PING_RAYS),
+            "range_minimum": ping.range_min_m,
+            "range_maximum": ping.range_max_m,
             "sigma": PING_SPREAD,
             "miss": PING_MISS,
             "grazing_cosine": math.cos(PING_GRAZING_RAD),
-            "rays": PING_RAYS,
+            "temperature": TEMPERATURE_C,
+            "absorption": 1,
         },
     )
+
+
+def _beam(position: tuple[float, float], heading: float, opening: float, height: float, rays: int) -> dict[str, float]:
+    """Where a sensor is on the body and what it sees (beam_parameters in C)."""
+    x, y = position
+    return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
 
 
 def battery_parameters() -> Any:
@@ -164,15 +168,17 @@ def battery_parameters() -> Any:
     return ffi.new(
         "battery_parameters *",
         {
-            "full_v": BATTERY_FULL_V,
-            "empty_v": BATTERY_EMPTY_V,
-            "capacity_as": BATTERY_CAPACITY_AS,
-            "resistance_ohm": BATTERY_RESISTANCE_OHM,
-            "drop_out_v": BATTERY_DROP_OUT_V,
-            "board_a": BOARD_A,
-            "servo_idle_a": SERVO_IDLE_A,
-            "servo_run_a_s_m": SERVO_RUN_A_S_M,
-            "servo_a_per_n_m": SERVO_A_PER_N_M,
+            "supply": {
+                "full_v": BATTERY_FULL_V,
+                "empty_v": BATTERY_EMPTY_V,
+                "capacity_as": BATTERY_CAPACITY_AS,
+                "resistance_ohm": BATTERY_RESISTANCE_OHM,
+                "drop_out_v": BATTERY_DROP_OUT_V,
+                "board_a": BOARD_A,
+                "servo_idle_a": SERVO_IDLE_A,
+                "servo_run_a_s_m": SERVO_RUN_A_S_M,
+                "servo_a_per_n_m": SERVO_A_PER_N_M,
+            },
             "divider": BATTERY_DIVIDER,
             "noise_v": BATTERY_NOISE_V,
         },

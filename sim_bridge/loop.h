@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "boards/board.h"
+#include "logs.h"
 #include "parts/battery.h"
 #include "parts/infrared.h"
 #include "parts/ping.h"
@@ -23,6 +24,7 @@
 
 /* python: begin */
 enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
+enum { SIM_ANY = -1 };
 enum { SIM_OK = 0, SIM_NO_MEMORY = -1, SIM_WRONG_BOARD = -2, SIM_BAD_ARGUMENT = -3 };
 
 /* One row of the truth. */
@@ -34,24 +36,6 @@ typedef struct {
   double contact;          /* 1: touched something since the last row */
 } sim_truth;
 
-/* One edge on a pin of the board. */
-typedef struct {
-  uint64_t cycle;
-  uint8_t pin;
-  uint8_t level;
-  uint8_t unused[6];
-} sim_edge;
-
-/* What a range sensor saw. */
-typedef struct {
-  double time;          /* s */
-  double kind;          /* 0 IR pair, 1 Ping */
-  double x, y, heading; /* of the sensor, in the arena */
-  double beam;          /* full opening, rad */
-  double reach;         /* m */
-  double distance;      /* m; -1: nothing */
-} sim_look;
-
 typedef struct sim sim;
 
 /* step_cycles: world step; record_cycles: between two rows of the truth, a multiple of it, 0: no record. NULL without
@@ -59,21 +43,24 @@ typedef struct sim sim;
 sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise);
 void sim_destroy(sim *self);
 
-/* Adds a robot at rest with its board (the address of a `board`). Returns its number or an error. */
-int sim_add_robot(sim *self, uintptr_t board, const body_parameters *parameters, double x, double y, double heading);
+/* Adds a robot at rest with its board (the address of a `board`). `robot` >= 0 is its number from now on, and the key of
+ * its noise: a run is the same in whatever order robots are added. Returns SIM_OK or an error. */
+int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *parameters, double x, double y,
+                  double heading);
 
 /* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
-int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_parameters *parameters);
+int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
 int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn);
 int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
 int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
-                     const infrared_parameters *parameters);
-int sim_add_ping(sim *self, int robot, uint8_t pin, const ping_parameters *parameters);
+                     const infrared_pair_parameters *parameters);
+int sim_add_ping(sim *self, int robot, uint8_t pin, const sonar_parameters *parameters);
 int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
 
-/* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from a board and its line has
- * been idle for two byte times. Returns 0, or 1 + the number of a robot whose board crashed. */
-int sim_run(sim *self, uint64_t max_cycles, uint64_t quiet_cycles);
+/* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from the board of that robot
+ * (SIM_ANY: of any) and its line has been idle for two byte times. Returns 0, or 1 + the number of a robot whose board
+ * crashed. */
+int sim_run(sim *self, int robot, uint64_t max_cycles, uint64_t quiet_cycles);
 
 /* The cycle up to which the simulation has run. */
 uint64_t sim_now(const sim *self);
@@ -94,7 +81,7 @@ void sim_body(const sim *self, int robot, body_state *out);
 const sim_truth *sim_record(const sim *self, int robot, size_t *count);
 const sim_look *sim_looks(const sim *self, int robot, size_t *count);
 uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
-uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies */
+uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
 
 /* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */
 size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
@@ -126,7 +113,5 @@ const char *board_fault(uintptr_t board);
 /* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
 void board_read_counters(uintptr_t board, uint64_t counters[8]);
 /* python: end */
-
-#define SIM_EDGES_KEPT (1u << 20)
 
 #endif

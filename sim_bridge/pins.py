@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, BoardMemory, ResetCause
-from sim_bridge.sim import Sim
+from sim_bridge.sim import SimRobot
 
 EDGE = np.dtype(  # sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
@@ -23,10 +23,12 @@ class BoardPins(BoardMemory):
     Pins by Arduino number 0..19 (A0 is 14); levels LOW 0, HIGH 1, RELEASED 2.
     """
 
-    def __init__(self, sim: Sim) -> None:
-        super().__init__(lib, ffi, ffi.cast("board *", sim.board.address))
-        self._sim = sim
-        self._handle = sim.handle
+    def __init__(self, robot: SimRobot) -> None:
+        super().__init__(lib, ffi, ffi.cast("board *", robot.board.address))
+        self._robot = robot
+        self._sim = robot.sim
+        self._handle = robot.sim.handle
+        self._number = robot.number
         self.reset_cycle = 0  # when the program last started
 
     @property
@@ -36,42 +38,42 @@ class BoardPins(BoardMemory):
 
     def pin_log(self) -> NDArray[Any]:
         """The board's output edges (fields cycle, pin, level), the newest million, oldest first."""
-        count = min(int(lib.sim_edges_seen(self._handle, 0)), 1 << 20)
+        count = min(int(lib.sim_edges_seen(self._handle, self._number)), 1 << 20)
         log = np.empty(count, dtype=EDGE)
-        lib.sim_edges(self._handle, 0, ffi.from_buffer("sim_edge[]", log, require_writable=True), count)
+        lib.sim_edges(self._handle, self._number, ffi.from_buffer("sim_edge[]", log, require_writable=True), count)
         return log
 
     def output(self, pin: int) -> int:
         """What the firmware does to a pin now: LOW, HIGH, RELEASED or PULLED_UP (3)."""
-        return int(lib.board_output(self._sim.board.address, pin))
+        return int(lib.board_output(self._robot.board.address, pin))
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
         at = self._sim.cycle + 64 if at_cycle is None else at_cycle
-        self._check(lib.sim_drive(self._handle, 0, max(0, at), pin, level), f"pin {pin}, level {level}")
+        self._check(lib.sim_drive(self._handle, self._number, max(0, at), pin, level), f"pin {pin}, level {level}")
 
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
-        status = lib.sim_wave(self._handle, 0, pin, period // 2, round(seconds * CLOCK_HZ))
+        status = lib.sim_wave(self._handle, self._number, pin, period // 2, round(seconds * CLOCK_HZ))
         self._check(status, f"square wave of {period} cycles on pin {pin}")
 
     def press_whisker(self, pin: int, pressed: bool | None) -> None:
         """Holds a whisker pressed or free; None: as the world says."""
         held = -1 if pressed is None else int(pressed)
-        self._check(lib.sim_hold_whisker(self._handle, 0, pin, held), f"whisker on pin {pin}")
+        self._check(lib.sim_hold_whisker(self._handle, self._number, pin, held), f"whisker on pin {pin}")
 
     def answer_ping(self, echo_us: float | None) -> None:
         """Every trigger is answered by a pulse of that length (us), or by none at all; see `ask_world`."""
         echo = -2 if echo_us is None else round(echo_us * CLOCK_HZ / 1e6)
-        self._check(lib.sim_answer_ping(self._handle, 0, echo), "Ping")
+        self._check(lib.sim_answer_ping(self._handle, self._number, echo), "Ping")
 
     def ask_world(self) -> None:
         """The Ping measures distances again."""
-        self._check(lib.sim_answer_ping(self._handle, 0, -1), "Ping")
+        self._check(lib.sim_answer_ping(self._handle, self._number, -1), "Ping")
 
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
-        self._check(lib.sim_set_supply(self._handle, 0, 0.0 if volts is None else volts), "supply")
+        self._check(lib.sim_set_supply(self._handle, self._number, 0.0 if volts is None else volts), "supply")
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Puts the robot elsewhere, at rest (m, m, rad).
@@ -79,22 +81,24 @@ class BoardPins(BoardMemory):
         Raises:
             ArenaError: that place is not free.
         """
-        if lib.sim_place(self._handle, 0, x, y, heading) != lib.SIM_OK:
+        radius, number = self._robot.description.body.radius_m, self._number
+        free = self._sim.is_free(x, y, radius, without=number)
+        if not free or lib.sim_place(self._handle, number, x, y, heading) != lib.SIM_OK:
             raise ArenaError(f"the robot cannot be put at x = {x:g} m, y = {y:g} m: no free space")
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
         self.reset_cycle = self._sim.cycle
-        lib.board_reset(self._sim.board.address, ResetCause[cause.upper()])
+        lib.board_reset(self._robot.board.address, ResetCause[cause.upper()])
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""
-        lib.sim_line_rate(self._handle, 0, baud)
+        lib.sim_line_rate(self._handle, self._number, baud)
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""
         values = ffi.new("uint64_t[8]")
-        lib.board_read_counters(self._sim.board.address, values)
+        lib.board_read_counters(self._robot.board.address, values)
         return dict(zip(COUNTERS, (int(value) for value in values), strict=True))
 
     @staticmethod

@@ -242,9 +242,9 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
         cycles = pace.due()
         sim.run(cycles, cycles)  # first: the board must not hear, let alone answer, before it was told
         if heard:
-            sim.send(heard)
+            session.robot.send(heard)
             brisk_until = time.monotonic() + BRISK_FOR_S
-        if data := sim.receive():
+        if data := session.robot.receive():
             port.write(data)
         port.wait(BRISK_S if time.monotonic() < brisk_until else IDLE_S)
 

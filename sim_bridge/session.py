@@ -13,12 +13,11 @@ from collections.abc import Callable, Mapping
 from boebot import robots
 from boebot.boards import BoardRequest, Truth
 from boebot.errors import BoardError
-from sim_bridge._core import lib
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Floats, Sim
+from sim_bridge.sim import Floats, Sim, SimRobot
 
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
@@ -34,49 +33,48 @@ class SimTransport:
     realtime = False
     baud_given = False
 
-    def __init__(self, sim: Sim, name: str, paced: bool = False) -> None:
+    def __init__(self, robot: SimRobot, name: str, paced: bool = False) -> None:
         """`paced`: `read` also waits until as much time has passed on the wall."""
         self.name = name
-        self.baud = _baud(sim.robot)
-        self._sim = sim
-        self._handle = sim.handle
-        self._pace = Pace(sim) if paced else None
+        self.baud = _baud(robot.description)
+        self._robot = robot
+        self._sim = robot.sim
+        self._pace = Pace(robot.sim) if paced else None
         self._closed = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        self._sim.run(_cycles(wait_s), _cycles(quiet_s))
+        self._sim.run(_cycles(wait_s), _cycles(quiet_s), self._robot)
         if self._pace is not None:
             self._pace.wait()
-        return self._sim.receive()
+        return self._robot.receive()
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         """As `read`, with the instant at which the last byte had come (s)."""
         data = self.read(wait_s, quiet_s)
-        return [(lib.sim_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
+        return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        lib.sim_line_rate(self._handle, 0, rate)
+        self._robot.line_rate(rate)
         self.baud = rate
-        self._sim.receive()
+        self._robot.receive()
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        lib.sim_send(self._handle, 0, data, len(data))
+        self._robot.send(data)
 
     def now(self) -> float:
         """Simulated time since power-on (s)."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        now: float = lib.sim_now(self._handle) / CLOCK_HZ
-        return now
+        return self._sim.cycle / CLOCK_HZ
 
     def close(self) -> None:
         """Nothing is sent or received any more."""
@@ -112,18 +110,19 @@ class Pace:
 class SimSession:
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
-    def __init__(self, sim: Sim, kind: str, paced: bool = False) -> None:
-        self.sim = sim
-        self.arena = sim.arena
-        self.description = f"{sim.board.description} in arena {sim.arena.name}"
-        self.transport = SimTransport(sim, kind, paced)
+    def __init__(self, robot: SimRobot, kind: str, paced: bool = False) -> None:
+        self.robot = robot
+        self.sim = robot.sim
+        self.arena = robot.sim.arena
+        self.description = f"{robot.board.description} in arena {self.arena.name}"
+        self.transport = SimTransport(robot, kind, paced)
         self.transport.set_baud(self.transport.baud)
-        self.board = BoardPins(sim)
+        self.board = BoardPins(robot)
         self._closed = False
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""
-        columns = self.sim.truth()
+        columns = self.robot.truth()
         if not len(columns["time"]):
             return None
         return Truth(
@@ -140,7 +139,7 @@ class SimSession:
 
     def looks(self) -> dict[str, Floats]:
         """Where the range sensors looked from and what they saw: columns `LOOK`."""
-        return self.sim.looks()
+        return self.robot.looks()
 
     def counters(self) -> Mapping[str, float]:
         """Counters of the board, and `contacts`, `distance` (m), `time` (s), `load` (share of cycles executed)."""
@@ -148,11 +147,11 @@ class SimSession:
         cycle = self.sim.cycle
         return {
             **board,
-            "contacts": float(lib.sim_contacts(self.sim.handle, 0)),
-            "distance": float(self.sim.body().distance),
+            "contacts": float(self.robot.contacts),
+            "distance": float(self.robot.body().distance),
             "time": cycle / CLOCK_HZ,
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
-            "supply_voltage": float(lib.sim_supply_voltage(self.sim.handle, 0)),
+            "supply_voltage": self.robot.supply_voltage,
         }
 
     def close(self) -> None:
@@ -183,20 +182,19 @@ def _baud(robot: robots.RobotDescription) -> int:
 
 
 def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -> SimSession:
-    arena = load_arena(request.arena)
+    step_cycles = round(float(request.options.get("world_step_s", 0.001)) * CLOCK_HZ)
+    sim = Sim(
+        load_arena(request.arena),
+        seed=request.seed,
+        noise=request.noise,
+        record=request.record,
+        step_cycles=step_cycles,
+    )
     board = make()
     try:
-        sim = Sim(
-            board,
-            request.robot,
-            arena,
-            seed=request.seed,
-            noise=request.noise,
-            record=request.record,
-            pose=request.start_pose,
-            step_cycles=round(float(request.options.get("world_step_s", 0.001)) * CLOCK_HZ),
-        )
+        robot = sim.add(board, request.robot, pose=request.start_pose)
     except Exception:
+        sim.close()
         board.close()
         raise
-    return SimSession(sim, kind, request.realtime)
+    return SimSession(robot, kind, request.realtime)

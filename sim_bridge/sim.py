@@ -1,7 +1,8 @@
-"""The loop of board and world (loop.h) as Python calls it: one robot of a description in one arena."""
+"""The loop of boards and world (loop.h) as Python calls it: an arena and the robots in it."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -25,91 +26,156 @@ Floats = NDArray[np.float64]
 
 
 class Sim:
-    """An arena with one robot in it, in lockstep with its board. Seconds and SI units."""
+    """An arena and the robots in it, in lockstep with their boards. Seconds and SI units.
+
+    `robots` maps the number of each robot to it. A run is a function of arena, seed, robots by number, boards and
+    what is sent to them: neither the order in which robots are added nor the way a run is cut into calls matters.
+    """
 
     def __init__(
         self,
-        board: EmulatedBoard,
-        robot: robots.RobotDescription,
         arena: Arena,
         *,
         seed: int = 1,
         noise: bool = True,
         record: bool = True,
-        pose: tuple[float, float, float] | None = None,
         step_cycles: int = STEP_CYCLES,
     ) -> None:
-        """Puts the robot at `pose` (x, y, heading), or where the arena says.
+        """An arena without robots.
 
         Raises:
-            ArenaError: that place is not free.
             BoardError: a world step that does not divide the control tick.
         """
         if step_cycles <= 0 or TICK_CYCLES % step_cycles:
             raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
-        self.board, self.robot, self.arena = board, robot, arena
-        x, y, heading = arena.start if pose is None else pose
-        if not arena.is_free(x, y, robot.body.radius_m):
-            raise ArenaError(f"arena {arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space")
-        draw = imperfections.Draw(seed, noise)
+        self.arena, self.seed, self.noise = arena, seed, noise
+        self.robots: dict[int, SimRobot] = {}
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        # the board outlives the simulation, whichever of the two Python lets go of first
-        self.handle = ffi.gc(handle, lambda handle, board=board: lib.sim_destroy(handle))
-        _done(lib.sim_add_robot(handle, board.address, imperfections.body_parameters(robot.body), x, y, heading))
-        _done(lib.sim_add_battery(handle, 0, _battery_channel(robot), imperfections.battery_parameters()))
-        for name, device in robot.device.items():
-            if device.on:
-                self._join(name, device, draw)
-        self._bytes = ffi.new("uint8_t[]", 65536)
-        self._count = ffi.new("size_t *")
-        self._body = ffi.new("body_state *")
+        boards: list[EmulatedBoard] = []
+        # arena and boards outlive the simulation, whichever of them Python lets go of first
+        self.handle = ffi.gc(handle, lambda handle, keep=(arena, boards): lib.sim_destroy(handle))
+        self._boards = boards
 
-    def _join(self, name: str, device: robots.Device, draw: imperfections.Draw) -> None:
-        """Joins a device to its pins; those without a part in the world are left alone."""
-        side = lib.SIM_RIGHT if name.endswith("right") else lib.SIM_LEFT
-        body = self.robot.body
-        match device:
-            case robots.ContinuousServo():
-                servo = imperfections.servo_parameters(device, body, side, draw)
-                _done(lib.sim_add_servo(self.handle, 0, side, robots.pin_number(device.pin), servo))
-            case robots.Encoder():
-                pin, edges = robots.pin_number(device.pin), device.edges_per_turn
-                _done(lib.sim_add_encoder(self.handle, 0, side, pin, 255, edges))
-            case robots.QuadratureEncoder():
-                pin_a, pin_b = robots.pin_number(device.pin_a), robots.pin_number(device.pin_b)
-                _done(lib.sim_add_encoder(self.handle, 0, side, pin_a, pin_b, device.edges_per_turn))
-            case robots.Whisker():
-                whisker = imperfections.whisker_parameters(device)
-                _done(lib.sim_add_whisker(self.handle, 0, robots.pin_number(device.pin), whisker))
-            case robots.InfraredPair():
-                pair = imperfections.infrared_parameters(device)
-                led, receiver = robots.pin_number(device.led_pin), robots.pin_number(device.receiver_pin)
-                _done(lib.sim_add_infrared(self.handle, 0, led, receiver, pair))
-            case robots.Ping():
-                ping = imperfections.ping_parameters(device)
-                _done(lib.sim_add_ping(self.handle, 0, robots.pin_number(device.pin), ping))
+    def add(
+        self,
+        board: EmulatedBoard,
+        description: robots.RobotDescription,
+        *,
+        pose: tuple[float, float, float] | None = None,
+        number: int | None = None,
+    ) -> SimRobot:
+        """Puts a robot at `pose` (x, y, heading; m, m, rad), or where the arena says.
+
+        `number` is its name in the run and the key of its noise and its imperfections: the next one if None.
+
+        Raises:
+            ArenaError: that place is not free.
+            BoardError: the number is taken or negative.
+        """
+        if number is None:
+            number = max(self.robots, default=-1) + 1
+        if number < 0 or number in self.robots:
+            raise BoardError(f"robot number {number} is taken or negative")
+        x, y, heading = self.arena.start if pose is None else pose
+        if not self.is_free(x, y, description.body.radius_m):
+            raise ArenaError(
+                f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
+            )
+        body = imperfections.body_parameters(description.body)
+        _done(lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading))
+        self._boards.append(board)
+        robot = SimRobot(self, number, board, description)
+        self.robots[number] = robot
+        return robot
+
+    def is_free(self, x: float, y: float, radius: float, without: int | None = None) -> bool:
+        """Whether a disc lies in free space, and on no robot (but `without`)."""
+        if not self.arena.is_free(x, y, radius):
+            return False
+        for number, robot in self.robots.items():
+            body = robot.body()
+            near = math.hypot(body.x - x, body.y - y) < radius + robot.description.body.radius_m
+            if near and number != without:
+                return False
+        return True
 
     @property
     def cycle(self) -> int:
         """Up to where the simulation has run."""
         return int(lib.sim_now(self.handle))
 
-    def run(self, cycles: int, quiet: int = 0) -> None:
+    def run(self, cycles: int, quiet: int = 0, hear: SimRobot | None = None) -> None:
         """Runs for at most `cycles`; after `quiet` of them, until bytes have come and the line is idle.
 
+        `hear`: the robot whose bytes end the run; None: anybody's.
+
         Raises:
-            BoardError: the board's program crashed.
+            BoardError: a board's program crashed.
         """
-        if lib.sim_run(self.handle, cycles, quiet):
-            fault = lib.board_fault(self.board.address)
+        crashed = lib.sim_run(self.handle, lib.SIM_ANY if hear is None else hear.number, cycles, quiet)
+        if crashed:
+            board = self.robots[crashed - 1].board
+            fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
-            raise BoardError(f"the {self.board.description} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+            raise BoardError(f"the {board.description} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+
+    def hash(self) -> int:
+        """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""
+        return int(lib.sim_hash(self.handle))
+
+    def close(self) -> None:
+        """Frees the simulation, then the boards."""
+        ffi.release(self.handle)
+        for board in self._boards:
+            board.close()
+
+
+class SimRobot:
+    """One robot of a simulation: its line, its truth, its logs. Made by `Sim.add`."""
+
+    def __init__(self, sim: Sim, number: int, board: EmulatedBoard, description: robots.RobotDescription) -> None:
+        self.sim, self.number, self.board, self.description = sim, number, board, description
+        self._handle = sim.handle
+        self._bytes = ffi.new("uint8_t[]", 65536)
+        self._count = ffi.new("size_t *")
+        self._body = ffi.new("body_state *")
+        draw = imperfections.Draw(sim.seed, sim.noise, number)
+        battery = imperfections.battery_parameters()
+        _done(lib.sim_add_battery(self._handle, number, _battery_channel(description), battery))
+        for name, device in description.device.items():
+            if device.on:
+                self._join(name, device, draw)
+
+    def _join(self, name: str, device: robots.Device, draw: imperfections.Draw) -> None:
+        """Joins a device to its pins; those without a part in the world are left alone."""
+        side = lib.SIM_RIGHT if name.endswith("right") else lib.SIM_LEFT
+        handle, number, body = self._handle, self.number, self.description.body
+        match device:
+            case robots.ContinuousServo():
+                servo = imperfections.servo_parameters(device, body, side, draw)
+                _done(lib.sim_add_servo(handle, number, side, robots.pin_number(device.pin), servo))
+            case robots.Encoder():
+                pin, edges = robots.pin_number(device.pin), device.edges_per_turn
+                _done(lib.sim_add_encoder(handle, number, side, pin, 255, edges))
+            case robots.QuadratureEncoder():
+                pin_a, pin_b = robots.pin_number(device.pin_a), robots.pin_number(device.pin_b)
+                _done(lib.sim_add_encoder(handle, number, side, pin_a, pin_b, device.edges_per_turn))
+            case robots.Whisker():
+                whisker = imperfections.whisker_parameters(device)
+                _done(lib.sim_add_whisker(handle, number, robots.pin_number(device.pin), whisker))
+            case robots.InfraredPair():
+                pair = imperfections.infrared_parameters(device)
+                led, receiver = robots.pin_number(device.led_pin), robots.pin_number(device.receiver_pin)
+                _done(lib.sim_add_infrared(handle, number, led, receiver, pair))
+            case robots.Ping():
+                ping = imperfections.ping_parameters(device)
+                _done(lib.sim_add_ping(handle, number, robots.pin_number(device.pin), ping))
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
-        count = lib.sim_receive(self.handle, 0, self._bytes, 65536)
+        count = lib.sim_receive(self._handle, self.number, self._bytes, 65536)
         if not count:
             return b""
         data: bytes = ffi.buffer(self._bytes, count)[:]
@@ -117,11 +183,35 @@ class Sim:
 
     def send(self, data: bytes) -> None:
         """Bytes to the board, from now on."""
-        lib.sim_send(self.handle, 0, data, len(data))
+        lib.sim_send(self._handle, self.number, data, len(data))
+
+    def line_rate(self, baud: int) -> None:
+        """Bit rate of the outside's side of the serial line."""
+        lib.sim_line_rate(self._handle, self.number, baud)
+
+    @property
+    def last_byte_cycle(self) -> int:
+        """At which the last byte from the board had come."""
+        return int(lib.sim_last_byte(self._handle, self.number))
+
+    @property
+    def contacts(self) -> int:
+        """Touches begun so far; apart by 0.1 s at least."""
+        return int(lib.sim_contacts(self._handle, self.number))
+
+    @property
+    def pack_voltage(self) -> float:
+        """Of the battery, V."""
+        return float(lib.sim_pack_voltage(self._handle, self.number))
+
+    @property
+    def supply_voltage(self) -> float:
+        """Of the rail that the board runs on, V."""
+        return float(lib.sim_supply_voltage(self._handle, self.number))
 
     def body(self) -> Any:
         """The body's state (C struct body_state): pose, speeds, wheel angles, distance, contact."""
-        lib.sim_body(self.handle, 0, self._body)
+        lib.sim_body(self._handle, self.number, self._body)
         return self._body
 
     def _rows(self, rows: Any, columns: tuple[str, ...]) -> dict[str, Floats]:
@@ -132,20 +222,11 @@ class Sim:
 
     def truth(self) -> dict[str, Floats]:
         """Columns `TRUTH`, one row every 10 ms; empty without recording."""
-        return self._rows(lib.sim_record(self.handle, 0, self._count), TRUTH)
+        return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
 
     def looks(self) -> dict[str, Floats]:
         """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
-        return self._rows(lib.sim_looks(self.handle, 0, self._count), LOOK)
-
-    def hash(self) -> int:
-        """Of the body's whole state: equal for runs that are equal bit for bit."""
-        return int(lib.sim_hash(self.handle))
-
-    def close(self) -> None:
-        """Frees the simulation, then the board."""
-        ffi.release(self.handle)
-        self.board.close()
+        return self._rows(lib.sim_looks(self._handle, self.number, self._count), LOOK)
 
 
 def _done(status: int) -> None:

@@ -14,6 +14,8 @@
 
 #define BOARD_CLOCK_HZ 16000000u
 #define BOARD_PIN_COUNT 20u /* Arduino numbers: 0..13, then A0..A5 as 14..19 */
+#define BOARD_FIRST_ANALOG_PIN 14u
+#define BOARD_ANALOG_COUNT 6u
 #define BOARD_INTERFACE_VERSION 1u
 #define BOARD_GUARD_CYCLES 64u
 

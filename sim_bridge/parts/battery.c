@@ -3,29 +3,32 @@
 
 #include <string.h>
 
+static void step(part *base) {
+  battery *self = (battery *)base;
+  const chassis *c = base->chassis;
+  double servos_a = 0.0;
+  for (int side = 0; side < 2; side++) {
+    const chassis_wheel *wheel = &c->wheel[side];
+    servos_a += supply_servo_current(&self->parameters.supply, wheel->powered, wheel->speed, wheel->torque);
+  }
+  supply_step(&self->parameters.supply, &self->supply, servos_a, c->at_charger,
+              (double)c->step_cycles / BOARD_CLOCK_HZ);
+}
+
+static double analog(part *base, uint64_t cycle) {
+  battery *self = (battery *)base;
+  (void)cycle;
+  const double noise = self->parameters.noise_v * noise_next_normal(&base->noise);
+  const double v = self->supply.pack_v * self->parameters.divider + noise;
+  return v < 0.0 ? 0.0 : (v > SUPPLY_NOMINAL_V ? SUPPLY_NOMINAL_V : v);
+}
+
+static const part_operations OPERATIONS = {.step = step, .analog = analog};
+
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters) {
   memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->channel = channel;
+  const uint8_t pin = channel == PART_NO_PIN ? PART_NO_PIN : (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel);
+  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_ANALOG}, 1);
   self->parameters = *parameters;
-  battery_step(self, 0.0, 0.0);
-}
-
-void battery_step(battery *self, double servo_a, double dt) {
-  const battery_parameters *p = &self->parameters;
-  const double current = p->board_a + servo_a;
-  self->drawn_as += current * dt;
-  double left = 1.0 - self->drawn_as / p->capacity_as;
-  if (left < 0.0) left = 0.0;
-  self->pack_v = p->empty_v + (p->full_v - p->empty_v) * left - p->resistance_ohm * current;
-  if (self->pack_v < 0.0) self->pack_v = 0.0;
-  self->regulated_v = self->pack_v - p->drop_out_v;
-  if (self->regulated_v > BATTERY_NOMINAL_V) self->regulated_v = BATTERY_NOMINAL_V;
-  if (self->regulated_v < 0.0) self->regulated_v = 0.0;
-}
-
-double battery_sample(battery *self) {
-  const double v =
-      self->pack_v * self->parameters.divider + self->parameters.noise_v * noise_next_normal(&self->place.noise);
-  return v < 0.0 ? 0.0 : (v > BATTERY_NOMINAL_V ? BATTERY_NOMINAL_V : v);
+  supply_init(&parameters->supply, &self->supply, 1.0);
 }

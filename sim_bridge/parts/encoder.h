@@ -10,7 +10,8 @@
 #include "part.h"
 
 typedef struct {
-  part_place place;
+  part part;
+  int side; /* 0 left, 1 right */
   uint8_t pin_a;
   uint8_t pin_b; /* PART_NO_PIN: one channel */
   double edges_per_rad;
@@ -19,11 +20,8 @@ typedef struct {
   long long index; /* its whole part */
 } encoder;
 
-/* The pins get their levels for wheel angle `angle`, rad. */
-void encoder_init(encoder *self, const part_place *place, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn,
-                  double angle);
-
-/* The wheel turned to `angle`, rad, between `cycle` and `cycle + step_cycles`. */
-void encoder_step(encoder *self, double angle, uint64_t cycle, uint32_t step_cycles);
+/* An encoder at the wheel of `side` (0 left, 1 right); its pins get their levels for the wheel's angle now. */
+void encoder_init(encoder *self, const part_place *place, int side, uint8_t pin_a, uint8_t pin_b,
+                  uint32_t edges_per_turn);
 
 #endif

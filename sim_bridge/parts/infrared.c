@@ -1,7 +1,6 @@
 /* infrared.c: see infrared.h. */
 #include "infrared.h"
 
-#include <math.h>
 #include <string.h>
 
 #define PERIOD_MINIMUM 360u /* 44.4 kHz */
@@ -9,57 +8,103 @@
 #define CYCLES_TO_HEAR 8u
 #define HOLD_CYCLES (10u * 421u) /* the output stays low for ten periods after the last one */
 
-double infrared_range_share(uint32_t period_cycles) {
-  /* Sensitivity against frequency, relative to its peak; light falls with the square of the distance. */
-  static const double kilohertz[] = {33.0, 35.0, 36.5, 38.0, 38.5, 39.0, 40.0, 41.0, 42.0, 45.0};
-  static const double sensitivity[] = {0.02, 0.15, 0.55, 0.97, 1.00, 0.90, 0.50, 0.33, 0.20, 0.02};
-  const double f = 16000.0 / (double)period_cycles;
-  double s = 0.02;
-  for (size_t i = 0; i + 1 < sizeof kilohertz / sizeof kilohertz[0]; i++) {
-    if (f < kilohertz[i] || f > kilohertz[i + 1]) continue;
-    s = sensitivity[i] + (sensitivity[i + 1] - sensitivity[i]) * (f - kilohertz[i]) / (kilohertz[i + 1] - kilohertz[i]);
-    break;
+static void forget_past_light(infrared *self, uint64_t cycle) {
+  int kept = 0;
+  for (int i = 0; i < self->foreign_count; i++) {
+    if (self->foreign[i].until > cycle) self->foreign[kept++] = self->foreign[i];
   }
-  return sqrt(s / 0.97);
+  self->foreign_count = kept;
 }
 
-void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
-                   const infrared_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->led_pin = led_pin;
-  self->receiver_pin = receiver_pin;
-  self->parameters = *parameters;
-  part_drive(&self->place, 0, receiver_pin, BOARD_HIGH);
+/* Queues the output from `cycle` on: low while any light lasts, the own burst's until `lit_until`. */
+static void drive_output(infrared *self, uint64_t cycle) {
+  forget_past_light(self, cycle);
+  uint64_t low_until = self->lit_until;
+  const int lit = low_until > cycle;
+  if (lit) part_drive(&self->part, cycle, self->receiver_pin, BOARD_LOW);
+  int low = lit;
+  for (int i = 0; i < self->foreign_count; i++) {
+    const infrared_light *light = &self->foreign[i];
+    if (low && light->from > low_until) {
+      part_drive(&self->part, low_until, self->receiver_pin, BOARD_HIGH);
+      low = 0;
+    }
+    if (!low) part_drive(&self->part, light->from > cycle ? light->from : cycle, self->receiver_pin, BOARD_LOW);
+    if (!low || light->until > low_until) low_until = light->until;
+    low = 1;
+  }
+  if (low) part_drive(&self->part, low_until, self->receiver_pin, BOARD_HIGH);
 }
 
-static void look(infrared *self, uint64_t cycle, uint32_t period) {
-  const infrared_parameters *p = &self->parameters;
-  const part_mount mount = {p->x, p->y, p->heading, p->beam};
-  const double spread = 1.0 + p->range_sigma * noise_next_normal(&self->place.noise); /* (3.1) */
-  const int falsely = noise_next_uniform(&self->place.noise) < p->false_hit;
-  self->reach = p->range_m * infrared_range_share(period) * (spread > 0.0 ? spread : 0.0);
-  self->distance = part_look(&self->place, &mount, p->rays, self->reach, 0.0);
-  self->seen = (uint8_t)(falsely || self->distance >= 0.0);
-  self->burst_cycle = cycle;
-  self->bursts++;
+static double frequency_of(uint32_t period) { return (double)BOARD_CLOCK_HZ / (double)period; }
+
+static void look(infrared *self, uint64_t cycle) {
+  const viewpoint from = part_view(&self->part, cycle);
+  const infrared_look seen = infrared_pair_look(&self->pair, &from, frequency_of(self->period), &self->part.noise);
+  self->reach = seen.reach;
+  self->distance = seen.distance;
+  self->seen = (uint8_t)seen.seen;
+  part_log_look(&self->part, cycle, LOOK_INFRARED, &from, &self->mount, self->reach, self->distance);
 }
 
-int infrared_edge(infrared *self, uint64_t cycle, uint8_t level) {
-  if (level != BOARD_HIGH) return 0;
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  infrared *self = (infrared *)base;
+  (void)pin;
+  if (level != BOARD_HIGH) return;
   const uint64_t period = cycle - self->last_rise;
   self->last_rise = cycle;
   if (period < PERIOD_MINIMUM || period > PERIOD_MAXIMUM) {
     self->carrier_cycles = 0;
     self->seen = 0;
-    return 0;
+    return;
   }
   self->carrier_cycles++;
-  const int recognised = self->carrier_cycles == CYCLES_TO_HEAR;
-  if (recognised) look(self, cycle, (uint32_t)period);
-  if (self->seen) { /* low from now on takes back the end that was queued a period ago */
-    part_drive(&self->place, cycle, self->receiver_pin, BOARD_LOW);
-    part_drive(&self->place, cycle + HOLD_CYCLES, self->receiver_pin, BOARD_HIGH);
+  self->period = (uint32_t)period;
+  if (self->carrier_cycles == CYCLES_TO_HEAR) look(self, cycle);
+  if (self->carrier_cycles >= CYCLES_TO_HEAR) {
+    if (self->sent_from == self->sent_until) self->sent_from = cycle;
+    self->sent_until = cycle + 1;
   }
-  return recognised;
+  if (self->seen) { /* low from now on takes back the end that was queued a period ago */
+    self->lit_until = cycle + HOLD_CYCLES;
+    drive_output(self, cycle);
+  }
+}
+
+static const part_operations OPERATIONS = {.edge = edge};
+
+infrared *infrared_of(part *base) { return base->op == &OPERATIONS ? (infrared *)base : NULL; }
+
+int infrared_take_burst(infrared *self, infrared_burst *burst, infrared_light *span) {
+  if (self->sent_from == self->sent_until) return 0;
+  const viewpoint from = part_view(&self->part, self->sent_from);
+  *burst = infrared_pair_burst(&self->pair, &from, frequency_of(self->period));
+  *span = (infrared_light){self->sent_from, self->sent_until};
+  self->sent_from = self->sent_until;
+  return 1;
+}
+
+void infrared_see_burst(infrared *self, const infrared_burst *burst, const infrared_light *span) {
+  if (self->part.off || !(self->pair.direct > 0.0)) return;
+  const viewpoint from = part_view(&self->part, span->from);
+  if (!infrared_pair_sees_burst(&self->pair, &from, burst)) return;
+  infrared_light light = {span->from, span->until + HOLD_CYCLES};
+  int i = self->foreign_count;
+  if (i == INFRARED_FOREIGN) return; /* it is lit without a pause anyway */
+  for (; i > 0 && self->foreign[i - 1].from > light.from; i--) self->foreign[i] = self->foreign[i - 1];
+  self->foreign[i] = light;
+  self->foreign_count++;
+  drive_output(self, light.from);
+}
+
+int infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
+                  const infrared_pair_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  if (infrared_pair_init(&self->pair, parameters) != 0) return -1;
+  const part_pin pins[] = {{led_pin, PART_HEARS}, {receiver_pin, PART_DRIVES | PART_PULLED_UP}};
+  part_join(&self->part, &OPERATIONS, place, pins, 2);
+  self->receiver_pin = receiver_pin;
+  self->mount = parameters->beam;
+  part_drive(&self->part, 0, receiver_pin, BOARD_HIGH);
+  return 0;
 }

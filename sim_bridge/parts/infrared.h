@@ -1,45 +1,52 @@
 /* infrared.h: an infra-red LED and a receiver for bursts of 36 to 42 kHz that looks the same way.
  *
- * The receiver's output is high. After a few cycles of the carrier on the LED's pin it goes low if something within range
- * sends enough light back, and it stays low until the carrier has been gone for a few cycles. It hears 38.5 kHz best;
- * the farther the carrier is from that, the nearer an object must be. Now and then it sees what is not there.
+ * The receiver's output is high. After a few cycles of the carrier it goes low if enough light reaches it
+ * (world/sensors/infrared_pair), and it stays low until the carrier has been gone for a few cycles. Light is that of the own
+ * LED, thrown back by something within range, or that of another robot's LED (cross-talk), or imagined. Another robot's
+ * light arrives one world step late: that is what two boards that run one after the other can know of each other.
  */
 #ifndef PART_INFRARED_H
 #define PART_INFRARED_H
 
+#include "../world/sensors/infrared_pair.h"
 #include "part.h"
 
-/* python: begin */
-typedef struct {
-  double x, y, heading, beam; /* in the body's frame: m, m, rad, full opening in rad */
-  double range_m;             /* at 38 kHz */
-  double range_sigma;         /* relative spread of the range from burst to burst */
-  double false_hit;           /* probability per burst */
-  int rays;
-} infrared_parameters;
+#define INFRARED_FOREIGN 8 /* bursts of others that wait to be seen */
 
-/* Share of the range that is left at a carrier of that period. */
-double infrared_range_share(uint32_t period_cycles);
-/* python: end */
+/* Light from elsewhere: the receiver is lit from one cycle to another. */
+typedef struct {
+  uint64_t from, until;
+} infrared_light;
 
 typedef struct {
-  part_place place;
-  uint8_t led_pin;
+  part part;
   uint8_t receiver_pin;
-  infrared_parameters parameters;
+  beam_parameters mount;
+  infrared_pair pair;
   uint64_t last_rise;
-  uint32_t carrier_cycles; /* in a row */
-  uint8_t seen;            /* in this burst */
-  double distance;         /* at the last burst, m; -1: nothing in the beam */
-  double reach;            /* of the last burst, m */
-  uint64_t burst_cycle;    /* when it was recognised; 0: never */
-  uint32_t bursts;
+  uint32_t period;                          /* of the carrier, cycles */
+  uint32_t carrier_cycles;                  /* in a row */
+  uint8_t seen;                             /* in this burst */
+  double distance;                          /* at the last burst, m; -1: nothing in the beam */
+  double reach;                             /* of the last burst, m */
+  uint64_t lit_until;                       /* by the own burst: the output is low until then */
+  infrared_light foreign[INFRARED_FOREIGN]; /* by increasing time */
+  int foreign_count;
+  /* what the LED sent since others were last told */
+  uint64_t sent_from, sent_until; /* the same cycle: nothing */
 } infrared;
 
-void infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
-                   const infrared_parameters *parameters);
+/* Returns 0, or -1 for parameters that no pair has. */
+int infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
+                  const infrared_pair_parameters *parameters);
 
-/* The board does `level` to the LED's pin from `cycle` on. Returns 1 if a burst was recognised just now. */
-int infrared_edge(infrared *self, uint64_t cycle, uint8_t level);
+/* The pair that this part is, or NULL. */
+infrared *infrared_of(part *base);
+
+/* What its LED sent since the last call, if it sent anything: 1, the burst, and from when until when its carrier lasted. */
+int infrared_take_burst(infrared *self, infrared_burst *burst, infrared_light *span);
+
+/* The LED of another robot sent `burst` during `span`, all cycles of this board. */
+void infrared_see_burst(infrared *self, const infrared_burst *burst, const infrared_light *span);
 
 #endif

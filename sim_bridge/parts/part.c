@@ -1,28 +1,62 @@
 /* part.c: see part.h. */
 #include "part.h"
 
-#include <math.h>
-
 #include "../world/numbers.h"
 
-double part_look(const part_place *place, const part_mount *mount, int rays, double reach, double grazing_cosine) {
-  const body_state *s = &place->body->state;
-  const double x = s->x + mount->x * s->cosine - mount->y * s->sine; /* (3.9) */
-  const double y = s->y + mount->x * s->sine + mount->y * s->cosine;
-  double nearest = -1.0;
-  for (int i = 0; i < rays; i++) {
-    const double share = rays > 1 ? (double)i / (double)(rays - 1) - 0.5 : 0.0; /* (3.10), (3.11) */
-    double sine, cosine;
-    number_sincos(s->heading + mount->heading + share * mount->beam, &sine, &cosine);
-    size_t hit = 0;
-    const double d = arena_ray(place->arena, x, y, cosine, sine, reach, &hit);
-    if (d < 0.0 || (nearest >= 0.0 && d >= nearest)) continue;
-    if (grazing_cosine > 0.0) {
-      const arena_edge *e = &arena_edges(place->arena)[hit];
-      const double normal = fabs(cosine * e->ey - sine * e->ex) / sqrt(e->length_squared);
-      if (normal < grazing_cosine) continue;
-    }
-    nearest = d;
+void part_join(part *self, const part_operations *op, const part_place *place, const part_pin *pins, int count) {
+  self->op = op;
+  self->chassis = place->chassis;
+  self->noise = place->noise;
+  self->off = 0;
+  self->turret = NULL;
+  for (int i = 0; i < PART_PINS; i++) self->pins[i] = i < count ? pins[i] : (part_pin){PART_NO_PIN, 0};
+}
+
+void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+  if (pin >= BOARD_PIN_COUNT || self->off) return;
+  self->chassis->driven[pin] = level;
+  self->chassis->board->op->drive(self->chassis->board, at, pin, level);
+}
+
+/* The body that would carry the part, turned about the turret's axis by `angle`, in its place. */
+static void turn_view(viewpoint *from, const part_turret *turret, double angle) {
+  const double tx = from->x + turret->x * from->cosine - turret->y * from->sine; /* (3.9) */
+  const double ty = from->y + turret->x * from->sine + turret->y * from->cosine;
+  from->heading += angle;
+  number_sincos(from->heading, &from->sine, &from->cosine);
+  from->x = tx - (turret->x * from->cosine - turret->y * from->sine);
+  from->y = ty - (turret->x * from->sine + turret->y * from->cosine);
+}
+
+viewpoint part_view(const part *self, uint64_t cycle) {
+  const chassis *c = self->chassis;
+  const body_state *s = &c->body->state;
+  viewpoint from = {c->around, s->x, s->y, s->heading, s->cosine, s->sine, c->self_id};
+  double share = 1.0;
+  if (cycle < c->since + c->step_cycles) {
+    share = cycle > c->since ? (double)(cycle - c->since) / (double)c->step_cycles : 0.0;
+    from.x = c->x + share * (s->x - c->x);
+    from.y = c->y + share * (s->y - c->y);
+    from.heading = c->heading + share * number_wrap(s->heading - c->heading);
+    number_sincos(from.heading, &from.sine, &from.cosine);
   }
-  return nearest;
+  const part_turret *turret = self->turret;
+  if (turret != NULL) turn_view(&from, turret, turret->before + share * (turret->angle - turret->before));
+  return from;
+}
+
+void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *beam,
+                   double reach, double distance) {
+  if (!self->chassis->recording) return;
+  const sim_look look = {
+      .time = (double)cycle / BOARD_CLOCK_HZ,
+      .kind = kind,
+      .x = from->x + beam->x * from->cosine - beam->y * from->sine,
+      .y = from->y + beam->x * from->sine + beam->y * from->cosine,
+      .heading = from->heading + beam->heading,
+      .beam = beam->opening,
+      .reach = reach,
+      .distance = distance,
+  };
+  buffer_append(self->chassis->looks, &look, sizeof look);
 }

@@ -1,9 +1,12 @@
 /* part.h: what the parts have in common.
  *
  * A part is one device: its pins on one side, its question to the world on the other. It hears the board's output edges on
- * its pins, at their cycle, from inside the board's run, and answers by driving pins. The loop calls `*_step` for parts
- * that follow the world. The world leads the board by a step; what a part stamps by the world's time is stamped PART_GUARD
- * cycles later, so that every stamp lies ahead of the board.
+ * its pins, at their cycle, from inside the board's run, and answers by driving pins, at once or later. The world leads
+ * the board by a step: what a part stamps by the world's time is stamped PART_GUARD cycles later, so that every stamp lies
+ * ahead of the board; what it is asked in between it answers from the pose interpolated to that cycle.
+ *
+ * A kind of part is a struct that begins with a `part`, and its `part_operations`. Each part keeps the struct it is by
+ * itself; the robot that carries it frees it with free().
  */
 #ifndef PART_H
 #define PART_H
@@ -11,50 +14,123 @@
 #include <stdint.h>
 
 #include "../boards/board.h"
-#include "../world/arena.h"
+#include "../logs.h"
 #include "../world/body.h"
 #include "../world/noise.h"
+#include "../world/sensors/beam.h"
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
+#define PART_PINS 2 /* at most, of one part */
 
-/* Who a part is among the keys of the noise. */
+/* Who a part is among the keys of the noise; where a robot may have several of a kind, and on. */
 enum {
   PART_SERVO_LEFT = 1,
   PART_SERVO_RIGHT = 2,
   PART_ENCODER_LEFT = 11,
   PART_ENCODER_RIGHT = 12,
-  PART_WHISKER = 21, /* and on */
+  PART_WHISKER = 21,
   PART_INFRARED = 31,
   PART_PING = 41,
   PART_BATTERY = 51,
+  PART_KINDS = 100 /* more than all of them */
 };
 
-/* Where a part is joined: the board, the body that carries it and the arena around it. */
+/* What a part does with a pin of its own. */
+enum {
+  PART_HEARS = 1,     /* `edge` is called for what the board does to it */
+  PART_DRIVES = 2,    /* the part drives it */
+  PART_PULLED_UP = 4, /* a resistor pulls it up when nobody drives it */
+  PART_ANALOG = 8     /* `analog` is asked for the voltage there */
+};
+
+typedef struct {
+  uint8_t pin; /* Arduino number, A0 is 14; PART_NO_PIN: not joined */
+  uint8_t role;
+} part_pin;
+
+/* One wheel's motor in the step under way. */
+typedef struct {
+  double speed;  /* of the rim along the ground, m/s, when the step begins */
+  double torque; /* N m */
+  int powered;   /* 1: the motor gets a signal */
+} chassis_wheel;
+
+/* What the parts of one robot share: the board and the body that carry them, and what is around. */
 typedef struct {
   board *board;
   body *body;
-  const arena *arena;
+  const scene *around; /* arena, moving obstacles, robots: also this one, as `self_id` */
+  uint32_t self_id;
+  uint64_t since;                  /* the world's step under way begins here */
+  uint32_t step_cycles;            /* and takes that long */
+  double x, y, heading;            /* pose at `since`; the body's state is that at the step's end */
+  chassis_wheel wheel[2];          /* left, right */
+  double supply;                   /* share of the nominal voltage, of the rail that the board runs on */
+  double servo_supply;             /* and of that of the servos */
+  int at_charger;                  /* 1: the body stands at a charging station */
+  uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
+  int recording;                   /* 1: looks are logged */
+  buffer *looks;                   /* sim_look */
+} chassis;
+
+/* Kinds of looks in the log. */
+enum { LOOK_INFRARED = 0, LOOK_PING = 1 };
+
+typedef struct part part;
+
+/* A turret on the body: what is mounted on it turns with it. */
+typedef struct {
+  double x, y;   /* of its axis, in the body's frame, m */
+  double before; /* angle when the step under way begins, rad, counter-clockwise from straight ahead */
+  double angle;  /* and when it ends */
+} part_turret;
+
+/* What a kind of part does; NULL: nothing. */
+typedef struct {
+  /* The board does `level` (LOW, HIGH, RELEASED, PULLED_UP) to a pin that the part hears, from `cycle` on. */
+  void (*edge)(part *self, uint64_t cycle, uint8_t pin, uint8_t level);
+
+  /* The body is about to move on from chassis->since: motors say their torque. */
+  void (*before_step)(part *self);
+
+  /* It has: the world stands at chassis->since + chassis->step_cycles. */
+  void (*step)(part *self);
+
+  /* The voltage at the part's analog pin. */
+  double (*analog)(part *self, uint64_t cycle);
+} part_operations;
+
+struct part {
+  const part_operations *op;
+  chassis *chassis;
   noise_source noise;
-  uint8_t *driven; /* what was driven last, by pin */
-  int off;         /* 1: switched off; it neither hears nor drives */
+  part_pin pins[PART_PINS];
+  const part_turret *turret; /* that carries it; NULL: the body does */
+  int off;                   /* 1: its pins were taken from it; it neither hears nor drives */
+};
+
+/* Where a part is joined; the loop knows it when the part is made. */
+typedef struct {
+  chassis *chassis;
+  noise_source noise;
 } part_place;
 
-static inline void part_drive(const part_place *place, uint64_t at, uint8_t pin, uint8_t level) {
-  if (pin >= BOARD_PIN_COUNT || place->off) return;
-  place->driven[pin] = level;
-  place->board->op->drive(place->board, at, pin, level);
-}
+/* Joins a new part to its pins: the first `count` of `pins`. */
+void part_join(part *self, const part_operations *op, const part_place *place, const part_pin *pins, int count);
 
-/* Where something looks from, in the body's frame. */
-typedef struct {
-  double x, y;    /* m */
-  double heading; /* rad */
-  double beam;    /* full opening, rad */
-} part_mount;
+/* From cycle `at` on the part drives `pin` to LOW, HIGH, or lets go of it. Replaces what was queued from `at` on. */
+void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
 
-/* The nearest edge within `reach` among `rays` rays spread over the beam, (3.9)-(3.11), or -1. Surfaces met flatter than
- * `grazing_cosine` (cosine of the angle to their normal) send nothing back; 0: all do. */
-double part_look(const part_place *place, const part_mount *mount, int rays, double reach, double grazing_cosine);
+/* End of the world's step under way. */
+static inline uint64_t part_step_end(const part *self) { return self->chassis->since + self->chassis->step_cycles; }
+
+/* Where the body is at that cycle, by linear interpolation within the step under way, and what is around it; for a part
+ * on a turret, where a body would be that carries the part turned so. */
+viewpoint part_view(const part *self, uint64_t cycle);
+
+/* Logs what a range sensor of that kind saw: `beam` as its parameters have it. */
+void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *beam,
+                   double reach, double distance);
 
 #endif

@@ -11,48 +11,53 @@
 #define ECHO_MAXIMUM (18500u * CYCLES_PER_US)
 #define REST_CYCLES (200u * CYCLES_PER_US)
 
-void ping_init(ping *self, const part_place *place, uint8_t pin, const ping_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->pin = pin;
-  self->parameters = *parameters;
-  self->answer = PING_ANSWER_WORLD;
-  self->distance = -1.0;
-}
-
-/* Length of the echo pulse. */
-static uint64_t echo(ping *self) {
-  const ping_parameters *p = &self->parameters;
-  const part_mount mount = {p->x, p->y, p->heading, p->beam};
-  const double sound = 331.5 + 0.6 * p->temperature_c; /* m/s */
-  const double spread = 1.0 + p->sigma * noise_next_normal(&self->place.noise);
-  const int missed = noise_next_uniform(&self->place.noise) < p->miss;
-  self->distance = missed ? -1.0 : part_look(&self->place, &mount, p->rays, p->range_maximum_m, p->grazing_cosine);
+/* Length of the echo pulse of a ping. */
+static uint64_t echo(ping *self, const viewpoint *from) {
+  self->distance = sonar_ping(&self->sonar, from, &self->part.noise);
   if (self->distance < 0.0) return ECHO_MAXIMUM;
-  double d = self->distance * spread;
-  if (d < p->range_minimum_m) d = p->range_minimum_m;
-  const uint64_t cycles = (uint64_t)(2.0 * d / sound * BOARD_CLOCK_HZ + 0.5);
+  const uint64_t cycles = (uint64_t)(sonar_echo_time(&self->sonar, self->distance) * BOARD_CLOCK_HZ + 0.5);
   return cycles < ECHO_MINIMUM ? ECHO_MINIMUM : (cycles > ECHO_MAXIMUM ? ECHO_MAXIMUM : cycles);
 }
 
-int ping_edge(ping *self, uint64_t cycle, uint8_t level) {
-  const uint8_t high = level == BOARD_HIGH;
-  if (high == self->high) return 0;
-  self->high = high;
-  if (high) {
-    self->rise = cycle;
-    return 0;
-  }
-  const uint64_t width = cycle - self->rise;
-  if (width < TRIGGER_CYCLES || width > TRIGGER_MAXIMUM || self->rise < self->ready) return 0;
+/* The pin was let go at `cycle` after a trigger. */
+static void answer(ping *self, uint64_t cycle, uint8_t pin) {
+  const viewpoint from = part_view(&self->part, cycle);
   const uint64_t start = cycle + HOLD_OFF_CYCLES;
-  const uint64_t end = start + (self->answer >= 0 ? (uint64_t)self->answer : echo(self));
-  if (self->answer == PING_ANSWER_NONE) return 1;
-  part_drive(&self->place, start, self->pin, BOARD_HIGH);
-  part_drive(&self->place, end, self->pin, BOARD_LOW);
-  part_drive(&self->place, end + REST_CYCLES / 2, self->pin, BOARD_RELEASED);
+  const uint64_t end = start + (self->answer >= 0 ? (uint64_t)self->answer : echo(self, &from));
+  part_log_look(&self->part, cycle, LOOK_PING, &from, &self->mount, self->sonar.range_maximum, self->distance);
+  if (self->answer == PING_ANSWER_NONE) return;
+  part_drive(&self->part, start, pin, BOARD_HIGH);
+  part_drive(&self->part, end, pin, BOARD_LOW);
+  part_drive(&self->part, end + REST_CYCLES / 2, pin, BOARD_RELEASED);
   self->ready = end + REST_CYCLES;
   self->ping_cycle = cycle;
   self->pings++;
-  return 1;
+}
+
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  ping *self = (ping *)base;
+  const uint8_t high = level == BOARD_HIGH;
+  if (high == self->high) return;
+  self->high = high;
+  if (high) {
+    self->rise = cycle;
+    return;
+  }
+  const uint64_t width = cycle - self->rise;
+  if (width < TRIGGER_CYCLES || width > TRIGGER_MAXIMUM || self->rise < self->ready) return;
+  answer(self, cycle, pin);
+}
+
+static const part_operations OPERATIONS = {.edge = edge};
+
+ping *ping_of(part *base) { return base->op == &OPERATIONS ? (ping *)base : NULL; }
+
+int ping_init(ping *self, const part_place *place, uint8_t pin, const sonar_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  if (sonar_init(&self->sonar, parameters) != 0) return -1;
+  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
+  self->mount = parameters->beam;
+  self->answer = PING_ANSWER_WORLD;
+  self->distance = -1.0;
+  return 0;
 }

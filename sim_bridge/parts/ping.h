@@ -1,32 +1,20 @@
 /* ping.h: Parallax Ping))), an ultrasonic range finder on one pin.
  *
  * The board raises the pin for at least 2 us and lets go; 750 us later the sensor raises it for the time that sound takes to
- * the nearest surface and back, at c = 331.5 + 0.6 T. No echo: 18.5 ms. Sound comes back from the nearest surface in the
- * beam that is not met too flatly.
+ * the nearest surface and back (world/sensors/sonar). No echo: 18.5 ms.
  */
 #ifndef PART_PING_H
 #define PART_PING_H
 
+#include "../world/sensors/sonar.h"
 #include "part.h"
-
-/* python: begin */
-typedef struct {
-  double x, y, heading, beam; /* in the body's frame: m, m, rad, full opening in rad */
-  double range_minimum_m, range_maximum_m;
-  double temperature_c;
-  double sigma;          /* relative spread of a reading, (3.1) */
-  double miss;           /* probability that no echo is heard */
-  double grazing_cosine; /* surfaces met flatter than this send nothing back */
-  int rays;
-} ping_parameters;
-/* python: end */
 
 enum { PING_ANSWER_WORLD = -1, PING_ANSWER_NONE = -2 };
 
 typedef struct {
-  part_place place;
-  uint8_t pin;
-  ping_parameters parameters;
+  part part;
+  beam_parameters mount;
+  sonar sonar;
   uint8_t high;
   uint64_t rise;
   uint64_t ready;      /* triggers before this cycle are not heard */
@@ -36,9 +24,10 @@ typedef struct {
   uint32_t pings;
 } ping;
 
-void ping_init(ping *self, const part_place *place, uint8_t pin, const ping_parameters *parameters);
+/* Returns 0, or -1 for parameters that no sonar has. */
+int ping_init(ping *self, const part_place *place, uint8_t pin, const sonar_parameters *parameters);
 
-/* The board does `level` to the pin from `cycle` on. Returns 1 if that was a trigger. */
-int ping_edge(ping *self, uint64_t cycle, uint8_t level);
+/* The Ping that this part is, or NULL. */
+ping *ping_of(part *base);
 
 #endif

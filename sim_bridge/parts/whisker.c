@@ -7,19 +7,11 @@
 
 #define BOUNCES_MAXIMUM 4
 
-void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  self->place = *place;
-  self->pin = pin;
-  self->parameters = *parameters;
-  self->held = -1;
-  part_drive(&self->place, 0, pin, BOARD_HIGH);
-}
-
 /* Drives the change and its bounce: an exponential length, cut at five times the mean, a few flicks within it. */
 static void change(whisker *self, uint64_t cycle, uint8_t level) {
-  noise_source *noise = &self->place.noise;
-  part_drive(&self->place, cycle, self->pin, level);
+  noise_source *noise = &self->part.noise;
+  const uint8_t pin = self->part.pins[0].pin;
+  part_drive(&self->part, cycle, pin, level);
   if (self->parameters.bounce_s <= 0.0 || !noise->on) return;
   double length = -self->parameters.bounce_s * number_log(1.0 - noise_next_uniform(noise));
   if (length > 5.0 * self->parameters.bounce_s) length = 5.0 * self->parameters.bounce_s;
@@ -28,20 +20,35 @@ static void change(whisker *self, uint64_t cycle, uint8_t level) {
   double at = (double)cycle;
   for (int i = 0; i < 2 * flicks; i++) {
     at += 16.0 + part * 2.0 * noise_next_uniform(noise);
-    part_drive(&self->place, (uint64_t)at, self->pin, (i & 1) ? level : (uint8_t)!level);
+    part_drive(&self->part, (uint64_t)at, pin, (i & 1) ? level : (uint8_t)!level);
   }
 }
 
-void whisker_step(whisker *self, uint64_t cycle) {
+static void step(part *base) {
+  whisker *self = (whisker *)base;
   uint8_t pressed;
   if (self->held >= 0) {
     pressed = (uint8_t)self->held;
   } else {
     const whisker_parameters *p = &self->parameters;
-    pressed =
-        (uint8_t)body_segment_touches(self->place.body, self->place.arena, p->root_x, p->root_y, p->tip_x, p->tip_y);
+    const chassis *c = base->chassis;
+    pressed = (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y);
   }
   if (pressed == self->pressed) return;
   self->pressed = pressed;
-  change(self, cycle + PART_GUARD, pressed ? BOARD_LOW : BOARD_HIGH);
+  change(self, part_step_end(base) + PART_GUARD, pressed ? BOARD_LOW : BOARD_HIGH);
+}
+
+static const part_operations OPERATIONS = {.step = step};
+
+whisker *whisker_of(part *base) { return base->op == &OPERATIONS ? (whisker *)base : NULL; }
+
+void whisker_hold(whisker *self, int held) { self->held = held; }
+
+void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters) {
+  memset(self, 0, sizeof *self);
+  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_DRIVES | PART_PULLED_UP}, 1);
+  self->parameters = *parameters;
+  self->held = -1;
+  part_drive(&self->part, 0, pin, BOARD_HIGH);
 }

@@ -15,17 +15,21 @@ typedef struct {
 } whisker_parameters;
 /* python: end */
 
+#define WHISKER_HEIGHT_M 0.03 /* above the floor */
+
 typedef struct {
-  part_place place;
-  uint8_t pin;
+  part part;
   whisker_parameters parameters;
   int held; /* -1: as the world says, 0: held free, 1: held pressed */
   uint8_t pressed;
 } whisker;
 
-void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters);
+/* Holds it pressed (1) or free (0) whatever the world says; -1 ends that. */
+void whisker_hold(whisker *self, int held);
 
-/* The world's step ends at `cycle`. */
-void whisker_step(whisker *self, uint64_t cycle);
+/* The whisker that this part is, or NULL. */
+whisker *whisker_of(part *base);
+
+void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters);
 
 #endif

@@ -14,7 +14,7 @@ from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Sim
+from sim_bridge.sim import Sim, SimRobot
 
 MS = CLOCK_HZ // 1000
 US = CLOCK_HZ // 1_000_000
@@ -46,12 +46,16 @@ def arena_of(
 class Scripted:
     """A simulated robot whose board plays a script."""
 
-    sim: Sim
+    robot: SimRobot
     script: Any
 
     @property
+    def sim(self) -> Sim:
+        return self.robot.sim
+
+    @property
     def pins(self) -> BoardPins:
-        return BoardPins(self.sim)
+        return BoardPins(self.robot)
 
     def run(self, seconds: float) -> None:
         cycles = round(seconds * CLOCK_HZ)
@@ -85,6 +89,13 @@ class Scripted:
         return [(int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]]
 
 
+def script_board() -> tuple[Any, EmulatedBoard]:
+    """A board that plays a script, and its place in a simulation."""
+    script = lib.script_board_new()
+    address = int(lib.script_board_address(script))
+    return script, EmulatedBoard(address, "script", lambda: lib.script_board_destroy(script))
+
+
 def scripted(
     arena: Arena | None = None,
     robot: RobotDescription | None = None,
@@ -94,19 +105,20 @@ def scripted(
     step_cycles: int = 16_000,
 ) -> Scripted:
     """A robot on a script board, in an empty field if no arena is given."""
-    script = lib.script_board_new()
-    address = int(lib.script_board_address(script))
-    board = EmulatedBoard(address, "script", lambda: lib.script_board_destroy(script))
-    sim = Sim(
-        board,
-        load_robot("shieldbot") if robot is None else robot,
-        arena_of() if arena is None else arena,
-        noise=noise,
-        seed=seed,
-        pose=pose,
-        step_cycles=step_cycles,
-    )
-    return Scripted(sim, script)
+    sim = Sim(arena_of() if arena is None else arena, noise=noise, seed=seed, step_cycles=step_cycles)
+    return add_scripted(sim, robot, pose)
+
+
+def add_scripted(
+    sim: Sim,
+    robot: RobotDescription | None = None,
+    pose: tuple[float, float, float] | None = None,
+    number: int | None = None,
+) -> Scripted:
+    """One more robot on a script board of its own."""
+    script, board = script_board()
+    description = load_robot("shieldbot") if robot is None else robot
+    return Scripted(sim.add(board, description, pose=pose, number=number), script)
 
 
 def distance_to_segments(arena: Arena, x: float, y: float) -> float:

@@ -389,3 +389,69 @@ def test_noise_filter_drops_a_glitch(noise_filter: int, captures: int) -> None:
     machine.board.advance(1200)
     # without the filter the fall comes before the interrupt has turned the edge
     assert machine.avr.data(26)[0] == 2 * captures
+
+
+# ---- Timer 0 as a tone needs it --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("pin", "port", "bit", "unit"), [(6, "D", 6, "A"), (5, "D", 5, "B")])
+@pytest.mark.parametrize(("clock_select", "divider"), [(1, 1), (2, 8), (3, 64), (4, 256), (5, 1024)])
+@pytest.mark.parametrize("top", [24, 249])
+def test_timer_0_toggles_its_pin_on_match(
+    pin: int, port: str, bit: int, unit: str, clock_select: int, divider: int, top: int
+) -> None:
+    """Clear on match: f = f_clk / (2 N (1 + OCR0A)), (15.7.2)."""
+    machine = Machine(
+        f"""
+        main:
+          sbi DDR{port}, {bit}
+          ldi r24, {top}
+          out OCR0A, r24
+          ldi r24, {top // 2}
+          out OCR0B, r24
+          ldi r24, 1 << COM0{unit}0 | 1 << WGM01
+          out TCCR0A, r24
+          ldi r24, {clock_select}
+          out TCCR0B, r24
+        1: rjmp 1b
+        """
+    )
+    half = divider * (top + 1)
+    machine.board.run(12 * half)
+    halves = gaps(edges_of(machine.board.log(), pin)[2:])
+    assert len(halves) >= 8
+    assert set(halves) == {half}
+
+
+@pytest.mark.parametrize(("frequency", "clock_select", "divider"), [(440, 4, 256), (1000, 3, 64), (2500, 3, 64)])
+def test_timer_0_interrupt_makes_a_tone_on_any_pin(frequency: int, clock_select: int, divider: int) -> None:
+    """Toggled by the interrupt of compare A, from idle sleep; the pin is that of the piezo, 4."""
+    top = round(16_000_000 / (2 * divider * frequency)) - 1
+    assert top <= 255
+    machine = Machine(
+        f"""
+        .global __vector_14
+        __vector_14:
+          sbi PIND, 4
+          reti
+        main:
+          sbi DDRD, 4
+          ldi r24, 1
+          out SMCR, r24
+          ldi r24, {top}
+          out OCR0A, r24
+          ldi r24, 1 << WGM01
+          out TCCR0A, r24
+          ldi r24, {clock_select}
+          out TCCR0B, r24
+          ldi r24, 1 << OCIE0A
+          sts TIMSK0, r24
+          sei
+        1: sleep
+          rjmp 1b
+        """
+    )
+    machine.board.run(400_000)
+    halves = gaps(edges_of(machine.board.log(), 4)[2:])
+    assert len(halves) >= 10
+    assert set(halves) == {divider * (top + 1)}

@@ -13,14 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.errors import ArenaError, BoardError
-from boebot.robots import ContinuousServo, load_robot
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.session import SimTransport
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, square
 
 BYTE = 320  # cycles at 500,000 baud
 
@@ -36,7 +34,7 @@ def message(robot: Scripted, end: int, count: int = 10) -> None:
 
 def test_read_waits_for_the_whole_message() -> None:
     robot = scripted()
-    transport = SimTransport(robot.sim, "script")
+    transport = SimTransport(robot.robot, "script")
     message(robot, 20 * MS + 123, count=60)
     data = transport.read(0.1)
     assert data == bytes(range(60))
@@ -46,7 +44,7 @@ def test_read_waits_for_the_whole_message() -> None:
 
 def test_read_lets_quiet_time_pass() -> None:
     robot = scripted()
-    transport = SimTransport(robot.sim, "script")
+    transport = SimTransport(robot.robot, "script")
     message(robot, 10 * MS)
     message(robot, 20 * MS)
     message(robot, 50 * MS)
@@ -58,7 +56,7 @@ def test_read_lets_quiet_time_pass() -> None:
 
 def test_read_ends_after_its_wait() -> None:
     robot = scripted()
-    transport = SimTransport(robot.sim, "script")
+    transport = SimTransport(robot.robot, "script")
     assert transport.read(0.0123) == b""
     assert transport.now() == pytest.approx(0.0123)
     message(robot, robot.sim.cycle + 2 * MS, count=60)
@@ -70,7 +68,7 @@ def test_read_ends_after_its_wait() -> None:
 
 def test_bytes_reach_the_board() -> None:
     robot = scripted()
-    SimTransport(robot.sim, "script").write(b"hello")
+    SimTransport(robot.robot, "script").write(b"hello")
     buffer = ffi.new("uint8_t[]", 10)
     assert lib.script_board_sent(robot.script, buffer, 10) == 5
     assert ffi.buffer(buffer, 5)[:] == b"hello"
@@ -81,11 +79,11 @@ def test_long_silence_of_the_reader_loses_nothing() -> None:
     for i in range(200_000):
         lib.script_board_byte(robot.script, i * BYTE, i & 0xFF)
     robot.run(4.1)
-    assert robot.sim.receive() == bytes(i & 0xFF for i in range(200_000))
+    assert robot.robot.receive() == bytes(i & 0xFF for i in range(200_000))
 
 
 def test_closed_transport_says_so() -> None:
-    transport = SimTransport(scripted().sim, "script")
+    transport = SimTransport(scripted().robot, "script")
     transport.close()
     for call in (lambda: transport.read(0.1), lambda: transport.write(b"x"), transport.now):
         with pytest.raises(BoardError, match="closed"):
@@ -95,7 +93,7 @@ def test_closed_transport_says_so() -> None:
 def test_paced_transport_keeps_to_the_wall_clock() -> None:
     import time
 
-    transport = SimTransport(scripted().sim, "script", paced=True)
+    transport = SimTransport(scripted().robot, "script", paced=True)
     start = time.monotonic()
     for _ in range(10):
         transport.read(0.01)
@@ -128,7 +126,7 @@ def lively(seed: int = 1, noise: bool = True) -> Scripted:
 
 
 def outcome(robot: Scripted) -> tuple[Any, ...]:
-    return (robot.sim.hash(), [robot.inputs(pin) for pin in range(20)], robot.sim.truth()["x"].tobytes())
+    return (robot.sim.hash(), [robot.inputs(pin) for pin in range(20)], robot.robot.truth()["x"].tobytes())
 
 
 def test_lively_robot_is_lively() -> None:
@@ -184,7 +182,7 @@ def test_step_of_the_world_may_be_chosen(step_us: int) -> None:
         robot = scripted(step_cycles=step_cycles)
         robot.pulses(1.0, {13: 1600, 12: 1420})
         robot.run(1.0)
-        return robot.sim.body()
+        return robot.robot.body()
 
     coarse, usual = end(step_us * US), end(1 * MS)
     assert coarse.x == pytest.approx(usual.x, abs=0.003)
@@ -203,7 +201,7 @@ def test_step_that_does_not_divide_the_tick_is_refused(step_cycles: int) -> None
 def test_truth_has_a_row_every_ten_milliseconds() -> None:
     robot = lively()
     robot.run(2.0)
-    truth = robot.sim.truth()
+    truth = robot.robot.truth()
     assert truth["time"] == pytest.approx(np.arange(200) * 0.01)
     speed = np.hypot(np.diff(truth["x"]), np.diff(truth["y"])) / 0.01
     assert speed.max() < 0.25
@@ -212,12 +210,11 @@ def test_truth_has_a_row_every_ten_milliseconds() -> None:
 
 
 def test_nothing_is_recorded_unless_asked_for() -> None:
-    script = lib.script_board_new()
-    board = EmulatedBoard(int(lib.script_board_address(script)), "script", lambda: lib.script_board_destroy(script))
-    sim = Sim(board, load_robot("shieldbot"), arena_of(), record=False)
-    sim.run(CLOCK_HZ, CLOCK_HZ)
-    assert len(sim.truth()["time"]) == 0
-    assert len(sim.looks()["time"]) == 0
+    sim = Sim(arena_of(), record=False)
+    robot = add_scripted(sim)
+    robot.run(1.0)
+    assert len(robot.robot.truth()["time"]) == 0
+    assert len(robot.robot.looks()["time"]) == 0
     sim.close()
 
 
@@ -227,7 +224,7 @@ def test_looks_tell_where_the_sensors_looked() -> None:
     robot.edge(1 * MS + 80, 8, 2)
     robot.burst(2 * MS, 9)
     robot.run(0.1)
-    looks = robot.sim.looks()
+    looks = robot.robot.looks()
     assert looks["kind"].tolist() == [1, 0]
     assert looks["distance"] == pytest.approx([1.0, -1.0])
     assert looks["x"] == pytest.approx([0.06, 0.05])
@@ -290,7 +287,7 @@ def test_new_square_wave_replaces_the_one_on_its_pin() -> None:
 
 def test_shortest_wait_lets_time_pass() -> None:
     robot = scripted()
-    transport = SimTransport(robot.sim, "script")
+    transport = SimTransport(robot.robot, "script")
     before = robot.sim.cycle
     transport.read(1e-9, 1e-9)
     assert robot.sim.cycle > before
@@ -312,7 +309,7 @@ def test_square_wave_has_its_edges() -> None:
 def test_robot_is_put_only_where_it_fits() -> None:
     robot = scripted(arena_of(square(1, 0, 1)))
     robot.pins.place(0.3, 0.2, 1.0)
-    assert (robot.sim.body().x, robot.sim.body().y, robot.sim.body().heading) == (0.3, 0.2, 1.0)
+    assert (robot.robot.body().x, robot.robot.body().y, robot.robot.body().heading) == (0.3, 0.2, 1.0)
     for x in (0.45, 1.0):
         with pytest.raises(ArenaError, match="no free space"):
             robot.pins.place(x, 0, 0)
@@ -348,44 +345,3 @@ def test_board_of_another_version_is_refused() -> None:
         EmulatedBoard(int(ffi.cast("uintptr_t", board)), "old board", lambda: released.append(1))
     assert released
     lib.script_board_destroy(script)
-
-
-def test_several_robots_share_a_run_and_do_not_disturb_each_other() -> None:
-    """Two robots with their own boards; the first one's bits are the same as alone."""
-
-    def run(count: int) -> list[Any]:
-        arena = arena_of(outline=square(0, 0, 4))
-        sim = ffi.gc(lib.sim_new(arena.handle, 5, 16_000, 0, 1), lib.sim_destroy)
-        description = load_robot("shieldbot")
-        draw = imperfections.Draw(5, noise=True)
-        body = imperfections.body_parameters(description.body)
-        scripts = [lib.script_board_new() for _ in range(count)]
-        for number, script in enumerate(scripts):
-            address = int(lib.script_board_address(script))
-            assert lib.sim_add_robot(sim, address, body, 0.5 * number, 0.5 * number, 0.3) == number
-            assert lib.sim_add_battery(sim, number, 255, imperfections.battery_parameters()) == 0
-            for side, (name, pin) in enumerate((("servo_left", 13), ("servo_right", 12))):
-                device = description.device[name]
-                assert isinstance(device, ContinuousServo)
-                servo = imperfections.servo_parameters(device, description.body, side, draw)
-                assert lib.sim_add_servo(sim, number, side, pin, servo) == 0
-                assert lib.sim_add_encoder(sim, number, side, 16 + side, 255, 64) == 0
-            for frame in range(50):
-                for pin in (12, 13):
-                    lib.script_board_edge(script, frame * 20 * MS + 100 * pin, pin, 1)
-                for pin, width in ((12, 1400 - 20 * number), (13, 1650)):
-                    lib.script_board_edge(script, frame * 20 * MS + 100 * pin + width * US, pin, 0)
-        assert lib.sim_run(sim, CLOCK_HZ, CLOCK_HZ) == 0
-        states = []
-        for number in range(count):
-            state = ffi.new("body_state *")
-            lib.sim_body(sim, number, state)
-            states.append(ffi.buffer(state)[:])
-        ffi.release(sim)
-        for script in scripts:
-            lib.script_board_destroy(script)
-        return states
-
-    alone, two = run(1), run(2)
-    assert two[0] == alone[0]
-    assert two[1] != two[0]

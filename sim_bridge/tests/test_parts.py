@@ -48,23 +48,23 @@ def servo(**changes: float) -> Any:
 )
 def test_servo_follows_the_measured_curve(offset_us: float, rpm: float) -> None:
     """The first of two measured servos; the fit is within 4 rpm of every measured point."""
-    speed = lib.servo_curve(servo(), 1500 + offset_us)
+    speed = lib.servo_motor_curve(servo(), 1500 + offset_us)
     assert speed / WHEEL / RPM == pytest.approx(rpm, abs=4)
     assert speed / WHEEL / RPM == pytest.approx(51.25 * math.tanh(offset_us / 78.5), abs=1e-6)
 
 
 def test_servo_dead_band_and_centre() -> None:
     unit = servo(centre_us=1490.0)
-    assert lib.servo_curve(unit, 1490 + 8.9) == 0 == lib.servo_curve(unit, 1490 - 8.9)
-    assert lib.servo_curve(unit, 1490 + 9.1) > 0 > lib.servo_curve(unit, 1490 - 9.1)
-    assert lib.servo_curve(unit, 1500) > 0
+    assert lib.servo_motor_curve(unit, 1490 + 8.9) == 0 == lib.servo_motor_curve(unit, 1490 - 8.9)
+    assert lib.servo_motor_curve(unit, 1490 + 9.1) > 0 > lib.servo_motor_curve(unit, 1490 - 9.1)
+    assert lib.servo_motor_curve(unit, 1500) > 0
 
 
 def test_servo_may_be_weaker_one_way() -> None:
     """Unit B: 36 rpm forward, 30 backward."""
     unit = servo(top_ccw_rad_s=36 * RPM, scale_ccw_us=50.5, top_cw_rad_s=30 * RPM, scale_cw_us=43.5)
-    assert lib.servo_curve(unit, 1600) / WHEEL / RPM == pytest.approx(35.8, abs=1.5)
-    assert lib.servo_curve(unit, 1400) / WHEEL / RPM == pytest.approx(-30.7, abs=1.5)
+    assert lib.servo_motor_curve(unit, 1600) / WHEEL / RPM == pytest.approx(35.8, abs=1.5)
+    assert lib.servo_motor_curve(unit, 1400) / WHEEL / RPM == pytest.approx(-30.7, abs=1.5)
 
 
 @pytest.mark.parametrize("offset_us", [20, 60, 200, -60])
@@ -73,10 +73,10 @@ def test_robot_reaches_the_speed_of_the_curve(offset_us: float) -> None:
     robot = scripted()
     robot.pulses(2.0, {LEFT: 1500 + offset_us, RIGHT: 1500 - offset_us})
     robot.run(2.0)
-    expected = lib.servo_curve(servo(), 1500 + offset_us)
-    a, gain, alpha = lib.body_a(imperfections.body_parameters(robot.sim.robot.body)), 1.2, 1.0
-    assert robot.sim.body().speed == pytest.approx(expected * 2 * a * gain / (2 * a * gain + alpha), rel=2e-3)
-    assert abs(robot.sim.body().heading) < 1e-9
+    expected = lib.servo_motor_curve(servo(), 1500 + offset_us)
+    a, gain, alpha = lib.body_a(imperfections.body_parameters(robot.robot.description.body)), 1.2, 1.0
+    assert robot.robot.body().speed == pytest.approx(expected * 2 * a * gain / (2 * a * gain + alpha), rel=2e-3)
+    assert abs(robot.robot.body().heading) < 1e-9
 
 
 def test_servo_lags() -> None:
@@ -84,7 +84,7 @@ def test_servo_lags() -> None:
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    truth = robot.sim.truth()
+    truth = robot.robot.truth()
     rise = float(np.interp(0.63 * truth["speed"][-1], truth["speed"], truth["time"]))
     assert 0.050 <= rise - 0.0017 <= 0.080
 
@@ -93,9 +93,9 @@ def test_without_pulses_it_rolls_out_and_is_free() -> None:
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    assert robot.sim.body().speed > 0.15
+    assert robot.robot.body().speed > 0.15
     robot.run(0.5)
-    assert abs(robot.sim.body().speed) < 0.001
+    assert abs(robot.robot.body().speed) < 0.001
 
 
 @pytest.mark.parametrize("width_us", [100, 400, 2600, 5000])
@@ -103,7 +103,7 @@ def test_what_is_no_pulse_is_ignored(width_us: float) -> None:
     robot = scripted()
     robot.pulses(0.5, {LEFT: width_us, RIGHT: width_us})
     robot.run(0.5)
-    assert robot.sim.body().distance == 0
+    assert robot.robot.body().distance == 0
 
 
 def test_pulse_that_a_reset_cuts_short_still_twitches() -> None:
@@ -112,7 +112,7 @@ def test_pulse_that_a_reset_cuts_short_still_twitches() -> None:
     robot.edge(1000, LEFT, 1)
     robot.edge(1000 + 700 * US, LEFT, 2)
     robot.run(0.1)
-    assert robot.sim.body().wheel_left < -0.01
+    assert robot.robot.body().wheel_left < -0.01
 
 
 def test_weak_supply_slows_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +120,7 @@ def test_weak_supply_slows_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
         robot = scripted()
         robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
         robot.run(1.0)
-        return float(robot.sim.body().speed)
+        return float(robot.robot.body().speed)
 
     full = speed()
     monkeypatch.setattr(imperfections, "BATTERY_FULL_V", 4.9)
@@ -156,7 +156,7 @@ def test_encoder_edges_are_the_wheels_angle(left_us: int, right_us: int) -> None
     robot = scripted()
     robot.pulses(1.0, {LEFT: 1500 + left_us, RIGHT: 1500 - right_us})
     robot.run(1.0)
-    body = robot.sim.body()
+    body = robot.robot.body()
     for pin, angle in zip(ENCODERS, (body.wheel_left, body.wheel_right), strict=True):
         # The disc starts half way between two edges; those of the last 4 us are still to come.
         expected = abs(math.floor(angle * 64 / (2 * math.pi) + 0.5))
@@ -171,7 +171,7 @@ def test_encoder_edges_come_at_exact_times() -> None:
     robot.pulses(3.0, {LEFT: 1600, RIGHT: 1400})
     robot.run(3.0)
     periods = np.diff([cycle for cycle, _ in edges(robot, 16)][-20:])
-    expected = 2 * math.pi * WHEEL / 64 / robot.sim.body().speed * CLOCK_HZ
+    expected = 2 * math.pi * WHEEL / 64 / robot.robot.body().speed * CLOCK_HZ
     assert periods == pytest.approx(expected, abs=3)
 
 
@@ -202,7 +202,7 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
         assert change in (-1, 1)
         count += change
         state = following
-    assert abs(count - robot.sim.body().wheel_left * 128 / (2 * math.pi)) <= 1
+    assert abs(count - robot.robot.body().wheel_left * 128 / (2 * math.pi)) <= 1
     assert (count > 50) == forward
 
 
@@ -476,7 +476,7 @@ def test_voltage_at_the_analog_pin() -> None:
 
 def test_charge_runs_out() -> None:
     parameters = imperfections.battery_parameters()
-    parameters.capacity_as = 1.0
+    parameters.supply.capacity_as = 1.0
     robot = scripted()
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)
@@ -489,7 +489,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     supply = 128  # BOARD_ANALOG_SUPPLY
     assert lib.script_board_volts(robot.script, supply) == 5.0
     parameters = imperfections.battery_parameters()
-    parameters.capacity_as = 1.0
+    parameters.supply.capacity_as = 1.0
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)
     # an empty pack of 5.0 V, sagging under the board's 0.08 A, less the drop-out of 0.5 V

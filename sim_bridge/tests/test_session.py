@@ -87,7 +87,7 @@ def test_it_drives_straight_and_records_it(session: SimSession) -> None:
 
 def test_it_turns_left_for_a_slower_left_wheel(session: SimSession) -> None:
     drive(session, -0.5, 0.5, 1.0)
-    assert session.sim.body().heading > 1.0
+    assert session.robot.body().heading > 1.0
 
 
 def test_same_request_same_bytes() -> None:
@@ -106,29 +106,29 @@ def test_sessions_side_by_side_share_nothing() -> None:
     one, other = open_with(), open_with()
     drive(one, 0.5, 0.5, 0.5)
     other.transport.read(0.5, 0.5)
-    assert one.sim.body().x > 0.02
-    assert other.sim.body().x == 0
+    assert one.robot.body().x > 0.02
+    assert other.robot.body().x == 0
     one.close()
     drive(other, 0.5, 0.5, 0.5)
-    assert other.sim.body().x > 0.02
+    assert other.robot.body().x > 0.02
     other.close()
 
 
 def test_reset_starts_the_program_again(session: SimSession) -> None:
     drive(session, 0.5, 0.5, 0.5)
-    before = session.sim.body().x
+    before = session.robot.body().x
     at = round(session.transport.now() * 1000) * MS
     session.board.reset("external")
     heard = frame.Decoder().feed(session.transport.read(0.2, 0.2))
     assert heard[0][0] == messages.Hello.ID
     assert session.board.counters()["resets"] == 1
     assert session.board.reset_cycle == at
-    assert session.sim.body().x > before  # the world went on
+    assert session.robot.body().x > before  # the world went on
 
 
 def test_start_pose_is_heeded() -> None:
     session = open_with(start_pose=(0.3, -0.2, 1.0))
-    body = session.sim.body()
+    body = session.robot.body()
     assert (body.x, body.y, body.heading) == (0.3, -0.2, 1.0)
     session.close()
 

@@ -81,6 +81,9 @@ static void happen(avr_board *b, due_source source, uint64_t cycle) {
     case DUE_EEPROM:
       eeprom_due(b);
       break;
+    case DUE_TWI:
+      twi_due(b, cycle);
+      break;
     case DUE_COUNT:
       break;
   }
@@ -128,7 +131,8 @@ void enable_interrupt(avr_board *b, uint8_t vector, bool enabled) {
 static void acknowledge(avr_board *b, uint8_t vector) {
   timer_state *timer = timer_of_vector(b, vector);
   if (timer) timer_bring_up(timer, b->avr->cycle);
-  bool is_state = vector == VECTOR_USART_RX || vector == VECTOR_USART_UDRE || vector == VECTOR_EE_READY;
+  bool is_state =
+      vector == VECTOR_USART_RX || vector == VECTOR_USART_UDRE || vector == VECTOR_EE_READY || vector == VECTOR_TWI;
   if (!is_state) clear_flag(b, vector);
   if (timer) timer_plan(timer);
   if (vector == VECTOR_WDT) watchdog_acknowledged(b);
@@ -174,6 +178,11 @@ static void crash(avr_board *b, const char *format, ...) {
   vsnprintf(b->fault, sizeof b->fault, format, arguments);
   va_end(arguments);
   b->crashed = true;
+}
+
+void refuse(avr_board *b, const char *what) {
+  crash(b, "the program uses %s, which is not built, in cycle %llu", what, (unsigned long long)b->avr->cycle);
+  stop_core(b);
 }
 
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
@@ -289,6 +298,7 @@ static void restart(avr_board *b) {
   avr->data[REG_MCUSR] = flags;
   timers_reset(b, cycle);
   usart_reset(b);
+  twi_reset(b);
   converter_reset(b);
   watchdog_reset(b, cycle);
   eeprom_reset(b, causes & (1u << BOARD_RESET_POWER | 1u << BOARD_RESET_BROWN_OUT));
@@ -375,8 +385,8 @@ static int on_request(avr_io_t *io, uint32_t request, void *param) {
   return 0;
 }
 
-/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; SPI, I2C and
- * the analog comparator answer nothing. */
+/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; SPI and the
+ * analog comparator answer nothing. */
 void mx8_init(struct avr_t *avr) {
   avr_board *b = avr->custom.data;
   struct mcu_t *chip = (struct mcu_t *)avr;
@@ -390,6 +400,7 @@ void mx8_init(struct avr_t *avr) {
   pins_init(b);
   timers_init(b);
   usart_init(b);
+  twi_init(b);
   converter_init(b);
   watchdog_init(b);
   eeprom_init(b);

@@ -1,5 +1,6 @@
 /* avr_converter.c: the analog-to-digital converter (24): 13 clocks of the converter for a conversion, 25 for the first
- * one after it was enabled; the input is held 1.5 (13.5) clocks after the start. Single conversions and free running.
+ * one after it was enabled; the input is held 1.5 (13.5) clocks after the start. Channel and reference are those at the
+ * first of these clocks. Single conversions and free running; a program that selects another trigger is stopped.
  *
  * The reference is AVCC, at the supply, or the band gap; nothing is joined to AREF, which reads as AVCC. The band gap as
  * input (channel 14) is good 70 us after it was selected (29.5, the longest start-up time), until then too low.
@@ -20,6 +21,7 @@ enum {
   ADPS = 0x07,
   ADLAR = 0x20,
   REFS = 0xC0,
+  ADTS = 0x07,
   MUX = 0x0F,
   MUX_BAND_GAP = 14
 };
@@ -34,11 +36,11 @@ static void start(avr_board *b, uint64_t cycle) {
   converter_state *c = &b->converter;
   uint64_t clock = clock_cycles(b);
   uint64_t first_edge = c->enabled_at + ((cycle - c->enabled_at) / clock + 1) * clock;
-  uint64_t hold = c->first ? clock * 27 / 2 : clock * 3 / 2;
+  c->hold = first_edge + (c->first ? clock * 27 / 2 : clock * 3 / 2);
   c->done = first_edge + clock * (c->first ? 25 : 13);
   c->first = false;
-  c->sampled = false;
-  set_due(b, DUE_CONVERTER, first_edge + hold);
+  c->begun = c->sampled = false;
+  set_due(b, DUE_CONVERTER, first_edge);
 }
 
 static double band_gap_at(const converter_state *c, uint64_t cycle) {
@@ -49,13 +51,13 @@ static double band_gap_at(const converter_state *c, uint64_t cycle) {
 
 static double volts_at(const avr_board *b, uint64_t cycle) {
   const converter_state *c = &b->converter;
-  unsigned channel = b->avr->data[REG_ADMUX] & MUX;
+  unsigned channel = c->selection & MUX;
   if (channel == MUX_BAND_GAP) return band_gap_at(c, cycle);
   return channel > 5 || !c->source ? 0.0 : c->source(c->context, cycle, (uint8_t)channel);
 }
 
 static double reference_at(const avr_board *b, uint64_t cycle) {
-  if ((b->avr->data[REG_ADMUX] & REFS) == REFS) return BOARD_BAND_GAP_VOLTS;
+  if ((b->converter.selection & REFS) == REFS) return BOARD_BAND_GAP_VOLTS;
   return board_supply_volts(b->converter.source, b->converter.context, cycle);
 }
 
@@ -68,6 +70,12 @@ static uint16_t convert(const avr_board *b, uint64_t cycle) {
 void converter_due(avr_board *b, uint64_t cycle) {
   converter_state *c = &b->converter;
   uint8_t *control = &b->avr->data[REG_ADCSRA];
+  if (!c->begun) {
+    c->begun = true;
+    c->selection = b->avr->data[REG_ADMUX];
+    set_due(b, DUE_CONVERTER, c->hold);
+    return;
+  }
   if (!c->sampled) {
     c->sample = convert(b, cycle);
     c->sampled = true;
@@ -108,6 +116,7 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
     c->enabled_at = cycle;
     c->first = true;
   }
+  if ((value & ADATE) && (avr->data[REG_ADCSRB] & ADTS)) refuse(b, "a trigger of the ADC");
   if (converting) {
     avr->data[address] |= ADSC; /* writing 0 does not stop it */
   } else if (value & ADSC) {
@@ -120,6 +129,15 @@ static void write_selection(avr_t *avr, avr_io_addr_t address, uint8_t value, vo
   uint64_t cycle = begin_access(b) + 1;
   if ((avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = cycle;
   avr->data[address] = value;
+}
+
+/* Which trigger starts conversions by itself, once ADATE is set. */
+static void write_trigger(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  begin_access(b);
+  avr->data[address] = value;
+  const uint8_t armed = ADEN | ADATE;
+  if ((value & ADTS) && (avr->data[REG_ADCSRA] & armed) == armed) refuse(b, "a trigger of the ADC");
 }
 
 static uint8_t read_low(avr_t *avr, avr_io_addr_t address, void *param) {
@@ -150,6 +168,7 @@ void converter_reset(avr_board *b) {
 void converter_init(avr_board *b) {
   on_read(b, REG_ADCSRA, read_control, b);
   on_write(b, REG_ADCSRA, write_control, b);
+  on_write(b, REG_ADCSRB, write_trigger, b);
   on_write(b, REG_ADMUX, write_selection, b);
   on_read(b, REG_ADCL, read_low, b);
   on_read(b, REG_ADCH, read_high, b);

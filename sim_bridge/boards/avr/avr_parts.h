@@ -2,7 +2,8 @@
  *
  * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
  * here: run loop and interrupts (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c), USART
- * (avr_usart.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c), program image (avr_image.c).
+ * (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c),
+ * program image (avr_image.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
@@ -53,6 +54,8 @@ enum {
   VECTOR_USART_TX,
   VECTOR_ADC,
   VECTOR_EE_READY,
+  VECTOR_ANALOG_COMP,
+  VECTOR_TWI,
 };
 #define FLAG(vector) (UINT32_C(1) << (vector))
 
@@ -70,6 +73,7 @@ typedef enum {
   DUE_CONVERTER,
   DUE_WATCHDOG,
   DUE_EEPROM,
+  DUE_TWI,
   DUE_COUNT
 } due_source;
 
@@ -99,7 +103,12 @@ enum {
   REG_ADCL = 0x78,
   REG_ADCH = 0x79,
   REG_ADCSRA = 0x7A,
+  REG_ADCSRB = 0x7B,
   REG_ADMUX = 0x7C,
+  REG_TWBR = 0xB8,
+  REG_TWSR = 0xB9,
+  REG_TWDR = 0xBB,
+  REG_TWCR = 0xBC,
   REG_UCSR0A = 0xC0,
   REG_UCSR0B = 0xC1,
   REG_UCSR0C = 0xC2,
@@ -238,6 +247,39 @@ typedef struct {
   size_t out_first, out_end, out_capacity;
 } usart_state;
 
+/* ---- two-wire interface ---- */
+
+typedef enum {
+  TWI_IDLE,      /* also: something is complete, and the program's turn */
+  TWI_WAIT_FREE, /* for a free bus, to send START */
+  TWI_WAIT_HIGH, /* for SCL, which was let go, to be high */
+  TWI_BIT_SET,
+  TWI_BIT_RISE,
+  TWI_BIT_FALL,
+  TWI_RESTART_RISE,
+  TWI_START_FALL,
+  TWI_START_HOLD,
+  TWI_STOP_RISE,
+  TWI_STOP_END
+} twi_phase;
+
+typedef struct {
+  uint8_t control;   /* TWCR without TWINT */
+  uint8_t rate;      /* TWBR */
+  uint8_t prescaler; /* TWPS */
+  uint8_t data;      /* TWDR */
+  uint8_t status;    /* of what was completed last */
+  bool owner;        /* the bus is ours: from START to STOP */
+  bool sda_low;      /* held low by us */
+  twi_phase phase;
+  twi_phase after_rise; /* of WAIT_HIGH */
+  bool is_address;      /* the byte under way is an address */
+  bool receiving;
+  uint8_t shift;
+  uint8_t bit;     /* 0..7 data, 8 acknowledgement */
+  uint64_t fallen; /* when SCL fell before this bit */
+} twi_state;
+
 /* ---- ADC, watchdog ---- */
 
 typedef struct {
@@ -247,8 +289,11 @@ typedef struct {
   uint64_t done;          /* when the conversion ends */
   uint64_t band_gap_from; /* since when the band gap is switched to the converter */
   bool first;             /* the next conversion is the first since the converter was enabled */
+  bool begun;             /* its first clock edge is past: the channel is fixed */
   bool sampled;
-  uint16_t result; /* in the register, as ADLAR has it */
+  uint64_t hold;     /* when the input is held */
+  uint8_t selection; /* ADMUX of the conversion under way */
+  uint16_t result;   /* in the register, as ADLAR has it */
   uint16_t sample;
   bool locked; /* ADCL was read, ADCH not yet */
 } converter_state;
@@ -305,6 +350,7 @@ typedef struct avr_board {
   uint8_t capture_level; /* of the capture pin, behind the noise filter */
   timer_state timer[3];
   usart_state usart;
+  twi_state twi;
   converter_state converter;
   watchdog_state watchdog;
   eeprom_state eeprom;
@@ -317,6 +363,8 @@ void clear_flag(avr_board *b, uint8_t vector);
 void enable_interrupt(avr_board *b, uint8_t vector, bool enabled);
 void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled` */
 void want_reset(avr_board *b, board_reset_cause cause);
+/* The program asks for a thing that is not built: the board stops, and says so. */
+void refuse(avr_board *b, const char *what);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
@@ -358,6 +406,12 @@ void usart_due_outside(avr_board *b, uint64_t cycle);
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count);
 size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 void usart_line_rate(avr_board *b, uint32_t baud);
+
+/* avr_twi.c */
+void twi_init(avr_board *b);
+void twi_reset(avr_board *b);
+void twi_due(avr_board *b, uint64_t cycle);
+void twi_line_moved(avr_board *b, uint64_t cycle); /* SDA or SCL */
 
 /* avr_converter.c */
 void converter_init(avr_board *b);

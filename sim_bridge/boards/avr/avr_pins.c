@@ -116,6 +116,7 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
     p->changed = cycle;
     p->level = level;
     see_edges(b, port, moved, cycle);
+    if (port == PORT_C) twi_line_moved(b, cycle);
   }
   uint8_t changes = (uint8_t)((p->out ^ before.out) | (p->out_level ^ before.out_level) | (p->pulled ^ before.pulled));
   for (unsigned bit = 0; changes; bit++, changes >>= 1) {

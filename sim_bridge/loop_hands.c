@@ -1,0 +1,103 @@
+/* loop_hands.c: see loop.h. Here: what a test does to a simulation, past its parts. */
+#include "loop_state.h"
+
+static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
+
+int sim_place(sim *self, int number, double x, double y, double heading) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !arena_is_free(self->arena, x, y, r->body.parameters.radius)) return SIM_BAD_ARGUMENT;
+  body_place(&r->body, x, y, heading);
+  r->chassis.x = x;
+  r->chassis.y = y;
+  r->chassis.heading = heading;
+  sim_update_scene(self);
+  return SIM_OK;
+}
+
+/* Takes a pin from its part. Returns 1 if a resistor on the board pulls it up when nobody drives it. */
+static int take_pin(robot *r, uint8_t pin) {
+  int pulled_up = 0;
+  for (int i = 0; i < r->part_count; i++) {
+    part *p = r->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
+      p->off = 1;
+      pulled_up |= (p->pins[k].role & PART_PULLED_UP) != 0;
+    }
+  }
+  return pulled_up;
+}
+
+int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
+  const int pulled_up = take_pin(r, pin);
+  for (int i = 0; i < r->waves; i++) {
+    if (r->wave[i].pin == pin) r->wave[i].end = 0;
+  }
+  if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
+  r->chassis.driven[pin] = level;
+  r->board->op->drive(r->board, at, pin, level);
+  return SIM_OK;
+}
+
+int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || bad_pin(pin) || half_cycles == 0) return SIM_BAD_ARGUMENT;
+  take_pin(r, pin);
+  int i = 0; /* the place of this pin's wave, or of one that is over, or a new one */
+  while (i < r->waves && r->wave[i].pin != pin) i++;
+  if (i == r->waves) i = 0;
+  while (i < r->waves && r->wave[i].pin != pin && r->wave[i].next <= r->wave[i].end) i++;
+  if (i == WAVES_MAXIMUM) return SIM_BAD_ARGUMENT;
+  if (i == r->waves) r->waves++;
+  const uint64_t start = self->world + PART_GUARD; /* edges up to there are queued already */
+  r->wave[i] = (wave){.pin = pin,
+                      .level = r->chassis.driven[pin] == BOARD_HIGH,
+                      .half = half_cycles,
+                      .next = start + half_cycles,
+                      .end = start + duration};
+  return SIM_OK;
+}
+
+void robot_step_waves(robot *self, uint64_t until) {
+  for (int i = 0; i < self->waves; i++) {
+    wave *w = &self->wave[i];
+    for (; w->next <= until && w->next <= w->end; w->next += w->half) {
+      w->level = !w->level;
+      self->board->op->drive(self->board, w->next, w->pin, w->level);
+    }
+  }
+}
+
+int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || held < -1 || held > 1) return SIM_BAD_ARGUMENT;
+  for (int i = 0; i < r->part_count; i++) {
+    whisker *w = whisker_of(r->parts[i]);
+    if (w == NULL || w->part.pins[0].pin != pin) continue;
+    whisker_hold(w, held);
+    return SIM_OK;
+  }
+  return SIM_BAD_ARGUMENT;
+}
+
+int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
+  robot *r = sim_robot(self, number);
+  int pings = 0;
+  for (int i = 0; r != NULL && i < r->part_count; i++) {
+    ping *p = ping_of(r->parts[i]);
+    if (p == NULL) continue;
+    p->answer = echo_cycles;
+    pings++;
+  }
+  return pings > 0 ? SIM_OK : SIM_BAD_ARGUMENT;
+}
+
+int sim_set_supply(sim *self, int number, double volts) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !(volts >= 0.0)) return SIM_BAD_ARGUMENT;
+  r->held_supply = volts / BOARD_NOMINAL_VOLTS;
+  robot_update_supply(r);
+  return SIM_OK;
+}

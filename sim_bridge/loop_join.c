@@ -1,0 +1,228 @@
+/* loop_join.c: see loop.h. Here: a simulation, its robots and their parts come and go. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "loop_state.h"
+#include "parts/encoder.h"
+
+#define BITS_PER_BYTE 10u
+#define LINE_RATE 500000u /* bit/s, unless set */
+
+uint64_t line_idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t)BOARD_CLOCK_HZ / baud; }
+
+/* ---- simulation ---------------------------------------------------------------------------------------------------- */
+
+sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise) {
+  if (where == NULL || step_cycles < 2 * PART_GUARD || record_cycles % step_cycles != 0) return NULL;
+  if (arena_moving_count(where) > OBSTACLES_MAXIMUM) return NULL;
+  sim *self = calloc(1, sizeof *self);
+  if (self == NULL) return NULL;
+  self->arena = where;
+  self->seed = seed;
+  self->step_cycles = step_cycles;
+  self->record_cycles = record_cycles;
+  self->noise = noise;
+  self->dt = (double)step_cycles / BOARD_CLOCK_HZ;
+  self->obstacles = arena_moving_count(where);
+  sim_update_scene(self);
+  return self;
+}
+
+static void destroy_robot(robot *r) {
+  r->board->sink = NULL;
+  r->board->op->analog(r->board, NULL, NULL);
+  for (int i = 0; i < r->part_count; i++) free(r->parts[i]);
+  free(r->parts);
+  buffer_free(&r->received);
+  buffer_free(&r->truth);
+  buffer_free(&r->looks);
+  edge_log_free(&r->edges);
+  free(r);
+}
+
+void sim_destroy(sim *self) {
+  if (self == NULL) return;
+  for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
+  free(self->robots);
+  free(self);
+}
+
+/* ---- robots -------------------------------------------------------------------------------------------------------- */
+
+robot *sim_robot(const sim *self, int number) {
+  for (int i = 0; i < self->robot_count; i++) {
+    if (self->robots[i]->number == number) return self->robots[i];
+  }
+  return NULL;
+}
+
+/* Its place in the order of numbers. */
+static void insert(sim *self, robot *r) {
+  int i = self->robot_count++;
+  for (; i > 0 && self->robots[i - 1]->number > r->number; i--) self->robots[i] = self->robots[i - 1];
+  self->robots[i] = r;
+  for (i = 0; i < self->robot_count; i++) self->bodies[i] = &self->robots[i]->body;
+}
+
+int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
+                  double heading) {
+  board *b = (board *)address;
+  if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
+  if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
+  robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
+  if (robots == NULL) return SIM_NO_MEMORY;
+  self->robots = robots;
+  robot *r = calloc(1, sizeof *r);
+  if (r == NULL) return SIM_NO_MEMORY;
+  r->sim = self;
+  r->number = number;
+  r->board = b;
+  r->idle = line_idle_cycles(LINE_RATE);
+  body_init(&r->body, parameters, 0.0);
+  r->body.id = robot_mover_id(number);
+  body_place(&r->body, x, y, heading);
+  r->chassis = (chassis){
+      .board = b,
+      .body = &r->body,
+      .around = &self->seen,
+      .self_id = robot_mover_id(number),
+      .since = self->world,
+      .step_cycles = self->step_cycles,
+      .x = x,
+      .y = y,
+      .heading = heading,
+      .supply = 1.0,
+      .servo_supply = 1.0,
+      .recording = self->record_cycles > 0,
+      .looks = &r->looks,
+  };
+  memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
+  b->sink = robot_on_edge;
+  b->sink_context = r;
+  b->op->analog(b, robot_on_analog, r);
+  insert(self, r);
+  sim_update_scene(self);
+  return SIM_OK;
+}
+
+/* ---- parts --------------------------------------------------------------------------------------------------------- */
+
+static int is_pin(uint8_t pin) { return pin < BOARD_PIN_COUNT; }
+
+static int is_side(int side) { return side == SIM_LEFT || side == SIM_RIGHT; }
+
+static part_place place_of(robot *r, uint32_t device) {
+  return (part_place){
+      .chassis = &r->chassis,
+      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise != 0},
+  };
+}
+
+/* The place of one more part of a kind of which a robot may have several. */
+static part_place next_place(robot *r, uint32_t kind) { return place_of(r, kind + (uint32_t)r->parts_of_kind[kind]++); }
+
+/* Room for a part of that size in the robot's list, or NULL. */
+static void *new_part(robot *r, size_t size) {
+  if (r == NULL) return NULL;
+  part **parts = realloc(r->parts, (size_t)(r->part_count + 1) * sizeof *parts);
+  if (parts == NULL) return NULL;
+  r->parts = parts;
+  return calloc(1, size);
+}
+
+/* The robot has the part from now on; it hears its pins, beginning with what the board does to them now. */
+static int join(robot *r, part *p) {
+  r->parts[r->part_count++] = p;
+  for (int i = 0; i < PART_PINS; i++) {
+    const uint8_t pin = p->pins[i].pin;
+    if (!is_pin(pin)) continue;
+    if (p->pins[i].role & PART_ANALOG) r->analog[pin - BOARD_FIRST_ANALOG_PIN] = p;
+    if (!(p->pins[i].role & PART_HEARS)) continue;
+    r->hears[pin] = p;
+    const uint8_t level = r->board->op->output(r->board, pin);
+    if (level != BOARD_LOW) p->op->edge(p, r->board->op->now(r->board), pin, level);
+  }
+  return SIM_OK;
+}
+
+/* The same for a part whose `_init` may have found its parameters to be bad. */
+static int join_if(robot *r, part *p, int status) {
+  if (status == 0) return join(r, p);
+  free(p);
+  return SIM_BAD_ARGUMENT;
+}
+
+int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin) || !is_side(side)) return SIM_BAD_ARGUMENT;
+  servo *s = new_part(r, sizeof *s);
+  if (s == NULL) return SIM_NO_MEMORY;
+  const part_place place = place_of(r, PART_SERVO_LEFT + (uint32_t)side);
+  servo_init(s, &place, pin, side, parameters, self->dt);
+  return join(r, &s->part);
+}
+
+int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin_a) || !is_side(side) || edges_per_turn == 0) return SIM_BAD_ARGUMENT;
+  encoder *e = new_part(r, sizeof *e);
+  if (e == NULL) return SIM_NO_MEMORY;
+  const part_place place = place_of(r, PART_ENCODER_LEFT + (uint32_t)side);
+  encoder_init(e, &place, side, pin_a, pin_b, edges_per_turn);
+  return join(r, &e->part);
+}
+
+/* What touches on the body reaches as far as this point of its frame. */
+static void widen_reach(body *b, double x, double y) {
+  const double distance = sqrt(x * x + y * y);
+  if (distance > b->reach) b->reach = distance;
+  b->near.slack = -1.0; /* look around again */
+}
+
+int sim_add_whisker(sim *self, int number, uint8_t pin, const whisker_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
+  whisker *w = new_part(r, sizeof *w);
+  if (w == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_WHISKER);
+  whisker_init(w, &place, pin, parameters);
+  widen_reach(&r->body, parameters->root_x, parameters->root_y);
+  widen_reach(&r->body, parameters->tip_x, parameters->tip_y);
+  return join(r, &w->part);
+}
+
+int sim_add_infrared(sim *self, int number, uint8_t led_pin, uint8_t receiver_pin,
+                     const infrared_pair_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(led_pin) || !is_pin(receiver_pin)) return SIM_BAD_ARGUMENT;
+  infrared *i = new_part(r, sizeof *i);
+  if (i == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_INFRARED);
+  return join_if(r, &i->part, infrared_init(i, &place, led_pin, receiver_pin, parameters));
+}
+
+int sim_add_ping(sim *self, int number, uint8_t pin, const sonar_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
+  ping *p = new_part(r, sizeof *p);
+  if (p == NULL) return SIM_NO_MEMORY;
+  const part_place place = next_place(r, PART_PING);
+  return join_if(r, &p->part, ping_init(p, &place, pin, parameters));
+}
+
+int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || (channel != PART_NO_PIN && channel >= BOARD_ANALOG_COUNT)) return SIM_BAD_ARGUMENT;
+  if (r->battery != NULL) { /* a fresh one */
+    const part_place place = place_of(r, PART_BATTERY);
+    battery_init(r->battery, &place, channel, parameters);
+    return SIM_OK;
+  }
+  battery *b = new_part(r, sizeof *b);
+  if (b == NULL) return SIM_NO_MEMORY;
+  const part_place place = place_of(r, PART_BATTERY);
+  battery_init(b, &place, channel, parameters);
+  r->battery = b;
+  return join(r, &b->part);
+}

@@ -1,0 +1,89 @@
+/* loop_state.h: what the files of the loop know of a simulation: loop.c runs it, loop_join.c builds it, loop_truth.c reads
+ * it, loop_hands.c lays a test's hands on it.
+ */
+#ifndef LOOP_STATE_H
+#define LOOP_STATE_H
+
+#include "loop.h"
+#include "parts/part.h"
+
+#define WAVES_MAXIMUM 4
+#define OBSTACLES_MAXIMUM 64
+
+/* A square wave that a test puts on a pin. */
+typedef struct {
+  uint8_t pin;
+  uint8_t level;
+  uint32_t half;
+  uint64_t next;
+  uint64_t end;
+} wave;
+
+typedef struct {
+  sim *sim;
+  int number;
+  board *board;
+  body body;
+  chassis chassis;
+  part **parts;
+  int part_count;
+  int parts_of_kind[PART_KINDS]; /* by kind (PART_WHISKER and so on), how many there are */
+  part *hears[BOARD_PIN_COUNT];
+  part *analog[BOARD_ANALOG_COUNT];
+  battery *battery;   /* NULL: a supply that never sags */
+  double held_supply; /* share of the nominal voltage that a test holds, or 0 */
+  wave wave[WAVES_MAXIMUM];
+  int waves;
+  buffer received;
+  uint64_t last_byte; /* cycle of the end of the last byte received */
+  uint64_t idle;      /* cycles without a byte after which the line is idle: two bytes' time */
+  buffer truth;
+  buffer looks;
+  edge_log edges;
+  int touched; /* since the last row of the truth */
+  uint64_t last_touch;
+  uint64_t contacts;
+} robot;
+
+struct sim {
+  arena *arena;
+  uint64_t seed;
+  uint32_t step_cycles;
+  uint32_t record_cycles;
+  int noise;
+  double dt;
+  uint64_t now;   /* boards have run up to here */
+  uint64_t world; /* world and parts have run up to here */
+  uint64_t next_record;
+  robot **robots; /* by increasing number */
+  int robot_count;
+  body *bodies[BODY_MAXIMUM]; /* of the robots, in their order */
+  double torques[BODY_MAXIMUM][2];
+  mover movers[OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
+  size_t obstacles;
+  scene seen; /* arena and all movers */
+};
+
+/* The robot of that number, or NULL. */
+robot *sim_robot(const sim *self, int number);
+
+/* Sinks of the board: context is the robot. */
+void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
+double robot_on_analog(void *context, uint64_t cycle, uint8_t channel);
+
+/* Cycles without a byte after which a line of that bit rate is idle. */
+uint64_t line_idle_cycles(uint32_t baud);
+
+/* The voltage of the rail as it is now goes to whoever runs on it. */
+void robot_update_supply(robot *self);
+
+/* Puts the robots into the scene as they stand now. */
+void sim_update_scene(sim *self);
+
+/* The id of a robot among the movers; never 0. */
+static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }
+
+/* Queues the edges of a test's square waves up to `until`. */
+void robot_step_waves(robot *self, uint64_t until);
+
+#endif

@@ -1,0 +1,60 @@
+/* loop_truth.c: see loop.h. Here: what the simulation tells of itself. */
+#include <string.h>
+
+#include "loop_state.h"
+
+void sim_body(const sim *self, int number, body_state *out) {
+  const robot *r = sim_robot(self, number);
+  if (r != NULL) *out = r->body.state;
+}
+
+const sim_truth *sim_record(const sim *self, int number, size_t *count) {
+  const robot *r = sim_robot(self, number);
+  *count = r == NULL ? 0 : r->truth.count / sizeof(sim_truth);
+  return r == NULL ? NULL : (const sim_truth *)(const void *)r->truth.data;
+}
+
+const sim_look *sim_looks(const sim *self, int number, size_t *count) {
+  const robot *r = sim_robot(self, number);
+  *count = r == NULL ? 0 : r->looks.count / sizeof(sim_look);
+  return r == NULL ? NULL : (const sim_look *)(const void *)r->looks.data;
+}
+
+uint64_t sim_contacts(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->contacts;
+}
+
+uint64_t sim_hash(const sim *self) {
+  uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
+  for (int i = 0; i < self->robot_count; i++) {
+    const body_state *s = &self->robots[i]->body.state;
+    const double state[] = {
+        s->x,         s->y,          s->heading,     s->speed,    s->turn_rate,        s->lateral,         s->rim_left,
+        s->rim_right, s->wheel_left, s->wheel_right, s->distance, (double)s->touching, (double)s->slipping};
+    uint8_t bytes[sizeof state];
+    memcpy(bytes, state, sizeof state);
+    for (size_t k = 0; k < sizeof bytes; k++) hash = (hash ^ bytes[k]) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+size_t sim_edges(const sim *self, int number, sim_edge *out, size_t capacity) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : edge_log_copy(&r->edges, out, capacity);
+}
+
+uint64_t sim_edges_seen(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->edges.count;
+}
+
+double sim_pack_voltage(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL || r->battery == NULL ? 0.0 : r->battery->supply.pack_v;
+}
+
+double sim_supply_voltage(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0.0 : r->chassis.supply * BOARD_NOMINAL_VOLTS;
+}

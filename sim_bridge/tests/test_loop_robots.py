@@ -1,0 +1,148 @@
+"""Several robots in one run: they see, feel and bump each other, and their order does not matter."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+
+from boebot.errors import ArenaError, BoardError
+from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.sim import Sim
+from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, square
+
+LED, RECEIVER, PING, LEFT_WHISKER = 9, 10, 8, 5
+
+
+def sim_of(**wishes: Any) -> Sim:
+    return Sim(arena_of(outline=square(0, 0, 6)), noise=wishes.pop("noise", False), **wishes)
+
+
+def drive(robot: Scripted, seconds: float, left: float, right: float) -> None:
+    robot.pulses(seconds, {13: left, 12: right})
+
+
+def run_in_order(order: tuple[int, ...], noise: bool = True) -> tuple[int, list[Any]]:
+    """Three robots that cross each other's way, added in that order; the state's hash and what each board was told."""
+    sim = sim_of(seed=5, noise=noise)
+    poses = {0: (0.0, 0.0, 0.0), 3: (0.5, 0.02, math.pi), 7: (0.2, 0.5, -1.2)}
+    robots = {number: add_scripted(sim, pose=poses[number], number=number) for number in order}
+    for number, robot in robots.items():
+        drive(robot, 2.0, 1700 - 10 * number, 1310 + 5 * number)
+    sim.run(2 * CLOCK_HZ, 2 * CLOCK_HZ)
+    return sim.hash(), [[robots[number].inputs(pin) for pin in range(20)] for number in sorted(robots)]
+
+
+def test_order_of_adding_does_not_matter() -> None:
+    outcomes = [run_in_order(order) for order in itertools.permutations((0, 3, 7))]
+    assert all(outcome == outcomes[0] for outcome in outcomes)
+    assert outcomes[0] != run_in_order((0, 3, 7), noise=False)
+
+
+def test_robots_far_apart_do_not_disturb_each_other() -> None:
+    """The first one's bits are the same as alone; another number is another robot."""
+
+    def run(count: int) -> list[tuple[float, ...]]:
+        sim = sim_of(seed=5, noise=True)
+        scripts = [add_scripted(sim, pose=(2.0 * number - 1, 0, 0.3)) for number in range(count)]
+        for script in scripts:
+            drive(script, 1.0, 1650, 1400)
+        sim.run(CLOCK_HZ, CLOCK_HZ)
+        bodies = [script.robot.body() for script in scripts]
+        return [(b.x, b.y, b.heading, b.wheel_left, b.wheel_right) for b in bodies]
+
+    alone, two = run(1), run(2)
+    assert two[0] == alone[0]
+    assert two[1][3:] != two[0][3:]
+
+
+def ping_echo(robot: Scripted, at: int) -> float:
+    """Length of the echo pulse (us) of a ping at that cycle."""
+    robot.edge(at, PING, 1)
+    robot.edge(at + 5 * US, PING, 2)
+    robot.run(0.03)
+    rise, fall = robot.inputs(PING)[-3:-1]
+    return (fall[0] - rise[0]) / US
+
+
+def test_ping_hears_the_other_robot_and_not_itself() -> None:
+    sim = sim_of()
+    seer = add_scripted(sim, pose=(0, 0, 0))
+    other = add_scripted(sim, pose=(1.0, 0, 0))
+    face = 1.0 - other.robot.description.body.radius_m - 0.06
+    assert ping_echo(seer, 1 * MS) == pytest.approx(2 * face / 343.5 * 1e6, abs=0.1)
+    sim_alone = sim_of()
+    alone = add_scripted(sim_alone, pose=(0, 0, 0))
+    assert ping_echo(alone, 1 * MS) == pytest.approx(2 * 2.94 / 343.5 * 1e6, abs=0.1)
+
+
+def test_infrared_sees_the_other_robot() -> None:
+    for distance, seen in ((0.25, True), (1.0, False)):
+        sim = sim_of()
+        seer = add_scripted(sim, pose=(0, 0, 0))
+        add_scripted(sim, pose=(distance, 0.08, 0))
+        seer.burst(1 * MS, LED)
+        seer.run(0.01)
+        assert (len(seer.inputs(RECEIVER)) > 1) == seen
+
+
+def test_whisker_feels_the_other_robot() -> None:
+    """The tip of the left whisker is 0.1 m ahead and 0.05 m to the left."""
+    for distance, level in ((0.15, 0), (0.25, 1)):
+        sim = sim_of()
+        feeler = add_scripted(sim, pose=(0, 0, 0))
+        add_scripted(sim, pose=(distance, 0.05, 0))
+        feeler.run(0.01)
+        assert feeler.inputs(LEFT_WHISKER)[-1][1] == level
+
+
+def test_each_robot_has_its_own_line() -> None:
+    from sim_bridge._core import lib
+
+    sim = sim_of()
+    robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
+    lib.script_board_byte(robots[0].script, 5 * MS, 10)
+    lib.script_board_byte(robots[1].script, 9 * MS, 20)
+    sim.run(CLOCK_HZ, 0, robots[1].robot)  # the first one's byte does not end it
+    assert 9 * MS < sim.cycle < 10 * MS
+    assert [robot.robot.receive() for robot in robots] == [bytes([10]), bytes([20])]
+    assert [robot.robot.last_byte_cycle for robot in robots] == [5 * MS, 9 * MS]
+
+
+def test_anybodys_byte_ends_a_run() -> None:
+    from sim_bridge._core import lib
+
+    sim = sim_of()
+    robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
+    lib.script_board_byte(robots[1].script, 5 * MS, 20)
+    sim.run(CLOCK_HZ)
+    assert 5 * MS < sim.cycle < 6 * MS
+
+
+def test_crash_names_the_board() -> None:
+    from sim_bridge._core import lib
+
+    sim = sim_of()
+    robots = [add_scripted(sim, pose=(0.5 * i, 0, 0), number=4 * i) for i in range(2)]
+    lib.script_board_crash(robots[1].script)
+    with pytest.raises(BoardError, match="crashed"):
+        sim.run(CLOCK_HZ)
+
+
+def test_places_and_numbers_are_for_one() -> None:
+    sim = sim_of()
+    first = add_scripted(sim, pose=(0, 0, 0), number=2)
+    with pytest.raises(ArenaError, match="no free space"):
+        add_scripted(sim, pose=(0.1, 0.05, 0))
+    with pytest.raises(BoardError, match="taken"):
+        add_scripted(sim, pose=(1, 0, 0), number=2)
+    with pytest.raises(BoardError, match="negative"):
+        add_scripted(sim, pose=(1, 0, 0), number=-1)
+    second = add_scripted(sim, pose=(1, 0, 0))
+    assert second.robot.number == 3
+    with pytest.raises(ArenaError, match="no free space"):
+        second.pins.place(0.1, 0, 0)
+    second.pins.place(1.05, 0, 0)
+    assert first.robot.body().x == 0
