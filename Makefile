@@ -14,7 +14,7 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 
 FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[chS]' -o -name '*.def')
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
-IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf
+IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf build/images/boebot.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis

@@ -144,7 +144,7 @@ def parameters_header(spec: schema.Schema) -> str:
     lines += ["/* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]
     rows = []
     for p in spec.parameter:
-        default = str(p.default) if p.default is not None else f"DEFAULT_{p.name.upper()}"
+        default = str(p.default) if not p.default_from and p.default is not None else f"DEFAULT_{p.name.upper()}"
         rows.append(f"  X({p.name.upper()}, {p.type}, {p.min}, {p.max}, {default})")
     lines += [*continued("#define PARAMETER_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
@@ -169,8 +169,9 @@ def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
             lines += ["", f"#define PIN_{full} {pin}"]
             lines += [f"#define {full}_PORT PORT{port}", f"#define {full}_DDR DDR{port}"]
             lines += [f"#define {full}_PINR PIN{port}", f"#define {full}_BIT {bit}"]
-    quadrature = type(robot.device["encoder_left"]).__name__ == "QuadratureEncoder"
-    lines += ["", f"#define ENCODER_QUADRATURE {int(quadrature)}"]
+    encoder = robot.device.get("encoder_left")
+    lines += ["", f"#define ENCODER_LINES {len(encoder.pins()) if encoder else 0} /* of each wheel */"]
+    lines += ["", "/* Devices bits of what the map has pins for. */", f"#define DEVICES_BUILT {devices_built(spec, robot)}"]
     lines += ["", "/* Defaults of the parameters, in counts of their scale. */"]
     lines.append(f"#define DEFAULT_DEVICES {devices_default(spec, robot)}")
     for p in spec.parameter:
@@ -185,9 +186,16 @@ def devices_default(spec: schema.Schema, robot: RobotDescription) -> int:
     return sum(1 << i for i, device in enumerate(spec.flags["devices"].device) if robot.has(device))
 
 
+def devices_built(spec: schema.Schema, robot: RobotDescription) -> int:
+    """The devices bits of what the robot's map gives pins to, on or off."""
+    return sum(1 << i for i, device in enumerate(spec.flags["devices"].device) if device in robot.device)
+
+
 def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
     """The parameter's default for that robot in counts: a key of its body or of one of its devices."""
     owner_name, key = parameter.default_from.split(".")
+    if owner_name != "body" and owner_name not in robot.device and parameter.default is not None:
+        return parameter.default
     owner = robot.body if owner_name == "body" else robot.device[owner_name]
     counts = round(float(getattr(owner, key)) / parameter.scale)
     if not parameter.min <= counts <= parameter.max:
@@ -411,7 +419,7 @@ def tables(spec: schema.Schema) -> str:
     lines += ["|---|---|---|---|---|---|"]
     for p in spec.parameter:
         unit = " ".join(part for part in ("" if p.scale == 1.0 else number(p.scale), p.unit) if part)
-        default = str(p.default) if p.default is not None else "the robot's"
+        default = str(p.default) if not p.default_from and p.default is not None else "the robot's"
         lines.append(f"| {p.id} | `{p.name}` | {unit} | {p.min} … {p.max} | {default} | {p.doc} |")
     return "\n".join(lines)
 

@@ -11,10 +11,9 @@
 #define PERIOD_LONGEST 31250u /* 0.5 s in 16 us */
 #define SILENT_TICKS 50u      /* 0.5 s */
 
-#if ENCODER_QUADRATURE
+#if ENCODER_LINES == 2
 #define LINES_PER_SIDE 2u
 #define SIDE_BITS(side) (line_bit[2u * (side)] | line_bit[2u * (side) + 1u])
-#define PORT_BITS() HAL_PORT_READ(ENCODER_LEFT_A)
 static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {1u << ENCODER_LEFT_A_BIT, 1u << ENCODER_LEFT_B_BIT,
                                                          1u << ENCODER_RIGHT_A_BIT, 1u << ENCODER_RIGHT_B_BIT};
 _Static_assert(PIN_ENCODER_LEFT_A >= 14 && PIN_ENCODER_LEFT_B >= 14 && PIN_ENCODER_RIGHT_A >= 14 &&
@@ -23,11 +22,15 @@ _Static_assert(PIN_ENCODER_LEFT_A >= 14 && PIN_ENCODER_LEFT_B >= 14 && PIN_ENCOD
 #else
 #define LINES_PER_SIDE 1u
 #define SIDE_BITS(side) (line_bit[side])
-#define PORT_BITS() HAL_PORT_READ(ENCODER_LEFT)
+#if ENCODER_LINES == 1
 static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {1u << ENCODER_LEFT_BIT, 1u << ENCODER_RIGHT_BIT};
 _Static_assert(PIN_ENCODER_LEFT >= 14 && PIN_ENCODER_RIGHT >= 14,
                "encoder lines share the pin-change interrupt of port C");
+#else /* wheels without encoders: none of the port's bits is theirs */
+static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {0, 0};
 #endif
+#endif
+#define PORT_BITS() HAL_PORT_C()
 
 #define LINES (LINES_PER_SIDE * SIDES)
 
@@ -50,14 +53,38 @@ static uint8_t before;       /* port bits of the last change worked off */
 static uint8_t watched;      /* port bits of the lines that count */
 static uint8_t limit;        /* edges of a line in a tick above which it is masked */
 static uint8_t phantoms;     /* interrupts of this tick without a change to be seen: pulses too short */
+static uint8_t awaited;      /* port bit of the other line whose change is awaited, or 0 */
+static uint8_t other_bit;    /* the same, also when it has come */
+static bool other_seen;      /* it has come, */
+static uint32_t other_edge;  /* at that schedule_now() */
 
 /* Lets the lines that count interrupt, unless the interrupt has just masked them. */
 static void listen(void) {
   HAL_ATOMIC {
     if (!hal_changes_stopped()) {
-      hal_pin_change_mask(watched);
+      hal_pin_change_mask(watched | awaited);
     }
   }
+}
+
+void encoder_await_other(uint8_t bit) {
+  encoder_poll();
+  other_seen = false;
+  awaited = other_bit = bit;
+  before = (uint8_t)((before & (uint8_t)~bit) | (PORT_BITS() & bit));
+  listen();
+}
+
+bool encoder_saw_other(void) { return other_seen; }
+
+uint32_t encoder_other_edge(void) { return other_edge; }
+
+/* The edge that was awaited: the line is masked again. */
+static __attribute__((noinline)) void see_other(uint32_t time) {
+  awaited = 0;
+  other_seen = true;
+  other_edge = time;
+  listen();
 }
 
 static __attribute__((noinline)) void mask_line(uint8_t line) {
@@ -83,7 +110,7 @@ static void count_wheel(wheel *w, int8_t step, uint32_t time) {
 /* What a change of the port means to one wheel. Inlined for each side, so that the bits are constants. */
 static inline __attribute__((always_inline)) void see_wheel(uint8_t side, uint8_t bits, uint8_t changed,
                                                             uint32_t time) {
-#if ENCODER_QUADRATURE
+#if ENCODER_LINES == 2
   const uint8_t a = line_bit[2u * side];
   const uint8_t b = line_bit[2u * side + 1u];
   if ((changed & (a | b)) == 0) {
@@ -116,6 +143,9 @@ static inline __attribute__((always_inline)) void work_off(uint8_t bits, uint32_
     see_wheel(LEFT, bits, changed, time);
     see_wheel(RIGHT, bits, changed, time);
   }
+  if (((bits ^ before) & awaited) != 0) {
+    see_other(time);
+  }
   before = bits;
 }
 
@@ -130,7 +160,8 @@ static void convict(uint8_t lines) {
   listen();
 }
 
-/* The lines whose noise stopped the interrupt, from the changes up to `head`. */
+/* The lines whose noise stopped the interrupt, from the changes up to `head`. The other line is told from them like one of
+ * theirs, and gets no mask: it is awaited no more. */
 static uint8_t noisy_lines(uint8_t head) {
   uint8_t at = (uint8_t)(head - HAL_CHANGE_BYTES);
   const uint8_t run = hal_change_after(at)->close;
@@ -138,6 +169,7 @@ static uint8_t noisy_lines(uint8_t head) {
   const uint8_t share = storm ? SHARE_OF_STORM : SHARE_OF_RING;
   uint8_t left = storm && run < HAL_CHANGES - 2u ? run : HAL_CHANGES - 2u;
   uint8_t edges[LINES] = {0};
+  uint8_t other_edges = 0;
   uint8_t lines = 0;
   uint8_t bits = hal_change_after(at)->bits;
   for (; left > 0; left--) {
@@ -148,15 +180,17 @@ static uint8_t noisy_lines(uint8_t head) {
         lines |= line_bit[line];
       }
     }
+    other_edges = (uint8_t)(other_edges + (((bits ^ earlier) & other_bit) != 0));
     bits = earlier;
   }
   lines &= watched;
-  return lines != 0 ? lines : watched;
+  return lines != 0 || other_edges >= share ? lines : watched;
 }
 
 /* After a stop: masks the noise and listens to the rest. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
+  awaited = 0;
   hal_changes_resume();
   convict(lines);
   work_off(PORT_BITS(), schedule_now()); /* what the others did meanwhile */
@@ -192,18 +226,20 @@ static uint8_t lines_on(void) {
 }
 
 void encoder_start(void) {
-#if ENCODER_QUADRATURE
+#if ENCODER_LINES == 2
   HAL_PIN_INPUT(ENCODER_LEFT_A);
   HAL_PIN_INPUT(ENCODER_LEFT_B);
   HAL_PIN_INPUT(ENCODER_RIGHT_A);
   HAL_PIN_INPUT(ENCODER_RIGHT_B);
-#else
+#elif ENCODER_LINES == 1
   HAL_PIN_INPUT(ENCODER_LEFT);
   HAL_PIN_INPUT(ENCODER_RIGHT);
 #endif
   hal_changes_head = hal_changes_tail = 0;
   hal_changes_resume();
   phantoms = 0;
+  awaited = other_bit = 0;
+  other_seen = false;
   for (uint8_t side = LEFT; side < SIDES; side++) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
   }

@@ -1,6 +1,6 @@
 /* encoder.h: wheel encoders on pin-change interrupts: counts of edges and the time between the last two.
  *
- * One line per wheel counts up whatever the direction; two lines (ENCODER_QUADRATURE) count down when the wheel turns
+ * One line per wheel counts up whatever the direction; two lines (ENCODER_LINES 2) count down when the wheel turns
  * backward. Forward is A leading B: (A, B) runs 00, 10, 11, 01. The pin map says which it is.
  * A line that fires more often in a tick than the parameter encoder_limit allows, or whose changes come back to back
  * (hal.h), is masked until the next tick; so are all lines when the noise cannot be told to be one line's. What a masked
@@ -49,6 +49,14 @@ static inline int8_t encoder_quadrature_step(uint8_t from, uint8_t to) {
   }
   return (from >> 1) == (to & 1u) ? 1 : -1;
 }
+
+/* The next change of another line of the port, `bit` of it, is stamped, once; 0: none is awaited. Noise that stops the
+ * interrupt ends the waiting. */
+void encoder_await_other(uint8_t bit);
+
+/* Whether that change has come, and when: as schedule_now(). After encoder_poll(). */
+bool encoder_saw_other(void);
+uint32_t encoder_other_edge(void);
 
 #ifdef __cplusplus
 }

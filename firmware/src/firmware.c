@@ -1,9 +1,13 @@
 /* firmware.c: start-up order and what one round of the main loop does. */
 #include "firmware.h"
 
+#include "analog.h"
+#include "buzzer.h"
+#include "compass.h"
 #include "encoder.h"
 #include "hal/hal.h"
 #include "infrared.h"
+#include "light.h"
 #include "link/identity.h"
 #include "link/link.h"
 #include "link/parameters.h"
@@ -27,12 +31,17 @@ void firmware_start(void) {
   infrared_start();
   ping_start();
   supply_start();
+  analog_start();
+  light_start();
+  compass_start();
+  buzzer_start();
   schedule_start(0);
   safety_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
   hal_start_serial(100ul * baud);
   link_start(baud);
   hal_start_timers();
+  buzzer_start_beep();
   hal_start_watchdog();
 }
 

@@ -10,12 +10,17 @@
 #include "schedule.h"
 
 #define BURST_CYCLES 16000u /* 1 ms */
+
+/* Half a period in cycles: 37.91, 39.02, 40.00, 41.03, 42.11 kHz. */
+#define BANDS 5u
+static const uint8_t half_periods[BANDS] = {211, 205, 200, 195, 190};
 #define AGE_NEVER 255u
 
 /* Shared with the interrupts; single bytes. */
 static volatile bool armed;    /* this tick shall have bursts */
 static volatile bool finished; /* both sides were read since the last look */
 static volatile uint8_t seen;  /* what the bursts of this tick found */
+static volatile uint8_t band;  /* frequency of this tick's bursts; changed between ticks with bursts only */
 
 /* Interrupts only. */
 static bool started;   /* this tick's left burst was made: the right one follows */
@@ -25,6 +30,10 @@ static uint8_t active; /* the side whose LED is on */
 static uint8_t reading;
 static uint8_t age;
 static uint8_t wait; /* ticks until the next reading */
+static bool sweeping;
+static uint8_t counts[SIDES]; /* frequencies of the sweep at which an object was seen so far, */
+static uint8_t zones[SIDES];  /* and in the last whole one */
+static uint8_t zone_age;
 
 void infrared_start(void) {
   HAL_PIN_LOW(INFRARED_LEFT_LED);
@@ -38,6 +47,9 @@ void infrared_start(void) {
   reading = 0;
   age = AGE_NEVER;
   wait = 0;
+  band = 0;
+  sweeping = false;
+  zone_age = AGE_NEVER;
 }
 
 void infrared_begin(uint8_t side, uint16_t start) {
@@ -49,7 +61,7 @@ void infrared_begin(uint8_t side, uint16_t start) {
     return;
   }
   active = side;
-  hal_carrier_start(side);
+  hal_carrier_start(side, half_periods[band]);
   hal_edge_arm_plain((uint16_t)(start + BURST_CYCLES));
 }
 
@@ -67,20 +79,56 @@ void infrared_end(void) {
   }
 }
 
+/* What a tick's bursts found: at 38 kHz the reading, in a sweep a part of the zones as well. */
+static void take(void) {
+  if (band == 0) {
+    reading = seen;
+    age = 0;
+    counts[LEFT] = counts[RIGHT] = 0;
+  }
+  if (!sweeping) {
+    return;
+  }
+  counts[LEFT] = (uint8_t)(counts[LEFT] + ((seen & INFRARED_LEFT) != 0));
+  counts[RIGHT] = (uint8_t)(counts[RIGHT] + ((seen & INFRARED_RIGHT) != 0));
+  band++;
+  if (band == BANDS) {
+    band = 0;
+    zones[LEFT] = counts[LEFT];
+    zones[RIGHT] = counts[RIGHT];
+    zone_age = 0;
+  }
+}
+
+static void forget_sweep(void) {
+  sweeping = false;
+  band = 0;
+  zones[LEFT] = zones[RIGHT] = 0;
+  zone_age = AGE_NEVER;
+}
+
 void infrared_task(void) {
   if (finished) {
     finished = false;
-    reading = seen;
-    age = 0;
+    take();
   }
   if (age < AGE_NEVER) {
     age++;
+  }
+  if (zone_age < AGE_NEVER) {
+    zone_age++;
   }
   if (wait > 0) {
     wait--;
   }
   if (parameters_device_on(DEVICES_INFRARED)) {
-    if (wait == 0) {
+    if (parameters_u16(PARAMETER_INFRARED_SWEEP) == 0) {
+      forget_sweep();
+    }
+    if (band != 0) { /* the sweep goes on */
+      armed = true;
+    } else if (wait == 0) {
+      sweeping = parameters_u16(PARAMETER_INFRARED_SWEEP) != 0;
       wait = (uint8_t)parameters_u16(PARAMETER_INFRARED_PERIOD);
       armed = true;
     }
@@ -88,8 +136,13 @@ void infrared_task(void) {
     armed = false;
     reading = 0;
     age = AGE_NEVER;
+    forget_sweep();
   }
 }
+
+uint8_t infrared_zone(uint8_t side) { return zones[side]; }
+
+uint8_t infrared_zone_age(void) { return zone_age; }
 
 uint8_t infrared_read(void) { return reading; }
 

@@ -1,6 +1,9 @@
 /* infrared.h: the two IR pairs. Every infrared_period ticks each LED gives a 1 ms burst of 38 kHz, left in the third
  * slot of the tick and right in the fourth; at its end the receiver is sampled: its output is low when an object
- * reflects the burst. */
+ * reflects the burst.
+ *
+ * With the parameter infrared_sweep on, the bursts of four more ticks follow at 39, 40, 41 and 42 kHz, at which the receiver
+ * is less and less sensitive: the nearer the object, the more of the five show it. Their number is the zone, 0 to 5. */
 #ifndef INFRARED_H
 #define INFRARED_H
 
@@ -20,6 +23,10 @@ uint8_t infrared_read(void);
 
 /* Its age in ticks; 255: none yet, or older. */
 uint8_t infrared_age(void);
+
+/* Zone of a side in the last whole sweep, and the age of its last burst in ticks; 255: none yet, or older. */
+uint8_t infrared_zone(uint8_t side);
+uint8_t infrared_zone_age(void);
 
 /* Interrupt context: a side's slot begins at hal_time() `start`; its burst is to end. */
 void infrared_begin(uint8_t side, uint16_t start);

@@ -23,11 +23,15 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high) {
   return value < low ? low : value > high ? high : value;
 }
 
-uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal) {
+int32_t motion_offset(int32_t gain, int16_t signal) {
   /* Two divisions would take a fifth of the time between two set-points on a full line: 26844 / 2^12 is 2^16 / 10000 to
    * 2e-5. */
   const int32_t part = shift((int32_t)signal * 26844, 12); /* signal in 1/65536 */
-  return (uint16_t)clamp(centre + shift(gain * part, 16), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
+  return shift(gain * part, 16);
+}
+
+uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal) {
+  return (uint16_t)clamp(centre + motion_offset(gain, signal), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
 }
 
 /* A division takes 600 cycles, and on a full line there are 5,000 for each set-point: it is made anew only for another

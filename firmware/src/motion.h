@@ -17,6 +17,9 @@ extern "C" {
 #define MOTION_PULSE_MIN 20800u /* 1300 us in cycles */
 #define MOTION_PULSE_MAX 27200u /* 1700 us */
 
+/* gain * signal / 10000, to 0.6 of a count; |gain| and |signal| up to 16000. */
+int32_t motion_offset(int32_t gain, int16_t signal);
+
 /* The pulse of one wheel in cycles, to 0.6 of a cycle. centre and gain (-3200..3200) in cycles, signal in 1/10000. */
 uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal);
 

@@ -1,12 +1,14 @@
 /* safety.c: see safety.h. */
 #include "safety.h"
 
+#include "buzzer.h"
 #include "generated/messages.h"
 #include "link/events.h"
 #include "link/parameters.h"
 #include "motion.h"
 #include "schedule.h"
 #include "supply.h"
+#include "turret.h"
 
 #define TIME_TO_LIVE_MAX MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MAX              /* ms; of every kind of set-point */
 #define AGE_MAX ((uint16_t)(TIME_TO_LIVE_MAX * 1000ul / SCHEDULE_TICK_US)) /* ticks; all older ones are late */
@@ -26,6 +28,13 @@ static uint16_t
 static uint32_t deadline;  /* schedule_time() at which it ends */
 static uint16_t last_tick; /* the tick that it answers */
 static uint8_t last_sequence;
+
+/* Whatever stops the motors also releases the turret and silences the buzzer. */
+static void stop_all(void) {
+  motion_off();
+  turret_release();
+  buzzer_silence();
+}
 
 void safety_start(void) {
   latch = LATCH_START;
@@ -72,7 +81,7 @@ safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8
 uint8_t safety_setpoint_sequence(void) { return last_sequence; }
 
 void safety_latch(uint8_t reason) {
-  motion_off();
+  stop_all();
   state = 0;
   if (latch == LATCH_NONE) {
     latch = reason;
@@ -119,7 +128,7 @@ void safety_task(void) {
   } else if ((int32_t)(schedule_time() - deadline) >= 0) {
     state = STATUS_DEAD_MAN;
     end_ticks(last_tick);
-    motion_off();
+    stop_all();
     events_raise(EVENT_KIND_DEAD_MAN, last_tick);
   }
 }

@@ -3,7 +3,8 @@
  * At start, by a stop command, at the end of a session and by a low supply the motors are latched off; only safety_arm()
  * ends that. Armed, they follow the set-point in force, which lives for its time to live, counted from the start of the
  * tick that it answers; when no newer one came by then, the motors stop until the next (dead-man). However they are
- * stopped, there are no more pulses from the next servo frame on (motion.h). */
+ * stopped, there are no more pulses from the next servo frame on (motion.h); the turret is released and the buzzer silenced
+ * with them. */
 #ifndef SAFETY_H
 #define SAFETY_H
 

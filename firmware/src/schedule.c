@@ -1,9 +1,14 @@
 /* schedule.c: slots, tasks and overruns; see schedule.h and tasks.def. */
 #include "schedule.h"
 
+#include "analog.h"
+#include "buzzer.h"
+#include "compass.h"
 #include "encoder.h"
 #include "infrared.h"
+#include "light.h"
 #include "link/counters.h"
+#include "link/devices.h"
 #include "link/events.h"
 #include "link/link.h"
 #include "link/requests.h"
@@ -15,6 +20,7 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
+#include "turret.h"
 #include "whisker.h"
 
 #define SLOTS_PER_FRAME 8u
@@ -23,21 +29,17 @@
 
 enum {
 #define TASK(name, period, phase, budget) TASK_##name,
-#define RESERVED(name, period, phase, budget)
 #include "tasks.def"
 #undef TASK
-#undef RESERVED
   TASKS
 };
 
 #define TASK(name, period, phase, budget) \
   _Static_assert(256 % (period) == 0 && (phase) < (period), "task " #name ": period and phase");
-#define RESERVED(name, period, phase, budget) TASK(name, period, phase, budget)
 #include "tasks.def"
 #undef TASK
-#undef RESERVED
 _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go together");
-_Static_assert(TASKS <= 16, "the due tasks are bits of 16");
+_Static_assert(TASKS <= 32, "the due tasks are bits of 32");
 
 volatile uint8_t schedule_slot;
 uint8_t schedule_next_slot;
@@ -93,7 +95,11 @@ HAL_INTERRUPT_SLOT {
     case 7:
       infrared_begin(RIGHT, schedule_slot_start);
       break;
-    default: /* 4: the turret's */
+    case 4:
+      edge_is_servo = true;
+      servo_begin(SERVO_TURRET, schedule_slot_start);
+      break;
+    default:
       break;
   }
 }
@@ -117,6 +123,12 @@ uint32_t schedule_now(void) {
   uint32_t cycles = 0;
   HAL_ATOMIC { cycles = slot_cycles + (uint16_t)(hal_time() - schedule_slot_start); }
   return cycles;
+}
+
+uint32_t schedule_cycles_at(uint8_t slot, uint16_t time) {
+  uint32_t start = 0;
+  HAL_ATOMIC { start = slot_cycles - (uint8_t)(schedule_slot - slot) * (uint32_t)HAL_SLOT_CYCLES; }
+  return start + (uint16_t)(time - (uint16_t)start);
 }
 
 uint32_t schedule_time(void) {
@@ -169,23 +181,21 @@ static __attribute__((noinline)) void between_tasks(void) {
 /* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run, and not in
  * a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
-  uint16_t due = 0;
-#define RESERVED(name, period, phase, budget)
+  uint32_t due = 0;
 #define TASK(name, period, phase, budget)    \
   if (slot % (uint8_t)(period) == (phase)) { \
-    due |= (uint16_t)(1u << TASK_##name);    \
+    due |= (uint32_t)1u << TASK_##name;      \
   }
 #include "tasks.def"
 #undef TASK
-#define TASK(name, period, phase, budget)             \
-  if ((due & (uint16_t)(1u << TASK_##name)) != 0) {   \
-    name##_task();                                    \
-    due &= (uint16_t) ~(uint16_t)(1u << TASK_##name); \
-    between_tasks();                                  \
+#define TASK(name, period, phase, budget)         \
+  if ((due & (uint32_t)1u << TASK_##name) != 0) { \
+    name##_task();                                \
+    due &= ~((uint32_t)1u << TASK_##name);        \
+    between_tasks();                              \
   }
 #include "tasks.def"
 #undef TASK
-#undef RESERVED
   if (due == 0 && overrun_row < OVERLOAD_TICKS) {
     hal_kick_watchdog();
   }

@@ -48,6 +48,10 @@ schedule_instant schedule_instant_now(void);
 /* Cycles since the timers started, modulo 2^32 (268 s); the low half is hal_time(). Main loop only. */
 uint32_t schedule_now(void);
 
+/* The same for the moment at which hal_time() was `time`, after the slot of that number (its low byte) had begun and
+ * before 4 ms of it were over. Main loop only, within 0.6 s of it. */
+uint32_t schedule_cycles_at(uint8_t slot, uint16_t time);
+
 /* Ticks whose work did not end in time since reset, modulo 256; and whether the previous one did not. */
 uint8_t schedule_overruns(void);
 bool schedule_overran(void);

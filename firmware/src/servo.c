@@ -9,20 +9,24 @@
 #define RISE_OFFSET 8000u /* cycles from the slot's start to the rising edge: above the lead and any interrupt */
 
 _Static_assert(RISE_OFFSET + 1700u * HAL_CYCLES_PER_US < HAL_SLOT_CYCLES - 2000u, "the longest pulse ends in its slot");
+_Static_assert(RISE_OFFSET + SERVO_TURRET_MAX < 2ul * HAL_SLOT_CYCLES - 2000u, "the turret's ends in the next");
 
-static volatile uint16_t wanted[SIDES];
-static volatile uint16_t in_force[SIDES];
-static uint8_t active; /* the side whose pulse is being made */
+static volatile uint16_t wanted[SERVOS];
+static volatile uint16_t in_force[SERVOS];
+static uint8_t active; /* the servo whose pulse is being made */
 static bool high;
 static uint16_t edge_time;
 
 void servo_start(void) {
   HAL_PIN_LOW(SERVO_LEFT);
   HAL_PIN_LOW(SERVO_RIGHT);
+  HAL_PIN_LOW(TURRET);
   HAL_PIN_OUTPUT(SERVO_LEFT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
-  wanted[LEFT] = wanted[RIGHT] = 0;
-  in_force[LEFT] = in_force[RIGHT] = 0;
+  HAL_PIN_OUTPUT(TURRET);
+  for (uint8_t servo = 0; servo < SERVOS; servo++) {
+    wanted[servo] = in_force[servo] = 0;
+  }
 }
 
 void servo_set(uint16_t left, uint16_t right) {
@@ -32,22 +36,27 @@ void servo_set(uint16_t left, uint16_t right) {
   }
 }
 
-uint16_t servo_pulse(uint8_t side) {
+void servo_turn(uint16_t turret) {
+  HAL_ATOMIC { wanted[SERVO_TURRET] = turret; }
+}
+
+uint16_t servo_pulse(uint8_t servo) {
   uint16_t width = 0;
-  HAL_ATOMIC { width = in_force[side]; }
+  HAL_ATOMIC { width = in_force[servo]; }
   return width;
 }
 
 void servo_frame(void) {
   in_force[LEFT] = wanted[LEFT];
   in_force[RIGHT] = wanted[RIGHT];
+  in_force[SERVO_TURRET] = wanted[SERVO_TURRET];
 }
 
-void servo_begin(uint8_t side, uint16_t start) {
-  if (in_force[side] == 0) {
+void servo_begin(uint8_t servo, uint16_t start) {
+  if (in_force[servo] == 0) {
     return;
   }
-  active = side;
+  active = servo;
   high = false;
   edge_time = (uint16_t)(start + RISE_OFFSET);
   hal_edge_arm(edge_time);
@@ -55,10 +64,12 @@ void servo_begin(uint8_t side, uint16_t start) {
 
 void servo_edge(void) {
   hal_edge_wait(edge_time);
-  if (active == LEFT) { /* the same way for both edges of a side, so that the width is exact */
+  if (active == LEFT) { /* the same way for both edges of a servo, so that the width is exact */
     HAL_PIN_TOGGLE(SERVO_LEFT);
-  } else {
+  } else if (active == RIGHT) {
     HAL_PIN_TOGGLE(SERVO_RIGHT);
+  } else {
+    HAL_PIN_TOGGLE(TURRET);
   }
   if (high) {
     hal_edge_disarm();

@@ -1,4 +1,4 @@
-/* servo.h: pulses for the two continuous-rotation servos, one each in a 20 ms frame.
+/* servo.h: pulses for the two continuous-rotation servos and the turret's, one each in a 20 ms frame.
  *
  * Widths are in cycles (1/16 us). A width takes effect with the next frame, for both wheels at once; a pulse under way
  * is finished at its old width, so a pulse is whole or absent, never cut. Width 0: no pulses; a Boe-Bot servo then
@@ -8,21 +8,30 @@
 
 #include <stdint.h>
 
+#include "pins.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* Beside LEFT and RIGHT. */
+enum { SERVO_TURRET = SIDES, SERVOS };
+
+#define SERVO_TURRET_MIN 9600u  /* 600 us in cycles */
+#define SERVO_TURRET_MAX 38400u /* 2400 us */
 
 void servo_start(void);
 
 /* Widths from the next frame on. */
 void servo_set(uint16_t left, uint16_t right);
+void servo_turn(uint16_t turret);
 
 /* Width of the pulses in the frame that runs. */
-uint16_t servo_pulse(uint8_t side);
+uint16_t servo_pulse(uint8_t servo);
 
-/* Interrupt context: a frame begins; a side's slot begins at hal_time() `start`; an edge is due. */
+/* Interrupt context: a frame begins; a servo's slot begins at hal_time() `start`; an edge is due. */
 void servo_frame(void);
-void servo_begin(uint8_t side, uint16_t start);
+void servo_begin(uint8_t servo, uint16_t start);
 void servo_edge(void);
 
 #ifdef __cplusplus

@@ -3,7 +3,7 @@
  * A step of the result is 22 mV at 5 V. */
 #include "supply.h"
 
-#include "hal/hal.h"
+#include "analog.h"
 #include "link/parameters.h"
 
 #define HYSTERESIS 100u /* mV */
@@ -48,8 +48,7 @@ static void judge(uint16_t minimum) {
 }
 
 void supply_task(void) {
-  const uint16_t result = hal_supply_result();
-  hal_supply_sample();
+  const uint16_t result = analog_take_bandgap();
   if (result < RESULT_MIN) {
     return;
   }

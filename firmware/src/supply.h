@@ -12,7 +12,7 @@ extern "C" {
 
 void supply_start(void);
 
-/* In every tick: takes the measurement that the last one began, and begins the next. */
+/* In every tick: judges the last measurement (analog.h). */
 void supply_task(void);
 
 /* mV; 0: not yet measured. */

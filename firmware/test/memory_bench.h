@@ -40,7 +40,9 @@ class memory_bench {
     std::memset(machine.eeprom, 0xFF, sizeof machine.eeprom);
     machine.edge = [](native_machine *, uint64_t, uint8_t, uint8_t) {};
     machine.transmit = [](native_machine *, uint64_t, const uint8_t *, size_t) {};
-    machine.supply = [](native_machine *self, uint64_t) { return reinterpret_cast<memory_bench *>(self)->volts; };
+    machine.analog = [](native_machine *self, uint64_t, uint8_t channel) {
+      return channel == NATIVE_SUPPLY ? reinterpret_cast<memory_bench *>(self)->volts : 0.0;
+    };
   }
   explicit memory_bench(const eeprom_image &eeprom) : memory_bench() {
     std::memcpy(machine.eeprom, eeprom.data(), eeprom.size());

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <vector>
 
 #include "generated/messages.h"
@@ -43,8 +44,10 @@ struct message {
 class native_bench {
  public:
   native_machine machine{};
-  double volts = 5.0;
-  std::vector<pin_edge> edges;   /* everything the firmware did to its pins */
+  double volts = 5.0;                                /* of the supply */
+  double analog[6] = {};                             /* at A0 to A5 */
+  std::vector<pin_edge> edges;                       /* everything the firmware did to its pins */
+  std::function<void(const pin_edge &)> answers_pin; /* a device: may drive pins at once */
   std::vector<message> messages; /* everything it said that is of this session or of the handshake */
   uint64_t bytes_out = 0;
   uint32_t seed = FRAME_NO_SESSION; /* of the session that the host believes in */
@@ -61,7 +64,9 @@ class native_bench {
     std::memset(machine.eeprom, 0xFF, sizeof machine.eeprom);
     machine.edge = on_edge;
     machine.transmit = on_transmit;
-    machine.supply = [](native_machine *self, uint64_t) { return of(self).volts; };
+    machine.analog = [](native_machine *self, uint64_t, uint8_t channel) {
+      return channel == NATIVE_SUPPLY ? of(self).volts : of(self).analog[channel];
+    };
     host_decoder_start(&decoder_, FRAME_NO_SESSION);
     api_->start(&machine, reset_cause);
     schedule_start(first_tick);
@@ -219,6 +224,7 @@ class native_bench {
   }
   size_t count(uint8_t id) const { return all(id).size(); }
   msg_telemetry telemetry() const { return last(MSG_TELEMETRY_ID).as<msg_telemetry>(); }
+  msg_devices_telemetry devices() const { return last(MSG_DEVICES_TELEMETRY_ID).as<msg_devices_telemetry>(); }
   msg_answer answer() const { return last(MSG_ANSWER_ID).as<msg_answer>(); }
 
   /* The board's counters, sent every 64 ticks: waits for the next ones. */
@@ -244,7 +250,11 @@ class native_bench {
   static native_bench &of(native_machine *machine) { return *reinterpret_cast<native_bench *>(machine); }
 
   static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_t level) {
-    of(machine).edges.push_back({cycle, pin, level});
+    native_bench &self = of(machine);
+    self.edges.push_back({cycle, pin, level});
+    if (self.answers_pin) {
+      self.answers_pin(self.edges.back());
+    }
   }
   static void on_transmit(native_machine *machine, uint64_t, const uint8_t *bytes, size_t count) {
     native_bench &self = of(machine);

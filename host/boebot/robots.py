@@ -60,7 +60,6 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
 
     on: bool = True
 
-    BUILT: ClassVar[bool] = True  # False: the firmware has no driver yet, only the pins are reserved
     PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # field of the pin -> the pins that can do it
@@ -86,11 +85,12 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
 
 
 class PositionServo(Device, tag="position_servo", frozen=True, kw_only=True):
-    """A servo that turns to an angle."""
+    """A servo that turns to an angle: pulse = centre + gain * angle."""
 
     pin: int | str
+    centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
+    gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
@@ -169,8 +169,8 @@ class Battery(Device, tag="battery", frozen=True, kw_only=True):
     """Battery voltage behind a divider."""
 
     pin: int | str
+    ratio: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # voltage of the pack for each volt at the pin
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
@@ -181,7 +181,6 @@ class AnalogInfrared(Device, tag="analog_infrared", frozen=True, kw_only=True):
 
     pin: int | str
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
@@ -192,8 +191,9 @@ class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
 
     pin: int | str
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge.
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(8), *_ANALOG)}
 
 
 class Compass(Device, tag="compass", frozen=True, kw_only=True):
@@ -202,7 +202,6 @@ class Compass(Device, tag="compass", frozen=True, kw_only=True):
     sda_pin: int | str
     scl_pin: int | str
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
@@ -213,7 +212,6 @@ class Buzzer(Device, tag="buzzer", frozen=True, kw_only=True):
 
     pin: int | str
 
-    BUILT: ClassVar[bool] = False
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
 
@@ -350,9 +348,6 @@ def _check_image(robot: RobotDescription, path: Path) -> None:
     for name in _ALWAYS:
         if not robot.has(name):
             raise RobotError(f"{file}: device.{name} is missing or off; every robot needs it")
-    for name, device in robot.device.items():
-        if device.on and not device.BUILT:
-            raise RobotError(f"{file}: device.{name} is on, but the firmware has no driver for it; expected on = false")
     owner = resources.folder("robots") / f"{robot.pin_map}.toml"
     if not owner.is_file() or owner.samefile(path):
         return  # a map of its own, with an image of its own

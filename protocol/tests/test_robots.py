@@ -17,7 +17,7 @@ def variant(tmp_path: Path, text: str) -> Path:
 
 
 def test_bundled_robots_load_under_their_own_names() -> None:
-    assert {load_robot(name).name for name in robot_names()} == set(robot_names()) >= {"shieldbot", "shieldbot-quad"}
+    assert {load_robot(name).name for name in robot_names()} == set(robot_names()) >= {"shieldbot", "shieldbot-quad", "boebot"}
 
 
 def test_shieldbot_pins_are_those_of_the_default_map() -> None:
@@ -32,6 +32,16 @@ def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
     robot = load_robot("shieldbot-quad")
     assert isinstance(robot.device["encoder_left"], QuadratureEncoder)
     assert "battery" not in robot.device and "light_left" not in robot.device
+
+
+def test_boebot_has_every_device_but_encoders_on_pins_of_its_own() -> None:
+    robot = load_robot("boebot")
+    assert "encoder_left" not in robot.device and "encoder_right" not in robot.device
+    assert all(device.on for device in robot.device.values())
+    pins = {name: device.pins() for name, device in robot.device.items()}
+    assert pins["analog_infrared"] == {"": 16} and pins["battery"] == {"": 14}
+    assert pins["compass"] == {"sda": 18, "scl": 19} and pins["turret"] == {"": 11} and pins["buzzer"] == {"": 4}
+    assert pins["light_left"] == {"": 15} and pins["light_right"] == {"": 6}
 
 
 @pytest.mark.parametrize(
@@ -59,7 +69,7 @@ def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
         ("remove = 'ping'", "remove: expected a list of devices, got 'ping'"),
         ("remove = ['uart']", "device.uart is missing or off; every robot needs it"),
         ("[device.servo_left]\non = false", "device.servo_left is missing or off"),
-        ("[device.buzzer]\non = true", "device.buzzer is on, but the firmware has no driver for it"),
+        ("[device.light_right]\npin = 10", "light_right.pin is pin 10, which cannot do that; expected 0, 1, 2"),
         (
             "remove = ['light_right']\n[device.whisker_left]\npin = 6",
             "whisker_left is whisker on pin 6, but in the firmware for pin map 'shieldbot' it is whisker on pin 5",
@@ -86,7 +96,7 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
-    with pytest.raises(RobotError, match="there is no robot 'dalek'; expected one of shieldbot, shieldbot-quad"):
+    with pytest.raises(RobotError, match="there is no robot 'dalek'; expected one of boebot, shieldbot, shieldbot-quad"):
         load_robot("dalek")
 
 

@@ -29,6 +29,7 @@ bool firmware_due(void) { return false; }
 HAL_INTERRUPT_SLOT { hal_slot_arm((uint16_t)(hal_time() + HAL_SLOT_CYCLES)); slot(); }
 HAL_INTERRUPT_EDGE {}
 HAL_INTERRUPT_CAPTURE {}
+volatile uint8_t schedule_slot;
 """
 
 
@@ -39,7 +40,7 @@ def native_program(source: str) -> BoardAccess:
         program.write_text(PREAMBLE + source, encoding="ascii")
         command = ["cc", "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
         command += ["-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", "-o", str(library), str(program)]
-        command += [str(FIRMWARE / "hal" / "native" / "hal_native.c")]
+        command += map(str, sorted((FIRMWARE / "hal" / "native").glob("*.c")))
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         assert result.returncode == 0, result.stderr
         board = native_board(library)

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 2u
-#define SCHEMA_HASH 0xB80C3E10ul
+#define SCHEMA_HASH 0x54219F34ul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
@@ -71,6 +71,15 @@ enum {
   ANSWER_STATUS_STORAGE_FAILED = 4,
   ANSWER_STATUS_LATCHED_AGAIN = 5,
   ANSWER_STATUS_BUSY = 6,
+};
+
+/* How the last exchange with the compass ended. */
+enum {
+  COMPASS_STATUS_OFF = 0,
+  COMPASS_STATUS_OK = 1,
+  COMPASS_STATUS_NO_ANSWER = 2,
+  COMPASS_STATUS_BUS_STUCK = 3,
+  COMPASS_STATUS_FAILED = 4,
 };
 
 /* What happened, and what `value` is. */
@@ -209,6 +218,29 @@ typedef struct __attribute__((packed)) {
 #define MSG_SETPOINT_COAST_TIME_TO_LIVE_MIN (0)
 #define MSG_SETPOINT_COAST_TIME_TO_LIVE_MAX (2000)
 
+/* Angle of the turret, or no pulses. Refused while latched. Whatever stops the motors releases the turret. */
+#define MSG_TURRET_ID 0x18u
+#define MSG_TURRET_LENGTH 3u
+typedef struct __attribute__((packed)) {
+  int16_t angle; /* 0.0001 rad; counter-clockwise positive, 0 straight ahead */
+  uint8_t hold; /* 1: turn there and hold; 0: no pulses, the servo is free */
+} msg_turret;
+#define MSG_TURRET_ANGLE_MIN (-16000)
+#define MSG_TURRET_ANGLE_MAX (16000)
+#define MSG_TURRET_HOLD_MIN (0)
+#define MSG_TURRET_HOLD_MAX (1)
+
+/* A tone, in place of the one that sounds. Whatever stops the motors silences it. */
+#define MSG_BUZZER_ID 0x19u
+#define MSG_BUZZER_LENGTH 4u
+typedef struct __attribute__((packed)) {
+  uint16_t frequency; /* Hz; 40 to 8000; 0: silence */
+  uint8_t duration; /* 0.01 s */
+  uint8_t token; /* another one for each tone; the last tone's again changes nothing. 0 at the start of a session */
+} msg_buzzer;
+#define MSG_BUZZER_FREQUENCY_MIN (0)
+#define MSG_BUZZER_FREQUENCY_MAX (8000)
+
 /* Asks for one parameter. */
 #define MSG_GET_PARAMETER_ID 0x20u
 #define MSG_GET_PARAMETER_LENGTH 3u
@@ -310,6 +342,43 @@ typedef struct __attribute__((packed)) {
   uint16_t deferred; /* events that had to wait for room in the queue, where changes of the same kind merge */
 } msg_counters;
 
+/* The slow devices: sent every devices_period ticks or less often where the line is slow, while one of them is on. */
+#define MSG_DEVICES_TELEMETRY_ID 0x92u
+#define MSG_DEVICES_TELEMETRY_LENGTH 31u
+typedef struct __attribute__((packed)) {
+  uint32_t tick; /* control ticks since reset */
+  uint16_t supply; /* 0.001 V; supply voltage, the analog readings' reference; 0: not yet measured */
+  uint8_t infrared_zone_left; /* at how many of the sweep's five frequencies an object is seen */
+  uint8_t infrared_zone_right;
+  uint8_t infrared_zone_age; /* ticks; age of the sweep's last burst; 255: never or older */
+  uint16_t battery; /* voltage at the battery's pin in 1/1024 of the supply */
+  uint8_t battery_age; /* ticks; 255: never or older */
+  uint16_t analog_infrared; /* voltage at the sensor's pin in 1/1024 of the supply */
+  uint8_t analog_infrared_age; /* ticks; 255: never or older */
+  uint16_t light_left; /* us; decay time of the light sensor, shorter in brighter light; 0: none; 14000: so long or longer */
+  uint16_t light_right; /* us */
+  uint8_t light_age; /* ticks; since the end of the measurement; 255: never or older */
+  int16_t compass_x; /* field along the sensor's axes, raw counts; -4096: overflow */
+  int16_t compass_y;
+  int16_t compass_z;
+  uint8_t compass_age; /* ticks; 255: never or older */
+  uint8_t compass_status; /* compass_status */
+  uint16_t turret_pulse; /* 0.0625 us; turret servo's pulse in force; 0: no pulses */
+  uint8_t buzzer_token; /* of the last tone that was begun in this session */
+} msg_devices_telemetry;
+#define MSG_DEVICES_TELEMETRY_INFRARED_ZONE_LEFT_MIN (0)
+#define MSG_DEVICES_TELEMETRY_INFRARED_ZONE_LEFT_MAX (5)
+#define MSG_DEVICES_TELEMETRY_INFRARED_ZONE_RIGHT_MIN (0)
+#define MSG_DEVICES_TELEMETRY_INFRARED_ZONE_RIGHT_MAX (5)
+#define MSG_DEVICES_TELEMETRY_BATTERY_MIN (0)
+#define MSG_DEVICES_TELEMETRY_BATTERY_MAX (1023)
+#define MSG_DEVICES_TELEMETRY_ANALOG_INFRARED_MIN (0)
+#define MSG_DEVICES_TELEMETRY_ANALOG_INFRARED_MAX (1023)
+#define MSG_DEVICES_TELEMETRY_LIGHT_LEFT_MIN (0)
+#define MSG_DEVICES_TELEMETRY_LIGHT_LEFT_MAX (14000)
+#define MSG_DEVICES_TELEMETRY_LIGHT_RIGHT_MIN (0)
+#define MSG_DEVICES_TELEMETRY_LIGHT_RIGHT_MAX (14000)
+
 /* Answer to a numbered request. */
 #define MSG_ANSWER_ID 0xA0u
 #define MSG_ANSWER_LENGTH 7u
@@ -356,6 +425,10 @@ static inline int16_t message_length_to_board(uint8_t id) {
       return MSG_SETPOINT_SPEED_LENGTH;
     case MSG_SETPOINT_COAST_ID:
       return MSG_SETPOINT_COAST_LENGTH;
+    case MSG_TURRET_ID:
+      return MSG_TURRET_LENGTH;
+    case MSG_BUZZER_ID:
+      return MSG_BUZZER_LENGTH;
     case MSG_GET_PARAMETER_ID:
       return MSG_GET_PARAMETER_LENGTH;
     case MSG_SET_PARAMETER_ID:
@@ -390,6 +463,8 @@ static inline int16_t message_length_to_host(uint8_t id) {
       return MSG_TELEMETRY_LENGTH;
     case MSG_COUNTERS_ID:
       return MSG_COUNTERS_LENGTH;
+    case MSG_DEVICES_TELEMETRY_ID:
+      return MSG_DEVICES_TELEMETRY_LENGTH;
     case MSG_ANSWER_ID:
       return MSG_ANSWER_LENGTH;
     case MSG_EVENT_ID:
@@ -417,7 +492,7 @@ static inline bool message_is_handshake(uint8_t id) {
 }
 
 /* X(id, payload bytes, hash) for each message, in order of ids. */
-#define MESSAGE_COUNT 24u
+#define MESSAGE_COUNT 27u
 #define MESSAGE_LIST(X)     \
   X(0x01, 9, 0xE0471814ul)  \
   X(0x02, 0, 0xBD434780ul)  \
@@ -427,8 +502,10 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x10, 8, 0xEFBA28FDul)  \
   X(0x11, 8, 0xFCEB8D85ul)  \
   X(0x12, 4, 0xD86ACD27ul)  \
+  X(0x18, 3, 0x76F31EB3ul)  \
+  X(0x19, 4, 0xB81D6D3Ful)  \
   X(0x20, 3, 0x9199C85Ful)  \
-  X(0x21, 7, 0x78EEA412ul)  \
+  X(0x21, 7, 0x93310006ul)  \
   X(0x22, 2, 0x1DEAD58Cul)  \
   X(0x23, 2, 0x5C7C21EEul)  \
   X(0x24, 3, 0x7A25B50Eul)  \
@@ -440,6 +517,7 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x88, 1, 0x24E076A5ul)  \
   X(0x90, 38, 0x425355C1ul) \
   X(0x91, 20, 0x7EF8DA38ul) \
+  X(0x92, 31, 0xFF7B65CCul) \
   X(0xA0, 7, 0x754ACE51ul)  \
   X(0xA1, 9, 0xCCFD276Eul)  \
   X(0xB0, 6, 0xFC092B76ul)

@@ -22,7 +22,12 @@
 #define PARAMETER_SUPPLY_MINIMUM 16u /* 0.001 V: supply below which motors and EEPROM writes are refused; 0: never */
 #define PARAMETER_BANDGAP 17u /* 0.001 V: this chip's bandgap voltage, against which the supply is measured */
 #define PARAMETER_BAUD_RATE 18u /* 100 bit/s: rate of the serial line after the next reset: 9600, 19200, 38400, 57600, 115200, 250000, 500000 or 1000000 */
-#define PARAMETER_COUNT 19u
+#define PARAMETER_INFRARED_SWEEP 19u /* flag: 1: bursts go through 38, 39, 40, 41 and 42 kHz in five ticks and count zones; 0: 38 kHz only */
+#define PARAMETER_DEVICES_PERIOD 20u /* ticks: ticks between two devices_telemetry messages, where the baud rate allows it */
+#define PARAMETER_TURRET_CENTRE 21u /* 0.0625 us: pulse at which the turret looks straight ahead */
+#define PARAMETER_TURRET_GAIN 22u /* 0.0625 us/rad: pulse for each radian of the turret to the left; negative for a servo that turns the other way */
+#define PARAMETER_START_BEEP 23u /* 0.01 s: length of the tone at each start, so that a reset is heard; 0: none */
+#define PARAMETER_COUNT 24u
 
 /* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */
 #define PARAMETER_LIST(X)                                              \
@@ -44,6 +49,11 @@
   X(RETRY_TIME, u16, 0, 2000, 0)                                       \
   X(SUPPLY_MINIMUM, u16, 0, 5500, 4200)                                \
   X(BANDGAP, u16, 1000, 1200, 1100)                                    \
-  X(BAUD_RATE, u16, 96, 10000, DEFAULT_BAUD_RATE)
+  X(BAUD_RATE, u16, 96, 10000, DEFAULT_BAUD_RATE)                      \
+  X(INFRARED_SWEEP, u16, 0, 1, 0)                                      \
+  X(DEVICES_PERIOD, u16, 1, 100, 2)                                    \
+  X(TURRET_CENTRE, u16, 16000, 32000, DEFAULT_TURRET_CENTRE)           \
+  X(TURRET_GAIN, i16, -16000, 16000, DEFAULT_TURRET_GAIN)              \
+  X(START_BEEP, u16, 0, 100, 0)
 
 #endif

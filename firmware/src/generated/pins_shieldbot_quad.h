@@ -126,7 +126,10 @@
 #define UART_TRANSMIT_PINR PIND
 #define UART_TRANSMIT_BIT 1
 
-#define ENCODER_QUADRATURE 1
+#define ENCODER_LINES 2 /* of each wheel */
+
+/* Devices bits of what the map has pins for. */
+#define DEVICES_BUILT 1823
 
 /* Defaults of the parameters, in counts of their scale. */
 #define DEFAULT_DEVICES 31
@@ -141,5 +144,7 @@
 #define DEFAULT_WHEEL_RADIUS 3310
 #define DEFAULT_TRACK_WIDTH 10500
 #define DEFAULT_BAUD_RATE 5000
+#define DEFAULT_TURRET_CENTRE 24000
+#define DEFAULT_TURRET_GAIN 9168
 
 #endif

@@ -8,6 +8,7 @@
  *   HAL_INTERRUPT_EDGE        the time given to hal_edge_arm() is HAL_EDGE_LEAD off  schedule.c
  *   HAL_INTERRUPT_CAPTURE     an edge on the Ping pin; hal_capture_time() has when  ping.c
  *   HAL_INTERRUPT_EEPROM      the EEPROM is ready; others may interrupt it          storage.c
+ *   HAL_INTERRUPT_TWO_WIRE    the two-wire bus has done a step; others may too      two_wire.c
  *   HAL_INTERRUPT_WATCHDOG    the watchdog was not kicked: a reset comes            reset.c
  * They stamp and store. What they share with the rest is read and written inside HAL_ATOMIC { ... }, the only way that
  * this firmware turns interrupts off outside an interrupt.
@@ -17,6 +18,8 @@
  *   HAL_PIN_HIGH HAL_PIN_LOW HAL_PIN_TOGGLE           single instructions, safe beside interrupts
  *   HAL_PIN_READ(NAME)                                0 or 1
  *   HAL_PORT_READ(NAME)                               the eight pins of NAME's port, NAME at bit NAME_BIT
+ *   HAL_PORT_C()                                      those of port C (A0..A5)
+ *   HAL_PIN_BIT(NAME)                                 NAME's bit of its port
  */
 #ifndef HAL_H
 #define HAL_H
@@ -25,7 +28,6 @@
 #include <stdint.h>
 
 #define HAL_SLOT_CYCLES 40000u
-#define HAL_CARRIER_CYCLES 211u /* half a period of 37.9 kHz */
 #define HAL_CYCLES_PER_US 16u
 
 /* Changes of the encoders' port, stamped by the pin-change interrupt and worked off by the main loop: a ring whose
@@ -88,10 +90,19 @@ void hal_start_watchdog(void);
 void hal_kick_watchdog(void);
 void hal_watchdog_reset(void); /* kicks count no more */
 
-/* Starts a measurement of the bandgap against the supply, 104 us long. */
-void hal_supply_sample(void);
-/* The last complete one: bandgap * 1024 / supply, rounded down; 0: none yet. */
-uint16_t hal_supply_result(void);
+/* The analog converter: joins it to channel 0..5 (A0..A5) or to the chip's bandgap, converts (104 us, the first time 200 us);
+ * the last complete result is voltage * 1024 / supply, rounded down, at most 1023. Nothing is joined while it is busy. */
+#define HAL_ANALOG_BANDGAP 14u
+void hal_analog_select(uint8_t channel);
+void hal_analog_convert(void);
+bool hal_analog_busy(void);
+uint16_t hal_analog_result(void);
+
+/* A tone on the pin named BUZZER: it is toggled every `count` (1..255) periods of a clock of 16 MHz by 8, ...; interrupt of
+ * 15 cycles. Off leaves the pin low. */
+enum { HAL_TONE_BY_8 = 2, HAL_TONE_BY_64, HAL_TONE_BY_256, HAL_TONE_BY_1024 };
+void hal_tone_start(uint8_t clock, uint8_t count);
+void hal_tone_stop(void);
 
 /* Queues bytes for sending. The caller has asked for room; as has who writes them to hal_serial_place() himself. */
 void hal_serial_send(const uint8_t *bytes, uint8_t count);
@@ -99,12 +110,28 @@ void hal_serial_send(const uint8_t *bytes, uint8_t count);
 /* Whether received bytes were lost since the last call. */
 bool hal_serial_overrun(void);
 
-/* Turns a 38 kHz carrier on the LED of one side on or off; off leaves the LED dark. Interrupt context. */
-void hal_carrier_start(uint8_t side);
+/* Turns a carrier on the LED of one side on or off, half a period given in cycles (at most 256); off leaves the LED dark.
+ * Interrupt context. */
+void hal_carrier_start(uint8_t side, uint8_t half_period);
 void hal_carrier_stop(void);
 
 /* Makes the pin named PING give a 5 us pulse, leaves it an input and waits for the echo's rising edge. */
 void hal_ping_trigger(void);
+
+/* Status codes of the two-wire bus (data sheet, tables 22-2 and 22-3). */
+enum {
+  HAL_TWO_WIRE_STARTED = 0x08,
+  HAL_TWO_WIRE_STARTED_AGAIN = 0x10,
+  HAL_TWO_WIRE_ADDRESS_TAKEN = 0x18, /* to write */
+  HAL_TWO_WIRE_ADDRESS_REFUSED = 0x20,
+  HAL_TWO_WIRE_BYTE_TAKEN = 0x28,
+  HAL_TWO_WIRE_BYTE_REFUSED = 0x30,
+  HAL_TWO_WIRE_ARBITRATION_LOST = 0x38,
+  HAL_TWO_WIRE_READ_TAKEN = 0x40, /* the address, to read */
+  HAL_TWO_WIRE_READ_REFUSED = 0x48,
+  HAL_TWO_WIRE_BYTE_READ = 0x50, /* and acknowledged */
+  HAL_TWO_WIRE_LAST_READ = 0x58,
+};
 
 /* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 50 ms. */
 uint32_t hal_image_size(void);
@@ -127,6 +154,19 @@ uint32_t hal_image_hash(void);
  *   void hal_changes_resume(void)                 forgets it
  *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt; changes of lines
  *                                                 that were all masked are forgotten
+ *   void hal_stamp_arm(uint8_t bits)              the next change of one of these pins of port D (0..7) is stamped, once:
+ *   bool hal_stamp_awaited(void)                  not yet; if it has come,
+ *   uint8_t hal_stamp_slot, uint16_t hal_stamp_time   are schedule_slot and hal_time() then
+ *   void hal_stamp_disarm(void)                   it is awaited no more
+ *   void hal_two_wire_on(void), hal_two_wire_off(void)   gives the pins A4 and A5 to the two-wire bus, at 100 kHz
+ *   void hal_two_wire_begin(void)                 a start, or a repeated one. This and the next three are the last thing
+ *                                                 that the interrupt does, or called within HAL_ATOMIC; the bus waits
+ *                                                 until then
+ *   void hal_two_wire_send(uint8_t byte)
+ *   void hal_two_wire_receive(bool more)          a byte, with the acknowledgement that asks for more, or without
+ *   void hal_two_wire_end(void)                   a stop; no interrupt follows
+ *   uint8_t hal_two_wire_status(void)             HAL_TWO_WIRE_..., the chip's code for what has just been done
+ *   uint8_t hal_two_wire_byte(void)               the byte received
  *   bool hal_serial_received(void)                whether a received byte waits
  *   uint8_t hal_serial_due(void)                  not 0 if a zero byte (the end of a frame) or a quarter of the ring waits
  *   void hal_serial_seen(void)                    zero bytes that wait now make it due no more,

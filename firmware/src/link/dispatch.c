@@ -3,16 +3,19 @@
 
 #include <string.h>
 
+#include "buzzer.h"
 #include "generated/messages.h"
 #include "link/counters.h"
 #include "link/events.h"
 #include "link/identity.h"
+#include "link/parameters.h"
 #include "link/requests.h"
 #include "link/send.h"
 #include "link/session.h"
 #include "motion.h"
 #include "safety.h"
 #include "schedule.h"
+#include "turret.h"
 
 /* Whether a set-point may be put in force; counts the late ones. What is late was not wrong to ask. */
 static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
@@ -62,6 +65,29 @@ static bool setpoint_coast(uint8_t sequence, const uint8_t *payload) {
     motion_off();
   }
   return !refused;
+}
+
+/* The turret is a motor: it does not move while they are latched off. It may be released at any time. */
+static bool turret(const uint8_t *payload) {
+  msg_turret message;
+  memcpy(&message, payload, sizeof message);
+  if (message.hold == 0) {
+    turret_release();
+    return true;
+  }
+  if (message.hold > MSG_TURRET_HOLD_MAX || beyond(message.angle, MSG_TURRET_ANGLE_MAX) ||
+      safety_latched() != LATCH_NONE || !parameters_device_on(DEVICES_TURRET)) {
+    return false;
+  }
+  turret_hold(message.angle);
+  return true;
+}
+_Static_assert(SYMMETRIC(MSG_TURRET_ANGLE), "turret");
+
+static bool buzzer(const uint8_t *payload) {
+  msg_buzzer message;
+  memcpy(&message, payload, sizeof message);
+  return buzzer_tone(message.frequency, message.duration, message.token);
 }
 
 static bool open(const uint8_t *payload) {
@@ -143,6 +169,10 @@ bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload) {
       return setpoint(id, sequence, payload);
     case MSG_SETPOINT_COAST_ID:
       return setpoint_coast(sequence, payload);
+    case MSG_TURRET_ID:
+      return turret(payload);
+    case MSG_BUZZER_ID:
+      return buzzer(payload);
     case MSG_ACKNOWLEDGE_ID:
       acknowledge(payload);
       return true;

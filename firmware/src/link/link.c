@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "link/counters.h"
+#include "link/devices.h"
 #include "link/dispatch.h"
 #include "link/frame.h"
 #include "link/send.h"
@@ -19,6 +20,7 @@ void link_start(uint16_t baud) {
   send_start(baud);
   counters_start();
   telemetry_start_line();
+  devices_start_line();
   session_start();
 }
 

@@ -33,7 +33,7 @@ HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
   _Static_assert((minimum) >= LIMIT_MIN_##type && (maximum) <= LIMIT_MAX_##type, "type of " #name);
 PARAMETER_LIST(WITHIN)
 #undef WITHIN
-_Static_assert((DEFAULT_DEVICES & ~PARAMETERS_DEVICES_BUILT) == 0, "the robot switches on a device that is not built");
+_Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a device without pins");
 
 static uint16_t values[PARAMETER_COUNT];
 
@@ -44,6 +44,9 @@ static parameter_range range_of(uint8_t parameter) {
 }
 
 static int32_t meant(uint16_t kept, uint8_t is_signed) { return is_signed ? (int32_t)(int16_t)kept : (int32_t)kept; }
+
+/* Only devices that the pin map has can be switched on. */
+static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUILT) == 0; }
 
 static bool is_baud_rate(uint16_t value) {
   for (uint8_t i = 0; i < sizeof baud_rates / sizeof *baud_rates; i++) {
@@ -63,7 +66,7 @@ static bool is_allowed(uint8_t parameter, uint16_t kept, const parameter_range *
   }
   switch (parameter) {
     case PARAMETER_DEVICES:
-      return (kept & (uint16_t)~PARAMETERS_DEVICES_BUILT) == 0;
+      return are_devices(kept);
     case PARAMETER_BAUD_RATE:
       return is_baud_rate(kept);
     default:

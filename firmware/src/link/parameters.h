@@ -13,10 +13,6 @@
 extern "C" {
 #endif
 
-/* Devices that this firmware can run; only they can be switched on. */
-#define PARAMETERS_DEVICES_BUILT \
-  (DEVICES_SERVOS | DEVICES_ENCODERS | DEVICES_WHISKERS | DEVICES_INFRARED | DEVICES_PING)
-
 /* At start: the defaults, then what is saved, if it is all there and within its ranges. */
 void parameters_start(void);
 

@@ -1,6 +1,7 @@
 /* session.c: see session.h. */
 #include "link/session.h"
 
+#include "buzzer.h"
 #include "hal/hal.h"
 #include "link/events.h"
 #include "link/frame.h"
@@ -49,6 +50,7 @@ static void begin(uint32_t new_seed) {
   requests_start();
   events_start();
   telemetry_start();
+  buzzer_start_session();
   session_heard();
 }
 

@@ -9,7 +9,7 @@
 
 namespace {
 
-#if ENCODER_QUADRATURE
+#if ENCODER_LINES == 2
 constexpr uint8_t LEFT_LINE = PIN_ENCODER_LEFT_A;
 constexpr uint8_t RIGHT_LINE = PIN_ENCODER_RIGHT_A;
 #else
@@ -39,7 +39,7 @@ TEST_CASE("steps of two lines") {
   }
 }
 
-#if ENCODER_QUADRATURE
+#if ENCODER_LINES == 2
 TEST_CASE("a random walk of phases is counted exactly") {
   std::mt19937 random(3);
   attended_bench bench;
@@ -126,7 +126,7 @@ TEST_CASE("a line that fires above its limit is masked until the tick ends, and 
   CHECK(bench.machine.interrupts - before < 400);
   bench.run_to(bench.tick(10));
   CHECK((bench.telemetry().status & STATUS_ENCODER_LEFT_MASKED) == 0);
-#if !ENCODER_QUADRATURE
+#if ENCODER_LINES == 1
   CHECK(bench.telemetry().encoder_left <= 3 * 81 + 3);
   CHECK(bench.telemetry().encoder_right == 30);
 #endif
@@ -145,7 +145,7 @@ TEST_CASE("changes back to back are a storm: masked at once, the other wheel cou
   CHECK(bench.telemetry().edge_period_left == 0);
   CHECK(bench.telemetry().edge_period_right == 3000 / 256);
   CHECK(bench.machine.interrupts - before < 300);
-#if !ENCODER_QUADRATURE
+#if ENCODER_LINES == 1
   CHECK(bench.telemetry().encoder_left <= 8);
   CHECK(bench.telemetry().encoder_right == 50);
 #endif

@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 2
-SCHEMA_HASH = 0xB80C3E10
+SCHEMA_HASH = 0x54219F34
 
 
 class Whiskers(IntFlag):
@@ -107,6 +107,16 @@ class AnswerStatus(IntEnum):
     STORAGE_FAILED = 4
     LATCHED_AGAIN = 5
     BUSY = 6
+
+
+class CompassStatus(IntEnum):
+    """How the last exchange with the compass ended."""
+
+    OFF = 0
+    OK = 1
+    NO_ANSWER = 2
+    BUS_STUCK = 3
+    FAILED = 4
 
 
 class EventKind(IntEnum):
@@ -410,6 +420,57 @@ class SetpointCoast(_SetpointCoastFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
+class _TurretFields(NamedTuple):
+    angle: int  # 0.0001 rad; counter-clockwise positive, 0 straight ahead
+    hold: int  # 1: turn there and hold; 0: no pulses, the servo is free
+
+
+class Turret(_TurretFields):
+    """Angle of the turret, or no pulses. Refused while latched. Whatever stops the motors releases the turret."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x18
+    NAME: ClassVar[str] = "turret"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<hB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
+class _BuzzerFields(NamedTuple):
+    frequency: int  # Hz; 40 to 8000; 0: silence
+    duration: int  # 0.01 s
+    token: int  # another one for each tone; the last tone's again changes nothing. 0 at the start of a session
+
+
+class Buzzer(_BuzzerFields):
+    """A tone, in place of the one that sounds. Whatever stops the motors silences it."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x19
+    NAME: ClassVar[str] = "buzzer"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 4
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
 class _GetParameterFields(NamedTuple):
     number: int  # of the request: 1 for the first of a session, then one more each
     parameter: int  # number of the parameter
@@ -681,6 +742,48 @@ class Counters(_CountersFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
+class _DevicesTelemetryFields(NamedTuple):
+    tick: int  # control ticks since reset
+    supply: int  # 0.001 V; supply voltage, the analog readings' reference; 0: not yet measured
+    infrared_zone_left: int  # at how many of the sweep's five frequencies an object is seen
+    infrared_zone_right: int
+    infrared_zone_age: int  # ticks; age of the sweep's last burst; 255: never or older
+    battery: int  # voltage at the battery's pin in 1/1024 of the supply
+    battery_age: int  # ticks; 255: never or older
+    analog_infrared: int  # voltage at the sensor's pin in 1/1024 of the supply
+    analog_infrared_age: int  # ticks; 255: never or older
+    light_left: int  # us; decay time of the light sensor, shorter in brighter light; 0: none; 14000: so long or longer
+    light_right: int  # us
+    light_age: int  # ticks; since the end of the measurement; 255: never or older
+    compass_x: int  # field along the sensor's axes, raw counts; -4096: overflow
+    compass_y: int
+    compass_z: int
+    compass_age: int  # ticks; 255: never or older
+    compass_status: int  # compass_status
+    turret_pulse: int  # 0.0625 us; turret servo's pulse in force; 0: no pulses
+    buzzer_token: int  # of the last tone that was begun in this session
+
+
+class DevicesTelemetry(_DevicesTelemetryFields):
+    """The slow devices: sent every devices_period ticks or less often where the line is slow, while one of them is on."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x92
+    NAME: ClassVar[str] = "devices_telemetry"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 31
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IHBBBHBHBHHBhhhBBHB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
 class _AnswerFields(NamedTuple):
     number: int  # of the request
     status: int  # answer_status
@@ -771,6 +874,8 @@ Message = (
     | SetpointSignal
     | SetpointSpeed
     | SetpointCoast
+    | Turret
+    | Buzzer
     | GetParameter
     | SetParameter
     | SaveParameters
@@ -781,6 +886,7 @@ Message = (
     | Stopped
     | Telemetry
     | Counters
+    | DevicesTelemetry
     | Answer
     | Event
     | ClockAnswer
@@ -798,6 +904,8 @@ MESSAGES: dict[int, type[Message]] = {
     0x10: SetpointSignal,
     0x11: SetpointSpeed,
     0x12: SetpointCoast,
+    0x18: Turret,
+    0x19: Buzzer,
     0x20: GetParameter,
     0x21: SetParameter,
     0x22: SaveParameters,
@@ -808,6 +916,7 @@ MESSAGES: dict[int, type[Message]] = {
     0x88: Stopped,
     0x90: Telemetry,
     0x91: Counters,
+    0x92: DevicesTelemetry,
     0xA0: Answer,
     0xA1: Event,
     0xB0: ClockAnswer,
@@ -826,8 +935,10 @@ HASHES: dict[int, int] = {
     0x10: 0xEFBA28FD,
     0x11: 0xFCEB8D85,
     0x12: 0xD86ACD27,
+    0x18: 0x76F31EB3,
+    0x19: 0xB81D6D3F,
     0x20: 0x9199C85F,
-    0x21: 0x78EEA412,
+    0x21: 0x93310006,
     0x22: 0x1DEAD58C,
     0x23: 0x5C7C21EE,
     0x24: 0x7A25B50E,
@@ -836,6 +947,7 @@ HASHES: dict[int, int] = {
     0x88: 0x24E076A5,
     0x90: 0x425355C1,
     0x91: 0x7EF8DA38,
+    0x92: 0xFF7B65CC,
     0xA0: 0x754ACE51,
     0xA1: 0xCCFD276E,
     0xB0: 0xFC092B76,
@@ -874,4 +986,9 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "supply_minimum": ParameterSpec(16, "V", 0.001, 0, 5500, "supply below which motors and EEPROM writes are refused; 0: never"),
     "bandgap": ParameterSpec(17, "V", 0.001, 1000, 1200, "this chip's bandgap voltage, against which the supply is measured"),
     "baud_rate": ParameterSpec(18, "bit/s", 100.0, 96, 10000, "rate of the serial line after the next reset: 9600, 19200, 38400, 57600, 115200, 250000, 500000 or 1000000", "uart.baud"),
+    "infrared_sweep": ParameterSpec(19, "flag", 1.0, 0, 1, "1: bursts go through 38, 39, 40, 41 and 42 kHz in five ticks and count zones; 0: 38 kHz only"),
+    "devices_period": ParameterSpec(20, "ticks", 1.0, 1, 100, "ticks between two devices_telemetry messages, where the baud rate allows it"),
+    "turret_centre": ParameterSpec(21, "us", 0.0625, 16000, 32000, "pulse at which the turret looks straight ahead", "turret.centre_us"),
+    "turret_gain": ParameterSpec(22, "us/rad", 0.0625, -16000, 16000, "pulse for each radian of the turret to the left; negative for a servo that turns the other way", "turret.gain_us_per_rad"),
+    "start_beep": ParameterSpec(23, "s", 0.01, 0, 100, "length of the tone at each start, so that a reset is heard; 0: none"),
 }

@@ -106,9 +106,14 @@ static void read_by_outside(const native_board *self, native_byte *byte) {
   byte->baud = 0;
 }
 
-static double on_supply(native_machine *machine, uint64_t cycle) {
+_Static_assert(NATIVE_SUPPLY == BOARD_ANALOG_SUPPLY, "one number");
+
+static double on_analog(native_machine *machine, uint64_t cycle, uint8_t channel) {
   const native_board *self = of_machine(machine);
-  return board_supply_volts(self->analog_source, self->analog_context, cycle);
+  if (channel == NATIVE_SUPPLY) {
+    return board_supply_volts(self->analog_source, self->analog_context, cycle);
+  }
+  return self->analog_source != NULL ? self->analog_source(self->analog_context, cycle, channel) : 0.0;
 }
 
 /* Loads a fresh copy of the library and finds its face. */
@@ -261,7 +266,7 @@ static uint8_t board_output(const board *face, uint8_t pin) {
 }
 
 static void board_analog(board *face, board_analog_source *source, void *context) {
-  native_board *self = of_board(face); /* this firmware reads the supply only */
+  native_board *self = of_board(face);
   self->analog_source = source;
   self->analog_context = context;
 }
@@ -384,7 +389,7 @@ board *native_board_create(const char *library_path, char *error, size_t error_s
   machine->next_byte = NATIVE_NEVER;
   machine->edge = on_edge;
   machine->transmit = on_transmit;
-  machine->supply = on_supply;
+  machine->analog = on_analog;
   memset(machine->eeprom, 0xFF, sizeof machine->eeprom);
   self->eeprom.bytes = machine->eeprom;
   memset(machine->output, NATIVE_RELEASED, sizeof machine->output);

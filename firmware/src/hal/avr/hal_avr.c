@@ -1,4 +1,4 @@
-/* hal_avr.c: timers, carrier, Ping trigger and image of the ATmega328P. */
+/* hal_avr.c: timers, carrier, tone, Ping trigger and image of the ATmega328P. */
 #include "hal/hal.h"
 #include "pins.h"
 
@@ -10,8 +10,7 @@
 
 void hal_start_timers(void) {
   TCCR2A = _BV(WGM21);
-  OCR2A = HAL_CARRIER_CYCLES - 1u;
-  PCICR = _BV(PCIE1);
+  PCICR = _BV(PCIE1) | _BV(PCIE2);
   SMCR = _BV(SE); /* idle: timers and UART go on */
 
   TCCR1A = 0;
@@ -42,12 +41,13 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         [right_pin] "I"(_SFR_IO_ADDR(INFRARED_RIGHT_LED_PINR)), [right_bit] "I"(INFRARED_RIGHT_LED_BIT));
 }
 
-void hal_carrier_start(uint8_t side) {
+void hal_carrier_start(uint8_t side, uint8_t half_period) {
   if (side == LEFT) {
     GPIOR0 = (uint8_t)(GPIOR0 | _BV(CARRIER_LEFT));
   } else {
     GPIOR0 = (uint8_t)(GPIOR0 | _BV(CARRIER_RIGHT));
   }
+  OCR2A = (uint8_t)(half_period - 1u);
   TCNT2 = 0;
   TIFR2 = _BV(OCF2A);
   TIMSK2 = _BV(OCIE2A);
@@ -61,6 +61,35 @@ void hal_carrier_stop(void) {
   GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(CARRIER_RIGHT));
   HAL_PIN_LOW(INFRARED_LEFT_LED);
   HAL_PIN_LOW(INFRARED_RIGHT_LED);
+}
+
+/* ---- buzzer ---- */
+
+/* 15 cycles with entry and return; neither flags nor registers change. Compare B is somebody else's (hal_avr.h), and in this
+ * mode it may be anything. */
+ISR(TIMER0_COMPA_vect, ISR_NAKED) {
+  __asm__ volatile(
+      "sbi %[pin], %[bit] \n"
+      "reti               \n"
+      :
+      : [pin] "I"(_SFR_IO_ADDR(BUZZER_PINR)), [bit] "I"(BUZZER_BIT));
+}
+
+_Static_assert(HAL_TONE_BY_8 == _BV(CS01) && HAL_TONE_BY_1024 == (_BV(CS02) | _BV(CS00)), "clocks as in table 15-9");
+
+void hal_tone_start(uint8_t clock, uint8_t count) {
+  TCCR0A = _BV(WGM01);
+  OCR0A = (uint8_t)(count - 1u);
+  TCNT0 = 0;
+  TIFR0 = _BV(OCF0A);
+  TIMSK0 = _BV(OCIE0A);
+  TCCR0B = clock;
+}
+
+void hal_tone_stop(void) {
+  TCCR0B = 0;
+  TIMSK0 = 0;
+  HAL_PIN_LOW(BUZZER);
 }
 
 /* ---- Ping ---- */

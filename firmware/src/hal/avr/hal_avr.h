@@ -2,8 +2,9 @@
  *
  *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots
  *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier
- *   Timer0  free for the buzzer, but for compare B
- *   ADC     the bandgap, for the supply
+ *   Timer0  CTC, runs during tones only: compare A toggles the buzzer
+ *   PCINT1  the encoders' port      PCINT2  port D: one stamped change
+ *   TWI     100 kHz      ADC  clk/128, against the supply
  *   GPIOR0  bit 0, 1: the carrier toggles the left, right LED; bit 2: received bytes were lost; bit 3: pin
  *           changes were stopped; bit 4: a zero byte was received; bit 5: the watchdog has run out
  *   GPIOR1  head of the receive ring      OCR0B  its tail      GPIOR2  tail of the send ring
@@ -30,11 +31,16 @@
   void __vector_eeprom_body(void) __attribute__((interrupt, used, externally_visible)); \
   void __vector_eeprom_body(void)
 
+/* The same for the two-wire bus (two_wire_avr.c). */
+#define HAL_INTERRUPT_TWO_WIRE                                                            \
+  void __vector_two_wire_body(void) __attribute__((interrupt, used, externally_visible)); \
+  void __vector_two_wire_body(void)
+
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
 /* Covers what can stand before the edge's interrupt (one that has begun, 51 cycles; a storm of pin changes, 5 x 79 and 16
- * to stop it; a capture, 110) and its own prologue, 50. */
-#define HAL_EDGE_LEAD 640u
+ * to stop it; a stamped change, 30; a capture, 110) and its own prologue, 50. */
+#define HAL_EDGE_LEAD 672u
 #define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
@@ -46,6 +52,7 @@
 #define HAL_PIN_LOW(name) (name##_PORT = (uint8_t)(name##_PORT & (uint8_t)~HAL_PIN_BIT(name)))
 #define HAL_PIN_TOGGLE(name) (name##_PINR = HAL_PIN_BIT(name))
 #define HAL_PORT_READ(name) (name##_PINR)
+#define HAL_PORT_C() (PINC)
 #define HAL_PIN_READ(name) ((uint8_t)((name##_PINR & HAL_PIN_BIT(name)) != 0 ? 1u : 0u))
 
 #define HAL_TABLE static const __attribute__((__progmem__))
@@ -86,6 +93,46 @@ static inline void hal_pin_change_mask(uint8_t bits) {
   }
   PCMSK1 = bits;
 }
+
+/* One stamped change of port D (stamp_avr.c): its interrupt empties the mask. */
+extern volatile uint8_t hal_stamp_slot;
+extern volatile uint16_t hal_stamp_time;
+
+static inline void hal_stamp_disarm(void) { PCMSK2 = 0; }
+
+static inline void hal_stamp_arm(uint8_t bits) {
+  hal_stamp_disarm();
+  PCIFR = _BV(PCIF2);
+  PCMSK2 = bits;
+}
+
+static inline bool hal_stamp_awaited(void) { return PCMSK2 != 0; }
+
+/* Two-wire bus (data sheet, 22). In its interrupt's body other interrupts are on and its own is off; the command that ends
+ * the body switches its own on again with the others off, so that it does not come before the body has returned. */
+#define HAL_TWO_WIRE_RATE ((F_CPU / 100000u - 16u) / 2u)
+
+static inline void hal_two_wire_on(void) {
+  TWSR = 0;
+  TWBR = HAL_TWO_WIRE_RATE;
+  TWCR = _BV(TWEN);
+}
+static inline void hal_two_wire_off(void) { TWCR = 0; }
+static inline __attribute__((always_inline)) void hal_two_wire_command(uint8_t bits) {
+  cli(); /* until the body returns; whoever is no interrupt calls from within HAL_ATOMIC */
+  TWCR = (uint8_t)(_BV(TWINT) | _BV(TWEN) | bits);
+}
+static inline void hal_two_wire_begin(void) { hal_two_wire_command(_BV(TWSTA) | _BV(TWIE)); }
+static inline void hal_two_wire_send(uint8_t byte) {
+  TWDR = byte;
+  hal_two_wire_command(_BV(TWIE));
+}
+static inline void hal_two_wire_receive(bool more) {
+  hal_two_wire_command(more ? (uint8_t)(_BV(TWIE) | _BV(TWEA)) : (uint8_t)_BV(TWIE));
+}
+static inline void hal_two_wire_end(void) { hal_two_wire_command(_BV(TWSTO)); }
+static inline uint8_t hal_two_wire_status(void) { return TWSR & 0xF8u; }
+static inline uint8_t hal_two_wire_byte(void) { return TWDR; }
 
 /* EEPROM (data sheet, 8.6). */
 #define HAL_EEPROM_SIZE 1024u

@@ -25,6 +25,9 @@ HAL_INTERRUPT_WATCHDOG;
 #define HAL_INTERRUPT_EEPROM void hal_native_eeprom(void)
 HAL_INTERRUPT_EEPROM;
 
+#define HAL_INTERRUPT_TWO_WIRE void hal_native_two_wire(void)
+HAL_INTERRUPT_TWO_WIRE;
+
 /* Interrupts come between calls, never inside one. */
 #define HAL_ATOMIC
 
@@ -47,6 +50,8 @@ void hal_native_toggle(uint8_t pin);
 #define HAL_PIN_LOW(name) hal_native_write(PIN_##name, false)
 #define HAL_PIN_TOGGLE(name) hal_native_toggle(PIN_##name)
 #define HAL_PORT_READ(name) (name##_PINR)
+#define HAL_PORT_C() (PINC)
+#define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_READ(name) ((uint8_t)((name##_PINR >> name##_BIT) & 1u))
 
 uint16_t hal_time(void);
@@ -65,6 +70,21 @@ void hal_capture_stop(void);
 uint8_t hal_changes_stopped(void);
 void hal_changes_resume(void);
 void hal_pin_change_mask(uint8_t bits);
+
+extern uint8_t hal_stamp_slot;
+extern uint16_t hal_stamp_time;
+void hal_stamp_arm(uint8_t bits);
+void hal_stamp_disarm(void);
+bool hal_stamp_awaited(void);
+
+void hal_two_wire_on(void);
+void hal_two_wire_off(void);
+void hal_two_wire_begin(void);
+void hal_two_wire_send(uint8_t byte);
+void hal_two_wire_receive(bool more);
+void hal_two_wire_end(void);
+uint8_t hal_two_wire_status(void);
+uint8_t hal_two_wire_byte(void);
 
 bool hal_serial_received(void);
 uint8_t hal_serial_due(void);

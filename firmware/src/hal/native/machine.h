@@ -13,7 +13,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define NATIVE_API_VERSION 2u
+#define NATIVE_API_VERSION 3u
 #define NATIVE_PINS 20u
 #define NATIVE_BAUD 500000u     /* of the board until the program selects another */
 #define NATIVE_BYTE_CYCLES 320u /* 10 bits of it */
@@ -21,6 +21,7 @@
 #define NATIVE_EEPROM_CYCLES 54400u /* a write: 3.4 ms (data sheet of the ATmega328P, table 8-1) */
 #define NATIVE_NOINIT_SIZE 32u
 #define NATIVE_NEVER UINT64_MAX
+#define NATIVE_SUPPLY 128u /* not a channel: the voltage of the supply */
 
 /* What a pin is given, by the firmware or (the first three) from outside; the numbers are those of the board interface. */
 enum { NATIVE_LOW = 0, NATIVE_HIGH = 1, NATIVE_RELEASED = 2, NATIVE_PULLED_UP = 3 };
@@ -78,8 +79,8 @@ struct native_machine {
   /* Memory that no start clears; its owner spoils it when the power comes. */
   uint8_t noinit[NATIVE_NOINIT_SIZE];
 
-  /* Voltage of the supply; NULL: the nominal 5 V. */
-  double (*supply)(native_machine *self, uint64_t cycle);
+  /* Voltage at analog channel 0..5, or of the supply (NATIVE_SUPPLY); NULL: 0 V and the nominal 5 V. */
+  double (*analog)(native_machine *self, uint64_t cycle, uint8_t channel);
 };
 
 typedef struct {

@@ -1,0 +1,110 @@
+/* analog.c: see analog.h. */
+#include "analog.h"
+
+#include <stdbool.h>
+
+#include "generated/messages.h"
+#include "hal/hal.h"
+#include "link/parameters.h"
+#include "pins.h"
+#include "schedule.h"
+
+#define SETTLE_CYCLES (200u * HAL_CYCLES_PER_US) /* bandgap 70 us, and the sampling capacitor (24.6, 28.8) */
+#define AGE_NEVER 255u
+#define FIRST_ANALOG_PIN 14u
+
+#ifdef PIN_BATTERY
+#define BATTERY_CHANNEL (PIN_BATTERY - FIRST_ANALOG_PIN)
+#else
+#define BATTERY_CHANNEL 0u /* never on */
+#endif
+#ifdef PIN_ANALOG_INFRARED
+#define INFRARED_CHANNEL (PIN_ANALOG_INFRARED - FIRST_ANALOG_PIN)
+#else
+#define INFRARED_CHANNEL 0u
+#endif
+
+static uint16_t results[ANALOG_INPUTS];
+static uint8_t ages[ANALOG_INPUTS]; /* ticks */
+static uint8_t input;               /* to which the converter is joined */
+static uint8_t last_device;         /* the input before the bandgap */
+static bool converting;
+static uint16_t joined_at; /* hal_time() */
+
+static uint16_t now(void) {
+  uint16_t time = 0;
+  HAL_ATOMIC { time = hal_time(); }
+  return time;
+}
+
+static void join(uint8_t to) {
+  input = to;
+  converting = false;
+  joined_at = now();
+  hal_analog_select(to == ANALOG_BATTERY    ? BATTERY_CHANNEL
+                    : to == ANALOG_INFRARED ? INFRARED_CHANNEL
+                                            : HAL_ANALOG_BANDGAP);
+}
+
+static bool is_on(uint8_t device) {
+  return parameters_device_on(device == ANALOG_BATTERY ? DEVICES_BATTERY : DEVICES_ANALOG_INFRARED);
+}
+
+/* The bandgap every other time, between them the devices in turn. */
+static uint8_t next_input(void) {
+  if (input != ANALOG_BANDGAP) {
+    return ANALOG_BANDGAP;
+  }
+  const uint8_t other = last_device == ANALOG_BATTERY ? ANALOG_INFRARED : ANALOG_BATTERY;
+  if (is_on(other)) {
+    last_device = other;
+  } else if (!is_on(last_device)) {
+    return ANALOG_BANDGAP;
+  }
+  return last_device;
+}
+
+void analog_start(void) {
+  for (uint8_t i = 0; i < ANALOG_INPUTS; i++) {
+    results[i] = 0;
+    ages[i] = AGE_NEVER;
+  }
+  last_device = ANALOG_INFRARED;
+  join(ANALOG_BANDGAP);
+}
+
+static void grow_older(uint8_t device) {
+  if (!is_on(device)) {
+    ages[device] = AGE_NEVER;
+    results[device] = 0;
+  } else if (ages[device] < AGE_NEVER) {
+    ages[device]++;
+  }
+}
+
+void analog_task(void) {
+  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+    grow_older(ANALOG_BATTERY);
+    grow_older(ANALOG_INFRARED);
+  }
+  if (!converting) {
+    if ((uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
+      converting = true;
+      hal_analog_convert();
+    }
+  } else if (!hal_analog_busy()) {
+    results[input] = hal_analog_result();
+    ages[input] = 0;
+    join(next_input());
+  }
+}
+
+uint16_t analog_read(uint8_t of) { return results[of]; }
+
+uint8_t analog_age(uint8_t of) { return ages[of]; }
+
+uint16_t analog_take_bandgap(void) {
+  const uint16_t result = results[ANALOG_BANDGAP];
+  results[ANALOG_BANDGAP] = 0;
+  return result;
+}

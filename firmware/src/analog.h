@@ -1,0 +1,34 @@
+/* analog.h: the one owner of the analog converter (data sheet of the ATmega328P, 24): it measures the chip's bandgap for
+ * the supply (supply.h), and in turn the battery's divider and the analog infra-red sensor, as far as they are on. In every
+ * slot it makes one step: join the converter to an input, in a later slot convert, in a later slot take the result. So an
+ * input has a slot to settle, and nothing waits. */
+#ifndef ANALOG_H
+#define ANALOG_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { ANALOG_BANDGAP, ANALOG_BATTERY, ANALOG_INFRARED, ANALOG_INPUTS };
+
+void analog_start(void);
+
+/* In every slot. */
+void analog_task(void);
+
+/* The last result of an input, in 1/1024 of the supply, rounded down; 0 before the first. */
+uint16_t analog_read(uint8_t input);
+
+/* Its age in ticks; 255: none yet, or older, or switched off. */
+uint8_t analog_age(uint8_t input);
+
+/* The bandgap's last result, given once: 0 until there is another. */
+uint16_t analog_take_bandgap(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

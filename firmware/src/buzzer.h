@@ -1,0 +1,40 @@
+/* buzzer.h: a piezo speaker. Timer0 toggles its pin (hal.h); a tone has a frequency and a length and ends by itself. */
+#ifndef BUZZER_H
+#define BUZZER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BUZZER_FREQUENCY_MIN 40u   /* Hz */
+#define BUZZER_FREQUENCY_MAX 8000u /* two interrupts a period */
+
+void buzzer_start(void);
+
+/* The tone at start, if there shall be one; after hal_start_timers(). Only its own end silences it. */
+void buzzer_start_beep(void);
+
+/* A new session: no token has been heard. */
+void buzzer_start_session(void);
+
+/* A tone of so many ticks, or silence (frequency or length 0), unless its token is the last one's. False if it is refused:
+ * switched off, or no such frequency. */
+bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t token);
+
+/* Ends a tone. */
+void buzzer_silence(void);
+
+/* Once per tick: ends what has sounded long enough. */
+void buzzer_task(void);
+
+/* Token of the last tone of this session. */
+uint8_t buzzer_token(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,115 @@
+/* devices_native.c: what the chip does for devices: IR carrier, Ping trigger and capture, tone, analog converter. */
+#include "hal/hal.h"
+#include "hal/native/events.h"
+#include "pins.h"
+
+#define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
+#define CONVERSION_CYCLES (104u * HAL_CYCLES_PER_US) /* 13 cycles of 125 kHz */
+#define NOMINAL_VOLTS 5.0
+#define BAND_GAP_VOLTS 1.1
+
+static uint8_t carrier_pin, carrier_half_period;
+static enum { CAPTURE_OFF, CAPTURE_RISING, CAPTURE_FALLING } capture;
+static uint16_t capture_time;
+static uint32_t tone_half_period;
+static uint8_t analog_channel;
+static uint16_t analog_result;
+
+void native_devices_reset(void) {
+  capture = CAPTURE_OFF;
+  analog_channel = 0;
+  analog_result = 0;
+}
+
+/* ---- IR carrier ---- */
+
+void hal_carrier_start(uint8_t side, uint8_t half_period) {
+  carrier_pin = side == LEFT ? PIN_INFRARED_LEFT_LED : PIN_INFRARED_RIGHT_LED;
+  carrier_half_period = half_period;
+  native_next[EVENT_CARRIER] = native->now + half_period;
+}
+
+void hal_carrier_stop(void) {
+  native_next[EVENT_CARRIER] = NATIVE_NEVER;
+  hal_native_write(carrier_pin, false);
+}
+
+void native_carrier_toggle(void) {
+  native_next[EVENT_CARRIER] += carrier_half_period;
+  native->interrupts++;
+  hal_native_toggle(carrier_pin);
+}
+
+/* ---- Ping ---- */
+
+void hal_ping_trigger(void) {
+  capture = CAPTURE_OFF;
+  HAL_PIN_LOW(PING);
+  HAL_PIN_OUTPUT(PING);
+  HAL_PIN_HIGH(PING);
+  native->now += PING_TRIGGER_CYCLES;
+  HAL_PIN_LOW(PING);
+  HAL_PIN_INPUT(PING);
+  capture = CAPTURE_RISING;
+}
+
+void native_ping_edge(bool rising) {
+  if (capture == (rising ? CAPTURE_RISING : CAPTURE_FALLING)) {
+    capture_time = hal_time();
+    native->interrupts++;
+    hal_native_capture();
+  }
+}
+
+uint16_t hal_capture_time(void) { return capture_time; }
+
+void hal_capture_falling(void) { capture = CAPTURE_FALLING; }
+
+void hal_capture_stop(void) { capture = CAPTURE_OFF; }
+
+/* ---- buzzer ---- */
+
+void hal_tone_start(uint8_t clock, uint8_t count) {
+  static const uint16_t cycles[] = {
+      [HAL_TONE_BY_8] = 8, [HAL_TONE_BY_64] = 64, [HAL_TONE_BY_256] = 256, [HAL_TONE_BY_1024] = 1024};
+  tone_half_period = (uint32_t)count * cycles[clock];
+  native_next[EVENT_TONE] = native->now + tone_half_period;
+}
+
+void hal_tone_stop(void) {
+  native_next[EVENT_TONE] = NATIVE_NEVER;
+  HAL_PIN_LOW(BUZZER);
+}
+
+void native_tone_toggle(void) {
+  native_next[EVENT_TONE] += tone_half_period;
+  native->interrupts++;
+  HAL_PIN_TOGGLE(BUZZER);
+}
+
+/* ---- analog converter ---- */
+
+void hal_analog_select(uint8_t channel) { analog_channel = channel; }
+
+void hal_analog_convert(void) {
+  if (!hal_analog_busy()) {
+    native_next[EVENT_CONVERSION] = native->now + CONVERSION_CYCLES;
+  }
+}
+
+bool hal_analog_busy(void) { return native_next[EVENT_CONVERSION] != NATIVE_NEVER; }
+
+uint16_t hal_analog_result(void) { return analog_result; }
+
+static double volts_at(uint8_t channel) { return native->analog(native, native->now, channel); }
+
+void native_conversion_done(void) {
+  const double supply = native->analog != NULL ? volts_at(NATIVE_SUPPLY) : NOMINAL_VOLTS;
+  double volts = BAND_GAP_VOLTS;
+  if (analog_channel != HAL_ANALOG_BANDGAP) {
+    volts = native->analog != NULL ? volts_at(analog_channel) : 0.0;
+  }
+  const double steps = volts * 1024.0 / supply;
+  native_next[EVENT_CONVERSION] = NATIVE_NEVER;
+  analog_result = steps < 1023.0 ? (uint16_t)(steps > 0.0 ? steps : 0.0) : 1023u;
+}

@@ -1,0 +1,74 @@
+/* devices.c: see devices.h. */
+#include "link/devices.h"
+
+#include <stdbool.h>
+
+#include "analog.h"
+#include "buzzer.h"
+#include "compass.h"
+#include "generated/messages.h"
+#include "infrared.h"
+#include "light.h"
+#include "link/frame.h"
+#include "link/parameters.h"
+#include "link/send.h"
+#include "link/session.h"
+#include "pins.h"
+#include "schedule.h"
+#include "servo.h"
+#include "supply.h"
+
+#define LINE_SHARE 4u /* it fills a quarter of the line at most */
+#define DEVICES \
+  (DEVICES_BATTERY | DEVICES_LIGHT | DEVICES_ANALOG_INFRARED | DEVICES_COMPASS | DEVICES_TURRET | DEVICES_BUZZER)
+
+static uint8_t line_period; /* ticks */
+static uint8_t since;       /* ticks, saturating */
+
+void devices_start_line(void) {
+  const uint32_t needed = LINE_SHARE * send_time(MSG_DEVICES_TELEMETRY_LENGTH + FRAME_OVERHEAD); /* us */
+  line_period = 1;
+  while (line_period * (uint32_t)SCHEDULE_TICK_US < needed) { /* 17 on the slowest */
+    line_period++;
+  }
+  since = 0;
+}
+
+static bool any_on(void) {
+  return parameters_device_on(DEVICES) ||
+         (parameters_device_on(DEVICES_INFRARED) && parameters_u16(PARAMETER_INFRARED_SWEEP) != 0);
+}
+
+void devices_task(void) {
+  if (since < UINT8_MAX) {
+    since++;
+  }
+  if (!session_is_open() || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) || !any_on() ||
+      !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
+    return;
+  }
+  since = 0;
+  const compass_reading *compass = compass_read();
+  const msg_devices_telemetry message = {
+      .tick = schedule_tick(),
+      .supply = supply_voltage(),
+      .infrared_zone_left = infrared_zone(LEFT),
+      .infrared_zone_right = infrared_zone(RIGHT),
+      .infrared_zone_age = infrared_zone_age(),
+      .battery = analog_read(ANALOG_BATTERY),
+      .battery_age = analog_age(ANALOG_BATTERY),
+      .analog_infrared = analog_read(ANALOG_INFRARED),
+      .analog_infrared_age = analog_age(ANALOG_INFRARED),
+      .light_left = light_read(LEFT),
+      .light_right = light_read(RIGHT),
+      .light_age = light_age(),
+      .compass_x = compass->x,
+      .compass_y = compass->y,
+      .compass_z = compass->z,
+      .compass_age = compass->age,
+      .compass_status = compass->status,
+      .turret_pulse = servo_pulse(SERVO_TURRET),
+      .buzzer_token = buzzer_token(),
+  };
+  send_message(MSG_DEVICES_TELEMETRY_ID, &message, sizeof message);
+}

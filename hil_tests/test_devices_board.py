@@ -1,0 +1,192 @@
+"""The slow devices' drivers, each with its device at the board's pins: from the pin to devices_telemetry, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from boebot.link import messages
+from boebot.link.messages import CompassStatus, Devices
+from hil_tests.device_bench import Capacitor, DeviceRig, TwoWireDevice
+from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES
+from sim_bridge.boards.board import Level
+
+pytestmark = pytest.mark.emulated
+
+COMPASS_ADDRESS = 0x1E
+LIGHT_LEFT, LIGHT_RIGHT, TURRET, BUZZER, SDA, SCL = 15, 6, 11, 4, 18, 19
+
+
+@pytest.fixture
+def bench(board_url: str) -> Iterator[DeviceRig]:
+    with DeviceRig(board_url) as rig:
+        rig.start()
+        rig.bench.access.log()
+        yield rig
+
+
+def pulses_of(rig: DeviceRig, pin: int) -> np.ndarray:
+    """Start and width of each whole pulse on `pin` since the last look, in cycles."""
+    pulses, rise = [], None
+    for edge in rig.bench.access.log():
+        if edge.pin == pin and edge.level == Level.HIGH:
+            rise = edge.cycle
+        elif edge.pin == pin and rise is not None:
+            pulses.append((rise, edge.cycle - rise))
+            rise = None
+    return np.array(pulses, dtype=np.int64).reshape(-1, 2)
+
+
+def compass(rig: DeviceRig) -> TwoWireDevice:
+    device = TwoWireDevice(rig.bench.access, COMPASS_ADDRESS)
+    rig.bench.devices.append(device)
+    return device
+
+
+def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: DeviceRig) -> None:
+    device = compass(bench)
+    for x, y, z in ((1, -2, 3), (-4096, 2047, -2048), (255, 256, -256)):
+        device.registers[3:9] = b"".join(value.to_bytes(2, "big", signed=True) for value in (x, z, y))
+        told = bench.devices(after_s=0.12)
+        assert told.compass_status == CompassStatus.OK
+        assert (told.compass_x, told.compass_y, told.compass_z) == (x, y, z)
+        assert told.compass_age <= 6
+    assert device.registers[:3] == bytes([0x78, 0x20, 0x00])
+
+
+def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: DeviceRig) -> None:
+    device = compass(bench)
+    device.plugged = False
+    assert bench.devices(after_s=0.1).compass_status == CompassStatus.NO_ANSWER
+    device.plugged = True
+    assert bench.devices(after_s=0.1).compass_status == CompassStatus.OK
+    device.holds = True
+    assert bench.devices(after_s=0.15).compass_status == CompassStatus.BUS_STUCK
+    device.holds = False
+    told = bench.devices(after_s=0.4)
+    assert told.compass_status == CompassStatus.OK and told.compass_age <= 6
+    assert bench.latest().overruns == 0
+
+
+@pytest.mark.parametrize("us", [20, 600, 1500, 4200, 9000])
+def test_light_is_the_decay_time(bench: DeviceRig, us: int) -> None:
+    bench.bench.devices += [
+        Capacitor(bench.bench.access, LIGHT_LEFT, us),
+        Capacitor(bench.bench.access, LIGHT_RIGHT, us + 1000),
+    ]
+    told = bench.devices(after_s=0.08)
+    assert abs(told.light_left - us) <= 6  # a slice is 2 us
+    assert abs(told.light_right - (us + 1000)) <= 6
+    assert told.light_age <= 2
+
+
+def test_analog_inputs_are_ratios_of_the_supply(bench: DeviceRig) -> None:
+    for battery, sharp in ((3.1, 0.42), (2.2, 2.9), (0.0, 4.9)):
+        bench.bench.access.analog(0, battery)
+        bench.bench.access.analog(2, sharp)
+        told = bench.devices(after_s=0.08)
+        assert abs(told.battery - battery / 5.0 * 1024) <= 1
+        assert abs(told.analog_infrared - sharp / 5.0 * 1024) <= 1
+        assert told.battery_age <= 3 and told.analog_infrared_age <= 3
+        assert abs(told.supply - 5000) <= 25
+
+
+@pytest.mark.parametrize("angle", [-1.2, -0.3, 0.0, 0.7, 1.5])
+def test_turret_turns_and_is_released_by_a_stop(bench: DeviceRig, angle: float) -> None:
+    bench.send(messages.Turret(round(angle * 1e4), 1))
+    bench.listen(0.05)
+    bench.bench.access.log()
+    bench.listen(0.2)
+    pulses = pulses_of(bench, TURRET)
+    expected = np.clip(24000 + 9168 * angle, 9600, 38400)
+    assert len(pulses) >= 8
+    assert np.all(np.abs(pulses[:, 1] - expected) <= 5)
+    assert np.all(np.abs(np.diff(pulses[:, 0]) - FRAME_CYCLES) <= 4)
+    bench.stop()
+    bench.listen(0.05)
+    bench.bench.access.log()
+    bench.listen(0.1)
+    assert len(pulses_of(bench, TURRET)) == 0
+    assert bench.devices().turret_pulse == 0
+
+
+@pytest.mark.parametrize("frequency", [60, 440, 2000, 8000])
+def test_buzzer_has_its_frequency_and_ends(bench: DeviceRig, frequency: int) -> None:
+    bench.send(messages.Buzzer(frequency, 20, 1))
+    bench.listen(0.4)
+    pulses = pulses_of(bench, BUZZER)
+    seconds = (pulses[-1].sum() - pulses[0, 0]) / CYCLES_PER_S
+    assert 0.18 <= seconds <= 0.20
+    measured = CYCLES_PER_S / np.mean(np.diff(pulses[:, 0]))
+    assert abs(measured / frequency - 1) <= 0.02
+    assert bench.devices().buzzer_token == 1
+
+
+def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: DeviceRig) -> None:
+    for receiver in (10, 3):
+        bench.bench.access.drive(receiver, Level.HIGH)
+    bench.set("infrared_sweep", 1)
+    assert bench.devices(after_s=0.15).infrared_zone_left == 0
+    bench.bench.access.drive(10, Level.LOW)
+    told = bench.devices(after_s=0.15)
+    assert (told.infrared_zone_left, told.infrared_zone_right) == (5, 0)
+    bench.bench.access.log()
+    bench.listen(0.1)
+    rises = np.array([e.cycle for e in bench.bench.access.log() if e.pin == 9 and e.level == Level.HIGH])
+    periods = np.diff(rises)
+    found = {round(CYCLES_PER_S / np.median(burst)) for burst in np.split(periods, np.where(periods > 10_000)[0] + 1)[1:-1]}
+    for expected in (38_000, 39_000, 40_000, 41_000, 42_000):
+        assert sum(abs(frequency - expected) <= 300 for frequency in found) >= 1
+
+
+@pytest.mark.parametrize("pin_map", ["shieldbot", "boebot"])
+def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, pin_map: str) -> None:
+    """Every device of the map at work, encoders at 1.5 kHz, the UART saturated both ways: ±4 cycles, no tick missed,
+    no byte lost."""
+    with DeviceRig(board_url, pin_map) as rig:
+        rig.start()
+        access = rig.bench.access
+        device = compass(rig)
+        rig.bench.devices += [Capacitor(access, LIGHT_LEFT, 1300.0), Capacitor(access, LIGHT_RIGHT, 2100.0)]
+        on = sum(1 << i for i, name in enumerate(_names()) if name in rig.bench.robot.device)
+        rig.set("devices", on)
+        rig.set("infrared_sweep", 1)
+        rig.set("devices_period", 1)
+        rig.send(messages.Turret(5000, 1))
+        rig.send(messages.Buzzer(8000, 255, 3))
+        rig.listen(0.1)
+        for i, pin in enumerate((16, 17) if on & Devices.ENCODERS else ()):
+            start = access.now + 1000
+            for edge in range(1100):
+                access.drive(pin, Level(edge % 2), start + edge * (CYCLES_PER_S // 3000 + 7 * i))
+        before, first, moved = access.counters(), len(rig.telemetry) + 1, device.bytes_moved
+        access.log()
+        rig.flood(messages.SetpointSignal(3000, -3000, 250, 0), seconds=0.3)
+        after = access.counters()
+        log = access.log()
+        frames = rig.telemetry[first:]
+        assert [f.tick - frames[0].tick for f in frames] == list(range(len(frames))) and len(frames) >= 27
+        assert frames[-1].overruns == frames[0].overruns
+        assert after["overruns"] == before["overruns"], "bytes were lost"
+        assert not any(f.status & messages.Status.RECEIVE_OVERRUN for f in frames)
+        assert (after["bytes_in"] - before["bytes_in"]) >= 0.95 * 0.3 * 50_000
+        for pin in (13, 12):
+            rises = [e.cycle for e in log if e.pin == pin and e.level == Level.HIGH][2:-1]
+            falls = [e.cycle for e in log if e.pin == pin and e.level != Level.HIGH]
+            widths = np.array([next(f for f in falls if f > rise) - rise for rise in rises])
+            assert len(widths) >= 10
+            assert np.all(np.abs(widths - 1560 * CYCLES_PER_US) <= 4), widths - 1560 * CYCLES_PER_US
+            assert np.all(np.abs(np.diff(rises) - FRAME_CYCLES) <= 4)
+        turret = [e for e in log if e.pin == TURRET]
+        widths = np.array([b.cycle - a.cycle for a, b in zip(turret, turret[1:], strict=False) if a.level == Level.HIGH])
+        assert np.all(np.abs(widths - (24000 + 4584)) <= 5)
+        told = rig.devices(after_s=0.05)
+        assert device.bytes_moved > moved + 50 and told.compass_status == CompassStatus.OK
+        assert abs(told.light_right - 2100) <= 6 and abs(told.light_left - 1300) <= 6
+        assert told.buzzer_token == 3 and told.infrared_zone_age <= 7
+
+
+def _names() -> list[str]:
+    return [messages.DEVICE_OF_BIT[bit] for bit in messages.DEVICE_OF_BIT]
