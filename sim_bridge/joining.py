@@ -13,8 +13,9 @@ FIRST_ANALOG_PIN = 14
 
 
 def join(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
-    """Joins battery and every device that is on to robot `number` of a simulation (C `sim *`); devices without a part in
-    the world are left alone. A Ping sits on the turret where there are both.
+    """Joins battery and every device that is on to robot `number` of a simulation (C `sim *`).
+
+    Devices without a part in the world are left alone. A Ping sits on the turret where there are both.
 
     Raises:
         MemoryError: there is none; descriptions are checked when they are loaded, so nothing else can fail.

@@ -165,7 +165,8 @@ int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_moto
   return join(r, &s->part);
 }
 
-int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters) {
+int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b,
+                    const encoder_parameters *parameters) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !is_pin(pin_a) || !is_side(side) || parameters->edges_per_turn == 0) return SIM_BAD_ARGUMENT;
   encoder *e = new_part(r, sizeof *e);

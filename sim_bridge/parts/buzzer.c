@@ -5,9 +5,11 @@
 
 #define PERIOD_MAXIMUM (BOARD_CLOCK_HZ / 20u) /* below 20 Hz there are clicks, no tone */
 
+#define PERIODS_MINIMUM 2u /* one alone is the pause between two tones */
+
 /* The tone under way has ended with the period that began at the last rise. */
 static void end_tone(buzzer *self) {
-  if (self->periods > 0) {
+  if (self->periods >= PERIODS_MINIMUM) {
     const double period = (double)(self->rise - self->begin) / self->periods;
     const sim_tone tone = {
         .time = (double)self->begin / BOARD_CLOCK_HZ,

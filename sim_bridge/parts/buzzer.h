@@ -1,6 +1,6 @@
 /* buzzer.h: a piezo speaker: it hears its pin and logs what it sounds, one row per tone.
  *
- * A tone is a row of periods that are alike (BUZZER_LIKENESS); it ends with the last falling edge when the next edge does
+ * A tone is a row of at least two periods that are alike (BUZZER_LIKENESS); it ends with the last falling edge when the next edge does
  * not come within its time, or with the edge at which another pitch begins. The world does not hear it.
  */
 #ifndef PART_BUZZER_H

@@ -46,11 +46,13 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   switch (level) {
     case BOARD_HIGH:
       begin(self, cycle, 1);
+      part_drive(base, cycle, pin, BOARD_HIGH); /* takes back the end of a decay under way */
       break;
     case BOARD_LOW: /* a short: empty at once */
       begin(self, cycle, 0);
       self->volts = 0.0;
       self->decay_per_s = 0.0;
+      part_drive(base, cycle, pin, BOARD_LOW);
       break;
     default: /* a pull-up is too weak to matter against full charge, and is not modelled */
       decay(self, cycle, pin);

@@ -1,0 +1,314 @@
+"""Light sensor, analog infrared, turret, buzzer, and what encoders get wrong, at the pins of a scripted board."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim_bridge import imperfections
+from sim_bridge._core import ffi, lib
+from sim_bridge.arena import Arena
+from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
+
+LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
+RELEASED = 2
+ON, OFF = imperfections.Draw(1, noise=True), imperfections.Draw(1, noise=False)
+
+
+# ---- light sensor ----------------------------------------------------------------------------------------
+
+
+def lit(arena: Arena, heading: float = 0.0, **changes: float) -> Scripted:
+    """A robot with one phototransistor at its middle that looks straight ahead."""
+    parameters = imperfections.light_parameters(0, OFF)
+    parameters.light.x = parameters.light.y = parameters.light.heading = 0.0
+    for name, value in changes.items():
+        setattr(parameters.light if hasattr(parameters.light, name) else parameters, name, value)
+    robot = scripted(arena, pose=(0, 0, heading))
+    assert lib.sim_add_light_sensor(robot.sim.handle, 0, LIGHT, parameters) == 0
+    return robot
+
+
+def lamp_at(x: float, y: float, power: float, *obstacles: list[tuple[float, float]]) -> Arena:
+    arena = arena_of(*obstacles)
+    assert lib.arena_add_light(arena.handle, x, y, 1.0, power) >= 0
+    lib.arena_build(arena.handle)
+    return arena
+
+
+def decay(robot: Scripted, charge_us: float = 100.0) -> float:
+    """Seconds from letting go to the low level."""
+    robot.edge(1 * MS, LIGHT, 1)
+    let_go = 1 * MS + round(charge_us * US)
+    robot.edge(let_go, LIGHT, RELEASED)
+    robot.run(0.3)
+    changes = [(cycle, level) for cycle, level in robot.inputs(LIGHT) if cycle >= let_go]
+    return (changes[-1][0] - let_go) / CLOCK_HZ if changes[-1][1] == 0 else math.inf
+
+
+@pytest.mark.parametrize("ambient", [0.5, 1.0, 2.0, 4.0])
+def test_decay_time_is_inverse_to_the_light(ambient: float) -> None:
+    """A constant current from a full charge: t = decay_s / L; 1.5 ms in a room (HARDWARE: 1 to 2 ms)."""
+    assert decay(lit(arena_of(), ambient=ambient)) == pytest.approx(0.0015 / ambient, abs=1e-6)
+
+
+def test_a_lamp_counts_by_its_distance_and_direction() -> None:
+    """L = ambient + P cos(theta) / (d0^2 + d^2), (section 1.9)."""
+    for heading, facing in ((0.0, 1.0), (1.0, math.cos(1.0)), (math.pi, 0.0)):
+        robot = lit(lamp_at(2.0, 0.0, 8.0), heading)
+        expected = 0.0015 / (1.0 + 8.0 * facing / (0.05**2 + 4.0))
+        assert decay(robot) == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_obstacle_casts_a_shadow() -> None:
+    shadow = decay(lit(lamp_at(2.0, 0.0, 8.0, square(1.0, 0.0, 0.4))))
+    assert shadow == pytest.approx(0.0015, abs=1e-6)
+
+
+def test_darkness_ends_with_the_leakage() -> None:
+    assert decay(lit(arena_of(), ambient=0.0)) == pytest.approx(0.2, abs=1e-5)
+
+
+@pytest.mark.parametrize("charge_us", [0.5, 1.0, 2.0, 5.0, 20.0])
+def test_what_was_not_charged_in_full_decays_sooner(charge_us: float) -> None:
+    """5 V (1 - exp(-t / RC)), RC = 2.2 us, falls to the threshold of 2.1 V in a straight line."""
+    volts = 5.0 * (1.0 - math.exp(-charge_us / 2.2))
+    expected = max(0.0, (volts - 2.1) / (5.0 - 2.1) * 0.0015)
+    assert decay(lit(arena_of()), charge_us) == pytest.approx(expected, abs=1e-6)
+
+
+def test_charging_again_takes_back_the_decay() -> None:
+    robot = lit(arena_of())
+    robot.edge(1 * MS, LIGHT, 1)
+    robot.edge(2 * MS, LIGHT, RELEASED)
+    robot.edge(2 * MS + 500 * US, LIGHT, 1)
+    robot.edge(4 * MS, LIGHT, RELEASED)
+    robot.run(0.02)
+    lows = [cycle for cycle, level in robot.inputs(LIGHT) if level == 0]
+    assert lows == pytest.approx([4 * MS + 1500 * US], abs=20)
+
+
+def test_bad_light_parameters_are_refused() -> None:
+    for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
+        parameters = imperfections.light_parameters(0, OFF)
+        setattr(parameters, name, value)
+        assert lib.sim_add_light_sensor(scripted().sim.handle, 0, LIGHT, parameters) == lib.SIM_BAD_ARGUMENT
+
+
+# ---- analog infrared -------------------------------------------------------------------------------------
+
+
+def sharp_before(distance: float, draw: imperfections.Draw = OFF) -> Scripted:
+    """A robot that looks at a wall from that distance."""
+    x = 0.06 + distance
+    robot = scripted(arena_of([(x, -3), (x + 0.1, -3), (x + 0.1, 3), (x, 3)]), pose=(0, 0, 0))
+    assert lib.sim_add_analog_infrared(robot.sim.handle, 0, 2, imperfections.analog_infrared_parameters(draw)) == 0
+    return robot
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.15, 0.3, 0.5, 0.8])
+def test_voltage_falls_with_the_distance(distance: float) -> None:
+    """V = 33.9 / (d + 4.74), d in cm (HARDWARE section 5)."""
+    robot = sharp_before(distance)
+    robot.run(0.1)
+    assert lib.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (100 * distance + 4.74), rel=1e-9)
+    assert lib.script_board_volts(robot.script, 1) == 0
+
+
+def test_near_things_look_far() -> None:
+    near, far = sharp_before(0.03), sharp_before(0.1)
+    for robot in (near, far):
+        robot.run(0.1)
+    assert lib.script_board_volts(near.script, 2) < 0.5 * lib.script_board_volts(far.script, 2)
+
+
+def test_a_new_value_every_38_ms_whoever_asks_and_7_6_ms_late() -> None:
+    """The robot is put nearer at 50 ms: the measurement at 76.6 ms is the first that knows, out at 84.2 ms."""
+    robot = sharp_before(0.8)
+    robot.run(0.05)
+    before = lib.script_board_volts(robot.script, 2)
+    robot.pins.place(0.4, 0, 0)
+    seen = []
+    for _ in range(60):
+        robot.run(0.001)
+        seen.append((robot.sim.cycle / CLOCK_HZ, lib.script_board_volts(robot.script, 2)))
+    change = next(time for time, volts in seen if volts != before)
+    assert change == pytest.approx(2 * 0.0383 + 0.0076, abs=0.0011)
+    silent = sharp_before(0.8)  # nobody asks until the end
+    silent.run(0.05)
+    silent.pins.place(0.4, 0, 0)
+    silent.run(0.06)
+    assert lib.script_board_volts(silent.script, 2) == seen[-1][1]
+
+
+# ---- turret ----------------------------------------------------------------------------------------------
+
+
+def with_turret(arena: Arena, width_us: float, seconds: float = 1.0) -> Scripted:
+    """A robot whose Ping sits on a turret at (0.045, 0); pulses of that width, then a ping."""
+    robot = scripted(arena, pose=(0, 0, 0))
+    parameters = ffi.new("motor_position_parameters *")
+    lib.motor_position_default(parameters)
+    assert lib.sim_add_turret(robot.sim.handle, 0, TURRET, 0.045, 0.0, parameters) == 0
+    assert lib.sim_mount(robot.sim.handle, 0, TURRET, PING) == 0
+    robot.pulses(seconds, {TURRET: width_us})
+    robot.run(seconds)
+    return robot
+
+
+def ping_look(robot: Scripted) -> dict[str, float]:
+    at = robot.sim.cycle + 1 * MS
+    robot.edge(at, PING, 1)
+    robot.edge(at + 5 * US, PING, RELEASED)
+    robot.run(0.03)
+    return {name: float(column[-1]) for name, column in robot.robot.looks().items()}
+
+
+@pytest.mark.parametrize("degrees", [-60, -30, 0, 30, 45, 90])
+def test_the_mounts_heading_follows_the_turret(degrees: float) -> None:
+    """500 us for 45 degrees; the Ping sits 15 mm before the axis and goes round it."""
+    robot = with_turret(arena_of(outline=square(0, 0, 4)), 1500 + 500 * degrees / 45)
+    angle = robot.robot.turret_angle(TURRET)
+    assert angle == pytest.approx(math.radians(degrees), abs=0.0064)  # its dead band, 4 us
+    look = ping_look(robot)
+    assert look["heading"] == pytest.approx(angle)
+    assert look["x"] == pytest.approx(0.045 + 0.015 * math.cos(angle))
+    assert look["y"] == pytest.approx(0.015 * math.sin(angle), abs=1e-9)
+
+
+def test_a_turned_ping_measures_elsewhere() -> None:
+    arena = arena_of(square(0.045, 1.0, 0.4), outline=square(0, 0, 8))
+    ahead, left = ping_look(with_turret(arena, 1500)), ping_look(with_turret(arena, 2500))
+    assert left["distance"] == pytest.approx(0.8 - 0.015, abs=0.01)
+    assert ahead["distance"] == -1
+
+
+def test_turret_turns_at_its_speed() -> None:
+    """90 degrees at 5 rad/s, then the exponential of K_s = 20 1/s within 0.25 rad of the end."""
+    robot = with_turret(arena_of(), 2500, seconds=0.0)
+    robot.pulses(1.0, {TURRET: 2500})
+    angles = []
+    for _ in range(100):
+        robot.run(0.01)
+        angles.append(robot.robot.turret_angle(TURRET))
+    speeds = np.diff(angles) / 0.01
+    assert speeds.max() == pytest.approx(5.0, rel=1e-6)
+    arrived = next(i for i, angle in enumerate(angles) if angle > math.pi / 2 - 0.02)
+    assert 0.01 * arrived == pytest.approx((math.pi / 2 - 0.25) / 5 + math.log(0.25 / 0.02) / 20, abs=0.03)
+
+
+def test_only_what_is_there_can_be_mounted() -> None:
+    robot = scripted()
+    assert lib.sim_mount(robot.sim.handle, 0, TURRET, PING) == lib.SIM_BAD_ARGUMENT
+    assert robot.robot.turret_angle(TURRET) == 0
+
+
+# ---- buzzer ----------------------------------------------------------------------------------------------
+
+
+def sound(robot: Scripted, start: float, frequency: float, seconds: float) -> None:
+    half = round(CLOCK_HZ / frequency / 2)
+    at = round(start * CLOCK_HZ)
+    for _ in range(round(seconds * frequency)):
+        robot.edge(at, BUZZER, 1)
+        robot.edge(at + half, BUZZER, 0)
+        at += 2 * half
+
+
+def buzzing() -> Scripted:
+    robot = scripted()
+    assert lib.sim_add_buzzer(robot.sim.handle, 0, BUZZER) == 0
+    return robot
+
+
+@pytest.mark.parametrize("frequency", [30, 440, 1000, 4000, 20_000])
+def test_a_tone_has_its_frequency_and_duration(frequency: float) -> None:
+    robot = buzzing()
+    sound(robot, 0.1, frequency, 0.5)
+    robot.run(1.0)
+    tones = robot.robot.tones()
+    assert tones["time"] == pytest.approx([0.1])
+    assert tones["duration"] == pytest.approx([0.5], abs=1.01 / frequency)
+    assert tones["frequency"] == pytest.approx([frequency], rel=1e-3)
+
+
+def test_a_melody_is_one_row_for_each_note() -> None:
+    robot = buzzing()
+    notes = [(0.10, 523.25, 0.2), (0.30, 659.25, 0.1), (0.45, 659.25, 0.1), (0.60, 784.0, 0.2)]
+    for note in notes:
+        sound(robot, *note)
+    robot.run(1.0)
+    tones = robot.robot.tones()
+    assert tones["frequency"] == pytest.approx([frequency for _, frequency, _ in notes], rel=2e-3)
+    assert tones["time"] == pytest.approx([start for start, _, _ in notes], abs=0.004)
+
+
+def test_jitter_makes_no_new_tone_and_clicks_are_none() -> None:
+    robot = buzzing()
+    at = 1 * MS
+    for i in range(200):
+        robot.edge(at, BUZZER, 1)
+        robot.edge(at + 8000, BUZZER, 0)
+        at += 16_000 + (100 if i % 3 else -200)
+    at += CLOCK_HZ // 10
+    for _ in range(5):  # 10 Hz
+        robot.edge(at, BUZZER, 1)
+        robot.edge(at + 1000, BUZZER, 0)
+        at += CLOCK_HZ // 10
+    robot.run(1.5)
+    assert robot.robot.tones()["frequency"] == pytest.approx([1000.0], rel=1e-3)
+
+
+def test_log_of_tones_does_not_depend_on_cuts() -> None:
+    def tones(cuts: list[float]) -> Any:
+        robot = buzzing()
+        sound(robot, 0.01, 440, 0.1)
+        sound(robot, 0.15, 880, 0.1)
+        for cut in cuts:
+            robot.run(cut)
+        return [column.tobytes() for column in robot.robot.tones().values()]
+
+    assert tones([0.5]) == tones([0.0123] * 40 + [0.008])
+
+
+# ---- encoders that err -----------------------------------------------------------------------------------
+
+
+def turning(missed: float, extra: float, noise: bool = True) -> tuple[int, int]:
+    """Edges that the left encoder shows in 20 s at full speed, and those that the wheel's angle has."""
+    robot = scripted(noise=noise)
+    parameters = imperfections.encoder_parameters(64)
+    parameters.missed, parameters.extra = missed, extra
+    assert lib.sim_add_encoder(robot.sim.handle, 0, 0, 2, 255, parameters) == 0
+    robot.pulses(20.0, {13: 1700, 12: 1300})
+    robot.run(20.0)
+    levels = [level for _, level in robot.inputs(2)]
+    assert all(a != b for a, b in itertools.pairwise(levels))
+    return len(levels) - 1, round(robot.robot.body().wheel_left * 64 / (2 * math.pi))
+
+
+def test_without_errors_every_edge_is_there() -> None:
+    shown, true = turning(0.0, 0.0)
+    assert abs(shown - true) <= 1
+
+
+def test_missed_edges_take_their_neighbours_with_them() -> None:
+    """A pulse is lost with probability p per edge that would have begun it: a share 2 p / (1 + p) of the edges."""
+    shown, true = turning(0.2, 0.0)
+    assert shown % 2 == true % 2 or abs(shown - true) > 1
+    assert shown / true == pytest.approx(1 - 2 * 0.2 / 1.2, abs=0.05)
+
+
+def test_flickers_add_two_edges_each() -> None:
+    shown, true = turning(0.0, 0.1)
+    assert shown / true == pytest.approx(1.2, abs=0.05)
+
+
+def test_errors_need_noise() -> None:
+    shown, true = turning(0.2, 0.2, noise=False)
+    assert abs(shown - true) <= 1
