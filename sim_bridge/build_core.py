@@ -49,6 +49,7 @@ HEADERS = [
     "parts/encoder.h",
     "parts/light_sensor.h",
     "parts/battery.h",
+    "parts/brown_out.h",
     "boards/script_board.h",
     "boards/board_access.h",
     "boards/native/native_board.h",

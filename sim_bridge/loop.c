@@ -112,6 +112,7 @@ static void follow(robot *r, uint64_t end) {
     if (p->op->step != NULL) p->op->step(p);
   }
   robot_update_supply(r);
+  brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->dt);
   robot_step_waves(r, end + PART_GUARD);
   if (!r->body.state.touching) return;
   if (r->contacts == 0 || end - r->last_touch > CONTACT_GAP) r->contacts++;

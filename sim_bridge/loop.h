@@ -16,6 +16,7 @@
 #include "logs.h"
 #include "parts/analog_infrared.h"
 #include "parts/battery.h"
+#include "parts/brown_out.h"
 #include "parts/compass.h"
 #include "parts/encoder.h"
 #include "parts/infrared.h"
@@ -116,6 +117,11 @@ int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t d
 int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
 int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
 int sim_set_supply(sim *self, int robot, double volts);
+
+/* What a weak supply does to a robot's board; by default it is as the data sheet has it, with 2 upsets per second at the
+ * worst. Returns SIM_OK or an error. `sim_brown_outs`: resets by the detector, and upsets above it. */
+int sim_set_brown_out(sim *self, int robot, const brown_out_parameters *parameters);
+uint32_t sim_brown_outs(const sim *self, int robot, uint32_t *upsets);
 
 /* Voltages of pack and regulator. */
 double sim_pack_voltage(const sim *self, int robot);

@@ -101,3 +101,12 @@ int sim_set_supply(sim *self, int number, double volts) {
   robot_update_supply(r);
   return SIM_OK;
 }
+
+int sim_set_brown_out(sim *self, int number, const brown_out_parameters *parameters) {
+  robot *r = sim_robot(self, number);
+  const brown_out_parameters *p = parameters;
+  if (r == NULL || !(p->reset_v >= 0.0 && p->reset_v < p->erratic_v && p->hysteresis_v >= 0.0)) return SIM_BAD_ARGUMENT;
+  if (!(p->upsets_per_s >= 0.0)) return SIM_BAD_ARGUMENT;
+  r->brown_out.parameters = *p;
+  return SIM_OK;
+}

@@ -66,6 +66,13 @@ static void insert(sim *self, robot *r) {
   for (i = 0; i < self->robot_count; i++) self->bodies[i] = &self->robots[i]->body;
 }
 
+static part_place place_of(robot *r, uint32_t device) {
+  return (part_place){
+      .chassis = &r->chassis,
+      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise != 0},
+  };
+}
+
 int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
                   double heading) {
   board *b = (board *)address;
@@ -99,6 +106,9 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
       .looks = &r->looks,
       .tones = &r->tones,
   };
+  r->brown_out.noise = place_of(r, PART_BROWN_OUT).noise;
+  r->brown_out.parameters = (brown_out_parameters){
+      .reset_v = SUPPLY_RESET_V, .hysteresis_v = 0.05, .erratic_v = SUPPLY_ERRATIC_V, .upsets_per_s = 2.0};
   memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
   b->sink = robot_on_edge;
   b->sink_context = r;
@@ -113,13 +123,6 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
 static int is_pin(uint8_t pin) { return pin < BOARD_PIN_COUNT; }
 
 static int is_side(int side) { return side == SIM_LEFT || side == SIM_RIGHT; }
-
-static part_place place_of(robot *r, uint32_t device) {
-  return (part_place){
-      .chassis = &r->chassis,
-      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise != 0},
-  };
-}
 
 /* The place of one more part of a kind of which a robot may have several. */
 static part_place next_place(robot *r, uint32_t kind) { return place_of(r, kind + (uint32_t)r->parts_of_kind[kind]++); }

@@ -30,6 +30,7 @@ typedef struct {
   int parts_of_kind[PART_KINDS]; /* by kind (PART_WHISKER and so on), how many there are */
   part *hears[BOARD_PIN_COUNT];
   part *analog[BOARD_ANALOG_COUNT];
+  brown_out brown_out;
   battery *battery;   /* NULL: a supply that never sags */
   double held_supply; /* share of the nominal voltage that a test holds, or 0 */
   wave wave[WAVES_MAXIMUM];

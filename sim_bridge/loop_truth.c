@@ -70,3 +70,9 @@ double sim_supply_voltage(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r == NULL ? 0.0 : r->chassis.supply * BOARD_NOMINAL_VOLTS;
 }
+
+uint32_t sim_brown_outs(const sim *self, int number, uint32_t *upsets) {
+  const robot *r = sim_robot(self, number);
+  *upsets = r == NULL ? 0 : r->brown_out.upsets;
+  return r == NULL ? 0 : r->brown_out.resets;
+}

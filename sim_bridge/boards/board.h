@@ -9,6 +9,7 @@
 #ifndef BOARD_H
 #define BOARD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -16,7 +17,7 @@
 #define BOARD_PIN_COUNT 20u /* Arduino numbers: 0..13, then A0..A5 as 14..19 */
 #define BOARD_FIRST_ANALOG_PIN 14u
 #define BOARD_ANALOG_COUNT 6u
-#define BOARD_INTERFACE_VERSION 1u
+#define BOARD_INTERFACE_VERSION 2u
 #define BOARD_GUARD_CYCLES 64u
 
 #define BOARD_NOMINAL_VOLTS 5.0
@@ -112,6 +113,10 @@ typedef struct {
    * loses RAM. Bytes in flight are lost. A write to the EEPROM that is under way is completed, but at POWER and BROWN_OUT
    * its cell is damaged. */
   void (*reset)(board *self, board_reset_cause cause);
+
+  /* Holds the microcontroller in brown-out reset or lets it go: held it executes nothing and lets go of its pins, but time
+   * passes; then the program begins anew. */
+  void (*hold)(board *self, bool held);
 
   void (*counters)(const board *self, board_counters *out);
 

@@ -29,6 +29,7 @@ struct script_board {
   void *source_context;
   uint64_t resets;
   int crashed;
+  int held;
 };
 
 static int add(script_list *list, uint64_t cycle, uint8_t pin, uint8_t value) {
@@ -63,6 +64,7 @@ static board_state advance(board *b, uint64_t until) {
   while (self->played < self->edges.count && self->edges.event[self->played].cycle <= until) {
     const script_event edge = self->edges.event[self->played++];
     if (edge.cycle > self->now) self->now = edge.cycle;
+    if (self->held) continue; /* a board in reset does nothing */
     self->output[edge.pin] = edge.value;
     if (b->sink != NULL) b->sink(b->sink_context, edge.cycle, edge.pin, edge.value);
   }
@@ -114,6 +116,12 @@ static void reset(board *b, board_reset_cause cause) {
   of(b)->resets++;
 }
 
+static void hold(board *b, bool held) {
+  script_board *self = of(b);
+  if (held && !self->held) self->resets++;
+  self->held = held;
+}
+
 static void counters(const board *b, board_counters *out) {
   const script_board *self = of_const(b);
   memset(out, 0, sizeof *out);
@@ -144,6 +152,7 @@ static const board_operations operations = {
     .receive = receive,
     .line_rate = line_rate,
     .reset = reset,
+    .hold = hold,
     .counters = counters,
     .fault = fault,
     .extension = extension,

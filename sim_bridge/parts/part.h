@@ -39,6 +39,7 @@ enum {
   PART_TURRET = 76,
   PART_TWO_WIRE = 81,
   PART_BUZZER = 86,
+  PART_BROWN_OUT = 91,
   PART_KINDS = 100 /* more than all of them */
 };
 

@@ -146,3 +146,91 @@ def test_places_and_numbers_are_for_one() -> None:
         second.pins.place(0.1, 0, 0)
     second.pins.place(1.05, 0, 0)
     assert first.robot.body().x == 0
+
+
+# ---- they bump each other --------------------------------------------------------------------------------
+
+
+def test_robots_bump_and_neither_enters_the_other() -> None:
+    sim = sim_of()
+    left, right = add_scripted(sim, pose=(-0.3, 0, 0)), add_scripted(sim, pose=(0.3, 0, math.pi))
+    for robot in (left, right):
+        drive(robot, 4.0, 1700, 1300)
+    sim.run(4 * CLOCK_HZ, 4 * CLOCK_HZ)
+    a, b = left.robot.body(), right.robot.body()
+    assert b.x - a.x == pytest.approx(0.14, abs=1e-3)  # two radii
+    assert a.touching and b.touching
+    assert left.robot.contacts == right.robot.contacts == 1
+
+
+def test_a_driving_robot_pushes_one_that_rolls_freely() -> None:
+    sim = sim_of()
+    pusher, pushed = add_scripted(sim, pose=(-0.3, 0, 0)), add_scripted(sim, pose=(0.0, 0, 0))
+    drive(pusher, 4.0, 1700, 1300)
+    sim.run(4 * CLOCK_HZ, 4 * CLOCK_HZ)
+    assert pushed.robot.body().x > 0.05
+    assert pushed.robot.body().x - pusher.robot.body().x >= 0.14 - 1e-6
+
+
+# ---- cross-talk ------------------------------------------------------------------------------------------
+
+
+def lit(distance: float, heading: float, obstacle: bool = False) -> list[tuple[int, int]]:
+    """The receiver of a silent robot whose left pair looks at the left pair of another robot that sends a burst."""
+    arena = arena_of(*([square(distance / 2, 0, 0.05)] if obstacle else []), outline=square(0, 0, 12))
+    sim = Sim(arena, noise=False)
+
+    def pose_of(x: float, y: float, looking: float) -> tuple[float, float, float]:
+        """Of a robot whose left pair is at (x, y) and looks that way."""
+        from boebot.robots import InfraredPair, load_robot
+
+        pair = load_robot("shieldbot").device["infrared_left"]
+        assert isinstance(pair, InfraredPair)
+        turn = looking - pair.heading_rad
+        px, py = pair.position_m
+        return (
+            x - px * math.cos(turn) + py * math.sin(turn),
+            y - px * math.sin(turn) - py * math.cos(turn),
+            turn,
+        )
+
+    hearer = add_scripted(sim, pose=pose_of(0, 0, 0))
+    sender = add_scripted(sim, pose=pose_of(distance, 0, heading))
+    sender.burst(5 * MS, LED)
+    sim.run(40 * MS, 40 * MS)
+    return hearer.inputs(RECEIVER)
+
+
+def test_another_robots_burst_lights_the_receiver() -> None:
+    """From the eighth period of the carrier until ten after its end, a world step and a guard later."""
+    late = 16_000 + 64
+    (_, first), (low, dark), (high, bright) = lit(1.0, math.pi)
+    assert (first, dark, bright) == (1, 0, 1)
+    assert low == 5 * MS + 8 * 421 + late
+    assert high == 5 * MS + 37 * 421 + 1 + 4210 + late
+
+
+@pytest.mark.parametrize(
+    ("distance", "heading", "obstacle"), [(2.5, math.pi, False), (1, 0, False), (1, math.pi, True)]
+)
+def test_what_is_far_turned_away_or_hidden_lights_nothing(distance: float, heading: float, obstacle: bool) -> None:
+    assert [level for _, level in lit(distance, heading, obstacle)] == [1]
+
+
+# ---- moving obstacles ------------------------------------------------------------------------------------
+
+
+def test_a_moving_obstacle_is_seen_where_it_is() -> None:
+    """A disc of 0.1 m that comes from x = 2 m with 0.5 m/s: after 2 s its face is 0.84 m before the Ping."""
+    from sim_bridge._core import ffi, lib
+
+    arena = arena_of(outline=square(0, 0, 12))
+    way = ffi.new("path_waypoint[]", [(0.0, 2.0, 0.0, 0.0), (2.0, 1.0, 0.0, 0.0)])
+    nothing = ffi.NULL
+    assert lib.arena_add_moving(arena.handle, nothing, 0, 0.1, nothing, way, 2, lib.PATH_ONCE) >= 0
+    lib.arena_build(arena.handle)
+    for wait, centre in ((0.5, 1.75), (1.0, 1.5), (3.0, 1.0)):
+        robot = add_scripted(Sim(arena, noise=False), pose=(0, 0, 0))
+        robot.run(wait)
+        echo = ping_echo(robot, robot.sim.cycle + 1)
+        assert echo == pytest.approx(2 * (centre - 0.1 - 0.06) / 343.5 * 1e6, abs=6)

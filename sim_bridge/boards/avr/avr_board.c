@@ -237,6 +237,10 @@ static board_state advance(board *self, uint64_t until) {
   while (avr->cycle < until) {
     catch_up(b, avr->cycle);
     if (b->reset_wanted) restart(b);
+    if (b->held) {
+      avr->cycle = earlier(until, b->next_due);
+      continue;
+    }
     if (b->crashed) return BOARD_CRASHED;
     if (next_of_simavr(avr) <= avr->cycle) avr_cycle_timer_process(avr);
     if (b->reset_wanted) continue;
@@ -467,6 +471,12 @@ static void line_rate(board *self, uint32_t baud) { usart_line_rate((avr_board *
 
 static void reset(board *self, board_reset_cause cause) { want_reset((avr_board *)self, cause); }
 
+static void hold(board *self, bool held) {
+  avr_board *b = (avr_board *)self;
+  if (held && !b->held) want_reset(b, BOARD_RESET_BROWN_OUT);
+  b->held = held;
+}
+
 static void counters(const board *self, board_counters *out) { *out = ((const avr_board *)self)->counters; }
 
 static const char *fault(const board *self) {
@@ -495,6 +505,7 @@ static const board_operations OPERATIONS = {
     .receive = receive,
     .line_rate = line_rate,
     .reset = reset,
+    .hold = hold,
     .counters = counters,
     .fault = fault,
     .extension = extension,

@@ -337,6 +337,7 @@ typedef struct avr_board {
   uint32_t raised;   /* interrupt flags */
   uint32_t enabled;  /* interrupts that are enabled */
   bool sleeping;
+  bool held;            /* in brown-out reset */
   uint8_t reset_wanted; /* bits 1 << board_reset_cause */
   bool crashed;
   char fault[160];

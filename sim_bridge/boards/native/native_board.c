@@ -24,6 +24,7 @@ typedef struct {
 
   bool started; /* the program has begun; it does so at the first advance, when somebody listens */
   bool reset_asked;
+  bool held; /* in brown-out reset */
   board_reset_cause reset_cause;
   char *fault; /* one sentence, or NULL */
 
@@ -234,6 +235,11 @@ static uint64_t board_now(const board *face) { return of_const_board(face)->mach
 
 static board_state board_advance(board *face, uint64_t until) {
   native_board *self = of_board(face);
+  if (self->held) { /* nobody hears what comes meanwhile */
+    if (until > self->machine.now) self->machine.now = until;
+    while (self->machine.next_byte <= self->machine.now) (void)native_take_byte(&self->machine);
+    return BOARD_RUNNING;
+  }
   do {
     if (self->reset_asked && !restart(self)) {
       return BOARD_CRASHED;
@@ -322,6 +328,20 @@ static void board_reset(board *face, board_reset_cause cause) {
   self->machine.stop = 1;
 }
 
+/* Held, it lets go of its pins; the program begins anew when it is let go. */
+static void board_hold(board *face, bool held) {
+  native_board *self = of_board(face);
+  if (held && !self->held) {
+    for (uint8_t pin = 0; pin < NATIVE_PINS; pin++) {
+      if (self->machine.output[pin] == NATIVE_RELEASED) continue;
+      self->machine.output[pin] = NATIVE_RELEASED;
+      on_edge(&self->machine, self->machine.now, pin, NATIVE_RELEASED);
+    }
+    if (self->started) board_reset(face, BOARD_RESET_BROWN_OUT);
+  }
+  self->held = held;
+}
+
 static void board_counters_now(const board *face, board_counters *out) {
   const native_board *self = of_const_board(face);
   const native_byte_queue *queue = &self->outgoing;
@@ -369,6 +389,7 @@ static const board_operations operations = {
     .receive = board_receive,
     .line_rate = board_line_rate,
     .reset = board_reset,
+    .hold = board_hold,
     .counters = board_counters_now,
     .fault = board_fault,
     .extension = board_extension,
