@@ -59,10 +59,9 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   return rate > 0.0 ? 2.0 / rate : INFINITY;
 }
 
-static int check_step(vehicle_model *self) {
-  if (self->dt < vehicle_model_euler_limit(self)) return VEHICLE_OK;
-  self->drive = DRIVE_NONE;
-  return VEHICLE_BAD_STEP;
+/* A model that steps too far keeps its drive, so that its limit can be told; vehicles_place refuses it. */
+static int check_step(const vehicle_model *self) {
+  return self->dt < vehicle_model_euler_limit(self) ? VEHICLE_OK : VEHICLE_BAD_STEP;
 }
 
 static int dc_usable(const motor_dc_parameters *m) {

@@ -40,6 +40,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
                    double heading) {
   const vehicle_model *m = self->model;
   if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
+  if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
   if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0 || id >= FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
