@@ -7,6 +7,8 @@
 
 #include "arena_data.h"
 
+#define FARTHEST 1e6 /* m: positions beyond lose the precision that rays need */
+
 static const arena_surface PLAIN = {.height = 1e300, .infrared_reflectance = 1.0, .sound_reflectance = 1.0};
 
 arena *arena_new(void) {
@@ -51,7 +53,7 @@ static void *grown(void *array, size_t count, size_t more, size_t size) {
 
 static int all_finite(const double *values, size_t count) {
   for (size_t i = 0; i < count; i++) {
-    if (!(fabs(values[i]) < 1e9)) return 0;
+    if (!(fabs(values[i]) <= FARTHEST)) return 0;
   }
   return 1;
 }
@@ -197,6 +199,7 @@ void arena_build(arena *self) {
   if (self->index_choice >= ARENA_INDEX_GRID && grid_build(&self->grid, &items) == 0 &&
       self->index_choice >= ARENA_INDEX_LISTS) {
     self->lists = ray_lists_new(&self->grid, &items);
+    if (self->lists != NULL && self->index_choice == ARENA_INDEX_LISTS_AT_ONCE) self->lists->patience = 0;
   }
 }
 
