@@ -20,6 +20,7 @@ HEADERS = [
     "world/paths.h",
     "world/arena.h",
     "world/scene.h",
+    "world/scan.h",
     "world/motor.h",
     "world/body.h",
     "parts/servo.h",

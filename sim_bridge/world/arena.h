@@ -31,8 +31,9 @@ typedef struct {
 typedef struct {
   int kind;
   arena_surface surface;
-  uint32_t first; /* edge, or disc */
-  uint32_t count; /* of edges; 1 for a disc */
+  uint32_t first;      /* edge, or disc */
+  uint32_t count;      /* of edges; 1 for a disc */
+  double x, y, radius; /* of a circle that holds the shape */
 } arena_shape;
 
 typedef struct {
