@@ -21,6 +21,7 @@ HEADERS = [
     "world/arena.h",
     "world/scene.h",
     "world/outline.h",
+    "world/scan.h",
     "world/body.h",
     "world/motor_regulated.h",
     "world/motor_dc.h",
