@@ -19,7 +19,11 @@ Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
 
 STAGES: Final = ("sense", "process", "send", "move", "arena", "check")  # of a step, Fig. 3.1
-ENDS: Final[dict[int, str]] = {lib.VEHICLE_RUNS: "", lib.VEHICLE_COLLIDED: "collision", lib.VEHICLE_EXHAUSTED: "battery empty"}
+ENDS: Final[dict[int, str]] = {
+    lib.VEHICLE_RUNS: "",
+    lib.VEHICLE_COLLIDED: "collision",
+    lib.VEHICLE_EXHAUSTED: "battery empty",
+}
 STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
 
 # The default robot of ARSim (THEORY section 1.2).
