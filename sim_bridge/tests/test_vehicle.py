@@ -129,8 +129,7 @@ def test_whiskers_table_battery_laser_and_light_in_one_model() -> None:
     assert vehicle["table"] == pytest.approx(5.0 - 4.0 * 0.7), "0.8 m to the wall, between bins 0.1 and 1.1"
     assert list(vehicle["laser"]) == pytest.approx([1 / math.cos(1), 1.0, 1 / math.cos(1)])
     run(vehicle, 500, 1.0, 1.0)
-    assert vehicle["whisker"] == 1.0 and vehicle.collided
-    assert not vehicle.ended
+    assert vehicle["whisker"] == 1.0 and vehicle.collided and vehicle.time == pytest.approx(5.0), "it goes on"
     assert vehicle["battery"] == pytest.approx(5 + 3 * (1 - 0.1 * 5.0)) and vehicle.energy == pytest.approx(0.5)
     run(vehicle, 600, 0.0, 0.0)
     assert vehicle.ended == "battery empty" and vehicle.energy == 0.0
