@@ -18,13 +18,13 @@ from boebot.errors import ArenaError
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena_description import (
     ArenaDescription,
+    DescriptionError,
     Disc,
     Moving,
     Point,
     Polygon,
     Start,
     Wall,
-    DescriptionError,
     check,
 )
 

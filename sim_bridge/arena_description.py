@@ -163,7 +163,7 @@ class DescriptionError(Exception):
 
 
 def check(description: ArenaDescription) -> None:
-    """Raises DescriptionError at the first thing that types cannot say: order in time, simple polygons, number of edges."""
+    """Raises DescriptionError at the first thing beyond types: simple polygons, order in time, number of edges."""
     rows = [*_closed(description), *((f"wall[{i}].points_m", wall.points_m) for i, wall in enumerate(description.wall))]
     edges = sum(len(points) for _, points in rows)
     if edges > EDGES_MAXIMUM:
