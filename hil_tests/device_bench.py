@@ -1,5 +1,6 @@
-"""A board by itself on the bench, with devices at its pins that answer within a few microseconds: a two-wire device and the
-capacitors of light sensors. Time goes by in slices of SLICE cycles; after each the devices look at what the board does.
+"""A board by itself on the bench, with devices at its pins that answer within a few microseconds: a two-wire device
+and the capacitors of light sensors. Time goes by in slices of SLICE cycles; after each the devices look at what the
+board does.
 
 It has the face of a board session, so that a Rig speaks with the board as with any other.
 """
@@ -27,7 +28,7 @@ def open_board(url: str, pin_map: str) -> BoardAccess:
 
 
 class TwoWireDevice:
-    """Registers on the two-wire bus, bit by bit after NXP UM10204; SDA is low where the board or the device pulls it."""
+    """Registers on the two-wire bus, bit by bit after NXP UM10204; SDA is low where board or device pulls it."""
 
     def __init__(self, board: BoardAccess, address: int) -> None:
         self.registers = bytearray(16)
@@ -161,9 +162,12 @@ class DeviceBench:
 class DeviceRig(Rig):
     """A rig that also keeps the slow devices' telemetry."""
 
-    def __init__(self, url: str, pin_map: str = "boebot") -> None:
-        self.bench = DeviceBench(url, pin_map)
+    def __init__(self, url: str, pin_map: str = "boebot", bench: DeviceBench | None = None) -> None:
+        self.bench = bench or DeviceBench(url, pin_map)
         super().__init__(self.bench)  # type: ignore[arg-type]
+
+    def __enter__(self) -> DeviceRig:
+        return self
 
     def devices(self, after_s: float = 0.0) -> messages.DevicesTelemetry:
         """The slow devices as they are told after that long."""

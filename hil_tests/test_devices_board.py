@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
 from hil_tests.device_bench import Capacitor, DeviceRig, TwoWireDevice
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES
+from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
 from sim_bridge.boards.board import Level
 
 pytestmark = pytest.mark.emulated
@@ -136,9 +137,24 @@ def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Device
     bench.listen(0.1)
     rises = np.array([e.cycle for e in bench.bench.access.log() if e.pin == 9 and e.level == Level.HIGH])
     periods = np.diff(rises)
-    found = {round(CYCLES_PER_S / np.median(burst)) for burst in np.split(periods, np.where(periods > 10_000)[0] + 1)[1:-1]}
+    found = {
+        round(CYCLES_PER_S / np.median(burst)) for burst in np.split(periods, np.where(periods > 10_000)[0] + 1)[1:-1]
+    }
     for expected in (38_000, 39_000, 40_000, 41_000, 42_000):
         assert sum(abs(frequency - expected) <= 300 for frequency in found) >= 1
+
+
+def saturate(rig: DeviceRig, seconds: float) -> None:
+    """All that the line carries to the board; back come answers (15 bytes for 11), telemetry (46 bytes a tick) and that
+    of the slow devices (39 bytes a tick): 480 of 500 bytes."""
+    wire, request = bytearray(), rig.numbered(messages.GetParameter, 0)
+    for _ in range(round(seconds / TICK_S)):
+        while len(wire) < LINE_BYTES_PER_TICK:
+            wire += rig.encode(rig.signal(0.3, -0.3)) + rig.encode(request) + rig.encode(request)
+        rig.transport.write(bytes(wire[:LINE_BYTES_PER_TICK]))
+        del wire[:LINE_BYTES_PER_TICK]
+        rig.listen(TICK_S)
+    rig.transport.write(bytes(wire))
 
 
 @pytest.mark.parametrize("pin_map", ["shieldbot", "boebot"])
@@ -150,7 +166,7 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
         access = rig.bench.access
         device = compass(rig)
         rig.bench.devices += [Capacitor(access, LIGHT_LEFT, 1300.0), Capacitor(access, LIGHT_RIGHT, 2100.0)]
-        on = sum(1 << i for i, name in enumerate(_names()) if name in rig.bench.robot.device)
+        on = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in rig.bench.robot.device)
         rig.set("devices", on)
         rig.set("infrared_sweep", 1)
         rig.set("devices_period", 1)
@@ -161,9 +177,10 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
             start = access.now + 1000
             for edge in range(1100):
                 access.drive(pin, Level(edge % 2), start + edge * (CYCLES_PER_S // 3000 + 7 * i))
+        rig.answers.clear()
         before, first, moved = access.counters(), len(rig.telemetry) + 1, device.bytes_moved
         access.log()
-        rig.flood(messages.SetpointSignal(3000, -3000, 250, 0), seconds=0.3)
+        saturate(rig, seconds=0.3)
         after = access.counters()
         log = access.log()
         frames = rig.telemetry[first:]
@@ -180,13 +197,10 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
             assert np.all(np.abs(widths - 1560 * CYCLES_PER_US) <= 4), widths - 1560 * CYCLES_PER_US
             assert np.all(np.abs(np.diff(rises) - FRAME_CYCLES) <= 4)
         turret = [e for e in log if e.pin == TURRET]
-        widths = np.array([b.cycle - a.cycle for a, b in zip(turret, turret[1:], strict=False) if a.level == Level.HIGH])
+        widths = np.array([b.cycle - a.cycle for a, b in itertools.pairwise(turret) if a.level == Level.HIGH])
         assert np.all(np.abs(widths - (24000 + 4584)) <= 5)
+        assert len([a for a in rig.answers if isinstance(a, messages.DevicesTelemetry)]) >= 20
         told = rig.devices(after_s=0.05)
         assert device.bytes_moved > moved + 50 and told.compass_status == CompassStatus.OK
         assert abs(told.light_right - 2100) <= 6 and abs(told.light_left - 1300) <= 6
         assert told.buzzer_token == 3 and told.infrared_zone_age <= 7
-
-
-def _names() -> list[str]:
-    return [messages.DEVICE_OF_BIT[bit] for bit in messages.DEVICE_OF_BIT]

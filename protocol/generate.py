@@ -171,7 +171,11 @@ def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
             lines += [f"#define {full}_PINR PIN{port}", f"#define {full}_BIT {bit}"]
     encoder = robot.device.get("encoder_left")
     lines += ["", f"#define ENCODER_LINES {len(encoder.pins()) if encoder else 0} /* of each wheel */"]
-    lines += ["", "/* Devices bits of what the map has pins for. */", f"#define DEVICES_BUILT {devices_built(spec, robot)}"]
+    lines += [
+        "",
+        "/* Devices bits of what the map has pins for. */",
+        f"#define DEVICES_BUILT {devices_built(spec, robot)}",
+    ]
     lines += ["", "/* Defaults of the parameters, in counts of their scale. */"]
     lines.append(f"#define DEFAULT_DEVICES {devices_default(spec, robot)}")
     for p in spec.parameter:

@@ -19,7 +19,11 @@ Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
 
 STAGES: Final = ("sense", "process", "send", "move", "arena", "check")  # of a step, Fig. 3.1
-ENDS: Final = {lib.VEHICLE_RUNS: "", lib.VEHICLE_COLLIDED: "collision", lib.VEHICLE_EXHAUSTED: "battery empty"}
+ENDS: Final[dict[int, str]] = {
+    lib.VEHICLE_RUNS: "",
+    lib.VEHICLE_COLLIDED: "collision",
+    lib.VEHICLE_EXHAUSTED: "battery empty",
+}
 STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
 
 # The default robot of ARSim (THEORY section 1.2).
@@ -251,6 +255,7 @@ class Vehicle:
         pointer = lib.vehicles_readings(self.handle)
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
         self._body = lib.vehicles_body(self.handle, 0)
+        self._flag = ffi.new("int8_t *")
         self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle)
 
     def __getitem__(self, name: str) -> Any:
@@ -276,9 +281,8 @@ class Vehicle:
     @property
     def ended(self) -> str:
         """Why the run has ended, "" while it goes on: "collision" or "battery empty"."""
-        flag = ffi.new("int8_t *")
-        lib.vehicles_flags(self.handle, 0, 1, flag)
-        return ENDS[flag[0]]
+        lib.vehicles_flags(self.handle, 0, 1, self._flag)
+        return ENDS[self._flag[0]]
 
     @property
     def collided(self) -> bool:

@@ -17,7 +17,11 @@ def variant(tmp_path: Path, text: str) -> Path:
 
 
 def test_bundled_robots_load_under_their_own_names() -> None:
-    assert {load_robot(name).name for name in robot_names()} == set(robot_names()) >= {"shieldbot", "shieldbot-quad", "boebot"}
+    assert (
+        {load_robot(name).name for name in robot_names()}
+        == set(robot_names())
+        >= {"shieldbot", "shieldbot-quad", "boebot"}
+    )
 
 
 def test_shieldbot_pins_are_those_of_the_default_map() -> None:
@@ -96,7 +100,9 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
-    with pytest.raises(RobotError, match="there is no robot 'dalek'; expected one of boebot, shieldbot, shieldbot-quad"):
+    with pytest.raises(
+        RobotError, match="there is no robot 'dalek'; expected one of boebot, shieldbot, shieldbot-quad"
+    ):
         load_robot("dalek")
 
 

@@ -32,8 +32,8 @@ def odometer(**changes: Any) -> Any:
 def odometry_error(rule: int, dt: float, counts: bool) -> float:
     """Position error (m) after 20 s of wheel speeds 0.1 + 0.05 sin t, 0.1 + 0.05 cos 0.7 t, R = 0.0525.
 
-    A step's travel is the integral of the speeds (`counts`), or the speed at its beginning times dt. Truth is (2.7)-(2.9)
-    at steps of 0.1 ms.
+    A step's travel is the integral of the speeds (`counts`), or the speed at its beginning times dt. Truth is
+    (2.7)-(2.9) at steps of 0.1 ms.
     """
 
     def left(t: Any) -> Any:

@@ -22,13 +22,7 @@ vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
   return self;
 }
 
-void vehicle_model_destroy(vehicle_model *self) {
-  if (self == NULL) return;
-  for (size_t i = 0; i < self->sensors_count; i++) {
-    if (self->sensors[i].kind == SENSOR_LASER) laser_destroy(self->sensors[i].as.laser);
-  }
-  free(self);
-}
+void vehicle_model_destroy(vehicle_model *self) { free(self); }
 
 double vehicle_model_dt(const vehicle_model *self) { return self->dt; }
 
@@ -59,10 +53,9 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   return rate > 0.0 ? 2.0 / rate : INFINITY;
 }
 
-static int check_step(vehicle_model *self) {
-  if (self->dt < vehicle_model_euler_limit(self)) return VEHICLE_OK;
-  self->drive = DRIVE_NONE;
-  return VEHICLE_BAD_STEP;
+/* A model that steps too far keeps its drive, so that its limit can be told; vehicles_place refuses it. */
+static int check_step(const vehicle_model *self) {
+  return self->dt < vehicle_model_euler_limit(self) ? VEHICLE_OK : VEHICLE_BAD_STEP;
 }
 
 static int dc_usable(const motor_dc_parameters *m) {
@@ -143,10 +136,12 @@ int vehicle_model_add_sonar(vehicle_model *self, const sonar_parameters *p, doub
 }
 
 int vehicle_model_add_laser(vehicle_model *self, const laser_parameters *p, double period) {
-  const size_t rays = p->rays > 0 ? (size_t)p->rays : 0;
-  vehicle_sensor *s = added(self, SENSOR_LASER, period, rays);
-  if (s != NULL) s->as.laser = laser_new(p);
-  return done(self, s, s != NULL && s->as.laser != NULL, rays);
+  if (self->laser != NULL) return VEHICLE_TOO_MANY;
+  if (laser_check(p)) return VEHICLE_BAD_NUMBER;
+  vehicle_sensor *s = added(self, SENSOR_LASER, period, (size_t)p->rays);
+  if (s != NULL) s->as.laser = *p;
+  self->laser = s;
+  return done(self, s, 1, (size_t)p->rays);
 }
 
 int vehicle_model_add_compass(vehicle_model *self, const compass_parameters *p, double period) {

@@ -125,7 +125,7 @@ typedef struct {
     infrared_proximity infrared_proximity;
     sharp_infrared sharp_infrared;
     sonar sonar;
-    laser *laser;
+    laser_parameters laser;
     compass_parameters compass;
     accelerometer_parameters accelerometer;
     phototransistor phototransistor;
@@ -144,6 +144,7 @@ struct vehicle_model {
   motor_dc_parameters dc[2];
   servo_motor_parameters servo[2];
   int has_battery;
+  const vehicle_sensor *laser; /* NULL: there is none */
   energy_parameters energy;
   int noise, ends_at_collision;
   size_t sensors_count, readings;

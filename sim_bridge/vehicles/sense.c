@@ -76,7 +76,7 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
       *out = sonar_read(&sensor->as.sonar, &s->from, noise);
       break;
     case SENSOR_LASER:
-      laser_scan(sensor->as.laser, &s->from, noise, out);
+      laser_scan(s->world->laser, &s->from, noise, out);
       break;
     case SENSOR_COMPASS: {
       const compass_parameters *c = &sensor->as.compass;

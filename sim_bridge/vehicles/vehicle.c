@@ -26,9 +26,16 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   return NULL;
 }
 
+/* Frees what a world has of its own. */
+static void leave(vehicle *w) {
+  free(w->movers);
+  laser_destroy(w->laser);
+  memset(w, 0, sizeof *w);
+}
+
 void vehicles_destroy(vehicles *self) {
   if (self == NULL) return;
-  for (size_t i = 0; self->worlds != NULL && i < self->count; i++) free(self->worlds[i].movers);
+  for (size_t i = 0; self->worlds != NULL && i < self->count; i++) leave(&self->worlds[i]);
   free(self->worlds);
   free(self->slots);
   free(self->readings);
@@ -40,6 +47,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
                    double heading) {
   const vehicle_model *m = self->model;
   if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
+  if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
   if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0 || id >= FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
@@ -53,9 +61,14 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
     free(movers);
     return VEHICLE_NOT_FREE;
   }
-  free(w->movers);
-  memset(w, 0, sizeof *w);
+  laser *eye = m->laser != NULL ? laser_new(&m->laser->as.laser) : NULL;
+  if (m->laser != NULL && eye == NULL) {
+    free(movers);
+    return VEHICLE_NO_MEMORY;
+  }
+  leave(w);
   w->movers = movers;
+  w->laser = eye;
   memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
   memset(self->brains + i * self->state_size, 0, self->state_size);
   w->where = where;

@@ -106,6 +106,7 @@ typedef struct {
 
 typedef struct {
   const arena *where;
+  laser *laser;  /* NULL: the model has none */
   mover *movers; /* as many as the arena has moving shapes */
   double hold;   /* of the DC motors' friction, see motor_dc.h */
   body body;

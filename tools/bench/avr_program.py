@@ -15,8 +15,8 @@ PLATFORM_FLAGS = ["-Os", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-ffunction-s
 PLATFORM_FLAGS += ["-Wl,--gc-sections", "-Wl,--relax"]
 
 
-def flags() -> list[str]:
-    """Those of the image for the Shield-Bot, for the compiler and the linker."""
+def flags(environment: str = ENVIRONMENT) -> list[str]:
+    """Those of an image, by default the Shield-Bot's, for the compiler and the linker."""
     project = configparser.ConfigParser(interpolation=None)
     project.read(ROOT / "platformio.ini", encoding="utf-8")
 
@@ -28,13 +28,13 @@ def flags() -> list[str]:
             text = before + option(*reference.split(".")) + after
         return text
 
-    return [*PLATFORM_FLAGS, *shlex.split(option(ENVIRONMENT, "build_flags")), "-std=gnu11"]
+    return [*PLATFORM_FLAGS, *shlex.split(option(environment, "build_flags")), "-std=gnu11"]
 
 
-def build(image: Path, main: Path | None = None, extra: tuple[str, ...] = ()) -> Path:
+def build(image: Path, main: Path | None = None, extra: tuple[str, ...] = (), environment: str = ENVIRONMENT) -> Path:
     """The firmware's ELF file at `image`, with `main` in place of its main.c. Raises CalledProcessError."""
     own = SOURCES / "main.c"
     firmware = [path for path in sorted(SOURCES.rglob("*.c")) if "native" not in path.parts]
     sources = [str(main or path) if path == own else str(path) for path in firmware]
-    subprocess.run(["avr-gcc", *flags(), *extra, f"-I{SOURCES}", "-o", str(image), *sources], check=True)
+    subprocess.run(["avr-gcc", *flags(environment), *extra, f"-I{SOURCES}", "-o", str(image), *sources], check=True)
     return image

@@ -10,6 +10,7 @@
 #include "infrared.h"
 #include "light.h"
 #include "link/frame.h"
+#include "link/link.h"
 #include "link/parameters.h"
 #include "link/send.h"
 #include "link/session.h"
@@ -43,7 +44,8 @@ void devices_task(void) {
   if (since < UINT8_MAX) {
     since++;
   }
-  if (!session_is_open() || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) || !any_on() ||
+  /* Neither must it take the room that a message waits for, nor that of the next telemetry. */
+  if (!session_is_open() || link_room != 0 || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) || !any_on() ||
       !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
     return;
   }

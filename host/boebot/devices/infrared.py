@@ -1,13 +1,15 @@
 """Infra-red pairs: an LED flashes at 38 kHz, a receiver says whether something reflects it.
 
-The firmware reads both pairs every few ticks; between two readings the last one stands, with its age.
+The firmware reads both pairs every few ticks; between two readings the last one stands, with its age. With the
+parameter infrared_sweep on it flashes at 38, 39, 40, 41 and 42 kHz in turn, at which the receiver is less and less
+sensitive: the nearer the object, the more of the five show it (HARDWARE: zones of a few centimetres).
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from boebot.link.messages import Telemetry
+from boebot.link.messages import DevicesTelemetry, Telemetry
 
 NEVER = 255  # age in telemetry: never measured, or older
 STALE_PERIODS = 3  # a reading older than this many of its periods is not valid
@@ -42,3 +44,34 @@ class InfraredReader:
     def __call__(self, telemetry: Telemetry) -> Infrared:
         """The pair's last reading as of that tick."""
         return self._views[telemetry.infrared & self._bit != 0][telemetry.infrared_age]
+
+
+SWEEP_TICKS = 5  # of a whole sweep: one frequency in each
+
+
+class InfraredZone(NamedTuple):
+    """One infra-red pair's zone."""
+
+    zone: int
+    """At how many of the five frequencies something reflected the flash: 0 nothing, 5 nearest."""
+    age: float
+    """Seconds since the sweep's last flash; infinite if there was none."""
+    valid: bool
+    """The zone is fresh."""
+
+
+class InfraredZoneReader:
+    """Reads the zone of one pair; `period_ticks` as of the pairs."""
+
+    def __init__(self, left: bool, period_ticks: int, tick_s: float) -> None:
+        self._left = left
+        self._fresh = min(STALE_PERIODS * max(period_ticks, SWEEP_TICKS), NEVER - 1)
+        self._tick_s = tick_s
+
+    def __call__(self, devices: DevicesTelemetry) -> InfraredZone:
+        """The pair's last zone as of that tick."""
+        ticks = devices.infrared_zone_age
+        if ticks >= NEVER:
+            return InfraredZone(0, float("inf"), False)
+        zone = devices.infrared_zone_left if self._left else devices.infrared_zone_right
+        return InfraredZone(zone, ticks * self._tick_s, ticks <= self._fresh)

@@ -8,47 +8,46 @@
 
 struct laser {
   laser_parameters parameters;
-  beam mount; /* one ray: where the fan begins */
-  double (*directions)[2];
+  beam mount;    /* one ray, along the fan's middle */
+  scan_fan *fan; /* NULL with a single ray */
 };
 
-static int usable(const laser_parameters *p) {
-  if (p->rays < 1 || p->rays > LASER_RAYS || !(p->step >= 0.0) || !isfinite(p->first)) return 0;
-  if (!(p->range > 0.0 && p->sigma >= 0.0) || !isfinite(p->range + p->sigma)) return 0;
-  return p->step * (p->rays - 1) <= 2.0 * NUMBERS_PI + 1e-9 && fabs(p->first) <= 2.0 * NUMBERS_PI;
+int laser_check(const laser_parameters *p) {
+  if (p->rays < 1 || p->rays > LASER_RAYS || !isfinite(p->first) || !isfinite(p->x + p->y + p->height)) return -1;
+  if (!(p->step > 0.0 || (p->rays == 1 && p->step == 0.0)) || !(fabs(p->heading) <= 1e4)) return -1;
+  if (!(p->range > 0.0 && p->sigma >= 0.0) || !isfinite(p->range + p->sigma)) return -1;
+  return p->step * (p->rays - 1) < 2.0 * NUMBERS_PI && fabs(p->first) <= 2.0 * NUMBERS_PI ? 0 : -1;
 }
 
 laser *laser_new(const laser_parameters *p) {
-  laser *self = usable(p) ? calloc(1, sizeof *self) : NULL;
+  laser *self = laser_check(p) == 0 ? calloc(1, sizeof *self) : NULL;
   if (self == NULL) return NULL;
-  const beam_parameters mount = {.x = p->x, .y = p->y, .heading = p->heading, .height = p->height, .rays = 1};
+  const double heading = p->rays > 1 ? p->heading : p->heading - p->first;
+  const beam_parameters mount = {.x = p->x, .y = p->y, .heading = heading, .height = p->height, .rays = 1};
   self->parameters = *p;
-  self->directions = calloc((size_t)p->rays, sizeof *self->directions);
-  if (self->directions == NULL || beam_init(&self->mount, &mount)) {
+  if (p->rays > 1) self->fan = scan_fan_new(-p->first, (p->rays - 1) * p->step - p->first, (size_t)p->rays);
+  if ((p->rays > 1 && self->fan == NULL) || beam_init(&self->mount, &mount)) {
     laser_destroy(self);
     return NULL;
-  }
-  for (int i = 0; i < p->rays; i++) {
-    const double angle = p->heading - p->first + (double)i * p->step;
-    number_sincos(angle, &self->directions[i][1], &self->directions[i][0]);
   }
   return self;
 }
 
 void laser_destroy(laser *self) {
   if (self == NULL) return;
-  free(self->directions);
+  scan_fan_destroy(self->fan);
   free(self);
 }
 
-void laser_scan(const laser *self, const viewpoint *from, noise_source *noise, double *distances) {
+void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double *distances) {
   const laser_parameters *p = &self->parameters;
   const beam_origin at = beam_from(&self->mount, from);
-  for (int i = 0; i < p->rays; i++) {
-    const double *direction = self->directions[i];
-    const double cosine = from->cosine * direction[0] - from->sine * direction[1];
-    const double sine = from->sine * direction[0] + from->cosine * direction[1];
-    distances[i] = scene_ray(from->around, at.x, at.y, cosine, sine, p->range, p->height, from->id, NULL);
+  if (self->fan == NULL) {
+    distances[0] = beam_ray(&self->mount, from, at, 0, p->range, NULL);
+  } else {
+    double cosine, sine;
+    beam_direction(&self->mount, from, 0, &cosine, &sine);
+    scan_look(self->fan, from->around, at.x, at.y, cosine, sine, p->range, p->height, from->id, distances);
   }
   if (p->sigma <= 0.0 || !noise->on) return;
   for (int i = 0; i < p->rays; i++) {

@@ -6,6 +6,7 @@
 #ifndef SENSORS_LASER_H
 #define SENSORS_LASER_H
 
+#include "../scan.h"
 #include "beam.h"
 
 #define LASER_RAYS 4096
@@ -22,12 +23,15 @@ typedef struct {
 
 typedef struct laser laser;
 
-/* A laser, or NULL without memory or where a number is not finite, negative or the fan wider than a turn. */
+/* 0, or -1: a number is not finite, negative or the fan wider than a turn. */
+int laser_check(const laser_parameters *parameters);
+
+/* A laser; it serves one thread at a time. NULL without memory or with bad parameters. */
 laser *laser_new(const laser_parameters *parameters);
 void laser_destroy(laser *self);
 
 /* One scan into `distances`, as many as there are rays. */
-void laser_scan(const laser *self, const viewpoint *from, noise_source *noise, double *distances);
+void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double *distances);
 /* python: end */
 
 #endif

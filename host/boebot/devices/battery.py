@@ -1,0 +1,39 @@
+"""Battery: the pack's voltage behind a divider, against the supply.
+
+voltage = ratio · result / 1024 · supply
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from boebot.devices.analog import READ_TICKS, voltage
+from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.link.messages import DevicesTelemetry
+
+
+class Battery(NamedTuple):
+    """The pack."""
+
+    voltage: float | None
+    """Volts of the pack, or None if nothing was measured yet."""
+    age: float
+    """Seconds since it was measured; infinite if never."""
+    valid: bool
+    """The measurement is fresh."""
+
+
+class BatteryReader:
+    """Reads the pack; `ratio`: its voltage for each volt at the pin."""
+
+    def __init__(self, ratio: float, tick_s: float) -> None:
+        self._ratio = ratio
+        self._tick_s = tick_s
+
+    def __call__(self, devices: DevicesTelemetry) -> Battery:
+        """The last measurement as of that tick."""
+        ticks = devices.battery_age
+        at_pin = voltage(devices.battery, devices.supply)
+        if ticks >= NEVER or at_pin is None:
+            return Battery(None, float("inf"), False)
+        return Battery(at_pin * self._ratio, ticks * self._tick_s, ticks <= STALE_PERIODS * READ_TICKS)

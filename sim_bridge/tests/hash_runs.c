@@ -1,0 +1,126 @@
+/* hash_runs.c: runs worlds of every sensor and both drives and prints a hash of each. The test compiles it with several
+ * compilers and options: the hashes are the same. */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "../vehicles/vehicle.h"
+#include "../vehicles/wander.h"
+
+#define WORLDS 6
+#define STEPS 600
+
+static arena *room(void) {
+  static const double outline[] = {-1.8, -1.8, 1.8, -1.8, 1.8, 1.8, -1.8, 1.8};
+  static const double pillar[] = {-0.9, 0.7, -0.7, 0.7, -0.7, 0.9, -0.9, 0.9};
+  static const path_waypoint there_and_back[] = {{0.0, 1.0, -1.2, 0.0}, {4.0, 1.0, 1.2, 3.0}};
+  arena *where = arena_new();
+  arena_add_polygon(where, outline, 4, ARENA_OUTLINE, NULL);
+  arena_add_polygon(where, pillar, 4, ARENA_OBSTACLE, NULL);
+  arena_add_disc(where, 0.8, -0.8, 0.15, NULL);
+  arena_add_light(where, 1.5, 1.5, 0.3, 2.0);
+  arena_add_moving(where, pillar, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);
+  arena_build(where);
+  return where;
+}
+
+static int add_sensors(vehicle_model *m) {
+  const beam_parameters look = {.x = 0.1, .heading = 0.4, .opening = 0.5, .height = 0.06, .rays = 3};
+  beam_parameters right = look;
+  right.heading = -0.4;
+  int bad = 0;
+  for (int side = 0; side < 2; side++) {
+    const infrared_proximity_parameters ir = {
+        .beam = side ? right : look, .range = 1.0, .c1 = 0.03, .c2 = 0.1, .sigma = 0.01};
+    bad |= vehicle_model_add_infrared_proximity(m, &ir, 0.0) < 0;
+  }
+  bad |= vehicle_model_add_sonar(m,
+                                 &(sonar_parameters){.beam = look,
+                                                     .range_minimum = 0.02,
+                                                     .range_maximum = 3.0,
+                                                     .sigma = 0.01,
+                                                     .miss = 0.02,
+                                                     .grazing_cosine = 0.7},
+                                 0.05) < 0;
+  bad |= vehicle_model_add_sharp_infrared(
+             m, &(sharp_infrared_parameters){
+                    .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076}) < 0;
+  bad |= vehicle_model_add_laser(
+             m, &(laser_parameters){.first = 2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
+  bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01}, 0.0) < 0;
+  bad |= vehicle_model_add_accelerometer(m, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1}, 0.0) < 0;
+  bad |=
+      vehicle_model_add_phototransistor(
+          m, &(phototransistor_parameters){.near_distance = 0.05, .gain = 1.0, .sigma = 0.01, .height = 0.09}, 0.0) < 0;
+  bad |= vehicle_model_add_odometer(m, &(odometer_parameters){.half_track = 0.05,
+                                                              .wheel_radius = 0.033,
+                                                              .factor_left = 1.01,
+                                                              .factor_right = 0.99,
+                                                              .sigma_share = 0.01,
+                                                              .edges_per_turn = 64.0,
+                                                              .slips_per_s = 0.1,
+                                                              .slip_share = 1.0}) < 0;
+  bad |= vehicle_model_add_whisker(m, 0.05, 0.03, 0.12, 0.06) < 0;
+  return bad;
+}
+
+static vehicle_model *model(int servos) {
+  const body_parameters small = {.mass = 0.6,
+                                .inertia = 1.2e-3,
+                                .radius = 0.07,
+                                .half_track = 0.0525,
+                                .wheel_radius = 0.0331,
+                                .wheel_mass = 0.03,
+                                .wheel_inertia = 1.7e-5,
+                                .linear_damping = 1.0,
+                                .angular_damping = 0.004,
+                                .grip = 0.7,
+                                .slip = servos};
+  const body_parameters large = {.mass = 3.0,
+                                 .inertia = 0.2,
+                                 .radius = 0.2,
+                                 .half_track = 0.2,
+                                 .wheel_radius = 0.1,
+                                 .linear_damping = 1.0,
+                                 .angular_damping = 0.1,
+                                 .grip = 0.7};
+  servo_motor_parameters left = {.mount = 1.0,
+                                 .wheel_radius = 0.0331,
+                                 .centre_us = 1502.0,
+                                 .dead_band_us = 9.0,
+                                 .top_ccw_rad_s = 5.4,
+                                 .scale_ccw_us = 78.5,
+                                 .top_cw_rad_s = 5.2,
+                                 .scale_cw_us = 75.0,
+                                 .lag_s = 0.055,
+                                 .motor = {1.2, 0.268, 0.3, 0.05}};
+  servo_motor_parameters right = left;
+  right.mount = -1.0;
+  vehicle_model *m = vehicle_model_new(servos ? &small : &large, servos ? 0.001 : 0.01);
+  motor_dc_parameters dc;
+  motor_dc_default(&dc);
+  const int driven = servos ? vehicle_model_drive_servo(m, &left, &right) : vehicle_model_drive_dc(m, &dc, &dc, 1);
+  const energy_parameters energy = {0.002, 0.004, 0.1};
+  const int bad = add_sensors(m) || vehicle_model_battery(m, &energy, 5.0, 7.75, 0.005) < 0 || driven != VEHICLE_OK;
+  vehicle_model_switch(m, 1, 0);
+  if (bad) printf("bad model\n");
+  return m;
+}
+
+int main(void) {
+  arena *where = room();
+  for (int servos = 0; servos < 2; servos++) {
+    vehicle_model *m = model(servos);
+    vehicles *worlds = vehicles_new(m, WORLDS, sizeof(vehicle_wander_state));
+    for (size_t i = 0; i < WORLDS; i++) {
+      if (vehicles_place(worlds, i, where, 100 + i, (uint32_t)i + 1, -0.5 + 0.1 * (double)i, 0.0, (double)i))
+        printf("not placed\n");
+      ((vehicle_wander_state *)vehicles_brain_state(worlds, i))->seed = i;
+    }
+    if (vehicles_run(worlds, 0, WORLDS, vehicle_wander, STEPS) != VEHICLE_OK) printf("bad run\n");
+    for (size_t i = 0; i < WORLDS; i++) printf("%016" PRIx64 "\n", vehicles_hash(worlds, i));
+    vehicles_destroy(worlds);
+    vehicle_model_destroy(m);
+  }
+  arena_destroy(where);
+  return 0;
+}

@@ -1,0 +1,175 @@
+"""Batches of worlds: the same bits whatever the batch's size, order and threads, whatever compiler built the core."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boebot.errors import ArenaError, BrainError, RobotError
+from sim_bridge._core import ffi, lib
+from sim_bridge.arena import load_arena
+from sim_bridge.batch import Batch
+from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.vehicle import Vehicle, VehicleModel, arsim, beam
+
+HERE = Path(__file__).resolve().parent
+STARTS = np.array([[0.1 * (k % 5) - 0.2, 0.1 * (k % 3), 0.7 * k] for k in range(12)])
+
+
+def model() -> VehicleModel:
+    built = arsim(odometer_sigma=1e-3, ends_at_collision=False)
+    built.sonar("sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
+    return built
+
+
+def driven(worlds: list[int], threads: int = 1, chunk: int = 50) -> dict[int, int]:
+    """Hash of each of those worlds after 300 steps under signals of its own."""
+    batch = Batch(model(), load_arena("arsim"), STARTS[worlds], np.array(worlds) + 5, threads=threads)
+    signals = np.array([[0.5 + 0.03 * k, 0.7 - 0.05 * k] for k in worlds])
+    for _ in range(300 // chunk):
+        batch.step(signals, chunk)
+    return dict(zip(worlds, batch.hashes().tolist(), strict=True))
+
+
+def test_a_world_is_the_same_whatever_the_batch_order_and_threads() -> None:
+    everyone = list(range(12))
+    truth = driven(everyone)
+    assert len(set(truth.values())) == 12
+    assert driven(everyone[::-1]) == truth
+    assert driven(everyone, threads=3) == truth and driven(everyone, threads=20) == truth
+    assert driven(everyone, chunk=1) == truth
+    for few in ([7], [3, 11], [0, 5, 9, 2]):
+        assert driven(few) == {k: truth[k] for k in few}
+
+
+def test_a_world_of_a_batch_is_a_single_vehicle() -> None:
+    vehicle = Vehicle(model(), load_arena("arsim"), pose=STARTS[4], seed=9)
+    for _ in range(300):
+        vehicle.step(0.5 + 0.03 * 4, 0.7 - 0.05 * 4)
+    assert vehicle.hash() == driven([4])[4]
+
+
+def test_arrays_in_and_out() -> None:
+    batch = Batch(arsim(noise=False), arena_of(outline=square(0, 0, 30)), STARTS, np.arange(12))
+    before = batch.readings.copy()
+    assert batch.readings.shape == (12, 6) and before[:, 2:5] == pytest.approx(batch.poses)
+    readings = batch.step(np.full((12, 2), 0.5), 100)
+    assert readings is batch.readings and not np.array_equal(readings, before)
+    assert batch.poses.shape == (12, 3) and batch.flags.tolist() == [0] * 12 and batch.steps.tolist() == [100] * 12
+    travel = np.hypot(*(batch.poses - STARTS)[:, :2].T)
+    assert travel == pytest.approx(np.full(12, travel[0]), rel=1e-9) and batch.bytes_per_world < 4096
+    with pytest.raises(ValueError, match="read-only"):
+        readings[0, 0] = 1.0
+
+
+def test_each_world_has_its_own_arena_and_its_own_end() -> None:
+    near, far = (arena_of([(x, -5), (x + 1, -5), (x + 1, 5), (x, 5)]) for x in (1.0, 20.0))
+    batch = Batch(arsim(noise=False), [near, far, near], np.zeros((3, 3)), [1, 2, 3])
+    batch.step(np.ones((3, 2)), 400)
+    assert batch.flags.tolist() == [lib.VEHICLE_COLLIDED, lib.VEHICLE_RUNS, lib.VEHICLE_COLLIDED]
+    assert batch.poses[0, 0] == pytest.approx(0.8) and batch.poses[1, 0] > 4
+    assert batch.steps[1] == 400 > batch.steps[0] == batch.steps[2]
+
+
+def wandering(threads: int) -> Batch:
+    batch = Batch(model(), load_arena("arsim"), STARTS, np.arange(12), threads=threads)
+    for index in range(12):
+        batch.state(index, "vehicle_wander_state *").seed = index
+    batch.run(ffi.addressof(lib, "vehicle_wander"), 500)
+    return batch
+
+
+def test_a_compiled_brain_drives_and_is_saved_with_its_world() -> None:
+    whole = wandering(1)
+    assert wandering(2).hashes().tolist() == whole.hashes().tolist()
+    state = whole.save(3)
+    whole.run(ffi.addressof(lib, "vehicle_wander"), 200)
+    other = wandering(1)
+    other.restore(8, state)
+    other.run(ffi.addressof(lib, "vehicle_wander"), 200)
+    assert other.hashes()[8] == whole.hashes()[3]
+    with pytest.raises(RobotError, match="no saved state"):
+        other.restore(0, state[:-8])
+
+
+@ffi.callback("vehicle_brain")  # type: ignore[untyped-decorator]
+def counting_brain(state: object, readings: object, signals: object) -> None:
+    count = ffi.cast("int64_t *", state)
+    left_right = ffi.cast("double *", signals)
+    count[0] += 1
+    left_right[0], left_right[1] = 0.5, 0.4 + 1e-3 * count[0]
+    if count[0] > 40:
+        left_right[0] = math.nan
+
+
+def test_a_brain_by_its_address_is_asked_in_every_step() -> None:
+    """As numba's cfunc gives it; the same signals given from outside make the same run. Not a number ends it."""
+    batch = Batch(model(), load_arena("arsim"), STARTS[:2], [5, 6])
+    batch.run(int(ffi.cast("intptr_t", counting_brain)), 40)
+    other = Batch(model(), load_arena("arsim"), STARTS[:2], [5, 6])
+    for step in range(40):
+        other.step([[0.5, 0.4 + 1e-3 * (step + 1)]] * 2)
+    assert batch.hashes().tolist() == other.hashes().tolist()
+    assert [batch.state(k, "int64_t *")[0] for k in range(2)] == [40, 40]
+    with pytest.raises(BrainError, match="finite"):
+        batch.run(counting_brain, 3)
+    assert batch.steps.tolist() == [40, 40]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_bad_input_is_refused_and_moves_nothing(threads: int) -> None:
+    batch = Batch(model(), load_arena("arsim"), STARTS, np.arange(12), threads=threads)
+    before = batch.hashes().tolist()
+    signals = np.zeros((12, 2))
+    signals[11, 1] = math.nan
+    with pytest.raises(BrainError, match="finite"):
+        batch.step(signals)
+    with pytest.raises(RobotError, match=r"expected shape \(12, 2\)"):
+        batch.step(np.zeros((11, 2)))
+    assert batch.hashes().tolist() == before
+    with pytest.raises(ArenaError, match="no free space"):
+        Batch(model(), load_arena("arsim"), [[9, 9, 0]], [1])
+    with pytest.raises(RobotError, match="expected shapes"):
+        Batch(model(), load_arena("arsim"), [[0, 0, 0]], [1, 2])
+    with pytest.raises(RobotError, match="arenas"):
+        Batch(model(), [load_arena("arsim")] * 2, [[0, 0, 0]], [1])
+
+
+def test_an_empty_batch() -> None:
+    batch = Batch(model(), load_arena("arsim"), np.zeros((0, 3)), np.zeros(0, dtype=int))
+    assert batch.step(np.zeros((0, 2)), 5).shape == (0, 7) and batch.hashes().size == 0
+
+
+# ---- the same bits from every compiler -------------------------------------------------------------------------------
+
+# Of hash_runs.c, as one number. It changes with every change of the world's behaviour, and then is to be renewed.
+RUNS_HASH = 0
+
+
+def hashes_by(folder: Path, compiler: str, optimisation: str) -> list[str]:
+    """Prints of hash_runs.c, built by that compiler."""
+    program = folder / f"{compiler}{optimisation}"
+    core = HERE.parent
+    sources = [path for room in ("vehicles", "world", "world/sensors") for path in sorted((core / room).glob("*.c"))]
+    command = [compiler, "-std=gnu11", optimisation, "-ffp-contract=off", str(HERE / "hash_runs.c"), *map(str, sources)]
+    subprocess.run([*command, "-lm", "-o", str(program)], check=True)
+    return subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.split()
+
+
+def test_every_compiler_gives_the_same_bits(tmp_path: Path) -> None:
+    builds = [(c, o) for c in ("gcc", "clang") if shutil.which(c) for o in ("-O0", "-O2")]
+    assert builds, "expected gcc or clang"
+    with ThreadPoolExecutor() as pool:
+        results = list(pool.map(lambda build: hashes_by(tmp_path, *build), builds))
+    assert all(len(line) == 16 for line in results[0]) and len(set(results[0])) == 12
+    assert all(result == results[0] for result in results)
+    together = 0
+    for line in results[0]:
+        together = (together * 31 + int(line, 16)) % 2**64
+    assert together == RUNS_HASH, hex(together)
