@@ -138,8 +138,8 @@ static inline uint64_t part_step_end(const part *self) { return self->chassis->s
  * on a turret, where a body would be that carries the part turned so. */
 viewpoint part_view(const part *self, uint64_t cycle);
 
-/* Logs what a range sensor of that kind saw: `beam` as its parameters have it. */
-void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *beam,
+/* Logs what a range sensor of that kind saw: `mount` as its parameters have it. */
+void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *mount,
                    double reach, double distance);
 
 #endif

@@ -16,10 +16,10 @@ static void change(whisker *self, uint64_t cycle, uint8_t level) {
   double length = -self->parameters.bounce_s * number_log(1.0 - noise_next_uniform(noise));
   if (length > 5.0 * self->parameters.bounce_s) length = 5.0 * self->parameters.bounce_s;
   const int flicks = (int)(noise_next_uniform(noise) * (BOUNCES_MAXIMUM + 1));
-  const double part = length * BOARD_CLOCK_HZ / (2.0 * BOUNCES_MAXIMUM);
+  const double share = length * BOARD_CLOCK_HZ / (2.0 * BOUNCES_MAXIMUM);
   double at = (double)cycle;
   for (int i = 0; i < 2 * flicks; i++) {
-    at += 16.0 + part * 2.0 * noise_next_uniform(noise);
+    at += 16.0 + share * 2.0 * noise_next_uniform(noise);
     part_drive(&self->part, (uint64_t)at, pin, (i & 1) ? level : (uint8_t)!level);
   }
 }
