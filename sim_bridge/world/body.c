@@ -98,12 +98,18 @@ double body_wheel_hold(const body *self, double dt) {
 
 /* ---- what is near -------------------------------------------------------------------------------------------------- */
 
-void body_look_around(body *self, const arena *where, double share) {
-  body_surroundings *near = &self->near;
+/* 1 if the lists are good while the body is within `share` of their slack. */
+static inline int knows(const body *self, const arena *where, double share) {
+  const body_surroundings *near = &self->near;
   const double dx = self->state.x - near->x;
   const double dy = self->state.y - near->y;
   const double good = share * near->slack;
-  if (near->version == arena_version(where) && good > 0.0 && dx * dx + dy * dy < good * good) return;
+  return good > 0.0 && dx * dx + dy * dy < good * good && near->version == arena_version(where);
+}
+
+void body_look_around(body *self, const arena *where, double share) {
+  if (knows(self, where, share)) return;
+  body_surroundings *near = &self->near;
   near->x = self->state.x;
   near->y = self->state.y;
   near->version = arena_version(where);
@@ -134,7 +140,7 @@ const uint32_t *body_near_discs(const body *self, const arena *where, size_t *co
 }
 
 int body_is_clear(body *self, const arena *where) {
-  body_look_around(self, where, 1.0);
+  if (!knows(self, where, 1.0)) body_look_around(self, where, 1.0);
   return self->near.edge_count == 0 && self->near.disc_count == 0;
 }
 
@@ -252,15 +258,18 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
 
 /* ---- steps -------------------------------------------------------------------------------------------------------- */
 
-/* 1 if nothing can come within the body's reach during the step: it ends within the clear circle around it, which holds
- * its straight way, and no mover is near. */
-static int stays_clear(body *self, const scene *around, double dt) {
+static inline double way_of(const body *self, double dt) {
+  const body_state *s = &self->state;
+  if (s->lateral == 0.0) return fabs(s->speed) * dt;
+  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
+}
+
+/* 1 if nothing can come within the body's reach during the step, in which its middle moves by `way`: it stays within the
+ * clear circle around where it looked, and no mover is near. */
+static int stays_clear(body *self, const scene *around, double way, double dt) {
   const body_state *s = &self->state;
   const body_surroundings *near = &self->near;
-  const double vx = s->speed * s->cosine - s->lateral * s->sine;
-  const double vy = s->speed * s->sine + s->lateral * s->cosine;
   if (!body_is_clear(self, around->arena)) return 0;
-  const double way = sqrt(vx * vx + vy * vy) * dt;
   const double dx = s->x - near->x;
   const double dy = s->y - near->y;
   const double room = near->slack - way;
@@ -277,46 +286,55 @@ static int stays_clear(body *self, const scene *around, double dt) {
 }
 
 /* Heading, then position, (3.18)-(3.22), where nothing is in the way. */
-static void move_freely(body *self, double dt) {
+static void move_freely(body *self, double way, double dt) {
   body_state *s = &self->state;
   contact_turn(self, s->turn_rate * dt);
   s->x += (s->speed * s->cosine - s->lateral * s->sine) * dt;
   s->y += (s->speed * s->sine + s->lateral * s->cosine) * dt;
+  s->distance += way;
   s->touching = 0;
 }
 
-static void finish(body *self, double from_x, double from_y, double dt) {
+static void move_in_contact(body *const bodies[], size_t count, const scene *around, double dt) {
+  double from[BODY_MAXIMUM][2];
+  for (size_t i = 0; i < count; i++) {
+    from[i][0] = bodies[i]->state.x;
+    from[i][1] = bodies[i]->state.y;
+  }
+  contact_move(bodies, count, around, dt);
+  for (size_t i = 0; i < count; i++) {
+    body_state *s = &bodies[i]->state;
+    s->distance += sqrt((s->x - from[i][0]) * (s->x - from[i][0]) + (s->y - from[i][1]) * (s->y - from[i][1]));
+  }
+}
+
+static void move_alone(body *self, const scene *around, double dt) {
+  const double way = way_of(self, dt);
+  if (stays_clear(self, around, way, dt)) {
+    move_freely(self, way, dt);
+  } else {
+    move_in_contact(&self, 1, around, dt);
+  }
+}
+
+static void turn_wheels(body *self, double dt) {
   body_state *s = &self->state;
-  const double dx = s->x - from_x;
-  const double dy = s->y - from_y;
-  s->distance += sqrt(dx * dx + dy * dy);
   if (!s->slipping) { /* rolling without slip, (2.16), (2.17) */
     s->rim_left = body_left_speed(self);
     s->rim_right = body_right_speed(self);
   }
-  s->wheel_left += s->rim_left * self->per_radius * dt;
-  s->wheel_right += s->rim_right * self->per_radius * dt;
+  const double angle = self->per_radius * dt;
+  s->wheel_left += s->rim_left * angle;
+  s->wheel_right += s->rim_right * angle;
 }
 
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
   const double torque[2] = {torque_left, torque_right};
   if (!(dt > 0.0)) return BODY_BAD_STEP;
-  const double from_x = self->state.x;
-  const double from_y = self->state.y;
   drive(self, around, torque, dt);
-  if (stays_clear(self, around, dt)) {
-    move_freely(self, dt);
-  } else {
-    contact_move(&self, 1, around, dt);
-  }
-  finish(self, from_x, from_y, dt);
+  move_alone(self, around, dt);
+  turn_wheels(self, dt);
   return BODY_OK;
-}
-
-/* Distance that a body's farthest point may cover in a step, at least. */
-static double way_of(const body *self, double dt) {
-  const body_state *s = &self->state;
-  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
 }
 
 /* Numbers the groups of robots that could meet within the step: each gets the least place of its group. */
@@ -363,11 +381,8 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
-  double from[BODY_MAXIMUM][2];
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
-    from[i][0] = sorted[i]->state.x;
-    from[i][1] = sorted[i]->state.y;
     drive(sorted[i], around, torques[order[i]], dt);
   }
   find_groups(sorted, count, dt, group);
@@ -377,12 +392,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     for (size_t k = i; k < count; k++) {
       if (group[k] == i) together[members++] = sorted[k];
     }
-    if (members == 1 && stays_clear(sorted[i], around, dt)) {
-      move_freely(sorted[i], dt);
+    if (members == 1) {
+      move_alone(sorted[i], around, dt);
     } else {
-      contact_move(together, members, around, dt);
+      move_in_contact(together, members, around, dt);
     }
   }
-  for (size_t i = 0; i < count; i++) finish(sorted[i], from[i][0], from[i][1], dt);
+  for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
   return BODY_OK;
 }
