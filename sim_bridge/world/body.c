@@ -231,7 +231,7 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2];
-  if (!s->slipping) {
+  if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     double speed = s->speed + dt * (self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed);
     double turn_rate =
         s->turn_rate + dt * (self->torque_gain * (torque[1] - torque[0]) - self->turn_drag * s->turn_rate);
