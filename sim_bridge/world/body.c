@@ -206,7 +206,7 @@ static void slide(body *self, const scene *around, const double limits[2], const
     if (at.count > 0) change += contact_stop(self, &at, dt);
     if (change < SLIP_SETTLED) break;
   }
-  ground_end(&floor, self);
+  ground_end(&floor, self, dt);
 }
 
 /* Rolling for certain (slip switched off), held across the heading by friction that something may have overcome. */

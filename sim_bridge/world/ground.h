@@ -48,7 +48,7 @@ void ground_begin(ground *self, body *of, const double limits[2], double torque_
 /* One round of the floor's answer. Returns by how much it changed a speed, m/s. */
 double ground_round(ground *self, body *of);
 
-/* The body rolls again if both tyres hold. */
-void ground_end(const ground *self, body *of);
+/* The body rolls again if both tyres hold, and could hold it on its curve. */
+void ground_end(const ground *self, body *of, double dt);
 
 #endif
