@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from sim_bridge._core import ffi, lib
 from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body, World, constant
 
-FREE = {"linear_damping": 0.0, "angular_damping": 0.0}
+FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
 
 
 def coefficients(parameters: dict[str, Any]) -> tuple[float, float]:
@@ -88,7 +88,7 @@ def drive_arsim(left: float, right: float, seconds: float, dt: float = 0.01) -> 
             lib.motor_dc_torque(motor, lib.motor_dc_voltage(motor, signal), rim / ARSIM["wheel_radius"], 0.0)
             for signal, rim in ((left, body.state.rim_left), (right, body.state.rim_right))
         ]
-        body.advance(*torques, dt=dt)
+        body.advance(torques[0], torques[1], dt=dt)
         rows.append((body.state.speed, body.state.turn_rate))
     return body, rows
 
@@ -126,6 +126,18 @@ def test_e07_circle_closes_around_its_centre_of_rotation() -> None:
     assert (max(ys) - min(ys)) / 2 == pytest.approx(0.2625, abs=0.0005)
     assert (max(ys) + min(ys)) / 2 == pytest.approx(0.2625, abs=0.0005)
     assert body.state.distance == pytest.approx(2 * math.pi * 0.2625, rel=1e-3)
+
+
+def test_parameters_that_describe_no_body_are_named() -> None:
+    good = ffi.new("body_parameters *", BOE_BOT)
+    assert lib.body_parameters_wrong(good) == ffi.NULL
+    wrong: list[tuple[str, float]] = [
+        ("mass", 0.0), ("inertia", -1.0), ("radius", 0.0), ("half_track", math.nan), ("wheel_radius", math.inf),
+        ("wheel_mass", -0.1), ("spin_inertia", math.nan), ("linear_damping", -1.0), ("grip", -0.5),
+    ]  # fmt: skip
+    for name, value in wrong:
+        bad = ffi.new("body_parameters *", {**BOE_BOT, name: value})
+        assert ffi.string(lib.body_parameters_wrong(bad)).decode() == name
 
 
 def test_coasting_decays_exponentially() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -13,8 +14,8 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.tests.bodies import BOE_BOT, CHASSIS, RADIUS, Body, World, constant
 from sim_bridge.tests.simulated import arena_of, square
 
-FREE = {"linear_damping": 0.0, "angular_damping": 0.0}
-ICE = {**FREE, "grip": 0.0}
+FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
+ICE: dict[str, Any] = {**FREE, "grip": 0.0}
 
 poses = st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-math.pi, math.pi))
 speeds = st.tuples(st.floats(-2, 2), st.floats(-6, 6))
@@ -190,6 +191,9 @@ def test_bad_steps_are_told_and_move_nothing() -> None:
     assert world.step([(0, 0), (0, 0)], 0.01) == lib.BODY_SAME_ID
     assert world.step([(0, 0), (0, 0)], 0.0) == lib.BODY_BAD_STEP
     assert world.step([(0, 0), (0, 0)], math.nan) == lib.BODY_BAD_STEP
+    for wrong in (math.nan, math.inf, -math.inf):
+        assert world.step([(0, 0), (0, wrong)], 0.01) == lib.BODY_BAD_TORQUE
+        assert lib.body_advance(b.body, b.scene, wrong, 0.0, 0.01) == lib.BODY_BAD_TORQUE
     many = World([Body(robot=i) for i in range(lib.BODY_MAXIMUM + 1)])
     assert many.step([(0, 0)] * (lib.BODY_MAXIMUM + 1), 0.01) == lib.BODY_TOO_MANY
     assert world.bits() == before

@@ -16,7 +16,7 @@ from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body, constant
 from sim_bridge.tests.simulated import arena_of, square
 
 G = 9.81
-FREE = {"linear_damping": 0.0, "angular_damping": 0.0}
+FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
 MASS = 0.6 + 2 * 0.03
 SPIN = 1e-4 / 0.0333**2  # with spin_inertia 1e-4: mass of a wheel's turning at the rim
 

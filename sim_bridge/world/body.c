@@ -16,6 +16,31 @@
 #define SLIP_SETTLED 1e-12 /* m/s */
 #define SPIN_SHARE 0.1     /* least spin inertia of a slipping wheel / M r^2 */
 
+const char *body_parameters_wrong(const body_parameters *p) {
+  const struct {
+    const char *name;
+    double value;
+    int may_be_zero;
+  } all[] = {
+      {"mass", p->mass, 0},
+      {"inertia", p->inertia, 0},
+      {"radius", p->outline != NULL ? p->outline->reach : p->radius, 0},
+      {"half_track", p->half_track, 0},
+      {"wheel_radius", p->wheel_radius, 0},
+      {"wheel_mass", p->wheel_mass, 1},
+      {"wheel_inertia", p->wheel_inertia, 1},
+      {"spin_inertia", p->spin_inertia, 1},
+      {"linear_damping", p->linear_damping, 1},
+      {"angular_damping", p->angular_damping, 1},
+      {"grip", p->grip, 1},
+  };
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    const double value = all[i].value;
+    if (!(value < 1e12) || !(all[i].may_be_zero ? value >= 0.0 : value > 0.0)) return all[i].name;
+  }
+  return NULL;
+}
+
 double body_a(const body_parameters *p) { /* (2.26) */
   const double r = p->wheel_radius;
   return 1.0 / (r * (1.0 + 2.0 * (p->wheel_inertia / (p->mass * r * r) + p->wheel_mass / p->mass)));
@@ -317,6 +342,8 @@ static void move_alone(body *self, const scene *around, double dt) {
   }
 }
 
+static int is_finite(double left, double right) { return fabs(left) + fabs(right) < 1e300; }
+
 static void turn_wheels(body *self, double dt) {
   body_state *s = &self->state;
   if (!s->slipping) { /* rolling without slip, (2.16), (2.17) */
@@ -330,7 +357,8 @@ static void turn_wheels(body *self, double dt) {
 
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
   const double torque[2] = {torque_left, torque_right};
-  if (!(dt > 0.0)) return BODY_BAD_STEP;
+  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
+  if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
   drive(self, around, torque, dt);
   move_alone(self, around, dt);
   turn_wheels(self, dt);
@@ -373,8 +401,11 @@ static int sort(body *const bodies[], size_t count, size_t order[]) {
 
 int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt) {
   if (count == 1) return body_advance(bodies[0], around, torques[0][0], torques[0][1], dt);
-  if (!(dt > 0.0)) return BODY_BAD_STEP;
+  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
   if (count > BODY_MAXIMUM) return BODY_TOO_MANY;
+  for (size_t i = 0; i < count; i++) {
+    if (!is_finite(torques[i][0], torques[i][1])) return BODY_BAD_TORQUE;
+  }
   size_t order[BODY_MAXIMUM];
   const int status = sort(bodies, count, order);
   if (status != BODY_OK) return status;
