@@ -1,86 +1,136 @@
-"""Arenas: where walls and obstacles are and where a robot starts, read from `arenas/*.toml`.
+"""Arenas: where things are and where a robot starts, read from `arenas/*.toml`, and what can be asked of them.
 
-Lengths in m, angles in rad. A wrong file gets one sentence that names the file, the key and what was expected.
+Lengths in m, angles in rad. A wrong file gets one sentence that names file, line, key and what was expected.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from boebot import toml_files
 from boebot.errors import ArenaError
 from sim_bridge._core import ffi, lib
+from sim_bridge.arena_description import (
+    ArenaDescription,
+    Disc,
+    Moving,
+    Point,
+    Polygon,
+    Start,
+    Wall,
+    DescriptionError,
+    check,
+)
 
-Point = tuple[float, float]
+__all__ = ["Arena", "ArenaDescription", "Floats", "Point", "Polygon", "Start", "arena_names", "load_arena"]
+
 Floats = NDArray[np.float64]
-
-EXTENT_M = 1000.0  # nothing lies farther from the origin
-
-
-class Start(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Where a robot starts."""
-
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_rad: float = 0.0
-
-
-class Polygon(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A closed polygon; its last corner joins the first."""
-
-    corners_m: list[Point]
-    name: str = ""
-
-
-class ArenaDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What an arena file says."""
-
-    name: str
-    title: str = ""
-    start: Start = Start()
-    outline: list[Polygon] = msgspec.field(default_factory=list)
-    obstacle: list[Polygon] = msgspec.field(default_factory=list)
+REPEATS = {"loop": lib.PATH_LOOP, "back_and_forth": lib.PATH_BACK_AND_FORTH, "once": lib.PATH_ONCE}
+DISC_CORNERS = 48  # of a disc as it is drawn
 
 
 class Arena:
-    """An arena that rays and robots can meet. Polygons are numbered outlines first, then obstacles."""
+    """An arena that rays and robots can meet. Shapes are numbered outlines, obstacles, walls, discs, in this order.
 
-    def __init__(self, description: ArenaDescription, file: str = "arena") -> None:
-        """Raises ArenaError where a polygon is none."""
+    It does not change, and any number of simulations may share it.
+
+    Attributes:
+        handle: the C core's `arena *`.
+    """
+
+    def __init__(self, description: ArenaDescription, where: Callable[[str], str] = lambda place: "arena") -> None:
+        """`where`: the file, and the line of a place in it.
+
+        Raises:
+            ArenaError: a polygon is none, a number is not finite, a path goes back in time.
+        """
+        try:
+            check(description)
+        except DescriptionError as error:
+            raise ArenaError(f"{where(error.place)}: {error}") from None
         self.description = description
         self.name = description.name
         self._polygons: list[Floats] = []
         self._numbers: dict[str, int] = {}
         self.handle = ffi.gc(lib.arena_new(), lib.arena_destroy)
-        for kind, key, polygons in (
-            (lib.ARENA_OUTLINE, "outline", description.outline),
-            (lib.ARENA_OBSTACLE, "obstacle", description.obstacle),
-        ):
-            for index, polygon in enumerate(polygons):
-                _check_polygon(polygon.corners_m, f"{file}: {key}[{index}].corners_m")
-                self._add(polygon, kind)
+        for outline in description.outline:
+            self._add_polygon(outline, lib.ARENA_OUTLINE)
+        for obstacle in description.obstacle:
+            self._add_polygon(obstacle, lib.ARENA_OBSTACLE)
+        for wall in description.wall:
+            self._add_wall(wall)
+        for disc in description.disc:
+            self._added(lib.arena_add_disc(self.handle, disc.x_m, disc.y_m, disc.radius_m, _surface(disc)), disc)
+            self._polygons.append(_ring(disc.radius_m) + np.array((disc.x_m, disc.y_m)))
+        self._add_floor()
+        for moving in description.moving:
+            self._add_moving(moving)
         lib.arena_build(self.handle)
 
-    def _add(self, polygon: Polygon, kind: int) -> None:
+    def _add_polygon(self, polygon: Polygon, kind: int) -> None:
         corners = np.array(polygon.corners_m, dtype=np.float64)
-        number = lib.arena_add_polygon(self.handle, ffi.from_buffer("double[]", corners), len(corners), kind, ffi.NULL)
-        if number < 0:
-            raise MemoryError("arena")
+        added = lib.arena_add_polygon(self.handle, _doubles(corners), len(corners), kind, _surface(polygon))
+        self._added(added, polygon)
         self._polygons.append(corners)
-        if polygon.name:
-            self._numbers[polygon.name] = number
+
+    def _add_wall(self, wall: Wall) -> None:
+        points = np.array(wall.points_m, dtype=np.float64)
+        self._added(lib.arena_add_wall(self.handle, _doubles(points), len(points), _surface(wall)), wall)
+        self._polygons.append(np.vstack((points, points[-2:0:-1])))  # there and back
+
+    def _add_floor(self) -> None:
+        """What rays do not meet."""
+        for patch in self.description.patch:
+            corners = np.array(patch.corners_m, dtype=np.float64)
+            self._added(lib.arena_add_patch(self.handle, _doubles(corners), len(corners), patch.grip))
+        for light in self.description.light:
+            self._added(lib.arena_add_light(self.handle, light.x_m, light.y_m, light.height_m, light.power_w))
+        if (charger := self.description.charger) is not None:
+            self._added(lib.arena_set_charger(self.handle, charger.x_m, charger.y_m, charger.radius_m))
+
+    def _add_moving(self, moving: Moving) -> None:
+        corners = None if moving.corners_m is None else np.array(moving.corners_m, dtype=np.float64)
+        shape = (ffi.NULL, 0) if corners is None else (_doubles(corners), len(corners))
+        points = [(point.time_s, point.x_m, point.y_m, point.heading_rad) for point in moving.path]
+        path = (ffi.new("path_waypoint[]", points), len(points), REPEATS[moving.repeat])
+        radius = moving.radius_m or 0.0
+        self._added(lib.arena_add_moving(self.handle, *shape, radius, _surface(moving), *path))
+
+    def _added(self, number: int, shape: Polygon | Wall | Disc | None = None) -> None:
+        if number < 0:
+            raise ArenaError(f"arena {self.name}: no room in memory, or a number is not finite")
+        if shape is not None and shape.name:
+            self._numbers[shape.name] = number
 
     @property
     def outlines(self) -> list[Floats]:
-        """All polygons where they are now: arrays of shape (corners, 2) in m."""
+        """All shapes that stay in place as closed polygons: arrays of shape (corners, 2) in m.
+
+        A wall goes there and back, a disc has 48 corners.
+        """
         return [polygon.copy() for polygon in self._polygons]
+
+    def moving_outlines(self, time: float) -> list[Floats]:
+        """The moving shapes where they are at `time` (s): closed polygons, arrays of shape (corners, 2) in m."""
+        polygons = []
+        movers = self._movers(time)
+        for mover, moving in zip(movers, self.description.moving, strict=True):
+            shape = _ring(moving.radius_m or 0.0) if moving.corners_m is None else np.array(moving.corners_m)
+            rotation = np.array([[mover.cosine, mover.sine], [-mover.sine, mover.cosine]])
+            polygons.append(shape @ rotation + np.array((mover.x, mover.y)))
+        return polygons
+
+    def _movers(self, time: float) -> Any:
+        """The C core's movers at a time."""
+        movers = ffi.new("mover[]", len(self.description.moving))
+        lib.scene_moving(self.handle, time, 1, movers)
+        return movers
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -89,21 +139,28 @@ class Arena:
         return start.x_m, start.y_m, start.heading_rad
 
     def ray(self, x: float, y: float, angle: float, reach: float) -> float | None:
-        """Distance (m) from (x, y) to the nearest edge in direction `angle` (rad), None beyond `reach` (m)."""
+        """Distance (m) from (x, y) to the nearest thing in direction `angle` (rad), None beyond `reach` (m)."""
         distance: float = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)
         return None if distance < 0 else distance
 
     def clearance(self, x: float, y: float, limit: float = 10.0) -> float:
-        """Distance (m) from (x, y) to the nearest edge, at most `limit`."""
+        """Distance (m) from (x, y) to the nearest edge or circle, at most `limit`."""
         distance: float = lib.arena_clearance(self.handle, x, y, limit)
         return distance
 
     def is_free(self, x: float, y: float, radius: float) -> bool:
-        """Whether a disc of `radius` (m) at (x, y) lies in free space."""
-        return bool(lib.arena_is_free(self.handle, x, y, radius))
+        """Whether a disc of `radius` (m) at (x, y) lies in free space, also of what moves, at the start."""
+        movers = self._movers(0.0)
+        scene = ffi.new("scene *", {"arena": self.handle, "movers": movers, "movers_count": len(movers)})
+        return bool(lib.scene_is_free(scene, x, y, radius, 0))
+
+    def grip(self, x: float, y: float, otherwise: float) -> float:
+        """Friction coefficient of the floor at (x, y); `otherwise` outside of all patches."""
+        coefficient: float = lib.arena_grip(self.handle, x, y, otherwise)
+        return coefficient
 
     def move(self, polygon: int | str, dx: float, dy: float) -> None:
-        """Moves a polygon, by number or name, by (dx, dy) m.
+        """Moves a polygon or wall, by number or name, by (dx, dy) m: only while nobody else uses the arena.
 
         Raises:
             ArenaError: there is no such polygon.
@@ -142,50 +199,29 @@ def load_arena(arena: str | Path | None) -> Arena:
     """The arena of that bundled name, or described by that file; None: the default, `room`.
 
     Raises:
-        ArenaError: unknown arena, unreadable file, wrong key or value, or no polygon.
+        ArenaError: unknown arena, unreadable file, wrong key or value, no polygon, or a start in no free space.
     """
     path = toml_files.find("arenas", "room" if arena is None else arena, ArenaError)
     table = toml_files.read(path, ArenaError)
-    return Arena(toml_files.convert(table, ArenaDescription, path.name, ArenaError), path.name)
+    description = toml_files.convert(table, ArenaDescription, path.name, ArenaError)
+    loaded = Arena(description, lambda place: toml_files.where(table, path.name, place))
+    x, y, _ = loaded.start
+    if not loaded.is_free(x, y, 0.0):
+        place = toml_files.where(table, path.name, "start")
+        raise ArenaError(f"{place}: start: x_m = {x:g}, y_m = {y:g} is in or behind something; expected free space")
+    return loaded
 
 
-def _check_polygon(corners: list[Point], where: str) -> None:
-    """Refuses what is no simple polygon of finite size."""
-    if len(corners) < 3:
-        raise ArenaError(f"{where} has {len(corners)} corners; expected at least 3")
-    for index, corner in enumerate(corners):
-        if not all(math.isfinite(value) and abs(value) <= EXTENT_M for value in corner):
-            raise ArenaError(f"{where}[{index}] is {list(corner)}; expected numbers within ±{EXTENT_M:g} m")
-    following = [*corners[1:], corners[0]]
-    for index, (a, b) in enumerate(zip(corners, following, strict=True)):
-        if math.dist(a, b) < 1e-9:
-            raise ArenaError(f"{where}[{index}] and the corner after it are the same point; expected an edge")
-    crossing = _crossing(np.array(corners), np.array(following))
-    if crossing is not None:
-        raise ArenaError(f"{where}: edges {crossing[0]} and {crossing[1]} cross; expected a polygon that does not")
+def _doubles(values: Floats) -> Any:
+    return ffi.from_buffer("double[]", values)
 
 
-def _crossing(starts: Floats, ends: Floats) -> tuple[int, int] | None:
-    """Two edges of a closed polygon that meet although they are no neighbours, or neighbours that fold back."""
+def _surface(shape: Polygon | Wall | Disc | Moving) -> Any:
+    height = math.inf if shape.height_m is None else shape.height_m
+    return ffi.new("arena_surface *", [height, shape.infrared_reflectance, shape.sound_reflectance])
 
-    def side(p: Floats, q: Floats, r: Floats) -> Floats:
-        cross: Floats = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
-            r[..., 0] - p[..., 0]
-        )
-        return cross
 
-    count = len(starts)
-    for i in range(count):
-        rest = np.arange(i + 1, count)
-        if rest.size == 0:
-            continue
-        a, b, c, d = starts[i], ends[i], starts[rest], ends[rest]
-        apart = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
-        meet = (side(a, b, c) * side(a, b, d) <= 0) & (side(c, d, a) * side(c, d, b) <= 0) & ~apart.any(axis=1)
-        neighbour = (rest == i + 1) | ((i == 0) & (rest == count - 1))
-        along = (b - a) @ (d - c).T
-        fold = neighbour & (along < 0) & (np.abs((b - a)[0] * (d - c)[:, 1] - (b - a)[1] * (d - c)[:, 0]) < 1e-15)
-        wrong = np.flatnonzero((meet & ~neighbour) | fold)
-        if wrong.size:
-            return i, int(rest[wrong[0]])
-    return None
+def _ring(radius: float) -> Floats:
+    """A disc as a polygon."""
+    turn = np.arange(DISC_CORNERS) * (2 * math.pi / DISC_CORNERS)
+    return radius * np.column_stack((np.cos(turn), np.sin(turn)))

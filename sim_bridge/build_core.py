@@ -20,6 +20,7 @@ HEADERS = [
     "world/paths.h",
     "world/arena.h",
     "world/scene.h",
+    "world/scan.h",
     "world/outline.h",
     "world/body.h",
     "world/motor_regulated.h",

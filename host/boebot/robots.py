@@ -301,7 +301,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     for name in removed:
         if base.get("device", {}).pop(name, None) is None:
             raise RobotError(f"{path.name} removes device {name!r}, which {base_name!r} does not have")
-    return _overlay(base, table)
+    return toml_files.overlaid(_overlay(base, table), table, base)
 
 
 def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:

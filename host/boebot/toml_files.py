@@ -1,23 +1,47 @@
 """TOML descriptions (robots, arenas): found by bundled name or path, read, and checked against their types.
 
-What is wrong is said with the file, the full key and what was expected there.
+What is wrong is said in one sentence with the file, the line, the full key and what was expected there.
 """
 
 from __future__ import annotations
 
-import math
 import tomllib
 import types
 import typing
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
 from boebot import resources
 from boebot.errors import BoebotError
+from boebot.toml_lines import line_of, lines_of
 
 _T = TypeVar("_T")
+
+SIZE_MAXIMUM = 8_000_000  # bytes of a file
+
+
+class Table(dict[str, Any]):
+    """What a file says, with the texts it came from: so that errors can name the line.
+
+    Attributes:
+        sources: names and texts of files; a key of an earlier one replaces that of a later one.
+    """
+
+    sources: tuple[tuple[str, str], ...] = ()
+
+
+class Fault(NamedTuple):
+    """What is wrong with a table.
+
+    Attributes:
+        place: where, as `toml_lines` writes it.
+        what: the rest of the sentence, with the key.
+    """
+
+    place: str
+    what: str
 
 
 def bundled_names(kind: str) -> list[str]:
@@ -38,72 +62,118 @@ def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
     return resources.folder(kind) / f"{name}.toml"
 
 
-def read(path: Path, error: type[BoebotError]) -> dict[str, Any]:
+def read(path: Path, error: type[BoebotError]) -> Table:
     """The file's table. Raises `error` if it cannot be read or is no TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        size = path.stat().st_size
+        if size > SIZE_MAXIMUM:
+            raise error(f"{path.name} has {size:,} bytes; expected at most {SIZE_MAXIMUM:,}")
+        text = path.read_text(encoding="utf-8")
+        table = Table(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
-    except tomllib.TOMLDecodeError as cause:
-        raise error(f"{path.name} is no valid TOML: {cause}") from None
+    except RecursionError:
+        raise error(f"{path.name} is nested too deeply; expected a flat description") from None
+    except ValueError as cause:  # also a number of thousands of digits, which tomllib passes on
+        raise error(f"{path.name} is no valid TOML: {' '.join(str(cause).split())}") from None
+    table.sources = ((path.name, text),)
+    return table
+
+
+def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) -> Table:
+    """`merged` as a table that came from `top`, and where that says nothing from `base`."""
+    table = Table(merged)
+    table.sources = tuple(source for layer in (top, base) if isinstance(layer, Table) for source in layer.sources)
+    return table
+
+
+def where(table: dict[str, Any], file: str, place: str) -> str:
+    """The file, with the line of the place if the table was read from it: "room.toml:12"."""
+    sources = table.sources if isinstance(table, Table) and place else ()
+    for name, text in sources:
+        if place in (lines := lines_of(text)):
+            return f"{name}:{lines[place]}"
+    return f"{file}:{line_of(sources[0][1], place)}" if sources else file
 
 
 def convert(table: dict[str, Any], kind: type[_T], file: str, error: type[BoebotError]) -> _T:
-    """The table as a `kind`, all of its numbers finite. Raises `error`, which names file, key and what was expected."""
-    if place := _not_finite(table, ""):
-        raise error(f"{file}: {place}: expected a finite number")
-    try:
-        return msgspec.convert(table, kind)
-    except msgspec.ValidationError as cause:
-        raise error(f"{file}: {_fault(table, kind, '') or cause}") from None
+    """The table as a `kind`, all of its numbers finite.
+
+    Raises `error`, which names file, line, key and what was expected.
+    """
+    fault = _not_finite(table, "")
+    if fault is None:
+        try:
+            return msgspec.convert(table, kind)
+        except msgspec.ValidationError as cause:
+            fault = _fault(table, kind, "") or Fault("", str(cause))
+    raise error(f"{where(table, file, fault.place)}: {fault.what}")
 
 
-def _not_finite(value: Any, key: str) -> str | None:
-    """The key of the first number in `value` that is infinite or none."""
+def _not_finite(value: Any, key: str) -> Fault | None:
+    """The first number in `value` that is infinite, none, or beyond what floating-point numbers hold."""
     if isinstance(value, dict):
         places = ((f"{key}.{name}" if key else name, entry) for name, entry in value.items())
     elif isinstance(value, list):
         places = ((f"{key}[{index}]", entry) for index, entry in enumerate(value))
+    elif isinstance(value, (int, float)) and not abs(value) < 1e300:
+        return Fault(key, f"{key}: expected a finite number")
     else:
-        return key if isinstance(value, float) and not math.isfinite(value) else None
+        return None
     return next((found for place, entry in places if (found := _not_finite(entry, place))), None)
 
 
-def _fault(value: Any, kind: Any, key: str) -> str | None:
-    """The first thing in `value` that does not fit `kind`, with its key."""
-    at = f"{key}: " if key else ""
+def _fault(value: Any, kind: Any, key: str) -> Fault | None:
+    """The first thing in `value` that does not fit `kind`."""
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin in (types.UnionType, typing.Union) and all(_is_struct(choice) for choice in inner):
-        if not isinstance(value, dict):
-            return f"{at}expected a table"
-        choices = {choice.__struct_config__.tag: choice for choice in inner}
-        tag_field = inner[0].__struct_config__.tag_field
-        if value.get(tag_field) not in choices:
-            return f"{at}{tag_field} is {value.get(tag_field)!r}; expected one of {', '.join(sorted(choices))}"
-        rest = {name: entry for name, entry in value.items() if name != tag_field}
-        return _fault(rest, choices[value[tag_field]], key)
+        return _union_fault(value, inner, key)
     if _is_struct(kind) and isinstance(value, dict):
-        fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
-        for name in value:
-            if name not in fields:
-                return f"{at}there is no key {name!r} here; expected {', '.join(fields)}"
-        for name, field in fields.items():
-            if name not in value:
-                if field.required:
-                    return f"{at}the key {name!r} is missing"
-            elif fault := _fault(value[name], field.type, f"{key}.{name}" if key else name):
-                return fault
-        return None
+        return _struct_fault(value, kind, key)
     if origin in (list, dict) and isinstance(value, origin):
         items = value.items() if isinstance(value, dict) else enumerate(value)
-        places = ((f"{key}.{place}" if origin is dict else f"{key}[{place}]", item) for place, item in items)
-        return next((fault for place, item in places if (fault := _fault(item, inner[-1], place))), None)
+        places = ((_below(key, str(place)) if origin is dict else f"{key}[{place}]", item) for place, item in items)
+        if fault := next((fault for place, item in places if (fault := _fault(item, inner[-1], place))), None):
+            return fault
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as cause:
         what, _, place = str(cause).replace("`", "").partition(" - at $")
-        return f"{key}{place}: {what[0].lower()}{what[1:]}"
+        at = f"{key}{place}: " if key or place else ""
+        return Fault(key + place, f"{at}{what[0].lower()}{what[1:]}")
     return None
+
+
+def _union_fault(value: Any, choices: tuple[Any, ...], key: str) -> Fault | None:
+    """Of tables that say by one of their keys what they are."""
+    at = f"{key}: " if key else ""
+    if not isinstance(value, dict):
+        return Fault(key, f"{at}expected a table")
+    by_tag = {choice.__struct_config__.tag: choice for choice in choices}
+    field = choices[0].__struct_config__.tag_field
+    tag = value.get(field)
+    if not isinstance(tag, str) or tag not in by_tag:
+        return Fault(_below(key, field), f"{at}{field} is {tag!r}; expected one of {', '.join(sorted(by_tag))}")
+    return _fault({name: entry for name, entry in value.items() if name != field}, by_tag[tag], key)
+
+
+def _struct_fault(value: dict[str, Any], kind: Any, key: str) -> Fault | None:
+    at = f"{key}: " if key else ""
+    fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
+    for name in value:
+        if name not in fields:
+            return Fault(_below(key, name), f"{at}there is no key {name!r} here; expected {', '.join(fields)}")
+    for name, field in fields.items():
+        if name not in value:
+            if field.required:
+                return Fault(key, f"{at}the key {name!r} is missing")
+        elif fault := _fault(value[name], field.type, _below(key, name)):
+            return fault
+    return None
+
+
+def _below(key: str, name: str) -> str:
+    return f"{key}.{name}" if key else name
 
 
 def _is_struct(kind: Any) -> bool:

@@ -158,25 +158,28 @@ corners_m = [[0, 0], [1, 0], [1, 1], [0, 1]]
     [
         ("name = ", "mine.toml is no valid TOML"),
         ("title = 'x'", "mine.toml: the key 'name' is missing"),
-        (GOOD + "colour = 'red'", "mine.toml: outline[0]: there is no key 'colour' here; expected corners_m, name"),
-        (GOOD.replace("[0, 1]]", "[0, 'a']]"), "mine.toml: outline[0].corners_m[3][1]: expected float, got str"),
+        (GOOD + "colour = 'red'", "mine.toml:5: outline[0]: there is no key 'colour' here; expected corners_m, name"),
+        (GOOD.replace("[0, 1]]", "[0, 'a']]"), "mine.toml:4: outline[0].corners_m[3][1]: expected float, got str"),
         (
             GOOD.replace("[0, 1]]", "[0, nan]]"),
-            "mine.toml: outline[0].corners_m[3][1]: expected a finite number",
+            "mine.toml:4: outline[0].corners_m[3][1]: expected a finite number",
         ),
-        (GOOD.replace("[0, 1]]", "[0, 1e6]]"), "expected numbers within"),
+        (GOOD.replace("[0, 1]]", "[0, 1e6]]"), "mine.toml:4: outline[0].corners_m[3][1]: expected float <= 1000"),
         (
             GOOD.replace(", [1, 1], [0, 1]", ""),
-            "mine.toml: outline[0].corners_m has 2 corners; expected at least 3",
+            "mine.toml:4: outline[0].corners_m: expected array of length >= 3",
         ),
-        (GOOD.replace("[0, 1]]", "[1, 1]]"), "corners_m[2] and the corner after it are the same point"),
+        (GOOD.replace("[0, 1]]", "[1, 1]]"), "corners_m[2] and the point after it are the same"),
         (
             GOOD.replace("[0, 1]]", "[0, 1], [0, 0]]"),
-            "corners_m[4] and the corner after it are the same point",
+            "corners_m[4] and the point after it are the same",
         ),
-        (GOOD.replace("[1, 1], [0, 1]", "[0, 1], [1, 1]"), "edges 1 and 3 cross"),
-        (GOOD.replace("[1, 1], [0, 1]", "[0.5, 0]"), "cross; expected a polygon"),
-        ("name = 'mine'\n[start]\nx_m = 'left'", "mine.toml: start.x_m: expected float, got str"),
+        (GOOD.replace("[1, 1], [0, 1]", "[0, 1], [1, 1]"), "edges 1 and 3 cross or touch"),
+        (
+            GOOD.replace("[1, 1], [0, 1]", "[0.5, 0]"),
+            "edges 0 and 1 cross or touch; expected a polygon whose edges do not",
+        ),
+        ("name = 'mine'\n[start]\nx_m = 'left'", "mine.toml:3: start.x_m: expected float, got str"),
     ],
 )
 def test_wrong_file_is_told_in_one_sentence(tmp_path: Path, text: str, expected: str) -> None:

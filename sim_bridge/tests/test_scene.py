@@ -37,7 +37,7 @@ class Thing:
     def rings(self) -> shapely.Geometry:
         """Its boundary in the arena's frame."""
         if self.outline is None:
-            return shapely.Point(self.x, self.y).buffer(self.radius, quad_segs=4096).exterior
+            return shapely.Point(self.x, self.y).buffer(self.radius, quad_segs=256).exterior
         turned = shapely.affinity.rotate(shapely.LinearRing(self.outline), self.heading, (0, 0), use_radians=True)
         return shapely.affinity.translate(turned, self.x, self.y)
 

@@ -7,6 +7,8 @@
 
 #include "arena_data.h"
 
+#define FARTHEST 1e6 /* m: positions beyond lose the precision that rays need */
+
 static const arena_surface PLAIN = {.height = 1e300, .infrared_reflectance = 1.0, .sound_reflectance = 1.0};
 
 arena *arena_new(void) {
@@ -51,9 +53,35 @@ static void *grown(void *array, size_t count, size_t more, size_t size) {
 
 static int all_finite(const double *values, size_t count) {
   for (size_t i = 0; i < count; i++) {
-    if (!(fabs(values[i]) < 1e9)) return 0;
+    if (!(fabs(values[i]) <= FARTHEST)) return 0;
   }
   return 1;
+}
+
+/* The circle around a shape's box. */
+static void enclose(const arena *self, arena_shape *shape) {
+  if (shape->kind == ARENA_DISC) {
+    const arena_disc *d = &self->disc[shape->first];
+    shape->x = d->x;
+    shape->y = d->y;
+    shape->radius = d->radius;
+    return;
+  }
+  const grid_items items = arena_items(self);
+  double all[4] = {1e300, 1e300, -1e300, -1e300};
+  for (uint32_t i = 0; i < shape->count; i++) {
+    double box[4];
+    grid_item_box(&items, shape->first + i, box);
+    for (int k = 0; k < 2; k++) {
+      all[k] = fmin(all[k], box[k]);
+      all[k + 2] = fmax(all[k + 2], box[k + 2]);
+    }
+  }
+  const double width = all[2] - all[0];
+  const double depth = all[3] - all[1];
+  shape->x = 0.5 * (all[0] + all[2]);
+  shape->y = 0.5 * (all[1] + all[3]);
+  shape->radius = 0.5 * sqrt(width * width + depth * depth) * (1.0 + 1e-12);
 }
 
 static int add_shape(arena *self, int kind, const arena_surface *surface, size_t first, size_t count) {
@@ -194,9 +222,11 @@ int arena_set_charger(arena *self, double x, double y, double radius) {
 void arena_build(arena *self) {
   const grid_items items = arena_items(self);
   index_drop(self);
+  for (size_t i = 0; i < self->shape_count; i++) enclose(self, &self->shape[i]);
   if (self->index_choice >= ARENA_INDEX_GRID && grid_build(&self->grid, &items) == 0 &&
       self->index_choice >= ARENA_INDEX_LISTS) {
     self->lists = ray_lists_new(&self->grid, &items);
+    if (self->lists != NULL && self->index_choice == ARENA_INDEX_LISTS_AT_ONCE) self->lists->patience = 0;
   }
 }
 

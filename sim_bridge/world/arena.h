@@ -16,8 +16,9 @@
 
 /* python: begin */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
-/* What arena_use_index may choose. */
-enum { ARENA_INDEX_NONE = 0, ARENA_INDEX_GRID = 1, ARENA_INDEX_LISTS = 2 };
+/* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
+ * many rays start, or wherever a ray starts. */
+enum { ARENA_INDEX_NONE = 0, ARENA_INDEX_GRID = 1, ARENA_INDEX_LISTS = 2, ARENA_INDEX_LISTS_AT_ONCE = 3 };
 
 typedef struct arena arena;
 
@@ -30,8 +31,9 @@ typedef struct {
 typedef struct {
   int kind;
   arena_surface surface;
-  uint32_t first; /* edge, or disc */
-  uint32_t count; /* of edges; 1 for a disc */
+  uint32_t first;      /* edge, or disc */
+  uint32_t count;      /* of edges; 1 for a disc */
+  double x, y, radius; /* of a circle that holds the shape */
 } arena_shape;
 
 typedef struct {
@@ -71,7 +73,7 @@ int arena_set_charger(arena *self, double x, double y, double radius);
 /* Makes the index. Without memory for it every question looks at every item. */
 void arena_build(arena *self);
 
-/* Which index answers: none, the grid, or the lists as well (the default). Answers are the same. */
+/* Which index answers. The answers are the same. */
 void arena_use_index(arena *self, int choice);
 
 /* Moves a polygon by (dx, dy) and builds anew: only while nobody else uses the arena. Returns 0, or -1. */

@@ -13,13 +13,90 @@
 #define MEMORY_LARGEST (64u << 20) /* bytes */
 #define LEVELS 512                 /* of distance, by which entries are sorted */
 
-ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
-#ifndef __GNUC__
-  (void)g, (void)items;
-  return NULL;
-#else
-  ray_lists *self = calloc(1, sizeof *self);
-  if (self == NULL) return NULL;
+#ifdef __GNUC__
+
+/* Direction as a number in [0, 4] that grows with the angle: 0 along x, 1 along y. No trigonometry. */
+static double turn_of(double x, double y) {
+  const double share = y / (fabs(x) + fabs(y));
+  if (x < 0.0) return 2.0 - share;
+  return share < 0.0 ? 4.0 + share : share;
+}
+
+static int by_size(const void *a, const void *b) {
+  const double x = *(const double *)a;
+  const double y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* The unit circle, cut wherever cosine or sine is a multiple of 1 / RAY_SECTORS_PER_UNIT. */
+static void cut_circle(ray_lists *self) {
+  const int n = RAY_SECTORS_PER_UNIT;
+  int count = 0;
+  double *turn = self->sector_turn;
+  for (int k = 0; k < n; k++) {
+    const double a = (double)k / n;
+    const double b = sqrt(1.0 - a * a);
+    const double first = turn_of(b, a);
+    const double second = turn_of(a, b);
+    for (int quarter = 0; quarter < 4; quarter++) {
+      turn[count++] = quarter + first;
+      if (k > 0) turn[count++] = quarter + second;
+    }
+  }
+  qsort(turn, (size_t)count, sizeof *turn, by_size);
+  turn[count] = 4.0;
+  self->sectors = count;
+  memset(self->sector_of, RAY_SECTORS_MOST, sizeof self->sector_of);
+  for (int k = 0; k < count; k++) {
+    /* A direction in the middle of the sector: of length 1, for the sector's cell. */
+    const double middle = 0.5 * (turn[k] + turn[k + 1]);
+    double y = middle < 1.0 ? middle : (middle < 3.0 ? 2.0 - middle : middle - 4.0);
+    double x = middle < 2.0 ? 1.0 - middle : middle - 3.0;
+    const double length = sqrt(x * x + y * y);
+    x /= length;
+    y /= length;
+    const int column = (int)(x * n + n);
+    const int row = (int)(y * n + n);
+    /* Where cosine or sine is 1 itself. */
+    const int columns = column == 2 * n - 1 ? 1 : 0;
+    const int rows = row == 2 * n - 1 ? 1 : 0;
+    for (int r = row; r <= row + rows; r++) {
+      for (int c = column; c <= column + columns; c++) self->sector_of[r * RAY_TABLE_SIDE + c] = (uint8_t)k;
+    }
+  }
+}
+
+/* Number of items from `first` on that make one strip: edges of one shape in a row, together shorter than a cell. The
+ * last edge of a shape leads somewhere else than to the next one's start, and stays alone. */
+static uint32_t strip_length(const ray_lists *self, uint32_t first) {
+  const arena_edge *edge = self->items.edge;
+  const uint32_t end = (uint32_t)self->items.edge_count;
+  double length = 0.0;
+  uint32_t count = 0;
+  while (count < RAY_STRIP_LONGEST && first + count + 1 < end) {
+    const arena_edge *e = &edge[first + count];
+    length += sqrt(e->length_squared);
+    if (length > self->cell || e[1].shape != e->shape) break;
+    count++;
+  }
+  return count > 1 ? count : 1;
+}
+
+static void make_strips(ray_lists *self) {
+  const uint32_t total = (uint32_t)(self->items.edge_count + self->items.disc_count);
+  for (uint32_t i = 0; i < total;) {
+    const uint32_t count = strip_length(self, i);
+    for (uint32_t k = 0; k < count; k++) self->strip_of[i + k] = (uint32_t)self->strip_count;
+    self->strips[self->strip_count++] = ray_strip(i, count);
+    i += count;
+  }
+  for (size_t i = 0; i < self->items.edge_count; i++) {
+    self->start_x[i] = self->items.edge[i].ax;
+    self->start_y[i] = self->items.edge[i].ay;
+  }
+}
+
+static void lay_out(ray_lists *self, const grid *g) {
   const double width = g->x1 - g->x0 + 2.0 * BORDER;
   const double height = g->y1 - g->y0 + 2.0 * BORDER;
   const double larger = width > height ? width : height;
@@ -32,16 +109,31 @@ ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
   self->columns = 1 + (int)(width * self->per_metre);
   self->rows = 1 + (int)(height * self->per_metre);
   self->grid = g;
+}
+
+ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
+  ray_lists *self = calloc(1, sizeof *self);
+  if (self == NULL) return NULL;
+  lay_out(self, g);
   self->items = *items;
-  const size_t count = (size_t)self->columns * (size_t)self->rows;
-  self->cells = calloc(count, sizeof(ray_list_cell *));
-  self->visits = calloc(count, sizeof *self->visits);
-  if (self->cells == NULL || self->visits == NULL) {
+  const size_t cells = (size_t)self->columns * (size_t)self->rows;
+  const size_t count = items->edge_count + items->disc_count;
+  self->cells = calloc(cells, sizeof(ray_list_cell *));
+  self->visits = calloc(cells, sizeof *self->visits);
+  self->strips = malloc(count * sizeof *self->strips);
+  self->strip_of = malloc(count * sizeof *self->strip_of);
+  self->start_x = calloc(items->edge_count + RAY_STRIP_LONGEST + 1, sizeof *self->start_x);
+  self->start_y = calloc(items->edge_count + RAY_STRIP_LONGEST + 1, sizeof *self->start_y);
+  if (self->cells == NULL || self->visits == NULL || self->strips == NULL || self->strip_of == NULL ||
+      self->start_x == NULL || self->start_y == NULL) {
     ray_lists_destroy(self);
     return NULL;
   }
+  cut_circle(self);
+  make_strips(self);
+  /* By then the lists cost less than they save. */
+  self->patience = (unsigned)(self->strip_count < GATHER_ENOUGH ? self->strip_count : GATHER_ENOUGH);
   return self;
-#endif
 }
 
 void ray_lists_destroy(ray_lists *self) {
@@ -50,14 +142,16 @@ void ray_lists_destroy(ray_lists *self) {
   for (size_t i = 0; i < count; i++) free(self->cells[i]);
   free(self->cells);
   free(self->visits);
+  free(self->strips);
+  free(self->strip_of);
+  free(self->start_x);
+  free(self->start_y);
   free(self);
 }
 
-#ifdef __GNUC__
-
-/* An item as a cell sees it: nothing of it nearer than `bound`; sectors `first` to `first + more`. */
+/* A strip as a cell sees it: nothing of it nearer than `bound`; sectors `first` to `first + more`. */
 typedef struct {
-  uint32_t item;
+  uint32_t strip;
   float bound;
   uint16_t level;
   uint8_t first, more;
@@ -76,113 +170,132 @@ typedef struct {
   double complete; /* nothing nearer than that is missing */
 } gathered;
 
-/* The sectors of directions that lie between the turns `low` and `high` around `middle`. */
-static void set_sectors(sight *s, double middle, double low, double high) {
-  const double per_turn = RAY_SECTORS / 4;
-  const int first = (int)number_floor((middle + low - 1e-9) * per_turn);
-  const int last = (int)number_floor((middle + high + 1e-9) * per_turn);
-  const int more = last - first;
-  s->first = (uint8_t)((unsigned)(first + 4 * RAY_SECTORS) % RAY_SECTORS);
-  s->more = (uint8_t)(more < RAY_SECTORS - 1 ? more : RAY_SECTORS - 1);
+/* Directions between the turns `middle + low` and `middle + high`; wider than everything: all. */
+typedef struct {
+  double middle, low, high;
+} span;
+
+static int sector_at(const ray_lists *self, double turn) {
+  int low = 0;
+  int high = self->sectors;
+  while (high - low > 1) {
+    const int half = (low + high) / 2;
+    if (self->sector_turn[half] <= turn) {
+      low = half;
+    } else {
+      high = half;
+    }
+  }
+  return low;
 }
 
-/* Widens [low, high] by the direction (x, y), as a turn from `middle`. */
-static void widen(double x, double y, double middle, double *low, double *high) {
-  double turn = ray_turn(x, y) - middle;
+static void set_sectors(const ray_lists *self, sight *s, const span *seen) {
+  double from = seen->middle + seen->low - 1e-9;
+  double to = seen->middle + seen->high + 1e-9;
+  s->first = 0;
+  s->more = (uint8_t)(self->sectors - 1);
+  if (to - from >= 3.0) return;
+  if (from < 0.0) from += 4.0;
+  if (from >= 4.0) from -= 4.0;
+  if (to < 0.0) to += 4.0;
+  if (to >= 4.0) to -= 4.0;
+  const int first = sector_at(self, from);
+  const int more = sector_at(self, to) - first;
+  s->first = (uint8_t)first;
+  s->more = (uint8_t)(more >= 0 ? more : more + self->sectors);
+}
+
+/* Widens the span by the direction (x, y). */
+static void widen(span *seen, double x, double y) {
+  double turn = turn_of(x, y) - seen->middle;
   if (turn < -2.0) turn += 4.0;
   if (turn >= 2.0) turn -= 4.0;
-  if (turn < *low) *low = turn;
-  if (turn > *high) *high = turn;
+  if (turn < seen->low) seen->low = turn;
+  if (turn > seen->high) seen->high = turn;
 }
 
-static void see_edge(sight *s, const arena_edge *e, const square *from) {
+static void see_everywhere(span *seen) {
+  seen->low = -2.0;
+  seen->high = 2.0;
+}
+
+/* Returns the least distance of the edge from the square. */
+static double see_edge(const arena_edge *e, const square *from, span *seen) {
   double qx, qy;
   const double distance = sqrt(arena_edge_distance_squared(e, from->x, from->y, &qx, &qy));
-  s->bound = (float)((distance - from->diagonal) * (1.0 - 1e-6) - 1e-9);
-  s->first = 0;
-  s->more = RAY_SECTORS - 1;
-  if (distance <= from->diagonal) return;
+  if (distance <= from->diagonal) {
+    see_everywhere(seen);
+    return 0.0;
+  }
   /* Directions from points of the square to points of the edge: the corners bound them. */
   const double dx = e->ax - from->x;
   const double dy = e->ay - from->y;
-  const double middle = ray_turn(qx - from->x, qy - from->y);
-  double low = 0.0;
-  double high = 0.0;
+  if (seen->middle < 0.0) seen->middle = turn_of(qx - from->x, qy - from->y);
   for (int corner = 0; corner < 4; corner++) {
     const double x = dx + (corner & 1 ? from->half : -from->half);
     const double y = dy + (corner & 2 ? from->half : -from->half);
-    widen(x, y, middle, &low, &high);
-    widen(x + e->ex, y + e->ey, middle, &low, &high);
+    widen(seen, x, y);
+    widen(seen, x + e->ex, y + e->ey);
   }
-  set_sectors(s, middle, low, high);
+  return distance - from->diagonal;
 }
 
-static void see_disc(sight *s, const arena_disc *d, const square *from) {
+static double see_disc(const arena_disc *d, const square *from, span *seen) {
   const double dx = d->x - from->x;
   const double dy = d->y - from->y;
   const double distance = sqrt(dx * dx + dy * dy);
   const double radius = d->radius + from->diagonal;
-  s->bound = (float)((fabs(distance - d->radius) - from->diagonal) * (1.0 - 1e-6) - 1e-9);
-  s->first = 0;
-  s->more = RAY_SECTORS - 1;
-  if (distance <= radius * (1.0 + 1e-9)) return;
-  /* Tangents from the square's centre to the circle enlarged by the square. */
-  const double sine = radius / distance;
-  const double cosine = sqrt(1.0 - sine * sine);
-  const double middle = ray_turn(dx, dy);
-  double low = 0.0;
-  double high = 0.0;
-  widen(dx * cosine - dy * sine, dy * cosine + dx * sine, middle, &low, &high);
-  widen(dx * cosine + dy * sine, dy * cosine - dx * sine, middle, &low, &high);
-  set_sectors(s, middle, low, high);
+  if (distance <= radius * (1.0 + 1e-9)) {
+    see_everywhere(seen);
+  } else {
+    /* Tangents from the square's centre to the circle enlarged by the square. */
+    const double sine = radius / distance;
+    const double cosine = sqrt(1.0 - sine * sine);
+    seen->middle = turn_of(dx, dy);
+    widen(seen, dx * cosine - dy * sine, dy * cosine + dx * sine);
+    widen(seen, dx * cosine + dy * sine, dy * cosine - dx * sine);
+  }
+  return fabs(distance - d->radius) - from->diagonal;
 }
 
-static void see(gathered *all, const grid_items *items, uint32_t item, const square *from) {
-  sight *s = &all->sights[all->count];
-  s->item = item;
-  if (item < items->edge_count) {
-    see_edge(s, &items->edge[item], from);
-  } else {
-    see_disc(s, &items->disc[item - items->edge_count], from);
+static void see(const ray_lists *self, gathered *all, uint32_t strip, const square *from) {
+  const grid_items *items = &self->items;
+  const uint32_t first = ray_strip_first(strip);
+  span seen = {.middle = -1.0};
+  double nearest = 1e300;
+  for (uint32_t i = first; i < first + ray_strip_count(strip); i++) {
+    const double distance = i < items->edge_count ? see_edge(&items->edge[i], from, &seen)
+                                                  : see_disc(&items->disc[i - items->edge_count], from, &seen);
+    if (distance < nearest) nearest = distance;
   }
+  sight *s = &all->sights[all->count];
+  s->strip = strip;
+  s->bound = (float)(nearest * (1.0 - 1e-6) - 1e-9);
+  set_sectors(self, s, &seen);
   if ((double)s->bound < all->complete) all->count++;
 }
 
-/* Items in the grid's cells between those columns and rows, each once. Returns how many. */
-static size_t collect(const grid *g, const int box[4], uint8_t *seen, uint32_t *list) {
+/* Strips in the grid's cells between those columns and rows, each once. Returns how many. */
+static size_t collect(const ray_lists *self, const int box[4], uint8_t *seen, uint32_t *list) {
+  const grid *g = self->grid;
   size_t count = 0;
   for (int r = box[1]; r <= box[3]; r++) {
     for (int c = box[0]; c <= box[2]; c++) {
       const size_t cell = (size_t)r * (size_t)g->columns + (size_t)c;
       for (uint32_t i = g->start[cell]; i < g->start[cell + 1]; i++) {
-        const uint32_t item = g->content[i];
-        if (seen[item]) continue;
-        seen[item] = 1;
-        list[count++] = item;
+        const uint32_t strip = self->strip_of[g->content[i]];
+        if (seen[strip]) continue;
+        seen[strip] = 1;
+        list[count++] = self->strips[strip];
       }
     }
   }
   return count;
 }
 
-/* Looks around from the square, far enough for GATHER_ENOUGH items. Returns 0, or -1 without memory. */
-static int gather(const ray_lists *self, const square *from, gathered *all) {
+/* Strips around the square, from as far as it takes for GATHER_ENOUGH. */
+static size_t collect_near(const ray_lists *self, const square *from, uint8_t *seen, uint32_t *list, double *complete) {
   const grid *g = self->grid;
-  const uint32_t total = (uint32_t)(self->items.edge_count + self->items.disc_count);
-  *all = (gathered){.sights = malloc(total * sizeof(sight)), .complete = 1e30};
-  if (all->sights == NULL) return -1;
-  if (total <= GATHER_ENOUGH) {
-    for (uint32_t i = 0; i < total; i++) see(all, &self->items, i, from);
-    return 0;
-  }
-  uint8_t *seen = calloc(total, 1);
-  uint32_t *list = malloc(total * sizeof *list);
-  if (seen == NULL || list == NULL) {
-    free(seen);
-    free(list);
-    free(all->sights);
-    return -1;
-  }
   size_t count = 0;
   for (double reach = 16.0 * g->cell; count < GATHER_ENOUGH; reach *= 1.5) {
     const int box[4] = {
@@ -191,17 +304,36 @@ static int gather(const ray_lists *self, const square *from, gathered *all) {
         grid_clamp((from->x + from->half + reach - g->x0) * g->per_metre + GRID_MARGIN, g->columns),
         grid_clamp((from->y + from->half + reach - g->y0) * g->per_metre + GRID_MARGIN, g->rows),
     };
-    count += collect(g, box, seen, list + count);
-    all->complete = reach;
+    count += collect(self, box, seen, list + count);
+    *complete = reach;
     if (box[0] == 0 && box[1] == 0 && box[2] == g->columns - 1 && box[3] == g->rows - 1) {
-      all->complete = 1e30;
+      *complete = 1e30;
       break;
     }
   }
-  for (size_t i = 0; i < count; i++) see(all, &self->items, list[i], from);
+  return count;
+}
+
+/* Looks around from the square. Returns 0, or -1 without memory. */
+static int gather(const ray_lists *self, const square *from, gathered *all) {
+  const size_t total = self->strip_count;
+  *all = (gathered){.sights = malloc(total * sizeof(sight)), .complete = 1e30};
+  if (all->sights == NULL) return -1;
+  if (total <= GATHER_ENOUGH) {
+    for (size_t i = 0; i < total; i++) see(self, all, self->strips[i], from);
+    return 0;
+  }
+  uint8_t *seen = calloc(total, 1);
+  uint32_t *list = malloc(total * sizeof *list);
+  if (seen != NULL && list != NULL) {
+    const size_t count = collect_near(self, from, seen, list, &all->complete);
+    for (size_t i = 0; i < count; i++) see(self, all, list[i], from);
+  }
+  const int failed = seen == NULL || list == NULL;
   free(seen);
   free(list);
-  return 0;
+  if (failed) free(all->sights);
+  return failed ? -1 : 0;
 }
 
 /* Sorts by distance, in LEVELS steps. Returns 0, or -1 without memory. */
@@ -232,32 +364,33 @@ static int sort(gathered *all) {
 }
 
 /* The lists of all sectors in one block, each with its end. */
-static ray_list_cell *packed(const gathered *all, size_t *size) {
-  uint32_t length[RAY_SECTORS] = {0};
+static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t *size) {
+  const unsigned sectors = (unsigned)self->sectors;
+  uint32_t length[RAY_SECTORS_MOST] = {0};
   for (size_t i = 0; i < all->count; i++) {
     const sight *s = &all->sights[i];
-    for (unsigned k = 0; k <= s->more; k++) length[(s->first + k) % RAY_SECTORS]++;
+    for (unsigned k = 0; k <= s->more; k++) length[(s->first + k) % sectors]++;
   }
   size_t total = 0;
-  uint32_t start[RAY_SECTORS];
-  for (int k = 0; k < RAY_SECTORS; k++) {
+  uint32_t start[RAY_SECTORS_MOST];
+  for (int k = 0; k < (int)sectors; k++) {
     start[k] = (uint32_t)total;
     total += (length[k] < LIST_LONGEST ? length[k] : LIST_LONGEST) + 1;
   }
   *size = sizeof(ray_list_cell) + total * sizeof(ray_list_entry);
   ray_list_cell *cell = malloc(*size);
   if (cell == NULL) return NULL;
-  uint32_t filled[RAY_SECTORS] = {0};
+  uint32_t filled[RAY_SECTORS_MOST] = {0};
   for (size_t i = 0; i < all->count; i++) {
     const sight *s = &all->sights[i];
     for (unsigned k = 0; k <= s->more; k++) {
-      const unsigned sector = (s->first + k) % RAY_SECTORS;
+      const unsigned sector = (s->first + k) % sectors;
       if (filled[sector] > LIST_LONGEST) continue;
-      const uint32_t item = filled[sector] < LIST_LONGEST ? s->item : RAY_LIST_END;
-      cell->entry[start[sector] + filled[sector]++] = (ray_list_entry){s->bound, item};
+      const uint32_t strip = filled[sector] < LIST_LONGEST ? s->strip : RAY_LIST_END;
+      cell->entry[start[sector] + filled[sector]++] = (ray_list_entry){s->bound, strip};
     }
   }
-  for (int k = 0; k < RAY_SECTORS; k++) {
+  for (int k = 0; k < (int)sectors; k++) {
     cell->start[k] = (uint16_t)start[k];
     if (filled[k] > LIST_LONGEST) continue;
     cell->entry[start[k] + filled[k]] = (ray_list_entry){(float)(all->complete * (1.0 - 1e-6)), RAY_LIST_END};
@@ -275,20 +408,14 @@ static ray_list_cell *made(const ray_lists *self, size_t number, size_t *size) {
   };
   gathered all;
   if (gather(self, &from, &all) != 0) return NULL;
-  ray_list_cell *cell = sort(&all) == 0 ? packed(&all, size) : NULL;
+  ray_list_cell *cell = sort(&all) == 0 ? packed(self, &all, size) : NULL;
   free(all.sights);
   return cell;
 }
 
-/* After so many rays the lists have cost less than they save. */
-static unsigned visits_wanted(const ray_lists *self) {
-  const size_t items = self->items.edge_count + self->items.disc_count;
-  return (unsigned)(items < GATHER_ENOUGH ? items : GATHER_ENOUGH);
-}
-
 const ray_list_cell *ray_lists_visit(ray_lists *self, size_t number) {
   const unsigned visits = __atomic_load_n(&self->visits[number], __ATOMIC_RELAXED);
-  if (visits < visits_wanted(self)) {
+  if (visits < self->patience) {
     __atomic_store_n(&self->visits[number], (uint16_t)(visits + 1), __ATOMIC_RELAXED);
     return NULL;
   }
@@ -306,6 +433,13 @@ const ray_list_cell *ray_lists_visit(ray_lists *self, size_t number) {
 }
 
 #else
+
+ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
+  (void)g, (void)items;
+  return NULL;
+}
+
+void ray_lists_destroy(ray_lists *self) { (void)self; }
 
 const ray_list_cell *ray_lists_visit(ray_lists *self, size_t number) {
   (void)self, (void)number;

@@ -13,16 +13,24 @@
 #include "grid.h"
 #include "rays.h"
 
-#define RAY_SECTORS 64
+#define RAY_SECTORS_PER_UNIT 16                       /* cells of the table of directions along a unit vector */
+#define RAY_TABLE_SIDE (2 * RAY_SECTORS_PER_UNIT + 1) /* of that table */
+#define RAY_SECTORS_MOST 128
+#define RAY_STRIP_LONGEST 15u /* edges */
 #define RAY_LIST_END UINT32_MAX
 
+/* Short edges in a row are listed as one strip. */
 typedef struct {
-  float bound;   /* nothing of the item is nearer to any point of the cell */
-  uint32_t item; /* RAY_LIST_END: beyond `bound` the list is silent */
+  float bound;    /* nothing of the strip is nearer to any point of the cell */
+  uint32_t strip; /* first item and number of items, see ray_strip_*; RAY_LIST_END: beyond `bound` the list is silent */
 } ray_list_entry;
 
+static inline uint32_t ray_strip(uint32_t first, uint32_t count) { return first | (count - 1) << 28; }
+static inline uint32_t ray_strip_first(uint32_t strip) { return strip & 0x0fffffffu; }
+static inline uint32_t ray_strip_count(uint32_t strip) { return (strip >> 28) + 1; }
+
 typedef struct {
-  uint16_t start[RAY_SECTORS];
+  uint16_t start[RAY_SECTORS_MOST];
   ray_list_entry entry[];
 } ray_list_cell;
 
@@ -31,9 +39,18 @@ typedef struct {
   int columns, rows;
   ray_list_cell **cells; /* columns * rows, NULL: not made yet */
   uint16_t *visits;
-  size_t memory; /* bytes in lists */
+  unsigned patience; /* a cell's lists are made after so many rays from there */
+  size_t memory;     /* bytes in lists */
   const grid *grid;
   grid_items items;
+  uint32_t *strips; /* of all items */
+  size_t strip_count;
+  uint32_t *strip_of;        /* by item */
+  double *start_x, *start_y; /* of all edges, and some more places */
+  /* Sectors of directions: between neighbouring multiples of 1 / RAY_SECTORS_PER_UNIT of cosine and sine. */
+  int sectors;
+  double sector_turn[RAY_SECTORS_MOST + 1];           /* where each begins, see ray_turn; the last is 4 */
+  uint8_t sector_of[RAY_TABLE_SIDE * RAY_TABLE_SIDE]; /* by row and column of cosine and sine */
 } ray_lists;
 
 /* NULL without memory, or where the compiler offers no atomic operations. */
@@ -43,15 +60,12 @@ void ray_lists_destroy(ray_lists *self);
 /* Counts a ray that starts in a cell without lists, and makes them when it is time. NULL: there are none. */
 const ray_list_cell *ray_lists_visit(ray_lists *self, size_t cell);
 
-/* Direction as a number in [0, 4) that grows with the angle: 0 along x, 1 along y. No trigonometry. */
-static inline double ray_turn(double x, double y) {
-  const double share = y / (fabs(x) + fabs(y));
-  if (x < 0.0) return 2.0 - share;
-  return share < 0.0 ? 4.0 + share : share;
-}
-
-static inline unsigned ray_sector(double cosine, double sine) {
-  return (unsigned)(int)(ray_turn(cosine, sine) * (RAY_SECTORS / 4)) % RAY_SECTORS;
+/* The sector of a direction; RAY_SECTORS_MOST: none, the vector's length is not 1. */
+static inline unsigned ray_sector(const ray_lists *self, double cosine, double sine) {
+  const int column = (int)(cosine * RAY_SECTORS_PER_UNIT + RAY_SECTORS_PER_UNIT);
+  const int row = (int)(sine * RAY_SECTORS_PER_UNIT + RAY_SECTORS_PER_UNIT);
+  const unsigned place = (unsigned)(row * RAY_TABLE_SIDE + column);
+  return place < sizeof self->sector_of ? self->sector_of[place] : RAY_SECTORS_MOST;
 }
 
 #endif

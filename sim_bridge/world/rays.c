@@ -3,17 +3,34 @@
 
 #include "arena_data.h"
 
-static inline void ask_item(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
-  if (item < self->edge_count) {
-    const arena_edge *e = &self->edge[item];
-    if (e->height >= height) ray_take(nearest, ray_edge(e, r, nearest->distance), item);
-  } else {
-    const arena_disc *d = &self->disc[item - self->edge_count];
-    if (d->height >= height) ray_take(nearest, ray_disc(d, r), item);
-  }
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+/* The way of most rays is straight: cell, sector, first entry, edge. */
+#ifdef __GNUC__
+#define INLINE static inline __attribute__((always_inline))
+#define NOT_INLINE __attribute__((noinline))
+#else
+#define INLINE static inline
+#define NOT_INLINE
+#endif
+
+NOT_INLINE static void ask_disc(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
+  const arena_disc *d = &self->disc[item - self->edge_count];
+  if (d->height >= height) ray_take(nearest, ray_disc(d, r), item);
 }
 
-static void ask_all(const arena *self, const ray *r, double height, ray_nearest *nearest) {
+INLINE void ask_item(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
+  if (item >= self->edge_count) {
+    ask_disc(self, r, height, item, nearest);
+    return;
+  }
+  const arena_edge *e = &self->edge[item];
+  if (e->height >= height) ray_take(nearest, ray_edge(e, r, nearest->distance), item);
+}
+
+NOT_INLINE static void ask_all(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   const uint32_t count = (uint32_t)(self->edge_count + self->disc_count);
   for (uint32_t i = 0; i < count; i++) ask_item(self, r, height, i, nearest);
 }
@@ -44,7 +61,7 @@ static int in_box(const grid *g, const ray *r, double *enter, double *leave) {
 
 /* Walks the cells that the ray crosses, in order, until what was met lies before the next cell. The ring of empty cells
  * around the grid takes the last step. */
-static void walk(const arena *self, const ray *r, double height, ray_nearest *nearest) {
+NOT_INLINE static void walk(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   const grid *g = &self->grid;
   const double far = 1e300;
   double enter = 0.0;
@@ -78,28 +95,81 @@ static void walk(const arena *self, const ray *r, double height, ray_nearest *ne
   }
 }
 
-/* Asks the list of the ray's cell and sector. Returns 0 if that does not settle the answer. */
-static int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
 #ifdef __GNUC__
+
+/* How far to the left of the ray's line each corner of a strip lies: bit i of `left` is set where corner i surely does,
+ * of `right` where it surely lies to the right. */
+static inline void sides(const ray_lists *lists, const ray *r, uint32_t first, uint32_t corners, uint32_t *left,
+                         uint32_t *right) {
+  const double surely = 1e-9; /* m */
+  const double *x = &lists->start_x[first];
+  const double *y = &lists->start_y[first];
+  *left = *right = 0;
+#ifdef __SSE2__
+  const __m128d from_x = _mm_set1_pd(r->x);
+  const __m128d from_y = _mm_set1_pd(r->y);
+  const __m128d cosine = _mm_set1_pd(r->cosine);
+  const __m128d sine = _mm_set1_pd(r->sine);
+  for (uint32_t i = 0; i < corners; i += 2) {
+    const __m128d dx = _mm_sub_pd(_mm_loadu_pd(x + i), from_x);
+    const __m128d dy = _mm_sub_pd(_mm_loadu_pd(y + i), from_y);
+    const __m128d aside = _mm_sub_pd(_mm_mul_pd(cosine, dy), _mm_mul_pd(sine, dx));
+    *left |= (uint32_t)_mm_movemask_pd(_mm_cmpgt_pd(aside, _mm_set1_pd(surely))) << i;
+    *right |= (uint32_t)_mm_movemask_pd(_mm_cmplt_pd(aside, _mm_set1_pd(-surely))) << i;
+  }
+#else
+  for (uint32_t i = 0; i < corners; i++) {
+    const double aside = r->cosine * (y[i] - r->y) - r->sine * (x[i] - r->x);
+    *left |= (uint32_t)(aside > surely) << i;
+    *right |= (uint32_t)(aside < -surely) << i;
+  }
+#endif
+}
+
+/* Asks those edges of a strip whose ends do not both lie on the same side of the ray. */
+NOT_INLINE static void ask_strip(const arena *self, const ray *r, double height, uint32_t first, uint32_t count,
+                                 ray_nearest *nearest) {
+  uint32_t left, right;
+  sides(self->lists, r, first, count + 1, &left, &right);
+  uint32_t wanted = ~((left & left >> 1) | (right & right >> 1)) & ((1u << count) - 1u);
+  for (; wanted != 0; wanted &= wanted - 1) {
+    ask_item(self, r, height, first + (uint32_t)__builtin_ctz(wanted), nearest);
+  }
+}
+
+/* Asks the list of the ray's cell and sector. Returns 0 if that does not settle the answer. */
+INLINE int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   ray_lists *lists = self->lists;
   const double gx = (r->x - lists->x0) * lists->per_metre;
   const double gy = (r->y - lists->y0) * lists->per_metre;
   if (!(gx >= 0.0 && gy >= 0.0 && gx < lists->columns && gy < lists->rows)) return 0;
   const size_t number = (size_t)(int)gy * (size_t)lists->columns + (size_t)(int)gx;
   const ray_list_cell *cell = __atomic_load_n(&lists->cells[number], __ATOMIC_ACQUIRE);
-  if (cell == NULL) cell = ray_lists_visit(lists, number);
-  if (cell == NULL) return 0;
-  const ray_list_entry *entry = &cell->entry[cell->start[ray_sector(r->cosine, r->sine)]];
+  if (cell == NULL && (cell = ray_lists_visit(lists, number)) == NULL) return 0;
+  const unsigned sector = ray_sector(lists, r->cosine, r->sine);
+  if (sector >= RAY_SECTORS_MOST) return 0;
+  const ray_list_entry *entry = &cell->entry[cell->start[sector]];
   for (; (double)entry->bound <= nearest->distance; entry++) {
-    if (entry->item == RAY_LIST_END) return 0;
-    ask_item(self, r, height, entry->item, nearest);
+    if (entry->strip == RAY_LIST_END) return 0;
+    const uint32_t first = ray_strip_first(entry->strip);
+    const uint32_t count = ray_strip_count(entry->strip);
+    if (count == 1) {
+      ask_item(self, r, height, first, nearest);
+    } else {
+      ask_strip(self, r, height, first, count, nearest);
+    }
   }
   return 1;
+}
+
 #else
+
+static int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   (void)self, (void)r, (void)height, (void)nearest;
   return 0;
-#endif
 }
+
+#endif
 
 double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t *item) {

@@ -18,30 +18,30 @@ typedef struct {
   double x, y, cosine, sine;
 } ray;
 
-/* Distance to the edge. RAY_MISS where it is not met, or surely not nearer than `best`. Surfaces have two sides. */
-static inline double ray_edge(const arena_edge *e, const ray *r, double best) {
-  const double wx = r->x - e->ax;
-  const double wy = r->y - e->ay;
-  double den = e->ey * r->cosine - e->ex * r->sine;
-  double t = e->ex * wy - e->ey * wx;       /* numerator of (3.6) */
-  double u = r->cosine * wy - r->sine * wx; /* numerator of (3.7) */
-  if (den < 0.0) {
-    den = -den;
-    t = -t;
-    u = -u;
-  }
-  if (den * den > 1e-24 * e->length_squared) {
-    const double slack = RAY_CRACK * den;
-    /* Farther than `best` by more than rounding can explain. */
-    if (t < 0.0 || t > best * den * (1.0 + RAY_CRACK) || u < -slack || u > den + slack) return RAY_MISS;
-    return t / den;
-  }
-  if (u * u > 1e-24) return RAY_MISS;                /* parallel beside it */
-  const double a = -(wx * r->cosine + wy * r->sine); /* collinear: the nearer of what lies ahead */
+/* Rays along an edge, for ray_edge: the nearer of what lies ahead of the ray. */
+static inline double ray_along_edge(const arena_edge *e, const ray *r, double u) {
+  if (u * u > 1e-24) return RAY_MISS; /* parallel beside it */
+  const double a = (e->ax - r->x) * r->cosine + (e->ay - r->y) * r->sine;
   const double b = a + e->ex * r->cosine + e->ey * r->sine;
   if ((a < 0.0) != (b < 0.0)) return 0.0; /* the ray starts on the edge */
   if (a < 0.0) return RAY_MISS;
   return a < b ? a : b;
+}
+
+/* Distance to the edge. RAY_MISS where it is not met, or surely not nearer than `best`. Surfaces have two sides. */
+static inline double ray_edge(const arena_edge *e, const ray *r, double best) {
+  const double wx = r->x - e->ax;
+  const double wy = r->y - e->ay;
+  const double signed_den = e->ey * r->cosine - e->ex * r->sine;
+  const double sign = copysign(1.0, signed_den);
+  const double den = fabs(signed_den);
+  const double t = sign * (e->ex * wy - e->ey * wx);       /* numerator of (3.6) */
+  const double u = sign * (r->cosine * wy - r->sine * wx); /* numerator of (3.7) */
+  if (!(den * den > 1e-24 * e->length_squared)) return ray_along_edge(e, r, u);
+  const double slack = RAY_CRACK * den;
+  /* Beside the edge, behind the ray, or farther than `best` by more than rounding can explain. */
+  if ((t < 0.0) | (t > best * den * (1.0 + RAY_CRACK)) | (u < -slack) | (u > den + slack)) return RAY_MISS;
+  return t / den;
 }
 
 /* Distance to a circle of `radius` whose centre lies at (dx, dy) from the ray's origin, met from outside or inside. */

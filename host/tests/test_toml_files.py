@@ -1,0 +1,157 @@
+"""Descriptions in TOML: every error names file, line, key and what was expected; keys are found in any layout."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from boebot import toml_files
+from boebot.errors import RobotError
+from boebot.robots import load_robot
+from boebot.toml_lines import line_of, lines_of
+
+LAYOUT = '''# a comment with [brackets] and "quotes"
+title = "a ] string } with # signs"   # line 2
+long = """three
+lines [of]
+text"""
+plain = \'\'\'one " two
+\'\'\'
+[a]
+"quoted key" = 1
+b.c = [1, [2, 3],
+  # a comment ]
+  [4,
+   { x = 5, y = [ 6 ] }],
+]
+
+[[part]]
+name = 'first'
+[[part.hole]]
+x = 1
+[part.hole.edge]
+z = 2
+[[part]]
+name = "second"
+hole = [{ x = 7 },
+  { x = 8 }]
+[[part.screw]]
+x = 3
+[[part.screw]]
+x = 4
+[a.d]
+last = 1979-05-27T07:32:00Z
+'''
+
+
+def test_every_key_is_found_in_its_line() -> None:
+    wanted = {
+        "title": 2, "long": 3, "plain": 6, "a": 8, "a.quoted key": 9, "a.b": 10, "a.b.c[1][1]": 10, "a.b.c[2]": 12,
+        "a.b.c[2][1].y[0]": 13, "part": 16, "part[0].name": 17, "part[0].hole[0]": 18, "part[0].hole[0].x": 19,
+        "part[0].hole[0].edge.z": 21, "part[1]": 22, "part[1].hole[1].x": 25, "part[1].screw[0].x": 27,
+        "part[1].screw[1].x": 29, "a.d.last": 31,
+    }  # fmt: skip
+    found = lines_of(LAYOUT)
+    assert {place: found.get(place) for place in wanted} == wanted
+    assert lines_of(LAYOUT.replace("\n", "\r\n")) == found
+    assert line_of(LAYOUT, "a.b.nothing[3].there") == 10
+    assert line_of(LAYOUT, "nothing") == 1
+
+
+def places(value: Any, place: str) -> set[str]:
+    """All places in a table."""
+    if isinstance(value, dict):
+        below = [(f"{place}.{name}" if place else name, entry) for name, entry in value.items()]
+    elif isinstance(value, list):
+        below = [(f"{place}[{index}]", entry) for index, entry in enumerate(value)]
+    else:
+        below = []
+    return {place}.union(*(places(entry, inner) for inner, entry in below))
+
+
+PIECES = st.sampled_from(
+    [
+        "[a]",
+        "[a.b]",
+        "[[c]]",
+        "[[c.d]]",
+        "[c.d.e]",
+        "k = 1",
+        "m = [1, [2, {x = 3}],\n]",
+        "n.o = 'q # ]'",
+        'p = """\n"""',
+        "#",
+    ]
+)
+
+
+@given(st.lists(PIECES, max_size=12))
+def test_the_scan_sees_what_tomllib_sees(pieces: list[str]) -> None:
+    text = "\n".join(pieces)
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return
+    assert set(lines_of(text)) == places(table, "")
+
+
+class Screw(msgspec.Struct, forbid_unknown_fields=True):
+    x: int
+
+
+class Part(msgspec.Struct, forbid_unknown_fields=True):
+    name: str
+    screw: list[Screw] = []
+
+
+class Whole(msgspec.Struct, forbid_unknown_fields=True):
+    part: list[Part]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("part = 1", "it.toml:1: part: expected array, got int"),
+        ("# nothing", "it.toml: the key 'part' is missing"),
+        ("\n[[part]]\n\n[[part]]\nname = 'b'", "it.toml:2: part[0]: the key 'name' is missing"),
+        ("[[part]]\nname = 'a'\n[[part.screw]]\nx = 'y'", "it.toml:4: part[0].screw[0].x: expected int, got str"),
+        ("[[part]]\nname = 'a'\nscrew = [{x = 1},\n{y = 2}]", "it.toml:4: part[0].screw[1]: there is no key 'y' here"),
+        ("[[part]]\nname = 'a'\nscrew = [\n{x = inf}]", "it.toml:4: part[0].screw[0].x: expected a finite number"),
+        (f"x = {'9' * 5000}", "it.toml is no valid TOML: "),
+        (f"x = {'9' * 400}", "it.toml:1: x: expected a finite number"),
+        (f"x = {'[' * 100_000}", "it.toml is "),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, sentence: str) -> None:
+    file = tmp_path / "it.toml"
+    file.write_text(text)
+    with pytest.raises(RobotError) as caught:
+        toml_files.convert(toml_files.read(file, RobotError), Whole, file.name, RobotError)
+    assert str(caught.value).startswith(sentence)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_too_large_is_not_read(tmp_path: Path) -> None:
+    file = tmp_path / "it.toml"
+    file.write_text("#" * (toml_files.SIZE_MAXIMUM + 1))
+    with pytest.raises(RobotError, match=r"it\.toml has 8,000,001 bytes; expected at most 8,000,000"):
+        toml_files.read(file, RobotError)
+
+
+def test_a_robot_that_extends_another_names_the_right_file_and_line(tmp_path: Path) -> None:
+    for name, text in {
+        "base.toml": "extends = 'shieldbot'\n[body]\nmass_kg = 'much'",
+        "robot.toml": f"extends = '{tmp_path / 'base.toml'}'\n\ntitle = 'mine'",
+        "other.toml": f"extends = '{tmp_path / 'base.toml'}'\n\n[body]\nmass_kg = 1.0\nradius_m = 'r'",
+    }.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(RobotError, match=r"base\.toml:3: body\.mass_kg: expected float, got str"):
+        load_robot(tmp_path / "robot.toml")
+    with pytest.raises(RobotError, match=r"other\.toml:5: body\.radius_m: expected float, got str"):
+        load_robot(tmp_path / "other.toml")

@@ -1,0 +1,259 @@
+"""What an arena file says: its keys with their units and limits, and what a description has to keep beyond its types.
+
+`sim_bridge/arenas/schema.json` and the table in docs/reference/arenas.md are made from these types
+(sim_bridge/arena_reference.py).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from sim_bridge._core import ffi, lib
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float]
+
+EXTENT_M = 1000.0  # nothing lies farther from the origin
+EDGES_MAXIMUM = 200_000  # of all shapes together
+DISTINCT_M = 1e-9  # corners nearer than that are the same
+
+Position = Annotated[float, Meta(ge=-EXTENT_M, le=EXTENT_M)]
+Length = Annotated[float, Meta(gt=0, le=EXTENT_M)]
+Angle = Annotated[float, Meta(ge=-10_000, le=10_000)]
+Height = Annotated[
+    float,
+    Meta(gt=0, description="top above the floor; sensors that sit higher do not see it (default: as high as any)"),
+]
+Infrared = Annotated[float, Meta(ge=0, le=1, description="share of infrared light thrown back; 1: a white wall")]
+Sound = Annotated[float, Meta(ge=0, le=1, description="share of sound thrown back; 1: a hard wall, less: cloth")]
+Name = Annotated[str, Meta(description="for people")]
+Corners = Annotated[
+    list[tuple[Position, Position]], Meta(min_length=3, description="x, y of each corner; the last one joins the first")
+]
+
+
+class Start(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Where a robot starts."""
+
+    x_m: Annotated[Position, Meta(description="to the right")] = 0.0
+    y_m: Annotated[Position, Meta(description="up")] = 0.0
+    heading_rad: Annotated[Angle, Meta(description="0: along x, counter-clockwise")] = 0.0
+
+
+class Polygon(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A closed polygon: as an outline, the robot is inside it; as an obstacle, outside."""
+
+    corners_m: Corners
+    name: Name = ""
+    height_m: Height | None = None
+    infrared_reflectance: Infrared = 1.0
+    sound_reflectance: Sound = 1.0
+
+
+class Wall(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A thin wall, seen and felt from both sides."""
+
+    points_m: Annotated[
+        list[tuple[Position, Position]],
+        Meta(min_length=2, description="x, y of its ends and of the bends between them"),
+    ]
+    name: Name = ""
+    height_m: Height | None = None
+    infrared_reflectance: Infrared = 1.0
+    sound_reflectance: Sound = 1.0
+
+
+class Disc(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A round obstacle."""
+
+    x_m: Annotated[Position, Meta(description="centre")]
+    y_m: Annotated[Position, Meta(description="centre")]
+    radius_m: Length
+    name: Name = ""
+    height_m: Height | None = None
+    infrared_reflectance: Infrared = 1.0
+    sound_reflectance: Sound = 1.0
+
+
+class Patch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A part of the floor with another friction; later ones lie on top of earlier ones."""
+
+    corners_m: Corners
+    grip: Annotated[float, Meta(ge=0, le=10, description="friction coefficient between wheels and floor")]
+    name: Name = ""
+
+
+class Light(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A lamp. Shapes that are higher than the line from lamp to sensor shade it."""
+
+    x_m: Position
+    y_m: Position
+    power_w: Annotated[float, Meta(ge=0, le=100_000, description="radiated, evenly in all directions")]
+    height_m: Annotated[float, Meta(ge=0, le=EXTENT_M, description="above the floor")] = 0.1
+    name: Name = ""
+
+
+class Charger(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A charging station: a disc on the floor; a robot is charged while its centre is on it."""
+
+    x_m: Annotated[Position, Meta(description="centre")]
+    y_m: Annotated[Position, Meta(description="centre")]
+    radius_m: Length
+
+
+class Waypoint(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Where a moving shape is at a time; between waypoints it goes straight and evenly."""
+
+    time_s: Annotated[float, Meta(ge=0, le=1e6, description="since the start; 0 for the first waypoint")]
+    x_m: Position
+    y_m: Position
+    heading_rad: Annotated[Angle, Meta(description="not wrapped: from 0 to 12.566 is two turns")] = 0.0
+
+
+class Moving(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A shape on its way: a polygon with corners in its own frame, or a disc."""
+
+    path: Annotated[list[Waypoint], Meta(min_length=1)]
+    corners_m: Corners | None = None
+    radius_m: Length | None = None
+    repeat: Annotated[
+        Literal["loop", "back_and_forth", "once"],
+        Meta(description="after the last waypoint: again from the first (which it has to equal), back, or stay"),
+    ] = "back_and_forth"
+    name: Name = ""
+    height_m: Height | None = None
+    infrared_reflectance: Infrared = 1.0
+    sound_reflectance: Sound = 1.0
+
+
+class ArenaDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """An arena. Lengths in m, angles in rad, x to the right, y up."""
+
+    name: str
+    title: Annotated[str, Meta(description="one line for people")] = ""
+    start: Start = Start()
+    outline: list[Polygon] = []
+    obstacle: list[Polygon] = []
+    wall: list[Wall] = []
+    disc: list[Disc] = []
+    patch: list[Patch] = []
+    light: list[Light] = []
+    charger: Charger | None = None
+    moving: list[Moving] = []
+
+
+class DescriptionError(Exception):
+    """Something that a description must not say.
+
+    Attributes:
+        place: of the key, such as "outline[0].corners_m[2]".
+        what: the rest of the sentence.
+    """
+
+    def __init__(self, place: str, what: str) -> None:
+        super().__init__(f"{place}{what}")
+        self.place, self.what = place, what
+
+
+def check(description: ArenaDescription) -> None:
+    """Raises DescriptionError at the first thing that types cannot say: order in time, simple polygons, number of edges."""
+    rows = [*_closed(description), *((f"wall[{i}].points_m", wall.points_m) for i, wall in enumerate(description.wall))]
+    edges = sum(len(points) for _, points in rows)
+    if edges > EDGES_MAXIMUM:
+        largest = max(rows, key=lambda row: len(row[1]))[0]
+        raise DescriptionError(largest, f": the arena has {edges:,} edges; expected at most {EDGES_MAXIMUM:,}")
+    for place, corners in _closed(description):
+        _check_polygon(corners, place)
+    for i, wall in enumerate(description.wall):
+        _check_points(wall.points_m, f"wall[{i}].points_m", 2)
+        _check_distinct(np.array(wall.points_m), f"wall[{i}].points_m")
+    for i, disc in enumerate(description.disc):
+        _check_finite((disc.x_m, disc.y_m), f"disc[{i}]")
+        _check_radius(disc.radius_m, f"disc[{i}].radius_m")
+    for i, moving in enumerate(description.moving):
+        _check_moving(moving, f"moving[{i}]")
+
+
+def _closed(description: ArenaDescription) -> Iterator[tuple[str, list[Point]]]:
+    """All closed polygons, with their places."""
+    for key, shapes in (("outline", description.outline), ("obstacle", description.obstacle)):
+        yield from ((f"{key}[{i}].corners_m", shape.corners_m) for i, shape in enumerate(shapes))
+    for i, patch in enumerate(description.patch):
+        yield f"patch[{i}].corners_m", patch.corners_m
+    for i, moving in enumerate(description.moving):
+        if moving.corners_m is not None:
+            yield f"moving[{i}].corners_m", moving.corners_m
+
+
+def _check_finite(point: Point, place: str) -> None:
+    if not all(math.isfinite(value) and abs(value) <= EXTENT_M for value in point):
+        raise DescriptionError(place, f" is {list(point)}; expected numbers within ±{EXTENT_M:g} m")
+
+
+def _check_radius(radius: float, place: str) -> None:
+    if not 0 < radius <= EXTENT_M:
+        raise DescriptionError(place, f" is {radius}; expected more than 0 and at most {EXTENT_M:g} m")
+
+
+def _check_points(points: list[Point], place: str, least: int) -> None:
+    if len(points) < least:
+        raise DescriptionError(
+            place, f" has {len(points)} {'corners' if least > 2 else 'points'}; expected at least {least}"
+        )
+    for index, point in enumerate(points):
+        _check_finite(point, f"{place}[{index}]")
+
+
+def _check_distinct(points: Floats, place: str) -> None:
+    """Neighbours in the row may not coincide."""
+    same = np.flatnonzero(np.hypot(*(points[1:] - points[:-1]).T) < DISTINCT_M)
+    if same.size:
+        raise DescriptionError(f"{place}[{same[0]}]", " and the point after it are the same; expected an edge")
+
+
+def _check_polygon(corners: list[Point], place: str) -> None:
+    """Refuses what is no simple polygon of finite size."""
+    _check_points(corners, place, 3)
+    xy = np.array(corners, dtype=np.float64)
+    _check_distinct(np.vstack((xy, xy[:1])), place)
+    one, other = ffi.new("uint32_t *"), ffi.new("uint32_t *")
+    crossing = lib.arena_crossing(ffi.from_buffer("double[]", xy), len(xy), one, other)
+    if crossing < 0:
+        raise MemoryError("arena")
+    if crossing > 0:
+        raise DescriptionError(
+            place, f": edges {one[0]} and {other[0]} cross or touch; expected a polygon whose edges do not"
+        )
+
+
+def _check_moving(moving: Moving, place: str) -> None:
+    if (moving.corners_m is None) == (moving.radius_m is None):
+        raise DescriptionError(place, ": expected either corners_m or radius_m")
+    if moving.radius_m is not None:
+        _check_radius(moving.radius_m, f"{place}.radius_m")
+    if not moving.path:
+        raise DescriptionError(f"{place}.path", " is empty; expected a waypoint")
+    for i, point in enumerate(moving.path):
+        _check_finite((point.x_m, point.y_m), f"{place}.path[{i}]")
+    times = [point.time_s for point in moving.path]
+    if times[0] != 0:
+        raise DescriptionError(f"{place}.path[0].time_s", f" is {times[0]:g}; expected 0 for the first waypoint")
+    for i in range(1, len(times)):
+        if not times[i - 1] < times[i] <= 1e6:
+            raise DescriptionError(
+                f"{place}.path[{i}].time_s", f" is {times[i]:g}; expected more than {times[i - 1]:g}"
+            )
+    first, last = moving.path[0], moving.path[-1]
+    turns = (last.heading_rad - first.heading_rad) / (2 * math.pi)
+    gap = math.dist((first.x_m, first.y_m), (last.x_m, last.y_m))
+    if moving.repeat == "loop" and (gap > 1e-6 or abs(turns - round(turns)) > 1e-4):
+        raise DescriptionError(
+            f"{place}.path[{len(times) - 1}]", ": expected the first waypoint again, as the path is a loop"
+        )
