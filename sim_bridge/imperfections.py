@@ -27,6 +27,7 @@ SERVO_TORQUE_N_M = 0.268  # stall (data)
 SERVO_COAST_N_S = 0.3  # unpowered gear train (chosen)
 SERVO_COAST_N_M = 0.05  # (chosen)
 
+SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its gear of about 1:250 (chosen)
 TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
@@ -126,6 +127,7 @@ def body_parameters(body: robots.Body) -> Any:
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
             "grip": TYRE_GRIP,
+            "spin_inertia": SPIN_INERTIA_KG_M2,
             "slip": 1,
         },
     )

@@ -16,6 +16,31 @@
 #define SLIP_SETTLED 1e-12 /* m/s */
 #define SPIN_SHARE 0.1     /* least spin inertia of a slipping wheel / M r^2 */
 
+const char *body_parameters_wrong(const body_parameters *p) {
+  const struct {
+    const char *name;
+    double value;
+    int may_be_zero;
+  } all[] = {
+      {"mass", p->mass, 0},
+      {"inertia", p->inertia, 0},
+      {"radius", p->outline != NULL ? p->outline->reach : p->radius, 0},
+      {"half_track", p->half_track, 0},
+      {"wheel_radius", p->wheel_radius, 0},
+      {"wheel_mass", p->wheel_mass, 1},
+      {"wheel_inertia", p->wheel_inertia, 1},
+      {"spin_inertia", p->spin_inertia, 1},
+      {"linear_damping", p->linear_damping, 1},
+      {"angular_damping", p->angular_damping, 1},
+      {"grip", p->grip, 1},
+  };
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    const double value = all[i].value;
+    if (!(value < 1e12) || !(all[i].may_be_zero ? value >= 0.0 : value > 0.0)) return all[i].name;
+  }
+  return NULL;
+}
+
 double body_a(const body_parameters *p) { /* (2.26) */
   const double r = p->wheel_radius;
   return 1.0 / (r * (1.0 + 2.0 * (p->wheel_inertia / (p->mass * r * r) + p->wheel_mass / p->mass)));
@@ -98,12 +123,18 @@ double body_wheel_hold(const body *self, double dt) {
 
 /* ---- what is near -------------------------------------------------------------------------------------------------- */
 
-void body_look_around(body *self, const arena *where, double share) {
-  body_surroundings *near = &self->near;
+/* 1 if the lists are good while the body is within `share` of their slack. */
+static inline int knows(const body *self, const arena *where, double share) {
+  const body_surroundings *near = &self->near;
   const double dx = self->state.x - near->x;
   const double dy = self->state.y - near->y;
   const double good = share * near->slack;
-  if (near->version == arena_version(where) && good > 0.0 && dx * dx + dy * dy < good * good) return;
+  return good > 0.0 && dx * dx + dy * dy < good * good && near->version == arena_version(where);
+}
+
+void body_look_around(body *self, const arena *where, double share) {
+  if (knows(self, where, share)) return;
+  body_surroundings *near = &self->near;
   near->x = self->state.x;
   near->y = self->state.y;
   near->version = arena_version(where);
@@ -134,7 +165,7 @@ const uint32_t *body_near_discs(const body *self, const arena *where, size_t *co
 }
 
 int body_is_clear(body *self, const arena *where) {
-  body_look_around(self, where, 1.0);
+  if (!knows(self, where, 1.0)) body_look_around(self, where, 1.0);
   return self->near.edge_count == 0 && self->near.disc_count == 0;
 }
 
@@ -200,7 +231,7 @@ static void slide(body *self, const scene *around, const double limits[2], const
     if (at.count > 0) change += contact_stop(self, &at, dt);
     if (change < SLIP_SETTLED) break;
   }
-  ground_end(&floor, self);
+  ground_end(&floor, self, dt);
 }
 
 /* Rolling for certain (slip switched off), held across the heading by friction that something may have overcome. */
@@ -225,7 +256,7 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2];
-  if (!s->slipping) {
+  if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     double speed = s->speed + dt * (self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed);
     double turn_rate =
         s->turn_rate + dt * (self->torque_gain * (torque[1] - torque[0]) - self->turn_drag * s->turn_rate);
@@ -252,15 +283,18 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
 
 /* ---- steps -------------------------------------------------------------------------------------------------------- */
 
-/* 1 if nothing can come within the body's reach during the step: it ends within the clear circle around it, which holds
- * its straight way, and no mover is near. */
-static int stays_clear(body *self, const scene *around, double dt) {
+static inline double way_of(const body *self, double dt) {
+  const body_state *s = &self->state;
+  if (s->lateral == 0.0) return fabs(s->speed) * dt;
+  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
+}
+
+/* 1 if nothing can come within the body's reach during the step, in which its middle moves by `way`: it stays within the
+ * clear circle around where it looked, and no mover is near. */
+static int stays_clear(body *self, const scene *around, double way, double dt) {
   const body_state *s = &self->state;
   const body_surroundings *near = &self->near;
-  const double vx = s->speed * s->cosine - s->lateral * s->sine;
-  const double vy = s->speed * s->sine + s->lateral * s->cosine;
   if (!body_is_clear(self, around->arena)) return 0;
-  const double way = sqrt(vx * vx + vy * vy) * dt;
   const double dx = s->x - near->x;
   const double dy = s->y - near->y;
   const double room = near->slack - way;
@@ -277,46 +311,58 @@ static int stays_clear(body *self, const scene *around, double dt) {
 }
 
 /* Heading, then position, (3.18)-(3.22), where nothing is in the way. */
-static void move_freely(body *self, double dt) {
+static void move_freely(body *self, double way, double dt) {
   body_state *s = &self->state;
   contact_turn(self, s->turn_rate * dt);
   s->x += (s->speed * s->cosine - s->lateral * s->sine) * dt;
   s->y += (s->speed * s->sine + s->lateral * s->cosine) * dt;
+  s->distance += way;
   s->touching = 0;
 }
 
-static void finish(body *self, double from_x, double from_y, double dt) {
+static void move_in_contact(body *const bodies[], size_t count, const scene *around, double dt) {
+  double from[BODY_MAXIMUM][2];
+  for (size_t i = 0; i < count; i++) {
+    from[i][0] = bodies[i]->state.x;
+    from[i][1] = bodies[i]->state.y;
+  }
+  contact_move(bodies, count, around, dt);
+  for (size_t i = 0; i < count; i++) {
+    body_state *s = &bodies[i]->state;
+    s->distance += sqrt((s->x - from[i][0]) * (s->x - from[i][0]) + (s->y - from[i][1]) * (s->y - from[i][1]));
+  }
+}
+
+static void move_alone(body *self, const scene *around, double dt) {
+  const double way = way_of(self, dt);
+  if (stays_clear(self, around, way, dt)) {
+    move_freely(self, way, dt);
+  } else {
+    move_in_contact(&self, 1, around, dt);
+  }
+}
+
+static int is_finite(double left, double right) { return fabs(left) + fabs(right) < 1e300; }
+
+static void turn_wheels(body *self, double dt) {
   body_state *s = &self->state;
-  const double dx = s->x - from_x;
-  const double dy = s->y - from_y;
-  s->distance += sqrt(dx * dx + dy * dy);
   if (!s->slipping) { /* rolling without slip, (2.16), (2.17) */
     s->rim_left = body_left_speed(self);
     s->rim_right = body_right_speed(self);
   }
-  s->wheel_left += s->rim_left * self->per_radius * dt;
-  s->wheel_right += s->rim_right * self->per_radius * dt;
+  const double angle = self->per_radius * dt;
+  s->wheel_left += s->rim_left * angle;
+  s->wheel_right += s->rim_right * angle;
 }
 
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
   const double torque[2] = {torque_left, torque_right};
-  if (!(dt > 0.0)) return BODY_BAD_STEP;
-  const double from_x = self->state.x;
-  const double from_y = self->state.y;
+  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
+  if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
   drive(self, around, torque, dt);
-  if (stays_clear(self, around, dt)) {
-    move_freely(self, dt);
-  } else {
-    contact_move(&self, 1, around, dt);
-  }
-  finish(self, from_x, from_y, dt);
+  move_alone(self, around, dt);
+  turn_wheels(self, dt);
   return BODY_OK;
-}
-
-/* Distance that a body's farthest point may cover in a step, at least. */
-static double way_of(const body *self, double dt) {
-  const body_state *s = &self->state;
-  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
 }
 
 /* Numbers the groups of robots that could meet within the step: each gets the least place of its group. */
@@ -355,19 +401,19 @@ static int sort(body *const bodies[], size_t count, size_t order[]) {
 
 int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt) {
   if (count == 1) return body_advance(bodies[0], around, torques[0][0], torques[0][1], dt);
-  if (!(dt > 0.0)) return BODY_BAD_STEP;
+  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
   if (count > BODY_MAXIMUM) return BODY_TOO_MANY;
+  for (size_t i = 0; i < count; i++) {
+    if (!is_finite(torques[i][0], torques[i][1])) return BODY_BAD_TORQUE;
+  }
   size_t order[BODY_MAXIMUM];
   const int status = sort(bodies, count, order);
   if (status != BODY_OK) return status;
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
-  double from[BODY_MAXIMUM][2];
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
-    from[i][0] = sorted[i]->state.x;
-    from[i][1] = sorted[i]->state.y;
     drive(sorted[i], around, torques[order[i]], dt);
   }
   find_groups(sorted, count, dt, group);
@@ -377,12 +423,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     for (size_t k = i; k < count; k++) {
       if (group[k] == i) together[members++] = sorted[k];
     }
-    if (members == 1 && stays_clear(sorted[i], around, dt)) {
-      move_freely(sorted[i], dt);
+    if (members == 1) {
+      move_alone(sorted[i], around, dt);
     } else {
-      contact_move(together, members, around, dt);
+      move_in_contact(together, members, around, dt);
     }
   }
-  for (size_t i = 0; i < count; i++) finish(sorted[i], from[i][0], from[i][1], dt);
+  for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
   return BODY_OK;
 }

@@ -49,7 +49,11 @@ typedef struct {
 } body_state;
 
 enum { BODY_MAXIMUM = 64 }; /* robots in one world */
-enum { BODY_OK = 0, BODY_BAD_STEP = -1, BODY_TOO_MANY = -2, BODY_SAME_ID = -3 };
+enum { BODY_OK = 0, BODY_BAD_STEP = -1, BODY_TOO_MANY = -2, BODY_SAME_ID = -3, BODY_BAD_TORQUE = -4 };
+
+/* NULL if they describe a body: else the name of the first that does not (not finite, or zero or less where that makes no
+ * sense). */
+const char *body_parameters_wrong(const body_parameters *p);
 
 /* A of (2.26) and B of (2.30). */
 double body_a(const body_parameters *p);
@@ -98,7 +102,8 @@ void body_place(body *self, double x, double y, double heading);
 /* One step of `dt` seconds of all robots of one world under their wheels' torques (left, right; N m; in the order of the
  * bodies). `around`: the arena and its moving obstacles as they are at the step's beginning, without the robots. Moving
  * obstacles push and are not pushed; robots push each other. The result does not depend on the order of the bodies.
- * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, and then nothing has moved. */
+ * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, BODY_BAD_TORQUE for one that is no finite
+ * number, and then nothing has moved. A body is saved and restored as a whole: its lists of near things belong to it. */
 int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
 
 /* The same for one robot. */

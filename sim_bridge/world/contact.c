@@ -7,7 +7,9 @@
 
 #define ROUNDS 100
 #define DEPTH_LIMIT 5e-7 /* m: deeper than this after all rounds there is no place */
-#define PARTS_MAXIMUM 4096.0
+#define PART_LEAST 1e-7  /* of a step */
+#define FAR 0.1          /* m: what is farther apart than this is not looked at closely */
+#define CORE_SHARE 0.5   /* a core that came nearer than this share of the rounding is treated as that far */
 
 /* What is met: everything within `rounding` of a segment, moving. */
 typedef struct {
@@ -61,6 +63,23 @@ static void add(contacts *out, const body *self, const capsule *c, double px, do
   }
 }
 
+/* Velocity of the point p of the body relative to the point q of what is met. */
+static double velocity_x(const body *self, const capsule *c, double py, double qy) {
+  const body_state *s = &self->state;
+  const double own = s->speed * s->cosine - s->lateral * s->sine - s->turn_rate * (py - s->y);
+  if (c->other == NULL) return own - (c->vx - c->turn_rate * (qy - c->y));
+  const body_state *o = &c->other->state;
+  return own - (o->speed * o->cosine - o->lateral * o->sine - o->turn_rate * (qy - o->y));
+}
+
+static double velocity_y(const body *self, const capsule *c, double px, double qx) {
+  const body_state *s = &self->state;
+  const double own = s->speed * s->sine + s->lateral * s->cosine + s->turn_rate * (px - s->x);
+  if (c->other == NULL) return own - (c->vy + c->turn_rate * (qx - c->x));
+  const body_state *o = &c->other->state;
+  return own - (o->speed * o->sine + o->lateral * o->cosine + o->turn_rate * (qx - o->x));
+}
+
 /* A pair of points, one of the core, one of the capsule. */
 static void pair(contacts *out, const body *self, const capsule *c, double px, double py, double qx, double qy,
                  double apart, double margin) {
@@ -70,6 +89,10 @@ static void pair(contacts *out, const body *self, const capsule *c, double px, d
   const double clear = distance - c->rounding;
   if (clear < out->nearest) out->nearest = clear;
   if (distance < apart + margin) add(out, self, c, px, py, qx, qy, apart, distance);
+  const double gap = distance - apart;
+  if (!(gap > CONTACT_DEPTH)) return;
+  const double closing = (velocity_x(self, c, py, qy) * dx + velocity_y(self, c, px, qx) * dy) / distance;
+  if (closing < 0.0 && (gap + CONTACT_DEPTH) / -closing < out->first) out->first = (gap + CONTACT_DEPTH) / -closing;
 }
 
 static void meet(contacts *out, const body *self, const capsule *c, double margin) {
@@ -144,7 +167,7 @@ static void meet_mover(contacts *out, const body *self, const mover *m, double e
   const double dx = x - self->state.x;
   const double dy = y - self->state.y;
   const double far = sqrt(dx * dx + dy * dy) - m->radius - self->body_reach;
-  if (far > 0.1) {
+  if (far > FAR) {
     if (far < out->nearest) out->nearest = far;
     return;
   }
@@ -164,7 +187,7 @@ static void meet_mover(contacts *out, const body *self, const mover *m, double e
 
 static void clear(contacts *out) {
   out->count = 0;
-  out->nearest = 1e300;
+  out->nearest = out->first = 1e300;
 }
 
 void contact_find(body *self, const scene *around, double elapsed, double margin, contacts *out) {
@@ -214,7 +237,7 @@ typedef struct {
 static answer answer_of(const body *self, double nx, double ny, double rx, double ry) {
   const body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
-  const double spin = s->slipping ? 0.0 : (p->slip ? self->slip_spin : self->spin); /* wheels that roll turn with it */
+  const double spin = p->slip ? 0.0 : self->spin; /* a blow is too short for tyres to pass it on to the wheels */
   answer a = {.along = nx * s->cosine + ny * s->sine, .across = ny * s->cosine - nx * s->sine};
   a.moment = rx * ny - ry * nx;
   a.speed = a.along / (self->mass + 2.0 * spin);
@@ -232,15 +255,12 @@ static double velocity_along(const body *self, const answer *a) {
 static void push(body *self, const answer *a, double impulse) {
   body_state *s = &self->state;
   if (self->parameters.slip && !s->slipping) {
-    s->speed += impulse * a->speed;
-    s->turn_rate += impulse * a->turn_rate;
     s->rim_left = body_left_speed(self);
     s->rim_right = body_right_speed(self);
-    s->slipping = impulse * a->lateral != 0.0; /* it rolls on unless it was pushed sideways */
-  } else {
-    s->speed += impulse * a->speed;
-    s->turn_rate += impulse * a->turn_rate;
+    s->slipping = 1;
   }
+  s->speed += impulse * a->speed;
+  s->turn_rate += impulse * a->turn_rate;
   s->lateral += impulse * a->lateral;
 }
 
@@ -315,7 +335,7 @@ static double put_out(body *self, const contacts *at) {
     const situation now = situation_of(self, k);
     const double depth = -now.gap;
     if (depth > deepest) deepest = depth;
-    if (depth < 0.0) continue;
+    if (depth < -CONTACT_DEPTH) continue;
     stop(self, k, &now, 0.0);
     if (depth < CONTACT_DEPTH) continue;
     const double lever = now.rx * k->ny - now.ry * k->nx;
@@ -345,47 +365,62 @@ static int are_near(const body *a, const body *b, double margin) {
   return dx * dx + dy * dy < reach * reach;
 }
 
-/* Notes who touches, and returns how long the bodies may move before a core could pass something. */
+static void note_touch(body *self, double x, double y) {
+  self->state.touching = 1;
+  self->state.touch_x = x;
+  self->state.touch_y = y;
+}
+
+/* Half of how far the fastest may go, and the time of the first meeting. */
+typedef struct {
+  double nearest, fastest, first;
+} outlook;
+
+static void consider(outlook *all, const body *self, const contacts *found) {
+  const double *core;
+  double rounding;
+  core_of(self, &core, &rounding);
+  const double nearest = fmax(found->nearest, CORE_SHARE * rounding);
+  if (nearest < all->nearest) all->nearest = nearest;
+  if (found->first < all->first) all->first = found->first;
+}
+
+/* Notes who touches, and returns how long the bodies may move: until a core could pass something, or to the instant of
+ * the first meeting, so that its impulse acts where it should. */
 static double look(body *const bodies[], size_t count, const scene *around, double elapsed, double remaining) {
   contacts found;
-  double fastest = 0.0;
-  double nearest = 1e300;
+  outlook all = {.nearest = 1e300, .first = 1e300};
   for (size_t i = 0; i < count; i++) {
     body *b = bodies[i];
-    body_state *s = &b->state;
+    const body_state *s = &b->state;
     contact_find(b, around, elapsed, BODY_SKIN, &found);
-    if (found.count > 0) {
-      const contact *k = &found.list[0];
-      s->touching = 1;
-      s->touch_x = k->qx;
-      s->touch_y = k->qy;
-    }
-    if (found.nearest < nearest) nearest = found.nearest;
+    if (found.count > 0) note_touch(b, found.list[0].qx, found.list[0].qy);
+    consider(&all, b, &found);
     const double turning = b->parameters.outline != NULL ? fabs(s->turn_rate) * b->body_reach : 0.0;
     const double own = sqrt(s->speed * s->speed + s->lateral * s->lateral) + turning;
-    if (own > fastest) fastest = own;
+    if (own > all.fastest) all.fastest = own;
     for (size_t k = 0; k < i; k++) {
-      if (!are_near(b, bodies[k], 0.1)) { /* farther apart than a core may go in a part */
-        if (nearest > 0.1) nearest = 0.1;
+      if (!are_near(b, bodies[k], FAR)) {
+        if (all.nearest > FAR) all.nearest = FAR;
         continue;
       }
       find_pair(b, bodies[k], BODY_SKIN, &found);
-      if (found.nearest < nearest) nearest = found.nearest;
+      consider(&all, b, &found);
       if (found.count == 0) continue;
       const situation now = situation_of(b, &found.list[0]);
-      s->touching = bodies[k]->state.touching = 1;
-      s->touch_x = bodies[k]->state.touch_x = bodies[k]->state.x + now.ox;
-      s->touch_y = bodies[k]->state.touch_y = bodies[k]->state.y + now.oy;
+      const body_state *o = &bodies[k]->state;
+      note_touch(b, o->x + now.ox, o->y + now.oy);
+      note_touch(bodies[k], o->x + now.ox, o->y + now.oy);
     }
   }
-  if (count > 1) fastest *= 2.0;
   double mover_fastest = 0.0;
   for (size_t i = 0; i < around->movers_count; i++) {
-    const double speed = contact_mover_speed(&around->movers[i]);
-    if (speed > mover_fastest) mover_fastest = speed;
+    mover_fastest = fmax(mover_fastest, contact_mover_speed(&around->movers[i]));
   }
-  const double rate = fastest + mover_fastest;
-  return rate * remaining > 0.5 * nearest ? 0.5 * nearest / rate : remaining;
+  const double rate = (count > 1 ? 2.0 : 1.0) * all.fastest + mover_fastest;
+  double part = rate * remaining > 0.5 * all.nearest ? 0.5 * all.nearest / rate : remaining;
+  if (all.first < part) part = all.first;
+  return part < remaining ? part : remaining;
 }
 
 static void move_part(body *const bodies[], size_t count, const scene *around, double elapsed, double dt) {
@@ -409,11 +444,11 @@ static void move_part(body *const bodies[], size_t count, const scene *around, d
   for (int round = 0; round < ROUNDS; round++) {
     deepest = 0.0;
     for (size_t i = 0; i < count; i++) {
-      contact_find(bodies[i], around, elapsed + dt, 0.0, &found);
+      contact_find(bodies[i], around, elapsed + dt, CONTACT_DEPTH, &found);
       if (found.count > 0) deepest = fmax(deepest, put_out(bodies[i], &found));
       for (size_t k = 0; k < i; k++) {
-        if (!are_near(bodies[i], bodies[k], 0.0)) continue;
-        find_pair(bodies[i], bodies[k], 0.0, &found);
+        if (!are_near(bodies[i], bodies[k], BODY_SKIN)) continue;
+        find_pair(bodies[i], bodies[k], CONTACT_DEPTH, &found);
         if (found.count > 0) deepest = fmax(deepest, put_out(bodies[i], &found));
       }
     }
@@ -435,10 +470,9 @@ static void move_part(body *const bodies[], size_t count, const scene *around, d
 void contact_move(body *const bodies[], size_t count, const scene *around, double dt) {
   double elapsed = 0.0;
   while (elapsed < dt) {
-    double part = look(bodies, count, around, elapsed, dt - elapsed);
-    if (part < dt / PARTS_MAXIMUM) part = dt / PARTS_MAXIMUM;
     const double left = dt - elapsed;
-    if (part >= left) part = left;
+    double part = look(bodies, count, around, elapsed, left);
+    if (part < PART_LEAST * dt) part = PART_LEAST * dt < left ? PART_LEAST * dt : left;
     move_part(bodies, count, around, elapsed, part);
     elapsed = part >= left ? dt : elapsed + part;
   }

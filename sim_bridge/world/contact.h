@@ -12,7 +12,7 @@
 #include "body.h"
 
 #define CONTACTS_CAPACITY 32
-#define CONTACT_DEPTH 1e-9 /* m: less is not put out */
+#define CONTACT_DEPTH 1e-10 /* m: less is not put out */
 
 typedef struct {
   body *other;   /* NULL: nothing that gives way */
@@ -27,6 +27,7 @@ typedef struct {
   contact list[CONTACTS_CAPACITY];
   int count;
   double nearest; /* distance of the core from anything, at least */
+  double first;   /* s, until the first gap that is still open would close at the speeds of now */
 } contacts;
 
 /* Contacts of a body with the arena and with movers, those moved on by `elapsed` seconds, where the gap is below

@@ -3,30 +3,8 @@
 
 #include <math.h>
 
-#define HELD 1e-9 /* m/s: slower than this a tyre that is within its limit holds */
-
-void ground_limits(const body *self, const arena *where, double limits[2]) {
-  const body_state *s = &self->state;
-  const double grip = self->parameters.grip;
-  const double dx = -self->parameters.half_track * s->sine;
-  const double dy = self->parameters.half_track * s->cosine;
-  limits[0] = self->half_load * arena_grip(where, s->x + dx, s->y + dy, grip);
-  limits[1] = self->half_load * arena_grip(where, s->x - dx, s->y - dy, grip);
-}
-
-int ground_holds(const body *self, const double limits[2], double torque_left, double torque_right, double speed,
-                 double turn_rate, double dt) {
-  const body_state *s = &self->state;
-  const double forward = self->spin * (speed - s->speed);
-  const double turning = self->spin * self->parameters.half_track * (turn_rate - s->turn_rate);
-  const double left = torque_left * self->per_radius * dt - (forward - turning); /* (2.12), (2.16): impulse of F_L */
-  const double right = torque_right * self->per_radius * dt - (forward + turning);
-  const double across = 0.5 * self->mass * speed * turn_rate * dt; /* centripetal, half a wheel */
-  const double most_left = limits[0] * dt;
-  const double most_right = limits[1] * dt;
-  return left * left + across * across <= most_left * most_left &&
-         right * right + across * across <= most_right * most_right;
-}
+#define LIMIT_LEAST 1e-30 /* N s: less is none */
+#define HELD 1e-9         /* m/s: slower than this a tyre that is within its limit holds */
 
 void ground_begin(ground *self, body *of, const double limits[2], double torque_left, double torque_right, double dt) {
   body_state *s = &of->state;
@@ -52,7 +30,7 @@ void ground_begin(ground *self, body *of, const double limits[2], double torque_
 static void floor_impulse(double sx, double sy, double kx, double ky, double limit, double *px, double *py) {
   double m = 0.0;
   *px = *py = 0.0;
-  if (!(limit > 0.0)) return;
+  if (!(limit > LIMIT_LEAST)) return;
   for (int round = 0; round < 40; round++) {
     const double x = sx / (m + kx);
     const double y = sy / (m + ky);
@@ -94,11 +72,13 @@ double ground_round(ground *self, body *of) {
   return kx * fmax(fabs(along[0]), fabs(along[1])) + ky * fmax(fabs(across[0]), fabs(across[1]));
 }
 
-void ground_end(const ground *self, body *of) {
+void ground_end(const ground *self, body *of, double dt) {
   body_state *s = &of->state;
+  const double centripetal =
+      0.5 * of->mass * fabs(s->speed * s->turn_rate) * dt; /* what going round needs, half a wheel */
   for (int i = 0; i < 2; i++) {
-    const double squared = self->along[i] * self->along[i] + self->across[i] * self->across[i];
-    if (!(squared < self->limit[i] * self->limit[i])) return;
+    const double across = fmax(fabs(self->across[i]), centripetal);
+    if (!(self->along[i] * self->along[i] + across * across < self->limit[i] * self->limit[i])) return;
   }
   if (fabs(body_left_speed(of) - s->rim_left) > HELD || fabs(body_right_speed(of) - s->rim_right) > HELD) return;
   if (fabs(s->lateral) > HELD) return;

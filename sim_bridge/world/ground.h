@@ -18,11 +18,29 @@ typedef struct {
 } ground;
 
 /* Friction limits, N, of the wheels where they stand. */
-void ground_limits(const body *self, const arena *where, double limits[2]);
+static inline void ground_limits(const body *self, const arena *where, double limits[2]) {
+  const body_state *s = &self->state;
+  const double grip = self->parameters.grip;
+  const double dx = -self->parameters.half_track * s->sine;
+  const double dy = self->parameters.half_track * s->cosine;
+  limits[0] = self->half_load * arena_grip(where, s->x + dx, s->y + dy, grip);
+  limits[1] = self->half_load * arena_grip(where, s->x - dx, s->y - dy, grip);
+}
 
 /* 1 if the tyres hold while the body, that rolls, comes to these speeds within `dt` under these torques. */
-int ground_holds(const body *self, const double limits[2], double torque_left, double torque_right, double speed,
-                 double turn_rate, double dt);
+static inline int ground_holds(const body *self, const double limits[2], double torque_left, double torque_right,
+                               double speed, double turn_rate, double dt) {
+  const body_state *s = &self->state;
+  const double forward = self->spin * (speed - s->speed);
+  const double turning = self->spin * self->parameters.half_track * (turn_rate - s->turn_rate);
+  const double left = torque_left * self->per_radius * dt - (forward - turning); /* (2.12), (2.16): impulse of F_L */
+  const double right = torque_right * self->per_radius * dt - (forward + turning);
+  const double across = 0.5 * self->mass * speed * turn_rate * dt; /* centripetal, half a wheel */
+  const double most_left = limits[0] * dt;
+  const double most_right = limits[1] * dt;
+  return left * left + across * across <= most_left * most_left &&
+         right * right + across * across <= most_right * most_right;
+}
 
 /* Torques and drag of a step on a body whose tyres slip; from here on its rims have their own speeds. */
 void ground_begin(ground *self, body *of, const double limits[2], double torque_left, double torque_right, double dt);
@@ -30,7 +48,7 @@ void ground_begin(ground *self, body *of, const double limits[2], double torque_
 /* One round of the floor's answer. Returns by how much it changed a speed, m/s. */
 double ground_round(ground *self, body *of);
 
-/* The body rolls again if both tyres hold. */
-void ground_end(const ground *self, body *of);
+/* The body rolls again if both tyres hold, and could hold it on its curve. */
+void ground_end(const ground *self, body *of, double dt);
 
 #endif
