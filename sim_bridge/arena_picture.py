@@ -45,7 +45,8 @@ def draw(arena: Arena, path: Path) -> Path:
 
 def _draw_floor(axes: Axes, arena: Arena) -> None:
     for outline in arena.description.outline:
-        axes.add_patch(Polygon(outline.corners_m, closed=True, facecolor=FLOOR, edgecolor=EDGE, lw=2.5, zorder=0.2))
+        axes.add_patch(Polygon(outline.corners_m, closed=True, facecolor=FLOOR, edgecolor="none", zorder=0.2))
+        axes.add_patch(Polygon(outline.corners_m, closed=True, fill=False, edgecolor=EDGE, lw=2.5, zorder=2))
     for patch in arena.description.patch:
         colour = ROUGH if patch.grip > PLAIN_GRIP else SMOOTH
         axes.add_patch(Polygon(patch.corners_m, closed=True, facecolor=colour, edgecolor="none", zorder=0.6))

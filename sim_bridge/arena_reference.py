@@ -1,0 +1,119 @@
+"""Writes what documents arena files: `python -m sim_bridge.arena_reference [--pictures]`.
+
+* sim_bridge/arenas/schema.json: the JSON schema of an arena file, made from the types (arena_description.py);
+* the tables of keys in docs/reference/arenas.md, between its markers;
+* with --pictures, docs/images/arena-NAME.png of each bundled arena.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import typing
+from typing import Any
+
+import msgspec
+
+from boebot import resources
+from sim_bridge.arena import arena_names, load_arena
+from sim_bridge.arena_description import ArenaDescription
+from sim_bridge.arena_picture import draw
+
+SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
+BEGIN, END = "<!-- keys: begin -->", "<!-- keys: end -->"
+UNITS = {"m": "m", "rad": "rad", "s": "s", "w": "W"}  # by a key's last part
+
+
+def schema() -> str:
+    """The JSON schema of an arena file."""
+    made = msgspec.json.schema(ArenaDescription)
+    return json.dumps({"$schema": SCHEMA_URI, "title": "arena file", **made}, indent=2, ensure_ascii=False) + "\n"
+
+
+def page(text: str) -> str:
+    """The page with its tables of keys made anew."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{_tables()}{END}{after}"
+
+
+def _tables() -> str:
+    """One table per kind of table in a file."""
+    definitions = msgspec.json.schema(ArenaDescription)["$defs"]
+    sections = [_section("at the top of the file", definitions["ArenaDescription"], top=True)]
+    for key, value in definitions["ArenaDescription"]["properties"].items():
+        if name := _table_of(value):
+            brackets = f"[[{key}]]" if value.get("type") == "array" else f"[{key}]"
+            sections.append(_section(f"`{brackets}`", definitions[name]))
+    sections.append(_section("a waypoint of `path`", definitions["Waypoint"]))
+    return "\n".join(sections)
+
+
+def _table_of(value: dict[str, Any]) -> str | None:
+    """The definition that a key's value, or the items of its array, refers to."""
+    choices = [value, value.get("items", {}), *value.get("allOf", ()), *value.get("anyOf", ())]
+    found = next((choice["$ref"] for choice in choices if isinstance(choice, dict) and "$ref" in choice), None)
+    return None if found is None else str(found).rsplit("/", 1)[-1]
+
+
+def _section(title: str, definition: dict[str, Any], top: bool = False) -> str:
+    rows = [
+        f"| `{key}` | {_unit(key)} | {_values(value)} | {_default(key, value, definition)} | {_meaning(value)} |"
+        for key, value in definition["properties"].items()
+        if not (top and _table_of(value))
+    ]
+    text = " ".join(definition.get("description", "").split())
+    head = "| key | unit | values | default | meaning |\n|---|---|---|---|---|"
+    return "\n".join([f"### {title[0].upper()}{title[1:]}", "", text, "", head, *rows, ""])
+
+
+def _unit(key: str) -> str:
+    return UNITS.get(key.rpartition("_")[2], "–")
+
+
+def _plain(value: dict[str, Any]) -> dict[str, Any]:
+    """Without the choice of leaving a value out."""
+    return next((choice for choice in value.get("anyOf", ()) if choice.get("type") != "null"), value)
+
+
+def _values(value: dict[str, Any]) -> str:
+    plain = _plain(value)
+    if "enum" in plain:
+        return ", ".join(f'"{name}"' for name in plain["enum"])
+    if plain.get("type") == "array":
+        inner = plain["items"]
+        return f"at least {plain['minItems']} " + ("waypoints" if "$ref" in inner else "pairs of numbers")
+    if plain.get("type") != "number":
+        return "text"
+    low = next(
+        (f"{sign} {plain[key]:g}" for sign, key in ((">", "exclusiveMinimum"), ("≥", "minimum")) if key in plain), ""
+    )
+    high = f"≤ {plain['maximum']:g}" if "maximum" in plain else ""
+    return ", ".join(bound for bound in (low, high) if bound) or "number"
+
+
+def _default(key: str, value: dict[str, Any], definition: dict[str, Any]) -> str:
+    if key in definition.get("required", ()):
+        return "required"
+    default = value.get("default")
+    return "–" if default in (None, "") else (f"{default:g}" if isinstance(default, float) else f'"{default}"')
+
+
+def _meaning(value: dict[str, Any]) -> str:
+    return typing.cast(str, _plain(value).get("description", value.get("description", "")))
+
+
+def main() -> None:
+    """Writes schema and page, and the pictures if they are wanted."""
+    (resources.folder("arenas") / "schema.json").write_text(schema(), encoding="utf-8")
+    if (root := resources.checkout()) is None:
+        return
+    document = root / "docs" / "reference" / "arenas.md"
+    document.write_text(page(document.read_text(encoding="utf-8")), encoding="utf-8")
+    if "--pictures" in sys.argv[1:]:
+        for name in arena_names():
+            draw(load_arena(name), root / "docs" / "images" / f"arena-{name}.png")
+
+
+if __name__ == "__main__":
+    main()
