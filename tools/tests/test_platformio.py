@@ -24,7 +24,7 @@ def test_it_builds_the_images_that_everybody_loads() -> None:
     done = pio("run")
     assert done.returncode == 0, done.stdout + done.stderr
     built = PROJECT / "build" / "platformio" / "build"
-    for environment, pin_map in (("uno", "shieldbot"), ("uno_quad", "shieldbot-quad")):
+    for environment, pin_map in (("uno", "shieldbot"), ("uno_quad", "shieldbot-quad"), ("uno_boebot", "boebot")):
         for suffix in (".elf", ".hex"):
             assert (IMAGES / f"{pin_map}{suffix}").read_bytes() == (
                 built / environment / f"firmware{suffix}"

@@ -99,7 +99,7 @@ bool hal_analog_busy(void);
 uint16_t hal_analog_result(void);
 
 /* A tone on the pin named BUZZER: it is toggled every `count` (1..255) periods of a clock of 16 MHz by 8, ...; interrupt of
- * 15 cycles. Off leaves the pin low. */
+ * 13 cycles. Off leaves the pin low. */
 enum { HAL_TONE_BY_8 = 2, HAL_TONE_BY_64, HAL_TONE_BY_256, HAL_TONE_BY_1024 };
 void hal_tone_start(uint8_t clock, uint8_t count);
 void hal_tone_stop(void);

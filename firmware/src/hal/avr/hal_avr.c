@@ -65,7 +65,7 @@ void hal_carrier_stop(void) {
 
 /* ---- buzzer ---- */
 
-/* 15 cycles with entry and return; neither flags nor registers change. Compare B is somebody else's (hal_avr.h), and in this
+/* 13 cycles with entry, vector and return; neither flags nor registers change. Compare B is somebody else's (hal_avr.h), and in this
  * mode it may be anything. */
 ISR(TIMER0_COMPA_vect, ISR_NAKED) {
   __asm__ volatile(

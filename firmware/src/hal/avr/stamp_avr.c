@@ -1,4 +1,4 @@
-/* stamp_avr.c: the pin-change interrupt of port D: it stamps one change and masks itself, 36 cycles with entry, vector and
+/* stamp_avr.c: the pin-change interrupt of port D: it stamps one change and masks itself, 30 cycles with entry, vector and
  * return; no flags change. */
 #include "hal/hal.h"
 #include "schedule.h"

@@ -153,7 +153,7 @@ static void read_bit(uint8_t bit) {
   if (bit == BITS - 1u) {
     answered = !high;
   } else if (doing == RECEIVE) {
-    data = (uint8_t)(data << 1 | (high ? 1u : 0u));
+    data = (uint8_t)((unsigned)data << 1 | (high ? 1u : 0u));
   }
 }
 
