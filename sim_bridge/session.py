@@ -20,12 +20,8 @@ from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, imag
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Floats, Sim
 
+_sim_now, _last_byte, _send = lib.sim_now, lib.sim_last_byte, lib.sim_send
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
-
-
-def _cycles(seconds: float) -> int:
-    """As many cycles, but at least one of any time at all: a wait that lets no time pass would be repeated for ever."""
-    return max(1, round(seconds * CLOCK_HZ)) if seconds > 0 else 0
 
 
 class SimTransport:
@@ -47,7 +43,10 @@ class SimTransport:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        self._sim.run(_cycles(wait_s), _cycles(quiet_s))
+        # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
+        cycles = int(wait_s * CLOCK_HZ + 0.5) or (1 if wait_s > 0 else 0)
+        quiet = int(quiet_s * CLOCK_HZ + 0.5) or (1 if quiet_s > 0 else 0)
+        self._sim.run(cycles if cycles > 0 else 0, quiet if quiet > 0 else 0)
         if self._pace is not None:
             self._pace.wait()
         return self._sim.receive()
@@ -55,7 +54,7 @@ class SimTransport:
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         """As `read`, with the instant at which the last byte had come (s)."""
         data = self.read(wait_s, quiet_s)
-        return [(lib.sim_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
+        return [(_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
@@ -69,13 +68,13 @@ class SimTransport:
         """Sends bytes, back to back from now on."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        lib.sim_send(self._handle, 0, data, len(data))
+        _send(self._handle, 0, data, len(data))
 
     def now(self) -> float:
         """Simulated time since power-on (s)."""
         if self._closed:
             raise BoardError("the emulated board is closed")
-        now: float = lib.sim_now(self._handle) / CLOCK_HZ
+        now: float = _sim_now(self._handle) / CLOCK_HZ
         return now
 
     def close(self) -> None:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Final, NamedTuple, NoReturn, TypeVar
 
 from boebot import robots
@@ -143,8 +142,7 @@ class Equipment:
         return lacking
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
+class Observation(NamedTuple):
     """What the robot's sensors said at one tick. It never changes; values are computed when they are looked
     at.
 
@@ -260,37 +258,44 @@ class Robot:
     @property
     def left_whisker(self) -> Whisker:
         """Left whisker: `.pressed`."""
-        return self.observation.left_whisker
+        seen = self.observation
+        return seen.equipment.left_whisker(seen.telemetry)
 
     @property
     def right_whisker(self) -> Whisker:
         """Right whisker: `.pressed`."""
-        return self.observation.right_whisker
+        seen = self.observation
+        return seen.equipment.right_whisker(seen.telemetry)
 
     @property
     def left_ir(self) -> Infrared:
         """Left infra-red pair: `.detected`."""
-        return self.observation.left_ir
+        seen = self.observation
+        return seen.equipment.left_ir(seen.telemetry)
 
     @property
     def right_ir(self) -> Infrared:
         """Right infra-red pair: `.detected`."""
-        return self.observation.right_ir
+        seen = self.observation
+        return seen.equipment.right_ir(seen.telemetry)
 
     @property
     def ping(self) -> Ping:
         """Ultrasonic range finder: `.distance` in metres, or None."""
-        return self.observation.ping
+        seen = self.observation
+        return seen.equipment.ping(seen.telemetry)
 
     @property
     def left_encoder(self) -> Encoder:
         """Left wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.observation.left_encoder
+        seen = self.observation
+        return seen.equipment.left_encoder(seen.telemetry)
 
     @property
     def right_encoder(self) -> Encoder:
         """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.observation.right_encoder
+        seen = self.observation
+        return seen.equipment.right_encoder(seen.telemetry)
 
     # ---- motors --------------------------------------------------------------------------------------------
 

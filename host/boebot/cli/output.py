@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from boebot.runner import Progress
+from boebot.driving import Progress
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of

@@ -47,11 +47,16 @@ class Line(ABC):
         self._now = transport.now
         self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(_stamp_now, transport)
         self._handlers: dict[int, Callable[[bytes, float], None]] = {}
+        self._refused: messages.Hello | None = None  # of a board that cannot be spoken with
         self._learn_baud()
 
     @abstractmethod
     def _service(self, now: float) -> None:
         """Sends what is due by now, and notes in `_due` when the next is."""
+
+    @abstractmethod
+    def _refuse(self) -> None:
+        """Raises why the board of `_refused` cannot be spoken with, unless that is being found out already."""
 
     def _turn(self, until: float) -> None:
         """One step: sends what is due and takes what comes, at the latest until the given time."""
@@ -76,6 +81,8 @@ class Line(ABC):
                 self._heard.take(data)
             for message_id, _, payload in self.decoder.feed(data):
                 self._handlers[message_id](payload, stamp)
+        if self._refused is not None:
+            self._refuse()
 
     def _learn_baud(self) -> None:
         baud = self.transport.baud if isinstance(self.transport, BaudSelectable) else 0

@@ -59,7 +59,6 @@ class Opening(Line):
         self._take_over = take_over
         self._wanted = False  # a session
         self._refusing = False
-        self._refused: messages.Hello | None = None
         self._own_sessions: deque[int] = deque(maxlen=16)
         self._opened_with = -1  # the board's nonce that opened the session
         self._open_payload = b""
@@ -214,15 +213,6 @@ class Opening(Line):
 
     # ---- what comes --------------------------------------------------------------------------------------------------
 
-    def _receive(self, wait_s: float, quiet_s: float) -> None:
-        super()._receive(wait_s, quiet_s)
-        if self._refused is not None and not self._refusing:
-            self._refusing = True
-            try:
-                raise self._refusal(self._refused)
-            finally:
-                self._refusing = False
-
     def _hear_hello(self, payload: bytes, now: float) -> None:
         hello = messages.Hello.unpack(payload)
         if not mismatch.speaks_alike(hello):
@@ -298,6 +288,15 @@ class Opening(Line):
                         return answer
                 self._answers = []
         raise BoardError(f"the board at {self.transport.name} did not {what}")
+
+    def _refuse(self) -> None:
+        if self._refused is None or self._refusing:
+            return
+        self._refusing = True
+        try:
+            raise self._refusal(self._refused)
+        finally:
+            self._refusing = False
 
     def _refusal(self, hello: messages.Hello) -> ProtocolError:
         """Why the board that said this cannot be spoken with."""

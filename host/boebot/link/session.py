@@ -10,6 +10,8 @@ Everything that crossed the wire is kept with its stamp when `record` is true.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.delivery import BoardEvent, LatchedAgainError, LinkTimes, RequestKind
@@ -51,6 +53,7 @@ class Link(Traffic):
             take_over: take the board even if another host has it.
         """
         super().__init__(transport, record, times or LinkTimes(), take_over)
+        self.polled_s = 0.0
 
     # ---- telemetry, events, set-points -------------------------------------------------------------------------------
 
@@ -63,16 +66,25 @@ class Link(Traffic):
             ProtocolError: a board of another protocol has come in its place.
         """
         now = self._now()
-        end = now + wait_s
-        look = now + quiet_s
+        return self.poll_until(now + quiet_s, now + wait_s)
+
+    def poll_until(self, look_s: float, end_s: float) -> list[Telemetry]:
+        """As `poll`, by the transport's clock: looks for telemetry from `look_s` on, and waits until `end_s` at most.
+        `polled_s` is then the time at which it returned."""
+        now = self._now()
         while True:
             if now >= self._due:
                 self._service(now)
-            wait = min(end, self._due) - now
-            self._receive(wait if wait > SHORTEST_S else SHORTEST_S, min(look - now, wait) if look > now else 0.0)
+            wait = (end_s if end_s < self._due else self._due) - now
+            if wait < SHORTEST_S:
+                wait = SHORTEST_S
+            quiet = look_s - now
+            self._receive(wait, 0.0 if quiet <= 0.0 else quiet if quiet < wait else wait)
             now = self._now()
-            if (self._telemetry and now >= look) or now >= end:
-                return self.fetch_telemetry()
+            if (self._telemetry and now >= look_s) or now >= end_s:
+                self.polled_s = now
+                telemetry, self._telemetry = self._telemetry, []
+                return telemetry
 
     def fetch_telemetry(self) -> list[Telemetry]:
         """The telemetry that arrived while somebody waited for an answer; does not wait."""
@@ -82,6 +94,11 @@ class Link(Traffic):
     def forget_telemetry(self) -> None:
         """Drops the telemetry that arrived while somebody waited for an answer."""
         self._telemetry = []
+
+    @property
+    def waiting_events(self) -> Collection[BoardEvent]:
+        """What `events` would return: the same object as long as the link lives."""
+        return self._events.waiting
 
     def events(self) -> list[BoardEvent]:
         """What happened on the board since the last call, in order. Events that nobody fetches are, after some, no
