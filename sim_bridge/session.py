@@ -41,19 +41,20 @@ class SimTransport:
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
-        # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
-        cycles = int(wait_s * CLOCK_HZ + 0.5) or (1 if wait_s > 0 else 0)
-        quiet = int(quiet_s * CLOCK_HZ + 0.5) or (1 if quiet_s > 0 else 0)
-        self._sim.run(cycles if cycles > 0 else 0, quiet if quiet > 0 else 0)
-        if self._pace is not None:
-            self._pace.wait()
-        return self._sim.receive()
+        return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         """As `read`, with the instant at which the last byte had come (s)."""
-        data = self.read(wait_s, quiet_s)
+        if self._closed:
+            raise BoardError("the emulated board is closed")
+        # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
+        cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
+        quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
+        sim = self._sim
+        sim.run(cycles, quiet)
+        if self._pace is not None:
+            self._pace.wait()
+        data = sim.receive()
         return [(_last_byte(self._handle, 0) / CLOCK_HZ, data)] if data else []
 
     def set_baud(self, rate: int) -> None:

@@ -189,3 +189,12 @@ def test_probe_and_stamp_are_cheap() -> None:
                     clock.observe(us, at_s + 2e-3)
             best[name] = min(best[name], (time.perf_counter() - begun) / 200)
     assert best["probe"] < 100e-6 and best["stamp"] < 10e-6, best
+
+
+def test_bounds_that_meet_in_a_point_pile_up_no_corners() -> None:
+    """Delays that are always the same, as in a simulated run: what is kept of the past stays small."""
+    line = Line(0.0, seed=3)
+    most = 0
+    for _ in line.run(60.0):
+        most = max(most, *(len(polygon) for polygon in line.clock._polygons))
+    assert 3 <= most <= 24
