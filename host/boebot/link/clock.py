@@ -257,8 +257,8 @@ def _centroid(x: list[float], y: list[float]) -> tuple[float, float]:
 
 def _cut(polygon: _Polygon, x: float, limit: float, side: float) -> _Polygon:
     """The part of the convex polygon in which side (o + r x) <= side limit (Sutherland and Hodgman 1974). A corner that
-    is on the line but for rounding stays, and is not cut off a second time: bounds that meet in a point, as where delays
-    are constant, would pile up corners there."""
+    is on the line but for rounding stays, and is not cut off a second time: bounds that meet in a point, as with
+    constant delays, would pile up corners there."""
     over = [side * (o + r * x - limit) - _ON_LINE_S for o, r in polygon]
     if max(over) <= 0.0:
         return polygon
