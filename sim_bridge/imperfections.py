@@ -96,7 +96,7 @@ def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int
     lean = 0.5 * SERVO_ASYMMETRY * draw(1 + side, 1)
     offset = SERVO_CENTRE_SPREAD_US * draw(1 + side, 2)
     return ffi.new(
-        "servo_parameters *",
+        "servo_motor_parameters *",
         {
             "mount": math.copysign(1.0, servo.gain_us),
             "wheel_radius": body.wheel_radius_m,
@@ -164,15 +164,17 @@ def battery_parameters() -> Any:
     return ffi.new(
         "battery_parameters *",
         {
-            "full_v": BATTERY_FULL_V,
-            "empty_v": BATTERY_EMPTY_V,
-            "capacity_as": BATTERY_CAPACITY_AS,
-            "resistance_ohm": BATTERY_RESISTANCE_OHM,
-            "drop_out_v": BATTERY_DROP_OUT_V,
-            "board_a": BOARD_A,
-            "servo_idle_a": SERVO_IDLE_A,
-            "servo_run_a_s_m": SERVO_RUN_A_S_M,
-            "servo_a_per_n_m": SERVO_A_PER_N_M,
+            "supply": {
+                "full_v": BATTERY_FULL_V,
+                "empty_v": BATTERY_EMPTY_V,
+                "capacity_as": BATTERY_CAPACITY_AS,
+                "resistance_ohm": BATTERY_RESISTANCE_OHM,
+                "drop_out_v": BATTERY_DROP_OUT_V,
+                "board_a": BOARD_A,
+                "servo_idle_a": SERVO_IDLE_A,
+                "servo_run_a_s_m": SERVO_RUN_A_S_M,
+                "servo_a_per_n_m": SERVO_A_PER_N_M,
+            },
             "divider": BATTERY_DIVIDER,
             "noise_v": BATTERY_NOISE_V,
         },

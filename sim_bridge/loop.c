@@ -181,7 +181,7 @@ static void on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
 static double on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   (void)cycle;
-  if (channel == BOARD_ANALOG_SUPPLY) return self->supply * BATTERY_NOMINAL_V;
+  if (channel == BOARD_ANALOG_SUPPLY) return self->supply * SUPPLY_NOMINAL_V;
   if (self->has_battery && self->battery.channel == channel) return battery_sample(&self->battery);
   return 0.0;
 }
@@ -271,7 +271,7 @@ static void listen(robot *r, uint8_t pin, uint8_t kind, int number) {
 
 static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 
-int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_parameters *parameters) {
+int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
   robot *r = find(self, number);
   if (r == NULL || bad_pin(pin) || side < 0 || side > 1) return SIM_BAD_ARGUMENT;
   const part_place place = place_of(r, PART_SERVO_LEFT + (uint32_t)side);
@@ -365,7 +365,13 @@ static void step_waves(robot *r, uint64_t until) {
 
 static double supply_of(const robot *r) {
   if (r->held_supply > 0.0) return r->held_supply;
-  return r->has_battery ? r->battery.regulated_v / BATTERY_NOMINAL_V : 1.0;
+  return r->has_battery ? r->battery.supply.board_v / SUPPLY_NOMINAL_V : 1.0;
+}
+
+/* Share of the nominal voltage that the servos get. */
+static double servo_supply_of(const robot *r) {
+  if (r->held_supply > 0.0 || !r->has_battery) return r->supply;
+  return r->battery.supply.servo_v / SUPPLY_NOMINAL_V;
 }
 
 /* World and parts of one robot, from self->world to self->world + step_cycles. */
@@ -379,13 +385,11 @@ static void step_robot(sim *self, robot *r) {
     if (!r->has_servo[side]) continue;
     servo *s = &r->servo[side];
     const double speed = side == SIM_LEFT ? body_left_speed(b) : body_right_speed(b);
-    torque[side] = servo_torque(s, begin, speed, r->supply);
-    const battery_parameters *p = &r->battery.parameters;
-    if (s->pulses > 0) current += p->servo_idle_a + p->servo_run_a_s_m * fabs(speed);
-    current += p->servo_a_per_n_m * fabs(torque[side]);
+    torque[side] = servo_torque(s, speed, servo_supply_of(r));
+    current += supply_servo_current(&r->battery.parameters.supply, s->pulses > 0, speed, torque[side]);
   }
   body_advance(b, self->arena, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
-  if (r->has_battery) battery_step(&r->battery, current, self->dt);
+  if (r->has_battery) battery_step(&r->battery, current, 0, self->dt);
   r->supply = supply_of(r);
   if (r->has_encoder[SIM_LEFT]) encoder_step(&r->encoder[SIM_LEFT], b->state.wheel_left, begin, self->step_cycles);
   if (r->has_encoder[SIM_RIGHT]) encoder_step(&r->encoder[SIM_RIGHT], b->state.wheel_right, begin, self->step_cycles);
@@ -534,12 +538,12 @@ uint64_t sim_edges_seen(const sim *self, int number) {
 
 double sim_pack_voltage(const sim *self, int number) {
   const robot *r = find(self, number);
-  return r == NULL ? 0.0 : r->battery.pack_v;
+  return r == NULL ? 0.0 : r->battery.supply.pack_v;
 }
 
 double sim_supply_voltage(const sim *self, int number) {
   const robot *r = find(self, number);
-  return r == NULL ? 0.0 : r->supply * BATTERY_NOMINAL_V;
+  return r == NULL ? 0.0 : r->supply * SUPPLY_NOMINAL_V;
 }
 
 /* ---- hands of a test ------------------------------------------------------------------------------------------------ */
@@ -627,7 +631,7 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
 int sim_set_supply(sim *self, int number, double volts) {
   robot *r = find(self, number);
   if (r == NULL || !(volts >= 0.0)) return SIM_BAD_ARGUMENT;
-  r->held_supply = volts / BATTERY_NOMINAL_V;
+  r->held_supply = volts / SUPPLY_NOMINAL_V;
   r->supply = supply_of(r);
   return SIM_OK;
 }

@@ -63,7 +63,7 @@ void sim_destroy(sim *self);
 int sim_add_robot(sim *self, uintptr_t board, const body_parameters *parameters, double x, double y, double heading);
 
 /* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
-int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_parameters *parameters);
+int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
 int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, uint32_t edges_per_turn);
 int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
 int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,

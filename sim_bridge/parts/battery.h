@@ -1,25 +1,15 @@
-/* battery.h: the pack, its sagging under load, and the 5 V regulator that board and servos run on.
- *
- * Pack voltage = open-circuit voltage (falls with the charge that was drawn) - internal resistance * current. The regulator
- * gives 5 V until the pack comes within its drop-out. Half of the pack voltage lies at the analog pin, if one is joined.
- */
+/* battery.h: the pack at an analog pin: a share of its voltage, with noise, as the board samples it (world/supply). */
 #ifndef PART_BATTERY_H
 #define PART_BATTERY_H
 
+#include "../world/supply.h"
 #include "part.h"
 
 /* python: begin */
 typedef struct {
-  double full_v, empty_v; /* open-circuit voltage of the pack */
-  double capacity_as;     /* A s between them */
-  double resistance_ohm;  /* internal */
-  double drop_out_v;      /* of the regulator */
-  double board_a;         /* drawn by the board */
-  double servo_idle_a;    /* by a servo that gets pulses */
-  double servo_run_a_s_m; /* and by its speed at the rim */
-  double servo_a_per_n_m; /* and by its torque */
-  double divider;         /* pin voltage / pack voltage */
-  double noise_v;         /* standard deviation of one sample at the pin */
+  supply_parameters supply;
+  double divider; /* pin voltage / pack voltage */
+  double noise_v; /* standard deviation of one sample at the pin */
 } battery_parameters;
 /* python: end */
 
@@ -27,17 +17,13 @@ typedef struct {
   part_place place;
   uint8_t channel; /* analog channel 0..5, or PART_NO_PIN */
   battery_parameters parameters;
-  double drawn_as;
-  double pack_v;
-  double regulated_v;
+  supply supply;
 } battery;
-
-#define BATTERY_NOMINAL_V 5.0
 
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters);
 
-/* `servo_a`: what the servos draw in this step of `dt` seconds. */
-void battery_step(battery *self, double servo_a, double dt);
+/* `servos_a`: what the servos draw in this step of `dt` seconds. */
+void battery_step(battery *self, double servos_a, int at_charger, double dt);
 
 /* Voltage at the analog pin, sampled now. */
 double battery_sample(battery *self);

@@ -48,23 +48,23 @@ def servo(**changes: float) -> Any:
 )
 def test_servo_follows_the_measured_curve(offset_us: float, rpm: float) -> None:
     """The first of two measured servos; the fit is within 4 rpm of every measured point."""
-    speed = lib.servo_curve(servo(), 1500 + offset_us)
+    speed = lib.servo_motor_curve(servo(), 1500 + offset_us)
     assert speed / WHEEL / RPM == pytest.approx(rpm, abs=4)
     assert speed / WHEEL / RPM == pytest.approx(51.25 * math.tanh(offset_us / 78.5), abs=1e-6)
 
 
 def test_servo_dead_band_and_centre() -> None:
     unit = servo(centre_us=1490.0)
-    assert lib.servo_curve(unit, 1490 + 8.9) == 0 == lib.servo_curve(unit, 1490 - 8.9)
-    assert lib.servo_curve(unit, 1490 + 9.1) > 0 > lib.servo_curve(unit, 1490 - 9.1)
-    assert lib.servo_curve(unit, 1500) > 0
+    assert lib.servo_motor_curve(unit, 1490 + 8.9) == 0 == lib.servo_motor_curve(unit, 1490 - 8.9)
+    assert lib.servo_motor_curve(unit, 1490 + 9.1) > 0 > lib.servo_motor_curve(unit, 1490 - 9.1)
+    assert lib.servo_motor_curve(unit, 1500) > 0
 
 
 def test_servo_may_be_weaker_one_way() -> None:
     """Unit B: 36 rpm forward, 30 backward."""
     unit = servo(top_ccw_rad_s=36 * RPM, scale_ccw_us=50.5, top_cw_rad_s=30 * RPM, scale_cw_us=43.5)
-    assert lib.servo_curve(unit, 1600) / WHEEL / RPM == pytest.approx(35.8, abs=1.5)
-    assert lib.servo_curve(unit, 1400) / WHEEL / RPM == pytest.approx(-30.7, abs=1.5)
+    assert lib.servo_motor_curve(unit, 1600) / WHEEL / RPM == pytest.approx(35.8, abs=1.5)
+    assert lib.servo_motor_curve(unit, 1400) / WHEEL / RPM == pytest.approx(-30.7, abs=1.5)
 
 
 @pytest.mark.parametrize("offset_us", [20, 60, 200, -60])
@@ -73,7 +73,7 @@ def test_robot_reaches_the_speed_of_the_curve(offset_us: float) -> None:
     robot = scripted()
     robot.pulses(2.0, {LEFT: 1500 + offset_us, RIGHT: 1500 - offset_us})
     robot.run(2.0)
-    expected = lib.servo_curve(servo(), 1500 + offset_us)
+    expected = lib.servo_motor_curve(servo(), 1500 + offset_us)
     a, gain, alpha = lib.body_a(imperfections.body_parameters(robot.sim.robot.body)), 1.2, 1.0
     assert robot.sim.body().speed == pytest.approx(expected * 2 * a * gain / (2 * a * gain + alpha), rel=2e-3)
     assert abs(robot.sim.body().heading) < 1e-9
@@ -476,7 +476,7 @@ def test_voltage_at_the_analog_pin() -> None:
 
 def test_charge_runs_out() -> None:
     parameters = imperfections.battery_parameters()
-    parameters.capacity_as = 1.0
+    parameters.supply.capacity_as = 1.0
     robot = scripted()
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)
@@ -489,7 +489,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     supply = 128  # BOARD_ANALOG_SUPPLY
     assert lib.script_board_volts(robot.script, supply) == 5.0
     parameters = imperfections.battery_parameters()
-    parameters.capacity_as = 1.0
+    parameters.supply.capacity_as = 1.0
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)
     # an empty pack of 5.0 V, sagging under the board's 0.08 A, less the drop-out of 0.5 V

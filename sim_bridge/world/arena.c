@@ -257,6 +257,10 @@ static inline double ray_edge(const arena_edge *e, double x, double y, double c,
   return d;
 }
 
+double arena_edge_ray(const arena_edge *e, double x, double y, double c, double s, double best) {
+  return ray_edge(e, x, y, c, s, best);
+}
+
 static double ray_all(const arena *self, double x, double y, double c, double s, double reach, size_t *edge) {
   double best = reach;
   for (size_t i = 0; i < self->edge_count; i++) {

@@ -57,6 +57,9 @@ uint32_t arena_version(const arena *self);
 /* Squared distance from (x, y) to an edge; the nearest point goes to (qx, qy). */
 double arena_edge_distance_squared(const arena_edge *edge, double x, double y, double *qx, double *qy);
 
+/* Distance along the ray from (x, y) in direction (cosine, sine) to the edge, or `best` if it is not met before that. */
+double arena_edge_ray(const arena_edge *edge, double x, double y, double cosine, double sine, double best);
+
 /* Edges nearer than `radius` to (x, y), in increasing number. Returns how many there are, even when more than
  * `capacity`. */
 size_t arena_edges_near(const arena *self, double x, double y, double radius, uint32_t *edges, size_t capacity);

@@ -21,6 +21,10 @@ double number_log(double x);
 /* Hyperbolic tangent. */
 double number_tanh(double x);
 
+/* Direction of (x, y) != (0, 0), finite and below 1e150, in [-pi, pi]; y where both are 0 and x = +0 or y on the positive
+ * x axis. */
+double number_atan2(double y, double x);
+
 /* The same angle in (-pi, pi]. */
 double number_wrap(double angle);
 /* python: end */

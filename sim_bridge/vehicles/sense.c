@@ -1,0 +1,142 @@
+/* sense.c: see sense.h. */
+#include "sense.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "../world/numbers.h"
+
+typedef struct {
+  vehicles *all;
+  vehicle *world;
+  viewpoint from;
+  double time;
+} sensing;
+
+void vehicle_sensors_start(vehicles *self, size_t i) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  sensor_slot *slots = &self->slots[i * m->sensors_count];
+  memset(slots, 0, m->sensors_count * sizeof *slots);
+  for (size_t k = 0; k < m->sensors_count; k++) {
+    const vehicle_sensor *sensor = &m->sensors[k];
+    slots[k].key = noise_key(w->state.seed, w->state.id, sensor->device);
+    slots[k].hold.period = sensor->period;
+    if (sensor->kind == SENSOR_ODOMETER) {
+      const body_state *b = &w->body.state;
+      odometer_calibrate(&slots[k].as.odometer, b->x, b->y, b->heading, b->wheel_left, b->wheel_right);
+    }
+  }
+}
+
+/* Current of both motors, A. */
+static double motor_current(const sensing *s) {
+  const vehicle_model *m = s->all->model;
+  if (m->drive != DRIVE_DC) return 0.0;
+  double sum = 0.0;
+  for (int side = 0; side < 2; side++) {
+    const double speed = (side == 0 ? body_left_speed(&s->world->body) : body_right_speed(&s->world->body));
+    const double volts = motor_dc_voltage(&m->dc[side], s->world->state.signals[side]);
+    const double current =
+        m->full ? s->world->state.currents[side] : motor_dc_current(&m->dc[side], volts, speed / m->body.wheel_radius);
+    sum += fabs(current);
+  }
+  return sum;
+}
+
+static double table_reading(const table_sensor *t, const viewpoint *from, noise_source *noise) {
+  ray_hit hit;
+  const double d = beam_ray(&t->beam, from, beam_from(&t->beam, from), 0, t->range, &hit);
+  if (d < 0.0) return t->none;
+  double cosine, sine;
+  beam_direction(&t->beam, from, 0, &cosine, &sine);
+  const double along = -(cosine * hit.normal_x + sine * hit.normal_y);
+  const double across = cosine * hit.normal_y - sine * hit.normal_x;
+  return table_noise_read(t->table, d, number_atan2(fabs(across), along), noise);
+}
+
+static void read_odometer(const sensing *s, const odometer_parameters *p, odometer_state *state, noise_source *noise,
+                          double *out) {
+  const body_state *b = &s->world->body.state;
+  if (s->world->state.step > 0) odometer_step(p, state, b->wheel_left, b->wheel_right, s->all->model->dt, noise);
+  out[0] = state->x;
+  out[1] = state->y;
+  out[2] = state->heading;
+}
+
+static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *slot, noise_source *noise, double *out) {
+  switch (sensor->kind) {
+    case SENSOR_INFRARED_PROXIMITY:
+      *out = infrared_proximity_read(&sensor->as.infrared_proximity, &s->from, noise);
+      break;
+    case SENSOR_SHARP_INFRARED:
+      *out = sharp_infrared_read(&sensor->as.sharp_infrared, &slot->as.sharp_infrared, &s->from, s->time, noise);
+      break;
+    case SENSOR_SONAR:
+      *out = sonar_read(&sensor->as.sonar, &s->from, noise);
+      break;
+    case SENSOR_LASER:
+      laser_scan(sensor->as.laser, &s->from, noise, out);
+      break;
+    case SENSOR_COMPASS: {
+      const compass_parameters *c = &sensor->as.compass;
+      *out = compass_read(c, &s->from, c->current_x != 0.0 || c->current_y != 0.0 ? motor_current(s) : 0.0, noise);
+      break;
+    }
+    case SENSOR_ACCELEROMETER:
+      *out = accelerometer_read(&sensor->as.accelerometer, &slot->as.accelerometer, noise);
+      break;
+    case SENSOR_PHOTOTRANSISTOR:
+      *out = phototransistor_read(&sensor->as.phototransistor, &s->from, NULL, 0, noise);
+      break;
+    case SENSOR_ODOMETER:
+      read_odometer(s, &sensor->as.odometer, &slot->as.odometer, noise, out);
+      break;
+    case SENSOR_TABLE:
+      *out = table_reading(&sensor->as.table, &s->from, noise);
+      break;
+    case SENSOR_WHISKER: {
+      const whisker_segment *w = &sensor->as.whisker;
+      *out = body_segment_touches(&s->world->body, s->world->where, w->x0, w->y0, w->x1, w->y1) ? 1.0 : 0.0;
+      break;
+    }
+    default: {
+      const battery_gauge *g = &sensor->as.battery;
+      const double noisy = g->sigma > 0.0 ? g->sigma * noise_next_normal(noise) : 0.0;
+      *out = g->empty + s->world->state.energy * (g->full - g->empty) + noisy;
+      break;
+    }
+  }
+}
+
+void vehicle_sense(vehicles *self, size_t i) {
+  const vehicle_model *m = self->model;
+  vehicle *w = &self->worlds[i];
+  if (w->state.sensed == w->state.step + 1) return;
+  const body_state *b = &w->body.state;
+  const scene around = {.arena = w->where};
+  const sensing s = {.all = self,
+                     .world = w,
+                     .from = {.around = &around,
+                              .x = b->x,
+                              .y = b->y,
+                              .heading = b->heading,
+                              .cosine = b->cosine,
+                              .sine = b->sine,
+                              .id = w->state.id},
+                     .time = (double)w->state.step * m->dt};
+  double *readings = &self->readings[i * m->readings];
+  sensor_slot *slots = &self->slots[i * m->sensors_count];
+  for (size_t k = 0; k < m->sensors_count; k++) {
+    const vehicle_sensor *sensor = &m->sensors[k];
+    sensor_slot *slot = &slots[k];
+    if (sensor->kind == SENSOR_ACCELEROMETER && w->state.step > 0)
+      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, w->state.acceleration, m->dt);
+    if (sensor->period > 0.0 && !sample_hold_due(&slot->hold, s.time)) continue;
+    noise_source noise = {.key = slot->key, .keyed = 1, .on = m->noise != 0};
+    noise_at(&noise, w->state.step);
+    read(&s, sensor, slot, &noise, &readings[sensor->first]);
+    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s.time, readings[sensor->first]);
+  }
+  w->state.sensed = w->state.step + 1;
+}

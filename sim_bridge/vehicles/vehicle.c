@@ -1,0 +1,211 @@
+/* vehicle.c: see vehicle.h. */
+#include "vehicle.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sense.h"
+
+#define SERVO_PERIOD_S 0.020
+
+vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
+  const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
+  vehicles *self = calloc(1, sizeof *self);
+  if (self == NULL) return NULL;
+  self->model = model;
+  self->count = count;
+  self->state_size = block;
+  self->worlds = calloc(count + 1, sizeof *self->worlds);
+  self->slots = calloc(count * model->sensors_count + 1, sizeof *self->slots);
+  self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
+  self->brains = calloc(count * block + 1, 1);
+  if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
+  vehicles_destroy(self);
+  return NULL;
+}
+
+void vehicles_destroy(vehicles *self) {
+  if (self == NULL) return;
+  free(self->worlds);
+  free(self->slots);
+  free(self->readings);
+  free(self->brains);
+  free(self);
+}
+
+int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
+                   double heading) {
+  const vehicle_model *m = self->model;
+  if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
+  if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0) return VEHICLE_BAD_NUMBER;
+  if (!arena_is_free(where, x, y, m->body.radius)) return VEHICLE_NOT_FREE;
+  vehicle *w = &self->worlds[i];
+  memset(w, 0, sizeof *w);
+  memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
+  memset(self->brains + i * self->state_size, 0, self->state_size);
+  w->where = where;
+  w->state.seed = seed;
+  w->state.id = id;
+  w->state.energy = 1.0;
+  body_init(&w->body, &m->body, m->reach);
+  body_place(&w->body, x, y, heading);
+  for (int side = 0; side < 2 && m->drive == DRIVE_SERVO; side++)
+    servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
+  vehicle_sensors_start(self, i);
+  vehicle_sense(self, i);
+  return VEHICLE_OK;
+}
+
+/* ---- the stages of a step ----------------------------------------------------------------------------------------- */
+
+void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
+
+static double limited(double signal) { return signal > 1.0 ? 1.0 : (signal < -1.0 ? -1.0 : signal); }
+
+int vehicles_send(vehicles *self, size_t i, double left, double right) {
+  if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
+  self->worlds[i].state.signals[0] = limited(left);
+  self->worlds[i].state.signals[1] = limited(right);
+  return VEHICLE_OK;
+}
+
+/* Torques of both wheels for the next step. */
+static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
+  vehicle_state *s = &w->state;
+  const double rims[2] = {body_left_speed(&w->body), body_right_speed(&w->body)};
+  if (m->drive == DRIVE_DC) {
+    for (int side = 0; side < 2; side++) {
+      const motor_dc_parameters *motor = &m->dc[side];
+      const double volts = motor_dc_voltage(motor, s->signals[side]); /* V = s V_max */
+      const double speed = rims[side] / m->body.wheel_radius;
+      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], volts, speed, 0.0, m->dt)
+                          : motor_dc_torque(motor, volts, speed, 0.0);
+    }
+    return;
+  }
+  const int pulse = s->step >= s->next_pulse;
+  for (int side = 0; side < 2; side++) {
+    const servo_motor_parameters *servo = &m->servo[side];
+    if (pulse) servo_motor_pulse(servo, &s->servos[side], servo_motor_pulse_of(servo, s->signals[side]));
+    out[side] = servo_motor_torque(servo, &s->servos[side], rims[side], 1.0);
+  }
+  if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
+}
+
+void vehicles_move(vehicles *self, size_t i) {
+  vehicle *w = &self->worlds[i];
+  double torque[2];
+  const double before = w->body.state.speed;
+  torques(self->model, w, torque);
+  body_advance(&w->body, w->where, torque[0], torque[1], self->model->dt);
+  w->state.acceleration = (w->body.state.speed - before) / self->model->dt;
+  w->state.step++;
+}
+
+void vehicles_update_arena(vehicles *self, size_t i) {
+  (void)self;
+  (void)i;
+}
+
+int vehicles_check(vehicles *self, size_t i) {
+  const vehicle_model *m = self->model;
+  vehicle_state *s = &self->worlds[i].state;
+  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], 0, m->dt);
+  if (m->ends_at_collision && self->worlds[i].body.state.touching) {
+    s->flag = VEHICLE_COLLIDED;
+  } else if (m->has_battery && s->energy <= 0.0) {
+    s->flag = VEHICLE_EXHAUSTED;
+  }
+  return s->flag;
+}
+
+/* From motor signals that were sent to the next readings. */
+static void finish_step(vehicles *self, size_t i) {
+  vehicles_move(self, i);
+  vehicles_update_arena(self, i);
+  vehicles_check(self, i);
+  vehicle_sense(self, i);
+}
+
+static int ready(const vehicles *self, size_t first, size_t count) {
+  if (first > self->count || count > self->count - first) return 0;
+  for (size_t i = first; i < first + count; i++) {
+    if (self->worlds[i].where == NULL) return 0;
+  }
+  return 1;
+}
+
+/* ---- stepping ----------------------------------------------------------------------------------------------------- */
+
+int vehicles_step_one(vehicles *self, size_t i, double left, double right) {
+  if (self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  const int status = vehicles_send(self, i, left, right);
+  if (status == VEHICLE_OK && self->worlds[i].state.flag == VEHICLE_RUNS) finish_step(self, i);
+  return status;
+}
+
+int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps) {
+  if (!ready(self, first, count)) return VEHICLE_NOT_PLACED;
+  for (size_t i = 0; i < 2 * count; i++) {
+    if (!isfinite(signals[i])) return VEHICLE_BAD_NUMBER;
+  }
+  for (size_t k = 0; k < count; k++) {
+    const size_t i = first + k;
+    (void)vehicles_send(self, i, signals[2 * k], signals[2 * k + 1]);
+    for (size_t step = 0; step < steps && self->worlds[i].state.flag == VEHICLE_RUNS; step++) finish_step(self, i);
+  }
+  return VEHICLE_OK;
+}
+
+int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps) {
+  if (!ready(self, first, count)) return VEHICLE_NOT_PLACED;
+  int status = VEHICLE_OK;
+  for (size_t i = first; i < first + count; i++) {
+    const double *readings = &self->readings[i * self->model->readings];
+    for (size_t step = 0; step < steps && self->worlds[i].state.flag == VEHICLE_RUNS; step++) {
+      double signals[2] = {0.0, 0.0};
+      brain(self->brains + i * self->state_size, readings, signals);
+      const int sent = vehicles_send(self, i, signals[0], signals[1]);
+      if (sent != VEHICLE_OK) {
+        status = sent;
+        break;
+      }
+      finish_step(self, i);
+    }
+  }
+  return status;
+}
+
+/* ---- what can be asked -------------------------------------------------------------------------------------------- */
+
+double *vehicles_readings(vehicles *self) { return self->readings; }
+
+size_t vehicles_reading_count(const vehicles *self) { return self->model->readings; }
+
+void *vehicles_brain_state(vehicles *self, size_t i) { return self->brains + i * self->state_size; }
+
+void vehicles_poses(const vehicles *self, size_t first, size_t count, double *poses) {
+  for (size_t k = 0; k < count; k++) {
+    const body_state *b = &self->worlds[first + k].body.state;
+    poses[3 * k] = b->x;
+    poses[3 * k + 1] = b->y;
+    poses[3 * k + 2] = b->heading;
+  }
+}
+
+void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *flags) {
+  for (size_t k = 0; k < count; k++) flags[k] = (int8_t)self->worlds[first + k].state.flag;
+}
+
+const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
+
+uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
+
+double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
+
+size_t vehicles_memory(const vehicles *self) {
+  const vehicle_model *m = self->model;
+  const size_t each = sizeof(vehicle) + m->sensors_count * sizeof(sensor_slot) + m->readings * sizeof(double);
+  return sizeof *self + self->count * (each + self->state_size);
+}

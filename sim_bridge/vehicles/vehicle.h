@@ -1,0 +1,122 @@
+/* vehicle.h: worlds without boards: motor signals in, readings out.
+ *
+ * `vehicles` holds N worlds of one model, each with one vehicle, its own arena, seed and pose. They know nothing of each
+ * other: what one does is the same whatever the others are, in whatever order and by however many threads they are
+ * stepped. The order of events within a step is that of Fig. 3.1 of the notes (THEORY section 3.1): sense, process, send
+ * motor signals, move, update the arena, check for the end. A world starts with its first sensing done, so that one
+ * call, vehicles_step, goes from motor signals to the next readings.
+ */
+#ifndef VEHICLES_VEHICLE_H
+#define VEHICLES_VEHICLE_H
+
+#include "model.h"
+
+/* python: begin */
+/* Why a run ended. */
+enum { VEHICLE_RUNS = 0, VEHICLE_COLLIDED = 1, VEHICLE_EXHAUSTED = 2 };
+
+typedef struct vehicles vehicles;
+
+/* A brain in compiled code. It gets the readings and writes the two motor signals, left and right, in [-1, 1]; `state` is
+ * its memory, one block for each world. In numba: void(voidptr, CPointer(float64), CPointer(float64)). */
+typedef void vehicle_brain(void *state, const double *readings, double *signals);
+
+/* `count` worlds, none of them placed. `state_size`: bytes of brain's memory in each, zero at first. NULL without memory.
+ * The model must outlive them. */
+vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size);
+void vehicles_destroy(vehicles *self);
+
+/* Puts vehicle `i` at rest at a pose in an arena and starts its run: `seed` and `id` (not 0) are the keys of its noise.
+ * The arena must outlive it. Senses for the first time. */
+int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
+                   double heading);
+
+/* `steps` steps of worlds first ... first + count - 1 with motor signals (count, 2) that hold throughout. A world whose
+ * run has ended stays as it is. Nothing moves where a signal is not finite. Different threads may step different worlds. */
+int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);
+
+/* The same for one world. */
+int vehicles_step_one(vehicles *self, size_t i, double left, double right);
+
+/* The same with a brain in compiled code that is asked in every step. A signal that is not a number stops that world and
+ * is reported. */
+int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps);
+
+/* The stages of one step of one world by themselves, for whoever looks on in between: sense, then (the brain), send, move,
+ * arena, check. Together they do what vehicles_step does; sensing twice in a step changes nothing. */
+void vehicles_sense(vehicles *self, size_t i);
+int vehicles_send(vehicles *self, size_t i, double left, double right);
+void vehicles_move(vehicles *self, size_t i);
+void vehicles_update_arena(vehicles *self, size_t i);
+int vehicles_check(vehicles *self, size_t i); /* VEHICLE_RUNS or why the run ended */
+
+/* Readings of all worlds, one after another; they stay in place. */
+double *vehicles_readings(vehicles *self);
+size_t vehicles_reading_count(const vehicles *self);
+
+/* The brain's memory in world i, `state_size` bytes. */
+void *vehicles_brain_state(vehicles *self, size_t i);
+
+/* Poses x, y, heading, (count, 3); flags VEHICLE_RUNS ... (count). */
+void vehicles_poses(const vehicles *self, size_t first, size_t count, double *poses);
+void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *flags);
+
+/* Truth of one world, for records and tests: never for a brain. */
+const body_state *vehicles_body(const vehicles *self, size_t i);
+uint64_t vehicles_steps_done(const vehicles *self, size_t i);
+double vehicles_energy(const vehicles *self, size_t i);
+
+/* Of everything that a world has come to; equal for runs that are equal bit for bit. */
+uint64_t vehicles_hash(const vehicles *self, size_t i);
+
+/* One world as bytes, and back into a world of the same model that is placed in the same arena. */
+size_t vehicles_snapshot_size(const vehicles *self);
+void vehicles_save(const vehicles *self, size_t i, void *bytes);
+int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
+
+/* Memory of `count` worlds, bytes. */
+size_t vehicles_memory(const vehicles *self);
+/* python: end */
+
+typedef union {
+  sharp_infrared_state sharp_infrared;
+  accelerometer_state accelerometer;
+  odometer_state odometer;
+} sensor_state;
+
+/* What a sensor keeps from step to step. */
+typedef struct {
+  uint64_t key; /* of its noise */
+  sample_hold hold;
+  sensor_state as;
+} sensor_slot;
+
+/* What changes in a world, without pointers. */
+typedef struct {
+  uint64_t seed, step, sensed; /* sensed: the step after whose sensing the readings are, plus 1 */
+  uint32_t id;
+  int32_t flag;
+  double signals[2];
+  double currents[2]; /* of full DC motors, A */
+  double acceleration;
+  double energy;
+  uint64_t next_pulse; /* step of the servos' next pulse */
+  servo_motor servos[2];
+} vehicle_state;
+
+typedef struct {
+  const arena *where;
+  body body;
+  vehicle_state state;
+} vehicle;
+
+struct vehicles {
+  const vehicle_model *model;
+  size_t count, state_size;
+  vehicle *worlds;
+  sensor_slot *slots; /* as many for each world as the model has sensors */
+  double *readings;
+  unsigned char *brains;
+};
+
+#endif

@@ -1,0 +1,27 @@
+/* accelerometer.c: see accelerometer.h. */
+#include "accelerometer.h"
+
+#include <math.h>
+
+int accelerometer_check(const accelerometer_parameters *p) {
+  if (!isfinite(p->mass + p->stiffness + p->damping + p->range + p->sigma + p->bias)) return -1;
+  return p->mass > 0.0 && p->stiffness > 0.0 && p->damping >= 0.0 && p->range > 0.0 && p->sigma >= 0.0 ? 0 : -1;
+}
+
+void accelerometer_step(const accelerometer_parameters *p, accelerometer_state *s, double acceleration, double dt) {
+  const double k = p->stiffness / p->mass;
+  const double c = p->damping / p->mass;
+  /* v' = v + dt (a - c v' - k z') with z' = z + dt v' */
+  s->speed = (s->speed + dt * (acceleration - k * s->deflection)) / (1.0 + dt * c + dt * dt * k);
+  s->deflection += dt * s->speed;
+  const double stop = p->range / k;
+  if (s->deflection > stop || s->deflection < -stop) {
+    s->deflection = s->deflection > 0.0 ? stop : -stop;
+    s->speed = 0.0;
+  }
+}
+
+double accelerometer_read(const accelerometer_parameters *p, const accelerometer_state *s, noise_source *noise) {
+  const double a = p->stiffness * s->deflection / p->mass + p->bias;
+  return p->sigma > 0.0 ? a + p->sigma * noise_next_normal(noise) : a;
+}

@@ -1,0 +1,20 @@
+/* beam.c: see beam.h. */
+#include "beam.h"
+
+#include <math.h>
+
+#include "../numbers.h"
+
+int beam_init(beam *self, const beam_parameters *p) {
+  if (!isfinite(p->x) || !isfinite(p->y) || !isfinite(p->height) || !(fabs(p->heading) < 1e4)) return -1;
+  if (!(p->opening >= 0.0 && p->opening <= NUMBERS_PI) || p->rays < 1 || p->rays > BEAM_RAYS) return -1;
+  *self = (beam){.x = p->x, .y = p->y, .height = p->height, .rays = p->rays};
+  number_sincos(p->heading, &self->middle_sine, &self->middle_cosine);
+  for (int i = 0; i < p->rays; i++) {
+    const double share = p->rays > 1 ? (double)i / (double)(p->rays - 1) - 0.5 : 0.0;
+    double unused;
+    number_sincos(p->heading + share * p->opening, &self->sine[i], &self->cosine[i]); /* (3.10), (3.11) */
+    number_sincos(share * p->opening, &unused, &self->inward[i]);
+  }
+  return 0;
+}

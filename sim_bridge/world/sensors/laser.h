@@ -1,0 +1,33 @@
+/* laser.h: a laser range finder: a fan of thin beams, as the Hokuyo URG-04LX (THEORY section 1.7).
+ *
+ * S_i is the distance along ray i, from right to left, or -1 beyond the range; noise by (3.1) for each ray, clamped to
+ * [0, D]. 683 directions over 239.77 degrees (steps 44 ... 725 of 1024 to a turn, the middle one is straight ahead).
+ */
+#ifndef SENSORS_LASER_H
+#define SENSORS_LASER_H
+
+#include "beam.h"
+
+#define LASER_RAYS 4096
+
+/* python: begin */
+typedef struct {
+  double x, y, heading, height; /* on the body: m, m, rad, m */
+  double first;                 /* rad to the middle's right, of ray 0; URG-04LX: 341 steps */
+  double step;                  /* rad from ray to ray; URG-04LX: 2 pi / 1024 (data) */
+  int rays;                     /* 1 to 4096; URG-04LX: 683 (notes) */
+  double range;                 /* D, m; 4.0 (notes) */
+  double sigma;                 /* of (3.1); 0.01 (data: 1 %); 0: no noise */
+} laser_parameters;
+
+typedef struct laser laser;
+
+/* A laser, or NULL without memory or where a number is not finite, negative or the fan wider than a turn. */
+laser *laser_new(const laser_parameters *parameters);
+void laser_destroy(laser *self);
+
+/* One scan into `distances`, as many as there are rays. */
+void laser_scan(const laser *self, const viewpoint *from, noise_source *noise, double *distances);
+/* python: end */
+
+#endif

@@ -1,0 +1,40 @@
+/* light.h: a phototransistor: L = sum over the lamps of P max(0, cos theta) / (d0^2 + d^2) (THEORY section 1.9).
+ *
+ * A lamp behind something as high as the sensor does not count. Read by a capacitor's decay, bright light is a short time.
+ */
+#ifndef SENSORS_LIGHT_H
+#define SENSORS_LIGHT_H
+
+#include "beam.h"
+
+/* python: begin */
+typedef struct {
+  double x, y;  /* m */
+  double power; /* P: what a sensor at d = 1 m sees, straight ahead, apart from d0 */
+} light_source;
+
+typedef struct {
+  double x, y, heading, height; /* on the body; height of the sensor above the floor */
+  double near_distance;         /* d0, m; chosen: 0.05 */
+  double ambient;               /* what is there without any lamp; 0: darkness */
+  double sigma;                 /* of (3.1); 0: no noise */
+  double gain;                  /* of this unit, 1: nominal */
+} phototransistor_parameters;
+
+typedef struct {
+  beam mount;
+  double near_squared, ambient, sigma, gain;
+} phototransistor;
+
+/* 0, or -1: a bad mount, or a number that is not finite or negative, or d0 = 0. */
+int phototransistor_init(phototransistor *self, const phototransistor_parameters *parameters);
+
+/* Irradiance L >= 0. */
+double phototransistor_read(const phototransistor *self, const viewpoint *from, const light_source *lamps, size_t count,
+                            noise_source *noise);
+
+/* Time of the capacitor's decay, s: `scale` s at L = 1, never above `maximum`. */
+double phototransistor_decay_time(double irradiance, double scale, double maximum);
+/* python: end */
+
+#endif

@@ -1,0 +1,66 @@
+/* odometer.c: see odometer.h. */
+#include "odometer.h"
+
+#include <math.h>
+
+#include "../numbers.h"
+
+#define ARSIM_STEP_S 0.01
+
+int odometer_check(const odometer_parameters *p) {
+  const double lengths = p->half_track + p->wheel_radius + p->factor_left + p->factor_right;
+  if (!isfinite(lengths + p->sigma_step + p->sigma_share + p->edges_per_turn + p->slips_per_s + p->slip_share))
+    return -1;
+  if (!(p->half_track > 0.0 && p->wheel_radius > 0.0 && p->factor_left > 0.0 && p->factor_right > 0.0)) return -1;
+  if (!(p->sigma_step >= 0.0 && p->sigma_share >= 0.0 && p->edges_per_turn >= 0.0 && p->slips_per_s >= 0.0)) return -1;
+  return p->slip_share >= 0.0 && p->slip_share <= 1.0 && p->rule >= ODOMETER_MIDPOINT && p->rule <= ODOMETER_NEW_HEADING
+             ? 0
+             : -1;
+}
+
+void odometer_calibrate(odometer_state *s, double x, double y, double heading, double wheel_left, double wheel_right) {
+  *s = (odometer_state){
+      .x = x, .y = y, .heading = number_wrap(heading), .wheel_left = wheel_left, .wheel_right = wheel_right};
+}
+
+void odometer_advance(const odometer_parameters *p, odometer_state *s, double left, double right) {
+  const double travel = 0.5 * (left + right);
+  const double turn = (right - left) / (2.0 * p->half_track);
+  const double share = p->rule == ODOMETER_MIDPOINT ? 0.5 : (p->rule == ODOMETER_EULER ? 0.0 : 1.0);
+  double sine, cosine;
+  number_sincos(s->heading + share * turn, &sine, &cosine);
+  s->x += travel * cosine;
+  s->y += travel * sine;
+  s->heading = number_wrap(s->heading + turn);
+  s->distance += travel < 0.0 ? -travel : travel;
+}
+
+/* What the odometer believes one wheel has travelled. */
+static double seen(const odometer_parameters *p, double angle, double factor, double dt, double *rest,
+                   noise_source *noise) {
+  double travel = factor * angle * p->wheel_radius;
+  if (p->sigma_share > 0.0) travel *= 1.0 + p->sigma_share * noise_next_normal(noise);
+  if (p->slips_per_s > 0.0 && noise->on && noise_next_uniform(noise) < p->slips_per_s * dt)
+    travel *= 1.0 - p->slip_share;
+  if (p->edges_per_turn > 0.0) {
+    const double edge = 2.0 * NUMBERS_PI * p->wheel_radius / p->edges_per_turn;
+    const double count = (*rest + travel) / edge;
+    const double whole = (double)(long long)count; /* towards 0: an edge that was seen is not seen again at once */
+    *rest = (count - whole) * edge;
+    travel = whole * edge;
+  }
+  if (p->sigma_step > 0.0) {
+    const double scale = dt == ARSIM_STEP_S ? 1.0 : sqrt(dt / ARSIM_STEP_S);
+    travel += scale * p->sigma_step * noise_next_normal(noise);
+  }
+  return travel;
+}
+
+void odometer_step(const odometer_parameters *p, odometer_state *s, double wheel_left, double wheel_right, double dt,
+                   noise_source *noise) {
+  const double left = seen(p, wheel_left - s->wheel_left, p->factor_left, dt, &s->rest_left, noise);
+  const double right = seen(p, wheel_right - s->wheel_right, p->factor_right, dt, &s->rest_right, noise);
+  s->wheel_left = wheel_left;
+  s->wheel_right = wheel_right;
+  odometer_advance(p, s, left, right);
+}

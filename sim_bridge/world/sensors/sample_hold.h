@@ -1,0 +1,23 @@
+/* sample_hold.h: a sensor with a rate of its own: between samples it gives the held value (rule S4 of THEORY section 1.3). */
+#ifndef SENSORS_SAMPLE_HOLD_H
+#define SENSORS_SAMPLE_HOLD_H
+
+#include <stdint.h>
+
+/* python: begin */
+typedef struct {
+  double period; /* s; 0: a new value at each question */
+  double next;   /* s: when the next sample is due */
+  double taken;  /* s: when the last one was taken */
+  double value;
+} sample_hold;
+
+/* 1 if a new sample is due at `time` s; whoever asks then takes it by sample_hold_take. */
+int sample_hold_due(const sample_hold *self, double time);
+void sample_hold_take(sample_hold *self, double time, double value);
+
+/* Age of the held value, s. */
+double sample_hold_age(const sample_hold *self, double time);
+/* python: end */
+
+#endif
