@@ -66,11 +66,11 @@ class Arena:
             for index, polygon in enumerate(polygons):
                 _check_polygon(polygon.corners_m, f"{file}: {key}[{index}].corners_m")
                 self._add(polygon, kind)
-        lib.arena_use_grid(self.handle, -1)
+        lib.arena_build(self.handle)
 
     def _add(self, polygon: Polygon, kind: int) -> None:
         corners = np.array(polygon.corners_m, dtype=np.float64)
-        number = lib.arena_add_polygon(self.handle, ffi.from_buffer("double[]", corners), len(corners), kind)
+        number = lib.arena_add_polygon(self.handle, ffi.from_buffer("double[]", corners), len(corners), kind, ffi.NULL)
         if number < 0:
             raise MemoryError("arena")
         self._polygons.append(corners)
@@ -90,7 +90,7 @@ class Arena:
 
     def ray(self, x: float, y: float, angle: float, reach: float) -> float | None:
         """Distance (m) from (x, y) to the nearest edge in direction `angle` (rad), None beyond `reach` (m)."""
-        distance: float = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, ffi.NULL)
+        distance: float = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)
         return None if distance < 0 else distance
 
     def clearance(self, x: float, y: float, limit: float = 10.0) -> float:

@@ -17,14 +17,16 @@ from cffi import FFI
 HEADERS = [
     "world/numbers.h",
     "world/noise.h",
+    "world/paths.h",
     "world/arena.h",
     "world/scene.h",
+    "world/outline.h",
+    "world/body.h",
     "world/motor_regulated.h",
     "world/motor_dc.h",
     "world/motor_position.h",
     "world/servo_motor.h",
     "world/supply.h",
-    "world/body.h",
     "world/sensors/beam.h",
     "world/sensors/infrared_proximity.h",
     "world/sensors/infrared_pair.h",
@@ -55,11 +57,15 @@ BEFORE = """
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """
-typedef struct { body_state state; ...; } body;
+typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
-void body_advance(body *self, const arena *where, double torque_left, double torque_right, double dt);
-int body_segment_touches(body *self, const arena *where, double x0, double y0, double x1, double y1);
+int body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
+int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
+void body_as_mover(const body *self, mover *out);
+double body_energy(const body *self);
+double body_wheel_hold(const body *self, double dt);
+int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1);
 """
 SOURCES = [
     "world/*.c",

@@ -27,7 +27,7 @@ SERVO_TORQUE_N_M = 0.268  # stall (data)
 SERVO_COAST_N_S = 0.3  # unpowered gear train (chosen)
 SERVO_COAST_N_M = 0.05  # (chosen)
 
-LATERAL_GRIP = 0.7  # rubber tyre across its way (chosen)
+TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
 
@@ -85,7 +85,8 @@ def body_parameters(body: robots.Body) -> Any:
             "wheel_inertia": body.wheel_inertia_kg_m2,
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
-            "lateral_grip": LATERAL_GRIP,
+            "grip": TYRE_GRIP,
+            "slip": 1,
         },
     )
 

@@ -384,11 +384,12 @@ static void step_robot(sim *self, robot *r) {
   for (int side = 0; side < 2; side++) {
     if (!r->has_servo[side]) continue;
     servo *s = &r->servo[side];
-    const double speed = side == SIM_LEFT ? body_left_speed(b) : body_right_speed(b);
+    const double speed = side == SIM_LEFT ? b->state.rim_left : b->state.rim_right;
     torque[side] = servo_torque(s, speed, servo_supply_of(r));
     current += supply_servo_current(&r->battery.parameters.supply, s->pulses > 0, speed, torque[side]);
   }
-  body_advance(b, self->arena, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
+  const scene around = {.arena = self->arena};
+  body_advance(b, &around, torque[SIM_LEFT], torque[SIM_RIGHT], self->dt);
   if (r->has_battery) battery_step(&r->battery, current, 0, self->dt);
   r->supply = supply_of(r);
   if (r->has_encoder[SIM_LEFT]) encoder_step(&r->encoder[SIM_LEFT], b->state.wheel_left, begin, self->step_cycles);
@@ -513,8 +514,9 @@ uint64_t sim_hash(const sim *self) {
   uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
   for (int i = 0; i < self->robot_count; i++) {
     const body_state *s = &self->robots[i]->body.state;
-    const double state[] = {s->x,       s->y,          s->heading,     s->speed,    s->turn_rate,
-                            s->lateral, s->wheel_left, s->wheel_right, s->distance, (double)s->touching};
+    const double state[] = {
+        s->x,         s->y,          s->heading,     s->speed,    s->turn_rate,        s->lateral,         s->rim_left,
+        s->rim_right, s->wheel_left, s->wheel_right, s->distance, (double)s->touching, (double)s->slipping};
     uint8_t bytes[sizeof state];
     memcpy(bytes, state, sizeof state);
     for (size_t k = 0; k < sizeof bytes; k++) hash = (hash ^ bytes[k]) * 0x100000001b3u;

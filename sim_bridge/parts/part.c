@@ -14,10 +14,10 @@ double part_look(const part_place *place, const part_mount *mount, int rays, dou
     const double share = rays > 1 ? (double)i / (double)(rays - 1) - 0.5 : 0.0; /* (3.10), (3.11) */
     double sine, cosine;
     number_sincos(s->heading + mount->heading + share * mount->beam, &sine, &cosine);
-    size_t hit = 0;
-    const double d = arena_ray(place->arena, x, y, cosine, sine, reach, &hit);
+    uint32_t hit = 0;
+    const double d = arena_ray(place->arena, x, y, cosine, sine, reach, 0.0, &hit);
     if (d < 0.0 || (nearest >= 0.0 && d >= nearest)) continue;
-    if (grazing_cosine > 0.0) {
+    if (grazing_cosine > 0.0 && hit < arena_edge_count(place->arena)) {
       const arena_edge *e = &arena_edges(place->arena)[hit];
       const double normal = fabs(cosine * e->ey - sine * e->ex) / sqrt(e->length_squared);
       if (normal < grazing_cosine) continue;

@@ -38,8 +38,8 @@ void whisker_step(whisker *self, uint64_t cycle) {
     pressed = (uint8_t)self->held;
   } else {
     const whisker_parameters *p = &self->parameters;
-    pressed =
-        (uint8_t)body_segment_touches(self->place.body, self->place.arena, p->root_x, p->root_y, p->tip_x, p->tip_y);
+    const scene around = {.arena = self->place.arena};
+    pressed = (uint8_t)body_segment_touches(self->place.body, &around, p->root_x, p->root_y, p->tip_x, p->tip_y);
   }
   if (pressed == self->pressed) return;
   self->pressed = pressed;

@@ -70,9 +70,9 @@ def test_grid_changes_no_answer(arena: Arena, x: float, y: float, angle: float) 
     def answers() -> tuple[float | None, float, bool]:
         return arena.ray(x, y, angle, 20.0), arena.clearance(x, y, 1.0), arena.is_free(x, y, 0.07)
 
-    lib.arena_use_grid(arena.handle, 0)
+    lib.arena_use_index(arena.handle, lib.ARENA_INDEX_NONE)
     without = answers()
-    lib.arena_use_grid(arena.handle, 1)
+    lib.arena_use_index(arena.handle, lib.ARENA_INDEX_GRID)
     assert answers() == without
 
 
@@ -121,9 +121,9 @@ def test_free_cells_of_a_room() -> None:
 
 
 def test_moved_polygon_is_met_where_it_is() -> None:
-    for grid in (0, 1):
+    for index in (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID):
         arena = arena_of(square(1, 0, 0.2), square(0, 3, 0.2))
-        lib.arena_use_grid(arena.handle, grid)
+        lib.arena_use_index(arena.handle, index)
         assert arena.ray(0, 0, 0, 5) == pytest.approx(0.9)
         arena.move("0", 1.0, 0.0)
         assert arena.ray(0, 0, 0, 5) == pytest.approx(1.9)

@@ -28,7 +28,8 @@ BOE_BOT = {
     "wheel_inertia": 1.7e-5,
     "linear_damping": 1.0,
     "angular_damping": 0.004,
-    "lateral_grip": 0.7,
+    "grip": 0.7,
+    "slip": 0,
 }
 ARSIM = {
     "mass": 3.0,
@@ -40,7 +41,8 @@ ARSIM = {
     "wheel_inertia": 0.0,
     "linear_damping": 1.0,
     "angular_damping": 0.1,
-    "lateral_grip": 0.7,
+    "grip": 0.7,
+    "slip": 0,
 }
 
 
@@ -52,6 +54,7 @@ class Body:
         self.arena = arena_of() if arena is None else arena
         self.body = ffi.new("body *")
         lib.body_init(self.body, self.parameters, 0.12)
+        self.scene = ffi.new("scene *", {"arena": self.arena.handle})
 
     @property
     def state(self) -> Any:
@@ -63,7 +66,7 @@ class Body:
 
     def advance(self, left: float, right: float, dt: float = 0.001, steps: int = 1) -> None:
         for _ in range(steps):
-            lib.body_advance(self.body, self.arena.handle, left, right, dt)
+            lib.body_advance(self.body, self.scene, left, right, dt)
 
     def regulate(
         self, reference: Callable[[float], tuple[float, float]], gain: float, seconds: float, dt: float
@@ -239,7 +242,7 @@ def test_grip_decides_whether_it_slides() -> None:
     """Pushed at 45 degrees into a wall, tyres that hold stop it where slippery ones let it slide."""
 
     def way(grip: float) -> float:
-        body = Body(arena_of(square(10, 0, 19)), lateral_grip=grip)
+        body = Body(arena_of(square(10, 0, 19)), grip=grip)
         body.place(0.5 - RADIUS, 0, math.radians(45))
         body.advance(0.02, 0.02, steps=2000)  # 2 x 0.02 N m at the rim: 1.2 N
         return float(body.state.y)
@@ -315,7 +318,7 @@ def test_segment_on_the_body_touches_what_it_crosses() -> None:
     body = Body(arena_of(square(1, 0, 1)))  # face at x = 0.5
 
     def touches() -> bool:
-        return bool(lib.body_segment_touches(body.body, body.arena.handle, 0.045, 0.03, 0.1, 0.055))
+        return bool(lib.body_segment_touches(body.body, body.scene, 0.045, 0.03, 0.1, 0.055))
 
     for x, expected in ((0.39, False), (0.3999, False), (0.4001, True), (0.42, True)):
         body.place(x, 0, 0)

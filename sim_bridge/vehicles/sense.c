@@ -35,7 +35,7 @@ static double motor_current(const sensing *s) {
   if (m->drive != DRIVE_DC) return 0.0;
   double sum = 0.0;
   for (int side = 0; side < 2; side++) {
-    const double speed = (side == 0 ? body_left_speed(&s->world->body) : body_right_speed(&s->world->body));
+    const double speed = side == 0 ? s->world->body.state.rim_left : s->world->body.state.rim_right;
     const double volts = motor_dc_voltage(&m->dc[side], s->world->state.signals[side]);
     const double current =
         m->full ? s->world->state.currents[side] : motor_dc_current(&m->dc[side], volts, speed / m->body.wheel_radius);
@@ -87,7 +87,7 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
       *out = accelerometer_read(&sensor->as.accelerometer, &slot->as.accelerometer, noise);
       break;
     case SENSOR_PHOTOTRANSISTOR:
-      *out = phototransistor_read(&sensor->as.phototransistor, &s->from, NULL, 0, noise);
+      *out = phototransistor_read(&sensor->as.phototransistor, &s->from, noise);
       break;
     case SENSOR_ODOMETER:
       read_odometer(s, &sensor->as.odometer, &slot->as.odometer, noise, out);
@@ -97,7 +97,7 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
       break;
     case SENSOR_WHISKER: {
       const whisker_segment *w = &sensor->as.whisker;
-      *out = body_segment_touches(&s->world->body, s->world->where, w->x0, w->y0, w->x1, w->y1) ? 1.0 : 0.0;
+      *out = body_segment_touches(&s->world->body, s->from.around, w->x0, w->y0, w->x1, w->y1) ? 1.0 : 0.0;
       break;
     }
     default: {
@@ -114,7 +114,7 @@ void vehicle_sense(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
   const body_state *b = &w->body.state;
-  const scene around = {.arena = w->where};
+  const scene around = vehicle_scene(w);
   const sensing s = {.all = self,
                      .world = w,
                      .from = {.around = &around,

@@ -30,8 +30,8 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
   const vehicle *w = &self->worlds[i];
   const body_state *b = &w->body.state;
   const vehicle_state *s = &w->state;
-  const double values[] = {b->x,          b->y,           b->heading,     b->speed,        b->turn_rate,
-                           b->lateral,    b->wheel_left,  b->wheel_right, b->distance,     s->signals[0],
+  const double values[] = {b->x,          b->y,           b->heading,     b->speed,        b->turn_rate, b->lateral,
+                           b->rim_left,   b->rim_right,   b->wheel_left,  b->wheel_right,  b->distance,  s->signals[0],
                            s->signals[1], s->currents[0], s->currents[1], s->acceleration, s->energy};
   const uint64_t counts[] = {s->step, s->id, (uint64_t)(uint32_t)s->flag, (uint64_t)(b->touching != 0)};
   uint64_t sum = mixed(mixed(0, values, sizeof values), counts, sizeof counts);
@@ -87,5 +87,6 @@ int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
   body_place(&w->body, fixed.body.x, fixed.body.y, fixed.body.heading); /* forgets what was near */
   w->body.state = fixed.body;
   w->state = fixed.state;
+  vehicles_update_arena(self, i);
   return VEHICLE_OK;
 }

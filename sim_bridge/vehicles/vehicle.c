@@ -8,6 +8,7 @@
 #include "sense.h"
 
 #define SERVO_PERIOD_S 0.020
+#define FIRST_MOVER 0x80000000u /* ids of the arena's moving shapes */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
   const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
@@ -27,6 +28,7 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
 
 void vehicles_destroy(vehicles *self) {
   if (self == NULL) return;
+  for (size_t i = 0; self->worlds != NULL && i < self->count; i++) free(self->worlds[i].movers);
   free(self->worlds);
   free(self->slots);
   free(self->readings);
@@ -38,17 +40,31 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
                    double heading) {
   const vehicle_model *m = self->model;
   if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
-  if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0) return VEHICLE_BAD_NUMBER;
-  if (!arena_is_free(where, x, y, m->body.radius)) return VEHICLE_NOT_FREE;
+  if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0 || id >= FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
+  const size_t moving = arena_moving_count(where);
+  mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
+  if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
+  scene_moving(where, 0.0, FIRST_MOVER, movers);
+  body at;
+  body_init(&at, &m->body, m->reach);
+  const scene around = {.arena = where, .movers = movers, .movers_count = moving};
+  if (!scene_is_free(&around, x, y, at.body_reach, id)) {
+    free(movers);
+    return VEHICLE_NOT_FREE;
+  }
+  free(w->movers);
   memset(w, 0, sizeof *w);
+  w->movers = movers;
   memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
   memset(self->brains + i * self->state_size, 0, self->state_size);
   w->where = where;
   w->state.seed = seed;
   w->state.id = id;
   w->state.energy = 1.0;
-  body_init(&w->body, &m->body, m->reach);
+  w->body = at;
+  w->body.id = id;
+  w->hold = body_wheel_hold(&w->body, m->dt);
   body_place(&w->body, x, y, heading);
   for (int side = 0; side < 2 && m->drive == DRIVE_SERVO; side++)
     servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
@@ -73,14 +89,14 @@ int vehicles_send(vehicles *self, size_t i, double left, double right) {
 /* Torques of both wheels for the next step. */
 static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   vehicle_state *s = &w->state;
-  const double rims[2] = {body_left_speed(&w->body), body_right_speed(&w->body)};
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
   if (m->drive == DRIVE_DC) {
     for (int side = 0; side < 2; side++) {
       const motor_dc_parameters *motor = &m->dc[side];
       const double volts = motor_dc_voltage(motor, s->signals[side]); /* V = s V_max */
       const double speed = rims[side] / m->body.wheel_radius;
-      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], volts, speed, 0.0, m->dt)
-                          : motor_dc_torque(motor, volts, speed, 0.0);
+      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], volts, speed, w->hold, m->dt)
+                          : motor_dc_torque(motor, volts, speed, w->hold);
     }
     return;
   }
@@ -98,20 +114,31 @@ void vehicles_move(vehicles *self, size_t i) {
   double torque[2];
   const double before = w->body.state.speed;
   torques(self->model, w, torque);
-  body_advance(&w->body, w->where, torque[0], torque[1], self->model->dt);
+  const scene around = vehicle_scene(w);
+  body_advance(&w->body, &around, torque[0], torque[1], self->model->dt);
   w->state.acceleration = (w->body.state.speed - before) / self->model->dt;
   w->state.step++;
 }
 
 void vehicles_update_arena(vehicles *self, size_t i) {
-  (void)self;
-  (void)i;
+  vehicle *w = &self->worlds[i];
+  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * self->model->dt, FIRST_MOVER, w->movers);
+}
+
+/* 1 at a charging station. */
+static int charges(const vehicle *w) {
+  const arena_charger *charger = arena_charger_of(w->where);
+  if (charger == NULL) return 0;
+  const double dx = w->body.state.x - charger->x;
+  const double dy = w->body.state.y - charger->y;
+  return dx * dx + dy * dy < charger->radius * charger->radius;
 }
 
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
-  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], 0, m->dt);
+  if (m->has_battery)
+    s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], charges(&self->worlds[i]), m->dt);
   if (m->ends_at_collision && self->worlds[i].body.state.touching) {
     s->flag = VEHICLE_COLLIDED;
   } else if (m->has_battery && s->energy <= 0.0) {

@@ -106,9 +106,17 @@ typedef struct {
 
 typedef struct {
   const arena *where;
+  mover *movers; /* as many as the arena has moving shapes */
+  double hold;   /* of the DC motors' friction, see motor_dc.h */
   body body;
   vehicle_state state;
 } vehicle;
+
+static inline scene vehicle_scene(const vehicle *self) {
+  return (scene){.arena = self->where,
+                 .movers = self->movers,
+                 .movers_count = self->movers == NULL ? 0 : arena_moving_count(self->where)};
+}
 
 struct vehicles {
   const vehicle_model *model;

@@ -1,8 +1,10 @@
-/* arena.h: where things are: closed polygons in the plane, and what can be asked of them.
+/* arena.h: where things are, and what can be asked of them.
  *
- * A polygon is an outline (the robot is inside it) or an obstacle (the robot is outside it). Rays follow (3.2)-(3.8) of
- * the notes. Above a few dozen edges a uniform grid limits what a question looks at; answers are the same with and
- * without it. Lengths in m, directions as unit vectors.
+ * Shapes: outlines (closed; the robot is inside), obstacles (closed; the robot is outside), walls (open polylines) and
+ * discs, each with a height and reflectances; further friction patches, lights, a charger, and moving shapes on scripted
+ * paths. Shapes consist of items that rays and bodies meet: first all edges, then all discs. An arena is built up, then
+ * `arena_build` makes its index; from then on it does not change, and any number of worlds and threads may share it.
+ * Lengths in m, directions as unit vectors.
  */
 #ifndef WORLD_ARENA_H
 #define WORLD_ARENA_H
@@ -10,46 +12,116 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "paths.h"
+
 /* python: begin */
-enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1 };
+enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
+/* What arena_use_index may choose. */
+enum { ARENA_INDEX_NONE = 0, ARENA_INDEX_GRID = 1, ARENA_INDEX_LISTS = 2 };
 
 typedef struct arena arena;
 
-/* An arena without edges, or NULL without memory. */
+typedef struct {
+  double height;               /* of the top above the floor; a sensor sees what is at least as high as itself */
+  double infrared_reflectance; /* 1: as a white wall */
+  double sound_reflectance;    /* 1: as a hard wall */
+} arena_surface;
+
+typedef struct {
+  int kind;
+  arena_surface surface;
+  uint32_t first; /* edge, or disc */
+  uint32_t count; /* of edges; 1 for a disc */
+} arena_shape;
+
+typedef struct {
+  double x, y, height, power; /* power in W, radiated evenly */
+} arena_light;
+
+typedef struct {
+  double x, y, radius;
+} arena_charger;
+
+/* A shape on its way: a disc of `radius`, or an outline in its own frame within a circle of `radius`. */
+typedef struct {
+  const double *outline; /* x0 y0 x1 y1 ..., NULL: a disc */
+  size_t corners;
+  double radius;
+  arena_surface surface;
+  path path;
+} arena_moving;
+
+/* An arena without anything in it, or NULL without memory. */
 arena *arena_new(void);
 void arena_destroy(arena *self);
 
-/* Adds a closed polygon of `count` >= 3 vertices x0 y0 x1 y1 ...; the last vertex joins the first. Returns its number,
- * or -1 without memory or where an edge has no length. */
-int arena_add_polygon(arena *self, const double *xy, size_t count, int kind);
+/* These add something and return its number, or -1 without memory or where a number is not finite, an edge has no
+ * length or a radius is not positive. `surface` NULL: infinitely high, reflectances 1. The caller's arrays are copied. */
+int arena_add_polygon(arena *self, const double *xy, size_t count, int kind, const arena_surface *surface);
+int arena_add_wall(arena *self, const double *xy, size_t count, const arena_surface *surface);
+int arena_add_disc(arena *self, double x, double y, double radius, const arena_surface *surface);
+int arena_add_patch(arena *self, const double *xy, size_t count, double grip);
+int arena_add_light(arena *self, double x, double y, double height, double power);
+/* `outline` NULL: a disc of `radius`. */
+int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
+                     const path_waypoint *waypoints, size_t waypoint_count, int repeat);
+/* Returns 0, or -1. */
+int arena_set_charger(arena *self, double x, double y, double radius);
 
-/* Moves a polygon by (dx, dy). Returns 0, or -1 if there is no such polygon. */
-int arena_move_polygon(arena *self, int polygon, double dx, double dy);
+/* Makes the index. Without memory for it every question looks at every item. */
+void arena_build(arena *self);
+
+/* Which index answers: none, the grid, or the lists as well (the default). Answers are the same. */
+void arena_use_index(arena *self, int choice);
+
+/* Moves a polygon by (dx, dy) and builds anew: only while nobody else uses the arena. Returns 0, or -1. */
+int arena_move_polygon(arena *self, int shape, double dx, double dy);
 
 size_t arena_edge_count(const arena *self);
+size_t arena_disc_count(const arena *self);
+size_t arena_shape_count(const arena *self);
+const arena_shape *arena_shape_at(const arena *self, size_t number);
+size_t arena_light_count(const arena *self);
+const arena_light *arena_lights(const arena *self);
+size_t arena_moving_count(const arena *self);
+const arena_moving *arena_movings(const arena *self);
+/* NULL if there is none. */
+const arena_charger *arena_charger_of(const arena *self);
 
-/* Builds the grid (1), drops it (0), or does what suits the number of edges (-1). Adding a polygon drops it. */
-void arena_use_grid(arena *self, int choice);
+/* Distance along the ray from (x, y) in direction (cosine, sine) to the nearest item that is at least `height` high, or
+ * -1 if there is none nearer than `reach`. `item`, if not NULL, gets the item met: of equally near ones the first. */
+double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,
+                 uint32_t *item);
 
-/* Distance along the ray from (x, y) in direction (cosine, sine) to the nearest edge, or -1 if there is none within
- * `reach`. `edge`, if not NULL, gets the number of the edge that was hit. */
-double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, size_t *edge);
-
-/* Distance from (x, y) to the nearest edge, at most `limit`. */
+/* Distance from (x, y) to the nearest edge or circle, at most `limit`. */
 double arena_clearance(const arena *self, double x, double y, double limit);
 
-/* 1 if a disc lies in free space: within an outline where there is one, in no obstacle, no edge nearer than `radius`. */
+/* 1 if a disc lies in free space: within an outline where there is one, in no obstacle, no item nearer than `radius`. */
 int arena_is_free(const arena *self, double x, double y, double radius);
+
+/* Friction coefficient of the floor at (x, y): of the last patch there, `otherwise` where there is none. */
+double arena_grip(const arena *self, double x, double y, double otherwise);
+
+/* Two edges of a closed polygon that cross, touch or fold back on each other: 1 and the first such pair; 0 if there are
+ * none; -1 without memory. */
+int arena_crossing(const double *xy, size_t count, uint32_t *one, uint32_t *other);
 /* python: end */
 
 typedef struct {
   double ax, ay; /* start */
   double ex, ey; /* end - start */
   double length_squared;
-  int polygon;
+  double height;
+  int shape;
 } arena_edge;
 
+typedef struct {
+  double x, y, radius, height;
+  int shape;
+} arena_disc;
+
 const arena_edge *arena_edges(const arena *self);
+const arena_disc *arena_discs(const arena *self);
 
 /* Changes whenever an edge moves; whoever keeps edges compares it. */
 uint32_t arena_version(const arena *self);
@@ -57,14 +129,16 @@ uint32_t arena_version(const arena *self);
 /* Squared distance from (x, y) to an edge; the nearest point goes to (qx, qy). */
 double arena_edge_distance_squared(const arena_edge *edge, double x, double y, double *qx, double *qy);
 
-/* Distance along the ray from (x, y) in direction (cosine, sine) to the edge, or `best` if it is not met before that. */
-double arena_edge_ray(const arena_edge *edge, double x, double y, double cosine, double sine, double best);
+/* Distance from (x, y) to the circle of a disc, negative inside; the nearest point goes to (qx, qy). */
+double arena_disc_distance(const arena_disc *disc, double x, double y, double *qx, double *qy);
 
-/* Edges nearer than `radius` to (x, y), in increasing number. Returns how many there are, even when more than
- * `capacity`. */
+/* Edges or discs nearer than `radius` to (x, y), in increasing number; a disc is near from inside as well. Return how
+ * many there are, even when more than `capacity`. */
 size_t arena_edges_near(const arena *self, double x, double y, double radius, uint32_t *edges, size_t capacity);
+size_t arena_discs_near(const arena *self, double x, double y, double radius, uint32_t *discs, size_t capacity);
 
-/* 1 if the segment from (x0, y0) to (x1, y1) meets the edge. */
+/* 1 if the segment from (x0, y0) to (x1, y1) meets the edge, or the disc. */
 int arena_edge_meets_segment(const arena_edge *edge, double x0, double y0, double x1, double y1);
+int arena_disc_meets_segment(const arena_disc *disc, double x0, double y0, double x1, double y1);
 
 #endif

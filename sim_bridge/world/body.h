@@ -1,9 +1,9 @@
-/* body.h: a differential-drive body: two driven wheels, a supporting point without friction, a circular outline.
+/* body.h: a differential-drive body: two driven wheels, a supporting point without friction, a circle or polygon around.
  *
  * Motion follows (2.25)-(2.32) with the full A and B, by semi-implicit Euler steps (3.16)-(3.22): speeds, then heading,
- * then position. The wheels roll without slip along the heading; across it they hold by friction, which a wall can
- * overcome: `lateral` is the speed of that slip. A body that touches an edge loses the velocity into it and slides along it;
- * it gains no energy, sinks into nothing and passes through nothing.
+ * then position. The wheels roll without slip as long as the tyres hold; beyond that they spin or slide (ground.h), and
+ * their speed is a state of its own. What a body meets it slides along; contact takes the velocity into it (restitution
+ * 0), turns a body met off its centre, and gives no energy, lets nothing sink in and nothing through (contact.h).
  */
 #ifndef WORLD_BODY_H
 #define WORLD_BODY_H
@@ -11,19 +11,25 @@
 #include <stdint.h>
 
 #include "arena.h"
+#include "outline.h"
+#include "scene.h"
 
 /* python: begin */
 typedef struct {
-  double mass;            /* M, kg, without wheels */
-  double inertia;         /* I, kg m^2, about the vertical axis through the axle's middle, without wheels */
-  double radius;          /* of the collision circle, m */
-  double half_track;      /* R, m */
-  double wheel_radius;    /* r, m */
-  double wheel_mass;      /* m, kg */
-  double wheel_inertia;   /* I_w, kg m^2, about the axle */
-  double linear_damping;  /* alpha, N s/m */
-  double angular_damping; /* beta, N m s */
-  double lateral_grip;    /* friction coefficient of the wheels across the heading */
+  double mass;                 /* M, kg, without wheels */
+  double inertia;              /* I, kg m^2, about the vertical axis through the axle's middle, without wheels */
+  double radius;               /* of the collision circle, m; with an outline not used */
+  const body_outline *outline; /* collision polygon, NULL: the circle */
+  double half_track;           /* R, m */
+  double wheel_radius;         /* r, m */
+  double wheel_mass;           /* m, kg */
+  double wheel_inertia;        /* I_w, kg m^2, about the axle */
+  double spin_inertia;         /* of a slipping wheel with the rotor behind its gear; 0: I_w, at least M r^2 / 10 */
+  double linear_damping;       /* alpha, N s/m */
+  double angular_damping;      /* beta, N m s */
+  double grip;                 /* friction coefficient of the tyres where no patch says another */
+  int slip;                    /* 0: wheels always roll without slip; grip holds only across the heading */
+  double height;               /* of its top above the floor, m; 0: higher than any sensor */
 } body_parameters;
 
 typedef struct {
@@ -31,39 +37,54 @@ typedef struct {
   double speed;         /* V along the heading, m/s */
   double turn_rate;     /* rad/s, counter-clockwise */
   double lateral;       /* m/s, to the left */
-  double wheel_left;    /* wheel angles, rad, forward positive */
+  double rim_left;      /* speeds of the wheels' rims, m/s forward: what motors and encoders see */
+  double rim_right;
+  double wheel_left; /* wheel angles, rad, forward positive */
   double wheel_right;
   double cosine, sine;     /* of the heading */
   double distance;         /* m travelled */
-  int touching;            /* 1: in contact with an edge after the last step */
-  double touch_x, touch_y; /* where */
+  double touch_x, touch_y; /* where it touches */
+  int touching;            /* 1: in contact with something after the last step */
+  int slipping;            /* 1: the rims' speeds are not those of the ground, or the body drifts sideways */
 } body_state;
+
+enum { BODY_MAXIMUM = 64 }; /* robots in one world */
+enum { BODY_OK = 0, BODY_BAD_STEP = -1, BODY_TOO_MANY = -2, BODY_SAME_ID = -3 };
 
 /* A of (2.26) and B of (2.30). */
 double body_a(const body_parameters *p);
 double body_b(const body_parameters *p);
 /* python: end */
 
-#define BODY_NEAR_CAPACITY 24u
+#define BODY_EDGES_CAPACITY 24u
+#define BODY_DISCS_CAPACITY 8u
 #define BODY_SKIN 1e-5 /* m; nearer than this counts as touching */
+#define BODY_GRAVITY 9.81
 
-/* Edges that the body or what it carries could reach before it has moved by `slack` from (x, y). */
+/* What of the arena the body or what it carries could reach before it has moved by `slack` from (x, y). */
 typedef struct {
   double x, y, slack;
   uint32_t version;
-  uint32_t count; /* more than BODY_NEAR_CAPACITY: all edges */
-  uint32_t edges[BODY_NEAR_CAPACITY];
+  uint16_t edge_count; /* more than the capacity: all edges */
+  uint16_t disc_count;
+  uint32_t edges[BODY_EDGES_CAPACITY];
+  uint32_t discs[BODY_DISCS_CAPACITY];
 } body_surroundings;
 
 typedef struct {
   body_parameters parameters;
-  double reach;        /* of the body and of what touches on it, m from the axle's middle */
-  double force_gain;   /* A / M */
-  double drag;         /* alpha / M */
-  double torque_gain;  /* B / I */
-  double turn_drag;    /* beta / I */
-  double forward_mass; /* what a force along the heading meets, wheels included */
-  double sideways_mass;
+  uint32_t id;          /* of the mover that it is; different for all robots of a world */
+  double reach;         /* of the body and of what touches on it, m from the axle's middle */
+  double body_reach;    /* of the body alone */
+  double force_gain;    /* A / M */
+  double drag;          /* alpha / M */
+  double torque_gain;   /* B / I */
+  double turn_drag;     /* beta / I */
+  double per_radius;    /* 1 / r */
+  double spin;          /* I_w / r^2: mass of a wheel's turning at the rim */
+  double slip_spin;     /* the same of a slipping wheel */
+  double mass, inertia; /* of body and wheels without the wheels' turning: what a force on a slipping body meets */
+  double half_load;     /* on a wheel, N */
   body_state state;
   body_surroundings near;
 } body;
@@ -74,9 +95,25 @@ void body_init(body *self, const body_parameters *parameters, double reach);
 /* Puts the body at a pose, at rest; wheel angles and distance stay. */
 void body_place(body *self, double x, double y, double heading);
 
-/* One step of `dt` seconds under the wheel torques, N m. */
-void body_advance(body *self, const arena *where, double torque_left, double torque_right, double dt);
+/* One step of `dt` seconds of all robots of one world under their wheels' torques (left, right; N m; in the order of the
+ * bodies). `around`: the arena and its moving obstacles as they are at the step's beginning, without the robots. Moving
+ * obstacles push and are not pushed; robots push each other. The result does not depend on the order of the bodies.
+ * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, and then nothing has moved. */
+int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
 
+/* The same for one robot. */
+int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
+
+/* How others see it. Reflectances are 1. */
+void body_as_mover(const body *self, mover *out);
+
+/* Kinetic energy with the wheels' turning (as slipping wheels have it), J. */
+double body_energy(const body *self);
+
+/* Torque per rad/s that stops a wheel within `dt`: the least inertia felt at a wheel / dt. For motor_dc_torque. */
+double body_wheel_hold(const body *self, double dt);
+
+/* Speed of the ground under the wheels. */
 static inline double body_left_speed(const body *self) {
   return self->state.speed - self->parameters.half_track * self->state.turn_rate; /* (2.18), (2.19) */
 }
@@ -84,10 +121,18 @@ static inline double body_right_speed(const body *self) {
   return self->state.speed + self->parameters.half_track * self->state.turn_rate;
 }
 
-/* 1 if the segment from (x0, y0) to (x1, y1), in the body's frame and within its reach, meets an edge. */
-int body_segment_touches(body *self, const arena *where, double x0, double y0, double x1, double y1);
+/* 1 if the segment from (x0, y0) to (x1, y1), in the body's frame and within its reach, meets something: an edge or disc
+ * of the arena, a mover with another id. */
+int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1);
 
-/* 1 if nothing is within the body's reach, without looking at an edge. */
+/* 1 if nothing of the arena is within the body's reach, without looking at it. */
 int body_is_clear(body *self, const arena *where);
+
+/* Renews the lists of near things when the body has moved by more than `share` of what they are good for. */
+void body_look_around(body *self, const arena *where, double share);
+
+/* Numbers of the near edges or discs; NULL: all of the arena's are to be looked at. */
+const uint32_t *body_near_edges(const body *self, const arena *where, size_t *count);
+const uint32_t *body_near_discs(const body *self, const arena *where, size_t *count);
 
 #endif

@@ -44,7 +44,13 @@ typedef struct {
 double scene_ray(const scene *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t self_id, ray_hit *hit);
 
-/* The same for one mover alone, whatever its id and height. */
+/* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. */
+void scene_moving(const arena *where, double time, uint32_t first_id, mover *out);
+
+/* 1 if a disc of `radius` at (x, y) lies in free space of the arena and outside of all movers but `self_id`. */
+int scene_is_free(const scene *self, double x, double y, double radius, uint32_t self_id);
+
+/* scene_ray for one mover alone, whatever its id and height. */
 double mover_ray(const mover *self, double x, double y, double cosine, double sine, double reach, ray_hit *hit);
 /* python: end */
 

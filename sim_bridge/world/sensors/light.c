@@ -15,8 +15,9 @@ int phototransistor_init(phototransistor *self, const phototransistor_parameters
   return 0;
 }
 
-double phototransistor_read(const phototransistor *self, const viewpoint *from, const light_source *lamps, size_t count,
-                            noise_source *noise) {
+double phototransistor_read(const phototransistor *self, const viewpoint *from, noise_source *noise) {
+  const arena_light *lamps = arena_lights(from->around->arena);
+  const size_t count = arena_light_count(from->around->arena);
   const beam_origin at = beam_from(&self->mount, from);
   double cosine, sine;
   beam_direction(&self->mount, from, 0, &cosine, &sine);

@@ -9,11 +9,6 @@
 
 /* python: begin */
 typedef struct {
-  double x, y;  /* m */
-  double power; /* P: what a sensor at d = 1 m sees, straight ahead, apart from d0 */
-} light_source;
-
-typedef struct {
   double x, y, heading, height; /* on the body; height of the sensor above the floor */
   double near_distance;         /* d0, m; chosen: 0.05 */
   double ambient;               /* what is there without any lamp; 0: darkness */
@@ -29,9 +24,8 @@ typedef struct {
 /* 0, or -1: a bad mount, or a number that is not finite or negative, or d0 = 0. */
 int phototransistor_init(phototransistor *self, const phototransistor_parameters *parameters);
 
-/* Irradiance L >= 0. */
-double phototransistor_read(const phototransistor *self, const viewpoint *from, const light_source *lamps, size_t count,
-                            noise_source *noise);
+/* Irradiance L >= 0 of the arena's lights. */
+double phototransistor_read(const phototransistor *self, const viewpoint *from, noise_source *noise);
 
 /* Time of the capacitor's decay, s: `scale` s at L = 1, never above `maximum`. */
 double phototransistor_decay_time(double irradiance, double scale, double maximum);

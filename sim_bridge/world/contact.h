@@ -1,0 +1,49 @@
+/* contact.h: bodies that meet things, section 3.2.5 of the notes and beyond it.
+ *
+ * A contact is a point of a body's core (outline.h) nearer to something than the roundings allow. Motion is cut into parts
+ * in which nothing moves farther than half of the distance that a core has from everything: nothing can be passed
+ * through. After each part the bodies are put out of what they have entered, and lose the velocity into it by an impulse
+ * at the contact, on the mass that they have there; an inelastic impulse never adds energy, and between two robots it is
+ * equal and opposite. Where no place is found (a wedge narrower than the body) they stay where they were, at rest.
+ */
+#ifndef WORLD_CONTACT_H
+#define WORLD_CONTACT_H
+
+#include "body.h"
+
+#define CONTACTS_CAPACITY 32
+#define CONTACT_DEPTH 1e-9 /* m: less is not put out */
+
+typedef struct {
+  body *other;   /* NULL: nothing that gives way */
+  double nx, ny; /* direction from there to the body */
+  double px, py; /* point of the core, in the body's frame */
+  double qx, qy; /* point on the other side: in the arena, or in the other body's frame */
+  double vx, vy; /* its velocity, if it does not give way */
+  double apart;  /* distance of the two points in contact: the roundings */
+} contact;
+
+typedef struct {
+  contact list[CONTACTS_CAPACITY];
+  int count;
+  double nearest; /* distance of the core from anything, at least */
+} contacts;
+
+/* Contacts of a body with the arena and with movers, those moved on by `elapsed` seconds, where the gap is below
+ * `margin`. */
+void contact_find(body *self, const scene *around, double elapsed, double margin, contacts *out);
+
+/* Takes away the velocities into the contacts, but for what closes a gap within `within` seconds. Returns the largest
+ * change, m/s. */
+double contact_stop(body *self, const contacts *at, double within);
+
+/* Moves the bodies of one group for `dt` seconds by the speeds that they have. */
+void contact_move(body *const bodies[], size_t count, const scene *around, double dt);
+
+/* Turns a body by an angle; a slipping one keeps its velocity in the plane. */
+void contact_turn(body *self, double angle);
+
+/* The fastest that any point of a mover moves, m/s. */
+double contact_mover_speed(const mover *self);
+
+#endif

@@ -1,0 +1,36 @@
+/* ground.h: what the floor can do to two tyres: hold them, up to Coulomb friction along and across the heading together.
+ *
+ * Each wheel carries half the weight. While the force that rolling without slip needs lies within grip * load at both
+ * wheels, (2.16) and (2.17) hold. Beyond that a wheel's rim has a speed of its own, I_w dw/dt = tau - F r (2.12), and the
+ * floor pulls against the slip, F = -grip N s / |s| with s the velocity of the tyre's print over the floor. A step solves
+ * both wheels together for the impulses that leave the least energy, which is that law with the slip taken at the step's
+ * end: stable at any step, and it never adds energy. With `slip` off the wheels always roll, and only the speed across
+ * the heading is held by friction.
+ */
+#ifndef WORLD_GROUND_H
+#define WORLD_GROUND_H
+
+#include "body.h"
+
+typedef struct {
+  double along[2], across[2]; /* impulses of the floor on the tyres so far, N s */
+  double limit[2];
+} ground;
+
+/* Friction limits, N, of the wheels where they stand. */
+void ground_limits(const body *self, const arena *where, double limits[2]);
+
+/* 1 if the tyres hold while the body, that rolls, comes to these speeds within `dt` under these torques. */
+int ground_holds(const body *self, const double limits[2], double torque_left, double torque_right, double speed,
+                 double turn_rate, double dt);
+
+/* Torques and drag of a step on a body whose tyres slip; from here on its rims have their own speeds. */
+void ground_begin(ground *self, body *of, const double limits[2], double torque_left, double torque_right, double dt);
+
+/* One round of the floor's answer. Returns by how much it changed a speed, m/s. */
+double ground_round(ground *self, body *of);
+
+/* The body rolls again if both tyres hold. */
+void ground_end(const ground *self, body *of);
+
+#endif

@@ -1,0 +1,112 @@
+/* outline.c: see outline.h. */
+#include "outline.h"
+
+#include <math.h>
+#include <string.h>
+
+#define ROUNDING 1e-3
+#define ROUNDING_LEAST 1e-6
+#define EDGE_LEAST 1e-6
+
+static double cross(const double *o, const double *a, const double *b) {
+  return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+}
+
+static int between(const double *a, const double *b, const double *p) { /* p on the line through a and b */
+  return p[0] >= fmin(a[0], b[0]) && p[0] <= fmax(a[0], b[0]) && p[1] >= fmin(a[1], b[1]) && p[1] <= fmax(a[1], b[1]);
+}
+
+static int meet(const double *a, const double *b, const double *c, const double *d) {
+  const double c1 = cross(a, b, c);
+  const double c2 = cross(a, b, d);
+  const double c3 = cross(c, d, a);
+  const double c4 = cross(c, d, b);
+  if (((c1 > 0.0 && c2 < 0.0) || (c1 < 0.0 && c2 > 0.0)) && ((c3 > 0.0 && c4 < 0.0) || (c3 < 0.0 && c4 > 0.0)))
+    return 1;
+  return (c1 == 0.0 && between(a, b, c)) || (c2 == 0.0 && between(a, b, d)) || (c3 == 0.0 && between(c, d, a)) ||
+         (c4 == 0.0 && between(c, d, b));
+}
+
+/* 1 if no two edges have a point in common but neighbours their corner, and no neighbours fold back on each other. */
+static int is_simple(const double *xy, size_t n) {
+  for (size_t i = 0; i < n; i++) {
+    const double *a = xy + 2 * i;
+    const double *b = xy + 2 * ((i + 1) % n);
+    const double *next = xy + 2 * ((i + 2) % n);
+    const double back = (b[0] - a[0]) * (next[0] - b[0]) + (b[1] - a[1]) * (next[1] - b[1]);
+    if (cross(a, b, next) == 0.0 && back < 0.0) return 0;
+    for (size_t k = i + 2; k < n; k++) {
+      if (i == 0 && k == n - 1) continue;
+      if (meet(a, b, xy + 2 * k, xy + 2 * ((k + 1) % n))) return 0;
+    }
+  }
+  return 1;
+}
+
+static double area_of(const double *xy, size_t n) {
+  double twice = 0.0;
+  for (size_t i = 0; i < n; i++) {
+    const double *a = xy + 2 * i;
+    const double *b = xy + 2 * ((i + 1) % n);
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  return 0.5 * twice;
+}
+
+/* Moves every edge inwards by `by`; a corner goes to where its edges then meet. Returns 1 if every edge kept its direction
+ * and the result is simple. */
+static int shrink(const double *xy, size_t n, double by, double *core) {
+  for (size_t i = 0; i < n; i++) {
+    const double *a = xy + 2 * ((i + n - 1) % n);
+    const double *b = xy + 2 * i;
+    const double *c = xy + 2 * ((i + 1) % n);
+    const double l1 = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
+    const double l2 = sqrt((c[0] - b[0]) * (c[0] - b[0]) + (c[1] - b[1]) * (c[1] - b[1]));
+    const double n1x = -(b[1] - a[1]) / l1;
+    const double n1y = (b[0] - a[0]) / l1;
+    const double n2x = -(c[1] - b[1]) / l2;
+    const double n2y = (c[0] - b[0]) / l2;
+    const double along = 1.0 + n1x * n2x + n1y * n2y;
+    if (along < 1e-9) return 0;
+    core[2 * i] = b[0] + by * (n1x + n2x) / along;
+    core[2 * i + 1] = b[1] + by * (n1y + n2y) / along;
+  }
+  for (size_t i = 0; i < n; i++) {
+    const size_t k = (i + 1) % n;
+    const double along = (core[2 * k] - core[2 * i]) * (xy[2 * k] - xy[2 * i]) +
+                         (core[2 * k + 1] - core[2 * i + 1]) * (xy[2 * k + 1] - xy[2 * i + 1]);
+    if (!(along > 0.0)) return 0;
+  }
+  return is_simple(core, n);
+}
+
+int body_outline_make(body_outline *self, const double *xy, size_t corners) {
+  memset(self, 0, sizeof *self);
+  if (corners < 3 || corners > BODY_CORNERS_MAXIMUM) return OUTLINE_CORNERS;
+  for (size_t i = 0; i < 2 * corners; i++) {
+    if (!(fabs(xy[i]) < 1e6)) return OUTLINE_NUMBER;
+  }
+  for (size_t i = 0; i < corners; i++) {
+    const size_t k = (i + 1) % corners;
+    const double dx = xy[2 * k] - xy[2 * i];
+    const double dy = xy[2 * k + 1] - xy[2 * i + 1];
+    if (!(dx * dx + dy * dy > EDGE_LEAST * EDGE_LEAST)) return OUTLINE_EDGE;
+  }
+  if (!is_simple(xy, corners)) return OUTLINE_CROSSING;
+  const int turned = area_of(xy, corners) < 0.0;
+  for (size_t i = 0; i < corners; i++) {
+    const size_t from = turned ? corners - 1 - i : i;
+    self->xy[2 * i] = xy[2 * from];
+    self->xy[2 * i + 1] = xy[2 * from + 1];
+    const double reach = sqrt(xy[2 * i] * xy[2 * i] + xy[2 * i + 1] * xy[2 * i + 1]);
+    if (reach > self->reach) self->reach = reach;
+  }
+  for (double by = ROUNDING; by >= ROUNDING_LEAST; by *= 0.5) {
+    /* shrunk twice as far it must still be itself: so that the core has a width */
+    if (!shrink(self->xy, corners, 2.0 * by, self->core) || !shrink(self->xy, corners, by, self->core)) continue;
+    self->rounding = by;
+    self->corners = corners;
+    return OUTLINE_OK;
+  }
+  return OUTLINE_THIN;
+}
