@@ -11,8 +11,12 @@ import numpy as np
 from boebot.boards import Truth
 from boebot.link.messages import Identity, Status
 from boebot.link.session import text
-from boebot.record import Pose, Record, Series, onsets, truth_at
+from boebot.readings import Layout
+from boebot.readings_series import ReadingsSeries
+from boebot.record import Record
 from boebot.robots import RobotDescription
+from boebot.series import Pose, Series, onsets, truth_at
+from boebot.telemetry_series import TelemetrySeries
 
 
 @dataclass(kw_only=True)
@@ -35,6 +39,7 @@ class RunResult:
         link: what the two ends of the link counted, "host" and "board".
         notices: what the user should know, in sentences.
         counters: what an emulated board counted.
+        layout: of a robot without a board: where the readings of each of its devices stand.
     """
 
     brain: str
@@ -63,13 +68,21 @@ class RunResult:
     link: dict[str, dict[str, int]] = field(default_factory=dict)
     notices: list[str] = field(default_factory=list)
     counters: dict[str, float] = field(default_factory=dict)
+    layout: Layout | None = None
 
     # ---- arrays --------------------------------------------------------------------------------------------
 
     @cached_property
     def series(self) -> Series:
-        """Everything the board told, as arrays, one entry per control tick received."""
-        return Series(self.record, self.robot, self.tick)
+        """Everything the robot told, as arrays, one entry per control tick received."""
+        if self.layout is not None:
+            return ReadingsSeries(self.record, self.robot, self.layout)
+        return self.telemetry
+
+    @cached_property
+    def telemetry(self) -> TelemetrySeries:
+        """Everything the board told, with what only a board tells; empty without one."""
+        return TelemetrySeries(self.record, self.robot, self.tick)
 
     @cached_property
     def true_pose(self) -> Pose | None:
@@ -123,8 +136,8 @@ class RunResult:
 
     @property
     def ticks(self) -> int:
-        """Control ticks whose telemetry was received."""
-        return len(self.record.telemetry)
+        """Control ticks whose telemetry was received, or steps of a robot without a board."""
+        return len(self.record.times)
 
     @property
     def overruns(self) -> int:

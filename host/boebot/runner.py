@@ -14,10 +14,11 @@ from numbers import Integral, Real
 from pathlib import Path
 
 from boebot import brains, interrupts, report
-from boebot.boards import BoardRequest, open_board
+from boebot.boards import BoardRequest, default_board, open_board, open_vehicle
 from boebot.brains import LoadedBrain
 from boebot.driving import Driver, Progress, Task
 from boebot.driving.board import BoardDriver, check_time_to_live
+from boebot.driving.direct import DirectDriver
 from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult
 from boebot.robot import Equipment
@@ -30,7 +31,7 @@ def run(
     brain: object = "wander",
     robot: str | Path | RobotDescription = "shieldbot",
     arena: str | Path | None = None,
-    on: str = "native",
+    on: str | None = None,
     seconds: float = 60.0,
     seed: int = 1,
     realtime: bool = False,
@@ -44,7 +45,8 @@ def run(
         brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with
         `step(robot)`. robot: bundled name, .toml file, or a description. arena: bundled name or .toml file;
         None: the simulator's own choice. Of no meaning on a real robot. on: "native", "avr", or a port:
-        "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT". seconds: length of the run by the board's clock;
+        "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot without a board. None: native or
+        direct. seconds: length of the run by the board's clock;
         may be infinite. seed: of the brain's chance, and of the noise of the simulated world. realtime: slow
         a simulated run down to the wall clock. out: folder for run.csv, run.png, replay.html and the raw
         bytes. period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05. progress:
@@ -77,7 +79,7 @@ def execute(
     brain: object,
     robot: str | Path | RobotDescription = "shieldbot",
     arena: str | Path | None = None,
-    on: str = "native",
+    on: str | None = None,
     seconds: float = 60.0,
     seed: int = 1,
     realtime: bool = False,
@@ -92,13 +94,14 @@ def execute(
     """
     _expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
     _expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
-    _expect("on", on, "the name of a board or a port", str)
+    _expect("on", on, "the name of a board or a port", str, type(None))
     _expect("seconds", seconds, "a number", Real)
     _expect("seed", seed, "a whole number", Integral)
     _expect("period", period, "seconds or None", Real, type(None))
     if not seconds > 0:
         raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
     description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
+    on = default_board(description) if on is None else on
     loaded = brains.load_brain(brain)
     period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
     check_time_to_live(period_s)
@@ -109,6 +112,12 @@ def execute(
         )
     request = BoardRequest(robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime)
     task = Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, progress=progress)
+    if not description.has_board:
+        vehicle = open_vehicle(on, request)
+        try:
+            return _drive(DirectDriver(vehicle, task), loaded)
+        finally:
+            vehicle.close()
     session = open_board(on, request)
     try:
         return _drive(BoardDriver(session, task), loaded)

@@ -20,8 +20,8 @@ from boebot.report import scene
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boebot.record import Floats, Pose
     from boebot.result import RunResult
+    from boebot.series import Floats, Pose
 
 PAPER = "#fbfaf7"
 WALL = "#3b4252"

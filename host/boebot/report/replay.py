@@ -16,8 +16,8 @@ from boebot.link.messages import Status
 from boebot.report import scene
 
 if TYPE_CHECKING:
-    from boebot.record import Floats, Pose
     from boebot.result import RunResult
+    from boebot.series import Floats, Pose
 
 FRAMES_AT_MOST = 20_000
 _PAGE = Path(__file__).with_name("replay_page.html")
@@ -41,7 +41,7 @@ def page_data(result: RunResult) -> dict[str, Any]:
     series = result.series
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
     low, high = scene.bounds(view)
-    status = series.raw["status"]
+    status = series.status
     flags = (
         series.left_whisker * LEFT_WHISKER
         | series.right_whisker * RIGHT_WHISKER

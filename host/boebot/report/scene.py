@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from boebot.record import Bools, Floats, Pose
     from boebot.result import RunResult
+    from boebot.series import Bools, Floats, Pose
 
 MARGIN = 0.02  # of the greater side
 
