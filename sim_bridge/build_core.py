@@ -37,6 +37,7 @@ HEADERS = [
     "world/sensors/accelerometer.h",
     "world/sensors/light.h",
     "world/sensors/odometer.h",
+    "world/sensors/quadrature.h",
     "world/sensors/table_noise.h",
     "world/sensors/unit.h",
     "world/sensors/sample_hold.h",

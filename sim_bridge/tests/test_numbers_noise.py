@@ -1,7 +1,7 @@
 """Elementary functions and random draws of the world.
 
-Truth of the functions is numpy's extended precision (64 bits of mantissa); their errors are counted in units in the last
-place of the double nearest to it.
+Truth of the functions is numpy's extended precision (64 bits of mantissa); their errors are counted in units
+in the last place of the double nearest to it.
 """
 
 from __future__ import annotations

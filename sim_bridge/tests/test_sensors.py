@@ -399,7 +399,9 @@ def test_light_of_several_lamps_and_what_hides_them() -> None:
     parameters = {"x": 0.05, "y": 0.02, "heading": 0.4, "height": 0.09, "near_distance": 0.05, "gain": 1.0}
     sensor = made("phototransistor", parameters)
     lamps = [(1.0, 0.5, 2.0), (-1.0, 0.0, 5.0), (0.5, 2.0, 1.0)]
-    c_lamps = ffi.new("light_source[]", lamps)
+    lit = arena_of(outline=OUTLINE)
+    for lamp_x, lamp_y, power in lamps:
+        assert lib.arena_add_light(lit.handle, lamp_x, lamp_y, 0.5, power) >= 0
     x, y, heading = 0.1, -0.2, 0.6
 
     def truth(visible: list[tuple[float, float, float]]) -> float:
@@ -411,14 +413,14 @@ def test_light_of_several_lamps_and_what_hides_them() -> None:
             total += power * max(0.0, facing) / (0.05**2 + (lx - px) ** 2 + (ly - py) ** 2)
         return total
 
-    view = View(arena_of(outline=OUTLINE), (x, y, heading))
-    assert lib.phototransistor_read(sensor, view.c, c_lamps, 3, source(False)) == pytest.approx(truth(lamps), rel=1e-12)
+    view = View(lit, (x, y, heading))
+    assert lib.phototransistor_read(sensor, view.c, source(False)) == pytest.approx(truth(lamps), rel=1e-12)
     low = {"x": 0.6, "y": 0.2, "radius": 0.1, "height": 0.05}
     for height, visible in ((0.05, lamps), (0.2, lamps[1:])):
-        hidden = View(arena_of(outline=OUTLINE), (x, y, heading), [low | {"height": height}])
-        sensed = lib.phototransistor_read(sensor, hidden.c, c_lamps, 3, source(False))
+        hidden = View(lit, (x, y, heading), [low | {"height": height}])
+        sensed = lib.phototransistor_read(sensor, hidden.c, source(False))
         assert sensed == pytest.approx(truth(visible), rel=1e-12)
-    assert lib.phototransistor_read(sensor, view.c, c_lamps, 0, source(False)) == 0.0
+    assert lib.phototransistor_read(sensor, View(arena_of(outline=OUTLINE)).c, source(False)) == 0.0
 
 
 def test_decay_time_is_short_in_bright_light() -> None:

@@ -166,10 +166,11 @@ static int ready(const vehicles *self, size_t first, size_t count) {
 /* ---- stepping ----------------------------------------------------------------------------------------------------- */
 
 int vehicles_step_one(vehicles *self, size_t i, double left, double right) {
-  if (self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
   const int status = vehicles_send(self, i, left, right);
-  if (status == VEHICLE_OK && self->worlds[i].state.flag == VEHICLE_RUNS) finish_step(self, i);
-  return status;
+  if (status != VEHICLE_OK) return status;
+  if (self->worlds[i].state.flag == VEHICLE_RUNS) finish_step(self, i);
+  return self->worlds[i].state.flag;
 }
 
 int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps) {

@@ -35,7 +35,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
  * run has ended stays as it is. Nothing moves where a signal is not finite. Different threads may step different worlds. */
 int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);
 
-/* The same for one world. */
+/* One step of one world. Returns VEHICLE_RUNS or why the run has ended, or an error. */
 int vehicles_step_one(vehicles *self, size_t i, double left, double right);
 
 /* The same with a brain in compiled code that is asked in every step. A signal that is not a number stops that world and
