@@ -195,14 +195,7 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     Raises:
         BoardError: no such board, or it cannot be opened, or the robot has none.
     """
-    robot = request.robot
-    if not robot.has_board:
-        raise BoardError(f"robot {robot.name!r} has no board: it cannot run on {url!r}; expected {DIRECT!r}")
-    if url == DIRECT:
-        raise BoardError(
-            f"robot {robot.name!r} is driven by its board: it cannot run {DIRECT!r}; "
-            f"expected one of {', '.join(board_kinds())}, or a port"
-        )
+    check_board(url, request.robot)
     for point in entry_points(group=BOARDS_GROUP):
         if point.name == url:
             factory: BoardFactory = _load(point.load, url)
@@ -213,14 +206,28 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     raise BoardError(_unknown(url))
 
 
+def check_board(url: str, robot: RobotDescription) -> None:
+    """Refuses to run a robot without a board on one, and one with a board without.
+
+    Raises:
+        BoardError: in one sentence.
+    """
+    if not robot.has_board and url != DIRECT:
+        raise BoardError(f"robot {robot.name!r} has no board: it cannot run on {url!r}; expected {DIRECT!r}")
+    if robot.has_board and url == DIRECT:
+        raise BoardError(
+            f"robot {robot.name!r} is driven by its board: it cannot run {DIRECT!r}; "
+            f"expected one of {', '.join(board_kinds())}, or a port"
+        )
+
+
 def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
     """Opens a robot without a board, in the simulated world.
 
     Raises:
         BoardError: `url` names a board, or there is no simulator.
     """
-    if url != DIRECT:
-        raise BoardError(f"robot {request.robot.name!r} has no board: it cannot run on {url!r}; expected {DIRECT!r}")
+    check_board(url, request.robot)
     for point in entry_points(group=VEHICLES_GROUP):
         factory: VehicleFactory = _load(point.load, point.name)
         return factory(request)

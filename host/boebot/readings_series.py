@@ -46,27 +46,27 @@ class ReadingsSeries(Series):
         return np.asarray(self.values(device)[:, 0] >= sensor.threshold, dtype=np.bool_)
 
     @cached_property
-    def left_whisker(self) -> Bools:  # type: ignore[override]
+    def left_whisker(self) -> Bools:
         """See `Series`."""
         return self._whisker("whisker_left")
 
     @cached_property
-    def right_whisker(self) -> Bools:  # type: ignore[override]
+    def right_whisker(self) -> Bools:
         """See `Series`."""
         return self._whisker("whisker_right")
 
     @cached_property
-    def left_ir(self) -> Bools:  # type: ignore[override]
+    def left_ir(self) -> Bools:
         """See `Series`."""
         return self._infrared("infrared_left")
 
     @cached_property
-    def right_ir(self) -> Bools:  # type: ignore[override]
+    def right_ir(self) -> Bools:
         """See `Series`."""
         return self._infrared("infrared_right")
 
     @cached_property
-    def ping_distance(self) -> Floats:  # type: ignore[override]
+    def ping_distance(self) -> Floats:
         """See `Series`."""
         sonar = self._robot.device.get("ping")
         if "ping" not in self._layout or not isinstance(sonar, vehicle_devices.Sonar):

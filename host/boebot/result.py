@@ -15,7 +15,7 @@ from boebot.readings import Layout
 from boebot.readings_series import ReadingsSeries
 from boebot.record import Record
 from boebot.robots import RobotDescription
-from boebot.series import Pose, Series, onsets, truth_at
+from boebot.series import Pose, Series, onsets, touch_indices, truth_at
 from boebot.telemetry_series import TelemetrySeries
 
 
@@ -126,7 +126,8 @@ class RunResult:
         """How many times the body came to touch something; on a real robot, a whisker."""
         if self.truth is not None and len(self.series):
             begin, end = self.clock_offset, self.clock_offset + float(self.series.time[-1])
-            return onsets(self.truth.contact[(self.truth.time >= begin) & (self.truth.time <= end)])
+            inside = (self.truth.time >= begin) & (self.truth.time <= end)
+            return len(touch_indices(self.truth.time[inside], self.truth.contact[inside]))
         return self.whisker_touches
 
     @cached_property
@@ -151,8 +152,10 @@ class RunResult:
 
     @cached_property
     def odometry_error(self) -> float | None:
-        """Distance of the estimate from the true place at the end (m), where somebody knows it."""
-        if self.true_pose is None:
+        """Distance of the estimate from the true place at the end (m), where somebody knows it and the robot has what
+        an estimate needs."""
+        measures = ("odometer",) if self.layout is not None else ("encoder_left", "encoder_right")
+        if self.true_pose is None or not all(self.robot.has(device) for device in measures):
             return None
         return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
 

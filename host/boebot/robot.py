@@ -160,10 +160,11 @@ class Robot:
     The same object is handed to every step of a run; its sensors always show the newest observation.
     """
 
-    __slots__ = ("_chances", "_period", "command", "latched", "name", "observation", "random")
+    __slots__ = ("_chances", "_period", "_speed_limit", "command", "latched", "name", "observation", "random")
 
-    def __init__(self, name: str, period: float, seed: int = 1) -> None:
+    def __init__(self, name: str, period: float, seed: int = 1, speed_limit: float = SPEED_LIMIT) -> None:
         self.name: Final = name
+        self._speed_limit = speed_limit  # m/s
         self._period = period
         self.observation: Observation
         self.command: Command = STOP
@@ -302,14 +303,15 @@ class Robot:
         command.
 
         Raises:
-            BrainError: a speed is beyond 0.5 m/s or no number.
+            BrainError: a speed is beyond 0.5 m/s (without a board: the wheels' greatest) or no number.
         """
+        limit = self._speed_limit
         try:
-            within = -SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT
+            within = -limit <= left <= limit and -limit <= right <= limit
         except (TypeError, ValueError):
             raise _no_numbers("drive_speed", left, right) from None
         if not within:
-            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s")
+            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{limit:g} to {limit:g} m/s")
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:

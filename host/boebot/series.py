@@ -122,6 +122,17 @@ def onsets(flags: Bools) -> int:
     return int(np.count_nonzero(flags[1:] & ~flags[:-1]) + (1 if len(flags) and flags[0] else 0))
 
 
+APART_S = 0.1  # touches nearer in time than this are one
+
+
+def touch_indices(time: Floats, contact: Bools) -> NDArray[np.intp]:
+    """Indices at which the body came to touch something that it had not touched for `APART_S`: sliding along a wall
+    chatters."""
+    touching = np.flatnonzero(contact)
+    before = np.concatenate(([-np.inf], time[touching[:-1]])) if len(touching) else np.empty(0)
+    return touching[time[touching] - before > APART_S]
+
+
 def truth_at(truth: Truth, times: Floats) -> Pose:
     """The true pose at the given instants on the transport's clock, between samples by interpolation."""
     heading = np.interp(times, truth.time, np.unwrap(truth.heading))

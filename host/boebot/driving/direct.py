@@ -31,12 +31,12 @@ class DirectDriver:
         self.period_ticks = whole_ticks(task.period_s, session.tick_s)
         self.period_s = self.period_ticks * session.tick_s
         self.equipment = Equipment(request.robot, session.tick_s, session.layout)
-        self.robot = Robot(request.robot.name, self.period_s, request.seed)
+        self._speed_maximum = request.robot.body.wheel_speed_maximum_m_s
+        self.robot = Robot(request.robot.name, self.period_s, request.seed, self._speed_maximum)
         self.record = Record()
         self._periods = periods(request.robot, session.layout, len(session.readings()))
         self._sampled = any(period_s > session.tick_s for period_s in self._periods)
         self._ages = (0.0,) * len(self._periods)
-        self._speed_maximum = request.robot.body.wheel_speed_maximum_m_s
 
     def begin(self) -> None:
         """Nothing is to be made ready."""
@@ -72,10 +72,10 @@ class DirectDriver:
                 sample = self._sample(tick, time_s)
                 times.append(time_s)
                 log.append((sample, left, right))
-                if session.ended:
-                    raise BoardError(f"robot {robot.name!r} can go no further: {session.ended}")
                 if time_s >= end_s:
                     break
+            if ended := session.ended:
+                raise BoardError(f"robot {robot.name!r} can go no further: {ended}")
 
     def _sample(self, tick: int, time_s: float) -> Readings:
         if self._sampled:
@@ -89,8 +89,7 @@ class DirectDriver:
         if kind == "signal":
             return left, right
         if kind == "speed":
-            most = self._speed_maximum
-            return max(-1.0, min(1.0, left / most)), max(-1.0, min(1.0, right / most))
+            return left / self._speed_maximum, right / self._speed_maximum
         return 0.0, 0.0
 
     def end(self) -> None:

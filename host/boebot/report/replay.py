@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boebot import robots
+from boebot import robots, vehicle_devices
 from boebot.link.messages import Status
 from boebot.report import scene
 
@@ -80,10 +80,10 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
     for name, device in robot.device.items():
         if not device.on:
             continue
-        if isinstance(device, robots.Whisker):
+        if isinstance(device, robots.Whisker | vehicle_devices.TouchWhisker):
             drawn[name] = {"root": device.root_m, "tip": device.tip_m}
-        elif isinstance(device, robots.InfraredPair | robots.Ping):
-            reach = device.range_m if isinstance(device, robots.InfraredPair) else device.range_max_m
+        elif isinstance(device, scene.RANGING):
+            reach = scene.reach(device)
             drawn[name] = {
                 "position": device.position_m,
                 "heading": device.heading_rad,
