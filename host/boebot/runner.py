@@ -104,7 +104,8 @@ def execute(
     on = default_board(description) if on is None else on
     loaded = brains.load_brain(brain)
     period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
-    check_time_to_live(period_s)
+    if description.has_board:
+        check_time_to_live(period_s)
     missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
     if missing:
         raise BrainError(

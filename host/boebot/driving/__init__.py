@@ -6,6 +6,7 @@ steps, and the next turn carries out the command that it gave. A brain cannot te
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
@@ -65,12 +66,19 @@ class Driver(Protocol):
         """What came of the run, which took so long by the wall clock; `error`: why it ended before its time."""
 
 
+def check_period(period_s: float) -> None:
+    """Raises BoebotError where a brain's period is none."""
+    if not (period_s > 0 and math.isfinite(period_s)):
+        raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
+
+
 def whole_ticks(period_s: float, tick_s: float) -> int:
     """A brain's period in ticks.
 
     Raises:
         BoebotError: it is none, or no whole number of them.
     """
+    check_period(period_s)
     ticks = round(period_s / tick_s)
     if ticks < 1 or abs(ticks * tick_s - period_s) > 1e-6:
         raise BoebotError(

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from struct import Struct
 
 from boebot.boards import BoardSession
-from boebot.driving import PROGRESS_S, Task, whole_ticks
+from boebot.driving import PROGRESS_S, Task, check_period, whole_ticks
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
 from boebot.link.delivery import LatchedAgainError, SessionLostError
@@ -47,8 +47,7 @@ def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
     Raises:
         BoebotError: the period is so long that the motors would stop between two steps.
     """
-    if not (period_s > 0 and math.isfinite(period_s)):
-        raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
+    check_period(period_s)
     time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
     if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
         raise BoebotError(
