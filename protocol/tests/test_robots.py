@@ -86,7 +86,9 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
-    with pytest.raises(RobotError, match="there is no robot 'dalek'; expected one of arsim, shieldbot, shieldbot-basic"):
+    with pytest.raises(
+        RobotError, match="there is no robot 'dalek'; expected one of arsim, shieldbot, shieldbot-basic"
+    ):
         load_robot("dalek")
 
 
