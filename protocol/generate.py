@@ -456,12 +456,10 @@ def outputs() -> dict[Path, str]:
         HERE / "boebot.dbc": can_database.database(spec),
         HERE / "PROTOCOL.md": protocol_page(spec),
     }
-    maps: dict[str, str] = {}
     for name in robot_names():
         robot = load_robot(name)
-        header = pins_header(spec, robot)
-        if maps.setdefault(robot.pin_map, robot.name) == robot.name:
-            made[generated / pins_file(robot)] = header
+        if robot.has_board and robot.name == robot.pin_map:  # others run the image of this one
+            made[generated / pins_file(robot)] = pins_header(spec, robot)
     return made
 
 

@@ -22,11 +22,6 @@ from sim_bridge.sim import Floats, Sim, SimRobot
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
 
-def _cycles(seconds: float) -> int:
-    """As many cycles, but at least one of any time at all: a wait that lets no time pass would be repeated for ever."""
-    return max(1, round(seconds * CLOCK_HZ)) if seconds > 0 else 0
-
-
 class SimTransport:
     """The board's serial line, in this process. Time passes only while `read` waits."""
 
@@ -44,16 +39,20 @@ class SimTransport:
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
-        self._sim.run(_cycles(wait_s), _cycles(quiet_s), self._robot)
-        if self._pace is not None:
-            self._pace.wait()
-        return self._robot.receive()
+        return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         """As `read`, with the instant at which the last byte had come (s)."""
-        data = self.read(wait_s, quiet_s)
+        if self._closed:
+            raise BoardError("the emulated board is closed")
+        # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
+        cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
+        quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
+        sim = self._sim
+        sim.run(cycles, quiet, self._robot)
+        if self._pace is not None:
+            self._pace.wait()
+        data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
 
     def set_baud(self, rate: int) -> None:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 BOARDS_GROUP = "boebot.boards"  # kind -> BoardFactory
+VEHICLES_GROUP = "boebot.vehicles"  # "direct" -> VehicleFactory
+DIRECT = "direct"  # what a robot without a board runs on
 SERVERS_GROUP = "boebot.servers"  # any name -> Server
 
 
@@ -85,6 +87,48 @@ class BoardSession(Protocol):
 
     def close(self) -> None:
         """Closes the board."""
+
+
+class VehicleSession(Protocol):
+    """A simulated robot without a board, opened. `close` gives everything back; nothing else is called after it."""
+
+    @property
+    def description(self) -> str:
+        """The robot in a few words."""
+
+    @property
+    def tick_s(self) -> float:
+        """Seconds that one step lasts."""
+
+    @property
+    def layout(self) -> Mapping[str, slice]:
+        """Where the readings of each device stand, by its name in the robot's description."""
+
+    def readings(self) -> tuple[float, ...]:
+        """All readings now, in SI units."""
+
+    def step(self, left: float, right: float) -> None:
+        """One step under these motor signals, -1 to 1."""
+
+    @property
+    def ended(self) -> str:
+        """Why it can go no further, or ""."""
+
+    def truth(self) -> Truth | None:
+        """What happened so far, a row a step from the start on; `time` is in s since then."""
+
+    def counters(self) -> Mapping[str, float]:
+        """What the world counted, by name; may be empty."""
+
+    def close(self) -> None:
+        """Frees the world."""
+
+
+class VehicleFactory(Protocol):
+    """What an entry point of the group `boebot.vehicles` loads to."""
+
+    def __call__(self, request: BoardRequest) -> VehicleSession:
+        """Opens a robot without a board; raises a BoebotError with one sentence if it cannot."""
 
 
 @runtime_checkable
@@ -149,8 +193,9 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     """Opens the board that `url` names.
 
     Raises:
-        BoardError: no such board, or it cannot be opened.
+        BoardError: no such board, or it cannot be opened, or the robot has none.
     """
+    check_board(url, request.robot)
     for point in entry_points(group=BOARDS_GROUP):
         if point.name == url:
             factory: BoardFactory = _load(point.load, url)
@@ -159,6 +204,39 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
         transport = open_port(url, _default_baud(request.robot))
         return LiveSession(transport, f"board at {transport.name}")
     raise BoardError(_unknown(url))
+
+
+def check_board(url: str, robot: RobotDescription) -> None:
+    """Refuses to run a robot without a board on one, and one with a board without.
+
+    Raises:
+        BoardError: in one sentence.
+    """
+    if not robot.has_board and url != DIRECT:
+        raise BoardError(f"robot {robot.name!r} has no board: it cannot run on {url!r}; expected {DIRECT!r}")
+    if robot.has_board and url == DIRECT:
+        raise BoardError(
+            f"robot {robot.name!r} is driven by its board: it cannot run {DIRECT!r}; "
+            f"expected one of {', '.join(board_kinds())}, or a port"
+        )
+
+
+def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
+    """Opens a robot without a board, in the simulated world.
+
+    Raises:
+        BoardError: `url` names a board, or there is no simulator.
+    """
+    check_board(url, request.robot)
+    for point in entry_points(group=VEHICLES_GROUP):
+        factory: VehicleFactory = _load(point.load, point.name)
+        return factory(request)
+    raise BoardError("there is no world for a robot without a board: the simulator is not installed")
+
+
+def default_board(robot: RobotDescription) -> str:
+    """What the robot runs on unless somebody says otherwise."""
+    return "native" if robot.has_board else DIRECT
 
 
 def find_server() -> Server:

@@ -11,8 +11,12 @@ import numpy as np
 from boebot.boards import Truth
 from boebot.link.messages import Identity, Status
 from boebot.link.session import text
-from boebot.record import Pose, Record, Series, onsets, truth_at
+from boebot.readings import Layout
+from boebot.readings_series import ReadingsSeries
+from boebot.record import Record
 from boebot.robots import RobotDescription
+from boebot.series import Pose, Series, onsets, touch_indices, truth_at
+from boebot.telemetry_series import TelemetrySeries
 
 
 @dataclass(kw_only=True)
@@ -35,6 +39,7 @@ class RunResult:
         link: what the two ends of the link counted, "host" and "board".
         notices: what the user should know, in sentences.
         counters: what an emulated board counted.
+        layout: of a robot without a board: where the readings of each of its devices stand.
     """
 
     brain: str
@@ -63,13 +68,21 @@ class RunResult:
     link: dict[str, dict[str, int]] = field(default_factory=dict)
     notices: list[str] = field(default_factory=list)
     counters: dict[str, float] = field(default_factory=dict)
+    layout: Layout | None = None
 
     # ---- arrays --------------------------------------------------------------------------------------------
 
     @cached_property
     def series(self) -> Series:
-        """Everything the board told, as arrays, one entry per control tick received."""
-        return Series(self.record, self.robot, self.tick)
+        """Everything the robot told, as arrays, one entry per control tick received."""
+        if self.layout is not None:
+            return ReadingsSeries(self.record, self.robot, self.layout)
+        return self.telemetry
+
+    @cached_property
+    def telemetry(self) -> TelemetrySeries:
+        """Everything the board told, with what only a board tells; empty without one."""
+        return TelemetrySeries(self.record, self.robot, self.tick)
 
     @cached_property
     def true_pose(self) -> Pose | None:
@@ -113,7 +126,8 @@ class RunResult:
         """How many times the body came to touch something; on a real robot, a whisker."""
         if self.truth is not None and len(self.series):
             begin, end = self.clock_offset, self.clock_offset + float(self.series.time[-1])
-            return onsets(self.truth.contact[(self.truth.time >= begin) & (self.truth.time <= end)])
+            inside = (self.truth.time >= begin) & (self.truth.time <= end)
+            return len(touch_indices(self.truth.time[inside], self.truth.contact[inside]))
         return self.whisker_touches
 
     @cached_property
@@ -123,8 +137,8 @@ class RunResult:
 
     @property
     def ticks(self) -> int:
-        """Control ticks whose telemetry was received."""
-        return len(self.record.telemetry)
+        """Control ticks whose telemetry was received, or steps of a robot without a board."""
+        return len(self.record.times)
 
     @property
     def overruns(self) -> int:
@@ -138,8 +152,10 @@ class RunResult:
 
     @cached_property
     def odometry_error(self) -> float | None:
-        """Distance of the estimate from the true place at the end (m), where somebody knows it."""
-        if self.true_pose is None:
+        """Distance of the estimate from the true place at the end (m), where somebody knows it and the robot has what
+        an estimate needs."""
+        measures = ("odometer",) if self.layout is not None else ("encoder_left", "encoder_right")
+        if self.true_pose is None or not all(self.robot.has(device) for device in measures):
             return None
         return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
 

@@ -14,29 +14,19 @@ way to the simulated world, to the board or to the link.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Final, NamedTuple, NoReturn, TypeVar
+from typing import Final, NamedTuple
 
-from boebot import robots
-from boebot.devices.encoder import Encoder, EncoderReader
-from boebot.devices.infrared import Infrared, InfraredReader
-from boebot.devices.ping import Ping, PingReader
-from boebot.devices.servo import Servo, ServoReader
-from boebot.devices.whisker import Whisker, WhiskerReader
+from boebot.devices.encoder import Encoder
+from boebot.devices.infrared import Infrared
+from boebot.devices.ping import Ping
+from boebot.devices.servo import Servo
+from boebot.devices.whisker import Whisker
+from boebot.equipment import GROUPS
+from boebot.equipment import Equipment as Equipment
 from boebot.errors import BrainError
-from boebot.link import messages
 from boebot.link.messages import Status, Telemetry
+from boebot.readings import Heading, OdometerPose, Proximity, Reading, Readings, Scan
 
-_T = TypeVar("_T")
-
-# What a brain may name in NEEDS besides a single device.
-GROUPS: Final[dict[str, tuple[str, ...]]] = {
-    "whiskers": ("left_whisker", "right_whisker"),
-    "infrared": ("left_ir", "right_ir"),
-    "encoders": ("left_encoder", "right_encoder"),
-    "servos": ("left_servo", "right_servo"),
-}
 SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol carries
 
 
@@ -53,105 +43,15 @@ class Command(NamedTuple):
 STOP: Final = Command("stop", 0.0, 0.0)
 
 
-class Equipment:
-    """The devices of one robot, ready to be read: one reader per device, called with a telemetry message.
-
-    In place of a device that the robot lacks stands a function that says so.
-    """
-
-    NAMES: Final = (
-        "left_whisker",
-        "right_whisker",
-        "left_ir",
-        "right_ir",
-        "ping",
-        "left_encoder",
-        "right_encoder",
-        "left_servo",
-        "right_servo",
-    )
-
-    def __init__(self, robot: robots.RobotDescription, tick_s: float) -> None:
-        self.robot_name = robot.name
-        self.tick_s = tick_s
-        device = {name: entry for name, entry in robot.device.items() if entry.on}
-        schedule = device.get("infrared")
-        infrared_period = schedule.period_ticks if isinstance(schedule, robots.InfraredSchedule) else 5
-
-        def whisker(key: str, bit: messages.Whiskers) -> Callable[[Telemetry], Whisker] | None:
-            return WhiskerReader(bit) if isinstance(device.get(key), robots.Whisker) else None
-
-        def infrared(key: str, bit: messages.Infrared) -> Callable[[Telemetry], Infrared] | None:
-            pair = device.get(key)
-            return InfraredReader(bit, infrared_period, tick_s) if isinstance(pair, robots.InfraredPair) else None
-
-        def encoder(key: str, left: bool) -> Callable[[Telemetry], Encoder] | None:
-            entry = device.get(key)
-            if not isinstance(entry, robots.Encoder | robots.QuadratureEncoder):
-                return None
-            directed = isinstance(entry, robots.QuadratureEncoder)
-            return EncoderReader(left, entry.edges_per_turn, robot.body.wheel_radius_m, directed)
-
-        def servo(key: str, left: bool) -> Callable[[Telemetry], Servo] | None:
-            entry = device.get(key)
-            if not isinstance(entry, robots.ContinuousServo):
-                return None
-            return ServoReader(left, entry.centre_us, entry.gain_us)
-
-        sonar = device.get("ping")
-        ping = (
-            PingReader(sonar.range_min_m, sonar.range_max_m, sonar.period_ticks, tick_s)
-            if isinstance(sonar, robots.Ping)
-            else None
-        )
-        self.left_whisker = self._or_refuse("left_whisker", whisker("whisker_left", messages.Whiskers.LEFT))
-        self.right_whisker = self._or_refuse("right_whisker", whisker("whisker_right", messages.Whiskers.RIGHT))
-        self.left_ir = self._or_refuse("left_ir", infrared("infrared_left", messages.Infrared.LEFT))
-        self.right_ir = self._or_refuse("right_ir", infrared("infrared_right", messages.Infrared.RIGHT))
-        self.ping = self._or_refuse("ping", ping)
-        self.left_encoder = self._or_refuse("left_encoder", encoder("encoder_left", True))
-        self.right_encoder = self._or_refuse("right_encoder", encoder("encoder_right", False))
-        self.left_servo = self._or_refuse("left_servo", servo("servo_left", True))
-        self.right_servo = self._or_refuse("right_servo", servo("servo_right", False))
-
-    def _or_refuse(self, name: str, reader: Callable[[Telemetry], _T] | None) -> Callable[[Telemetry], _T]:
-        if reader is not None:
-            return reader
-
-        def refuse(_: Telemetry) -> NoReturn:
-            raise BrainError(f"robot {self.robot_name!r} has no {name}")
-
-        refuse.missing = True  # type: ignore[attr-defined]
-        return refuse
-
-    def has(self, name: str) -> bool:
-        """Whether the robot has the device, by the name that a brain uses ("ping", "left_ir", ...)."""
-        return not hasattr(getattr(self, name), "missing")
-
-    def missing(self, needs: Iterable[str]) -> list[str]:
-        """Which of the needed devices the robot lacks; a group such as "whiskers" needs all of its devices.
-
-        Raises:
-            BrainError: a need is no device at all.
-        """
-        lacking = []
-        for need in needs:
-            if need not in GROUPS and need not in self.NAMES:
-                known = ", ".join((*GROUPS, *self.NAMES))
-                raise BrainError(f"a brain cannot need {need!r}; expected one of {known}")
-            lacking += [name for name in GROUPS.get(need, (need,)) if not self.has(name)]
-        return lacking
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
+class Observation(NamedTuple):
     """What the robot's sensors said at one tick. It never changes; values are computed when they are looked
     at.
 
     Each device is a small view with its values in SI units, their `age` (s) and whether they are `valid`.
     """
 
-    telemetry: Telemetry
+    sample: Telemetry | Readings
+    """What the devices said: a board's telemetry, or the readings of a robot without one."""
     equipment: Equipment
     time: float
     """Seconds since the run began, by the board's clock."""
@@ -166,57 +66,92 @@ class Observation:
     @property
     def tick(self) -> int:
         """The board's control tick that this observation belongs to."""
-        return self.telemetry.tick
+        return self.sample.tick
 
     @property
     def status(self) -> Status:
         """State and faults of the board."""
-        return Status(self.telemetry.status)
+        return Status(self.sample.status)
 
     @property
     def left_whisker(self) -> Whisker:
         """Left whisker: `.pressed`."""
-        return self.equipment.left_whisker(self.telemetry)
+        return self.equipment.left_whisker(self.sample)
 
     @property
     def right_whisker(self) -> Whisker:
         """Right whisker: `.pressed`."""
-        return self.equipment.right_whisker(self.telemetry)
+        return self.equipment.right_whisker(self.sample)
 
     @property
-    def left_ir(self) -> Infrared:
-        """Left infra-red pair: `.detected`."""
-        return self.equipment.left_ir(self.telemetry)
+    def left_ir(self) -> Infrared | Proximity:
+        """Left infra-red sensor: `.detected`; an analog one also says `.reading`."""
+        return self.equipment.left_ir(self.sample)
 
     @property
-    def right_ir(self) -> Infrared:
-        """Right infra-red pair: `.detected`."""
-        return self.equipment.right_ir(self.telemetry)
+    def right_ir(self) -> Infrared | Proximity:
+        """Right infra-red sensor: `.detected`; an analog one also says `.reading`."""
+        return self.equipment.right_ir(self.sample)
 
     @property
     def ping(self) -> Ping:
         """Ultrasonic range finder: `.distance` in metres, or None."""
-        return self.equipment.ping(self.telemetry)
+        return self.equipment.ping(self.sample)
 
     @property
     def left_encoder(self) -> Encoder:
         """Left wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.equipment.left_encoder(self.telemetry)
+        return self.equipment.left_encoder(self.sample)
 
     @property
     def right_encoder(self) -> Encoder:
         """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.equipment.right_encoder(self.telemetry)
+        return self.equipment.right_encoder(self.sample)
 
     @property
     def left_servo(self) -> Servo:
         """Left wheel's servo as driven now: `.pulse_us`, `.signal`."""
-        return self.equipment.left_servo(self.telemetry)
+        return self.equipment.left_servo(self.sample)
 
     @property
     def right_servo(self) -> Servo:
         """Right wheel's servo as driven now: `.pulse_us`, `.signal`."""
-        return self.equipment.right_servo(self.telemetry)
+        return self.equipment.right_servo(self.sample)
+
+    @property
+    def left_light(self) -> Reading:
+        """Left light sensor: `.value`."""
+        return self.equipment.left_light(self.sample)
+
+    @property
+    def right_light(self) -> Reading:
+        """Right light sensor: `.value`."""
+        return self.equipment.right_light(self.sample)
+
+    @property
+    def odometer(self) -> OdometerPose:
+        """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
+        return self.equipment.odometer(self.sample)
+
+    @property
+    def compass(self) -> Heading:
+        """Compass: `.heading` (rad)."""
+        return self.equipment.compass(self.sample)
+
+    @property
+    def laser(self) -> Scan:
+        """Laser range finder: `.distances` (m, -1: nothing), `.angles` (rad)."""
+        return self.equipment.laser(self.sample)
+
+    @property
+    def accelerometer(self) -> Reading:
+        """Acceleration along the heading: `.value` (m/s^2)."""
+        return self.equipment.accelerometer(self.sample)
+
+    @property
+    def battery(self) -> Reading:
+        """Battery: `.value` (V)."""
+        return self.equipment.battery(self.sample)
 
 
 class Robot:
@@ -225,10 +160,11 @@ class Robot:
     The same object is handed to every step of a run; its sensors always show the newest observation.
     """
 
-    __slots__ = ("_chances", "_period", "command", "latched", "name", "observation", "random")
+    __slots__ = ("_chances", "_period", "_speed_limit", "command", "latched", "name", "observation", "random")
 
-    def __init__(self, name: str, period: float, seed: int = 1) -> None:
+    def __init__(self, name: str, period: float, seed: int = 1, speed_limit: float = SPEED_LIMIT) -> None:
         self.name: Final = name
+        self._speed_limit = speed_limit  # m/s
         self._period = period
         self.observation: Observation
         self.command: Command = STOP
@@ -248,7 +184,7 @@ class Robot:
     @property
     def tick(self) -> int:
         """The board's control tick that the sensors show."""
-        return self.observation.telemetry.tick
+        return self.observation.sample.tick
 
     @property
     def period(self) -> float:
@@ -260,37 +196,91 @@ class Robot:
     @property
     def left_whisker(self) -> Whisker:
         """Left whisker: `.pressed`."""
-        return self.observation.left_whisker
+        seen = self.observation
+        return seen.equipment.left_whisker(seen.sample)
 
     @property
     def right_whisker(self) -> Whisker:
         """Right whisker: `.pressed`."""
-        return self.observation.right_whisker
+        seen = self.observation
+        return seen.equipment.right_whisker(seen.sample)
 
     @property
-    def left_ir(self) -> Infrared:
-        """Left infra-red pair: `.detected`."""
-        return self.observation.left_ir
+    def left_ir(self) -> Infrared | Proximity:
+        """Left infra-red sensor: `.detected`; an analog one also says `.reading`."""
+        seen = self.observation
+        return seen.equipment.left_ir(seen.sample)
 
     @property
-    def right_ir(self) -> Infrared:
-        """Right infra-red pair: `.detected`."""
-        return self.observation.right_ir
+    def right_ir(self) -> Infrared | Proximity:
+        """Right infra-red sensor: `.detected`; an analog one also says `.reading`."""
+        seen = self.observation
+        return seen.equipment.right_ir(seen.sample)
 
     @property
     def ping(self) -> Ping:
         """Ultrasonic range finder: `.distance` in metres, or None."""
-        return self.observation.ping
+        seen = self.observation
+        return seen.equipment.ping(seen.sample)
 
     @property
     def left_encoder(self) -> Encoder:
         """Left wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.observation.left_encoder
+        seen = self.observation
+        return seen.equipment.left_encoder(seen.sample)
 
     @property
     def right_encoder(self) -> Encoder:
         """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.observation.right_encoder
+        seen = self.observation
+        return seen.equipment.right_encoder(seen.sample)
+
+    @property
+    def left_light(self) -> Reading:
+        """Left light sensor: `.value`."""
+        seen = self.observation
+        return seen.equipment.left_light(seen.sample)
+
+    @property
+    def right_light(self) -> Reading:
+        """Right light sensor: `.value`."""
+        seen = self.observation
+        return seen.equipment.right_light(seen.sample)
+
+    @property
+    def odometer(self) -> OdometerPose:
+        """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
+        seen = self.observation
+        return seen.equipment.odometer(seen.sample)
+
+    @property
+    def compass(self) -> Heading:
+        """Compass: `.heading` (rad)."""
+        seen = self.observation
+        return seen.equipment.compass(seen.sample)
+
+    @property
+    def laser(self) -> Scan:
+        """Laser range finder: `.distances` (m, -1: nothing), `.angles` (rad)."""
+        seen = self.observation
+        return seen.equipment.laser(seen.sample)
+
+    @property
+    def accelerometer(self) -> Reading:
+        """Acceleration along the heading: `.value` (m/s^2)."""
+        seen = self.observation
+        return seen.equipment.accelerometer(seen.sample)
+
+    @property
+    def battery(self) -> Reading:
+        """Battery: `.value` (V)."""
+        seen = self.observation
+        return seen.equipment.battery(seen.sample)
+
+    def has(self, name: str) -> bool:
+        """Whether the robot has that device ("ping", "left_ir"), or all of that group ("whiskers", "infrared")."""
+        equipment = self.observation.equipment
+        return all(equipment.has(one) for one in GROUPS.get(name, (name,)))
 
     # ---- motors --------------------------------------------------------------------------------------------
 
@@ -313,14 +303,15 @@ class Robot:
         command.
 
         Raises:
-            BrainError: a speed is beyond 0.5 m/s or no number.
+            BrainError: a speed is beyond 0.5 m/s (without a board: the wheels' greatest) or no number.
         """
+        limit = self._speed_limit
         try:
-            within = -SPEED_LIMIT <= left <= SPEED_LIMIT and -SPEED_LIMIT <= right <= SPEED_LIMIT
+            within = -limit <= left <= limit and -limit <= right <= limit
         except (TypeError, ValueError):
             raise _no_numbers("drive_speed", left, right) from None
         if not within:
-            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{SPEED_LIMIT} to {SPEED_LIMIT} m/s")
+            raise BrainError(f"drive_speed({left}, {right}): wheel speeds go from -{limit:g} to {limit:g} m/s")
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:

@@ -13,31 +13,15 @@ from typing import Annotated, Any, ClassVar
 import msgspec
 
 from boebot import resources, toml_files
+from boebot.device import Device as Device
+from boebot.device import pin_name as pin_name
+from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
+from boebot.vehicle_devices import AnyVehicleDevice, DcMotor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 Point = tuple[float, float]
-
-PIN_COUNT = 20  # Arduino numbers: 0..13, A0..A5 = 14..19
-
-
-def pin_number(pin: int | str) -> int:
-    """The Arduino number 0..19 of a pin written as 0..13 or "A0".."A5".
-
-    Raises:
-        ValueError: there is no such pin.
-    """
-    if isinstance(pin, str) and len(pin) == 2 and pin[0] == "A" and pin[1] in "012345":
-        return 14 + int(pin[1])
-    if isinstance(pin, int) and 0 <= pin <= 13:
-        return pin
-    raise ValueError(f"there is no pin {pin!r}; expected 0..13 or 'A0'..'A5'")
-
-
-def pin_name(number: int) -> str:
-    """How the board's print names pin `number`: "0".."13", "A0".."A5"."""
-    return str(number) if number < 14 else f"A{number - 14}"
 
 
 class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -53,20 +37,6 @@ class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     linear_damping_n_s_m: NotNegative
     angular_damping_n_m_s: NotNegative
     wheel_speed_maximum_m_s: Positive
-
-
-class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, tag_field="type"):
-    """What every device has. `on = false` reserves its pins and leaves it switched off."""
-
-    on: bool = True
-
-    PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
-    NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # field of the pin -> the pins that can do it
-
-    def pins(self) -> dict[str, int]:
-        """Role of each pin ("" for a device with one pin) and its Arduino number."""
-        return {role: pin_number(getattr(self, field)) for field, role in self.PINS.items()}
 
 
 _ANALOG = tuple(range(14, 20))
@@ -243,7 +213,10 @@ AnyDevice = (
     | Compass
     | Buzzer
     | Uart
+    | AnyVehicleDevice
 )
+
+NO_BOARD = "none"  # the board of a robot that is driven by motor signals
 
 
 class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -252,9 +225,14 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     name: str
     title: str
     board: str
-    pin_map: str
     body: Body
     device: dict[str, AnyDevice]
+    pin_map: str = ""  # of the board's firmware
+
+    @property
+    def has_board(self) -> bool:
+        """Whether a board drives it; otherwise motor signals do, in the simulated world only."""
+        return self.board != NO_BOARD
 
     def has(self, name: str) -> bool:
         """Whether the robot has a device of that name, switched on."""
@@ -274,8 +252,11 @@ def load_robot(robot: str | Path) -> RobotDescription:
     """
     path = toml_files.find("robots", robot, RobotError)
     description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
-    _check_pins(description, path.name)
-    _check_image(description, path)
+    if description.has_board:
+        _check_pins(description, path.name)
+        _check_image(description, path)
+    else:
+        _check_vehicle(description, path.name)
     return description
 
 
@@ -319,6 +300,9 @@ def _check_pins(robot: RobotDescription, file: str) -> None:
     pin_owner: dict[int, str] = {}
     unit_owner: dict[str, tuple[str, str]] = {}
     for name, device in robot.device.items():
+        if isinstance(device, VehicleDevice):
+            kind = device.__struct_config__.tag
+            raise RobotError(f"{file}: device.{name} is {kind}, which only a robot without a board can have")
         try:
             pins = {field: pin_number(getattr(device, field)) for field in device.PINS}
         except ValueError as error:
@@ -337,6 +321,19 @@ def _check_pins(robot: RobotDescription, file: str) -> None:
             owner, owner_group = unit_owner.setdefault(unit, (name, group))
             if owner != name and (group == "" or group != owner_group):
                 raise RobotError(f"{file}: {owner} and {name} cannot share {unit}")
+
+
+def _check_vehicle(robot: RobotDescription, file: str) -> None:
+    """Refuses pins and a drive that is none."""
+    if robot.pin_map:
+        raise RobotError(f"{file}: pin_map is {robot.pin_map!r}, but a robot without a board has no pins")
+    for name, device in robot.device.items():
+        if not isinstance(device, VehicleDevice):
+            kind = device.__struct_config__.tag
+            raise RobotError(f"{file}: device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}")
+    for name in ("motor_left", "motor_right"):
+        if not (robot.has(name) and isinstance(robot.device[name], DcMotor)):
+            raise RobotError(f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor there")
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without

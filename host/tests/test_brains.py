@@ -20,7 +20,7 @@ def write(folder: Path, text: str, name: str = "mine.py") -> Path:
 def test_bundled_brain() -> None:
     assert "wander" in bundled()
     brain = load_brain("wander")
-    assert brain.name == "wander" and set(brain.needs) == {"whiskers", "infrared"}
+    assert brain.name == "wander" and set(brain.needs) == {"infrared"}
 
 
 def test_function_in_a_file(tmp_path: Path) -> None:

@@ -189,3 +189,16 @@ def test_probe_and_stamp_are_cheap() -> None:
                     clock.observe(us, at_s + 2e-3)
             best[name] = min(best[name], (time.perf_counter() - begun) / 200)
     assert best["probe"] < 100e-6 and best["stamp"] < 10e-6, best
+
+
+def test_bounds_that_meet_in_a_point_pile_up_no_corners() -> None:
+    """Delays that are always the same, as in a simulated run: what is kept of the past stays small."""
+    clock = BoardClock(BYTE_S)
+    most = 0
+    for tick in range(1, 6000):
+        board_us, now_s = tick * 10_000, 5.0 + tick * 0.01
+        if tick % 10 == 0:
+            clock.probe(now_s - 2e-3, board_us, now_s + ANSWER_S + 3e-4)
+        clock.observe(board_us, now_s + TELEMETRY_S + 1e-4)
+        most = max(most, *(len(polygon) for polygon in clock._polygons))
+    assert 3 <= most <= 24

@@ -433,6 +433,21 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     assert (seen["clock_bound_us"], seen["clock_offset_s"], seen["clock_drift_ppm"]) == (None, None, None)
 
 
+@pytest.mark.parametrize("columns", [80, 120])
+def test_list_of_parameters_is_readable_at_any_width(
+    board: InProcess, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, columns: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    code, out, _ = boebot(capsys, "parameters", "list")
+    lines = [line.rstrip() for line in out.splitlines()]
+    assert code == 0 and max(map(len, lines)) <= columns
+    assert len(lines) <= 3 * len(messages.PARAMETERS), "meanings are not squeezed into a narrow column"
+    for name, spec in messages.PARAMETERS.items():
+        first = next(index for index, line in enumerate(lines) if line.split()[:1] == [name])
+        following = " ".join(" ".join(line[-columns // 2 :] for line in lines[first : first + 3]).split())
+        assert spec.doc.split()[-1] in following
+
+
 def test_parameters_are_listed_set_saved_and_reset(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = boebot(capsys, "parameters", "list", "--json")
     listed = json.loads(out)

@@ -145,7 +145,11 @@ class LinkModel(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         link = self.link
-        assert len(link._telemetry) <= 4096 and len(link._probes) <= 64 and len(link._events.waiting) <= Events.ROOM
+        assert (
+            len(link._telemetry) <= 4096
+            and len(link._probes.waiting) <= 64
+            and len(link._events.waiting) <= Events.ROOM
+        )
         assert len(link._requests._waiting) <= Requests.ROOM and len(self.peer._events) <= QUEUE + len(
             messages.EventKind
         )

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 import boebot
 from boebot import runner
+from boebot.driving import board
 from boebot.errors import BoebotError
 from boebot.link import frame, messages
 from boebot.report import picture, replay
@@ -177,7 +178,7 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
 def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = InProcess(Peer())
     monkeypatch.setattr(runner, "open_board", lambda url, request: session)
-    monkeypatch.setattr(runner, "configure", lambda link, robot: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(board, "configure", lambda link, robot: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         boebot.run("wander", seconds=5, out=tmp_path)
     assert (tmp_path / "run.csv").read_text().count("\n") == 1

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
+import contextlib
 import math
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -97,8 +98,7 @@ def test_servo_is_read_back() -> None:
 
 def without(*devices: str) -> Equipment:
     fewer = {name: device for name, device in SHIELDBOT.device.items() if name not in devices}
-    robot = load_robot("shieldbot")
-    return Equipment(type(robot)(robot.name, robot.title, robot.board, robot.pin_map, robot.body, fewer), TICK_S)
+    return Equipment(msgspec.structs.replace(SHIELDBOT, device=fewer), TICK_S)
 
 
 def test_missing_device_is_refused_by_name() -> None:
@@ -116,7 +116,7 @@ def test_missing_device_is_refused_by_name() -> None:
 
 def test_observation_cannot_be_changed() -> None:
     seen = observe(encoder_left=5)
-    with pytest.raises(dataclasses.FrozenInstanceError):
+    with pytest.raises(AttributeError):
         seen.time = 2.0  # type: ignore[misc]
     with pytest.raises(AttributeError):
         seen.left_encoder.count = 6  # type: ignore[misc]
@@ -188,6 +188,8 @@ def test_nothing_leads_from_a_robot_to_the_world() -> None:
         module = type(thing).__module__
         assert not module.startswith(("sim_bridge", "boebot.link.transport", "boebot.link.session", "boebot.boards"))
         if module.startswith("boebot"):
-            todo += [getattr(thing, name) for name in dir(thing) if not name.startswith("__")]
+            for name in dir(thing):
+                with contextlib.suppress(BrainError):  # a device that the robot does not have
+                    todo += [getattr(thing, name)] if not name.startswith("__") else []
         if isinstance(thing, list | tuple):
             todo += thing

@@ -320,7 +320,7 @@ def test_frames_of_an_earlier_session_are_refused() -> None:
 
 def test_frames_of_an_earlier_session_would_count_without_the_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the seed is good for: the test above fails without it."""
-    from boebot.link import session as module
+    from boebot.link import line as module
     from boebot.link.frame import SEED, Decoder, encode
 
     monkeypatch.setattr(module, "encode", lambda number, sequence, payload, _: encode(number, sequence, payload, SEED))
@@ -542,7 +542,7 @@ def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> Non
 def test_probe_tokens_roll_over() -> None:
     link, _, _ = joined()
     listen(link, 0.5)
-    link._probe_token = 0xFFFF - 3
+    link._probes.token = 0xFFFF - 3
     answered: list[int] = []
     hear = link._handlers[messages.ClockAnswer.ID]
 
@@ -555,7 +555,7 @@ def test_probe_tokens_roll_over() -> None:
     listen(link, 0.5)
     assert answered[:8] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 3, 4]
     assert link.clock.probes - probes == len(answered), "each of them told the clock something"
-    assert len(link._probes) <= 1, "none is taken for another"
+    assert len(link._probes.waiting) <= 1, "none is taken for another"
 
 
 def test_stop_that_nobody_confirms_is_said() -> None:

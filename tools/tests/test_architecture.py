@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -118,7 +119,8 @@ def everything(start: object) -> list[object]:
         seen[id(thing)] = thing
         for name in dir(thing):
             if not name.startswith("__") and not callable(getattr(type(thing), name, None)):
-                waiting.append(getattr(thing, name))
+                with contextlib.suppress(boebot.BoebotError):  # a device that the robot does not have
+                    waiting.append(getattr(thing, name))
         if isinstance(thing, dict):
             waiting += list(thing.values())
         elif isinstance(thing, list | tuple):

@@ -10,7 +10,7 @@ The notes' robot runs 0.68 m/s and begins to turn with probability 0.01 in a hun
 
 from boebot import Robot
 
-NEEDS = ["whiskers", "infrared"]
+NEEDS = ["infrared"]  # whiskers where the robot has them
 
 FORWARD = 0.5  # motor signal straight ahead
 TURN = 0.7  # motor signal of turning on the spot
@@ -29,13 +29,18 @@ class Brain:
     """States: "straight" and "turn" wander, "avoid" heeds infra-red, "back" and "escape" follow a touch."""
 
     def __init__(self) -> None:
+        self.whiskers: bool | None = None  # does the robot have them?
         self.state = "straight"
         self.left = False  # which way it turns
         self.keep_side_until = 0.0
         self.until = 0.0  # when the present state ends (s)
 
     def step(self, robot: Robot) -> None:
-        touched_left, touched_right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        touched_left = touched_right = False
+        if self.whiskers is None:
+            self.whiskers = robot.has("whiskers")
+        if self.whiskers:
+            touched_left, touched_right = robot.left_whisker.pressed, robot.right_whisker.pressed
         seen_left, seen_right = robot.left_ir.detected, robot.right_ir.detected
 
         if touched_left or touched_right:

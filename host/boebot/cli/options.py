@@ -12,6 +12,15 @@ On = Annotated[
         "--on", metavar="BOARD", help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT."
     ),
 ]
+RunOn = Annotated[
+    str | None,
+    typer.Option(
+        "--on",
+        metavar="BOARD",
+        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT; direct for a robot without a "
+        "board. Else native, or direct.",
+    ),
+]
 RobotName = Annotated[str, typer.Option("--robot", metavar="R", help="Bundled robot or .toml file.")]
 ArenaName = Annotated[
     str | None, typer.Option("--arena", metavar="A", help="Bundled arena or .toml file (simulated runs).")

@@ -7,15 +7,19 @@ import json
 import math
 import re
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from boebot.runner import Progress
+from boebot.driving import Progress
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of
+_GAP = 3  # between the columns of a table
+_INDENT = 4  # of a sentence below its row
+_SENTENCE_LEAST = 40  # columns that a sentence beside its row wants
 _UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm)$")
 
 _UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V"}
@@ -57,17 +61,36 @@ def table(values: Mapping[str, Any]) -> Any:
 
 
 def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table with a header; the second column holds numbers."""
+    """A table with a header; the second column holds numbers, the last one sentences. Where the terminal is too narrow
+    for those beside the rest, each stands below its row."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    printed = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, title in enumerate(header):
-        printed.add_column(title, justify="right" if index == 1 else "left", overflow="fold", no_wrap=index < 2)
+    console = Console()
+    widths = [max(len(row[index]) for row in (header, *rows)) for index in range(len(header) - 1)]
+    beside = console.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
+    if beside:
+        printed = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        for index, title in enumerate(header):
+            printed.add_column(title, justify="right" if index == 1 else "left", no_wrap=index < len(widths))
+        for row in rows:
+            printed.add_row(*row)
+        console.print(printed)
+        return
+
+    def line(cells: Sequence[str]) -> str:
+        placed = (
+            cell.rjust(width) if index == 1 else cell.ljust(width)
+            for index, (cell, width) in enumerate(zip(cells, widths, strict=False))
+        )
+        return (" " * _GAP).join(placed).rstrip()
+
+    console.print(line(header), style="bold", highlight=False)
     for row in rows:
-        printed.add_row(*row)
-    Console().print(printed)
+        console.print(line(row), highlight=False)
+        for part in textwrap.wrap(row[-1], max(console.width - _INDENT, _SENTENCE_LEAST)):
+            console.print(" " * _INDENT + part, style="dim", highlight=False)
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from boebot.runner import execute
 
 def run(
     brain: Annotated[str, typer.Argument(metavar="BRAIN", help="Bundled brain (wander) or Python file.")],
-    on: options.On = "native",
+    on: options.RunOn = None,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
@@ -31,7 +31,10 @@ def run(
     """Let a brain drive a robot, and say what happened."""
     if out is not None:
         report.make_folder(out)
-    with output.progress_bar(f"{brain} on {on}", seconds) as bar, output.step_watch(bar) as progress:
+    with (
+        output.progress_bar(brain if on is None else f"{brain} on {on}", seconds) as bar,
+        output.step_watch(bar) as progress,
+    ):
         result = execute(
             brain,
             robot=robot,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.boards import BoardRequest, board_kinds, find_server
+from boebot.boards import BoardRequest, board_kinds, check_board, find_server
 from boebot.cli import options, output
 from boebot.errors import BoardError
 from boebot.robots import load_robot
@@ -35,7 +35,9 @@ def serve(
         raise BoardError(
             f"there is no emulated board {on!r} to serve; expected {' or '.join(board_kinds()) or 'an installed one'}"
         )
-    request = BoardRequest(robot=load_robot(robot), arena=arena, seed=seed, realtime=True, record=False)
+    description = load_robot(robot)
+    check_board(on, description)
+    request = BoardRequest(robot=description, arena=arena, seed=seed, realtime=True, record=False)
 
     def announce(url: str) -> None:
         if json:

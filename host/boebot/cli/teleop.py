@@ -98,7 +98,7 @@ def sensors(robot: Robot) -> str:
 
 
 def teleop(
-    on: options.On = "native",
+    on: options.RunOn = None,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seed: options.Seed = 1,

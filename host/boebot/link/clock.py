@@ -28,6 +28,7 @@ RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and
 _WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
 _WORTH_S = 1e-6
 _WORTH_MOST_S = 1e-3  # of the present bound
+_ON_LINE_S = 1e-10
 _WRAP_US = 1 << 32
 _FAR_S = 1e4  # o at the beginning
 
@@ -255,14 +256,16 @@ def _centroid(x: list[float], y: list[float]) -> tuple[float, float]:
 
 
 def _cut(polygon: _Polygon, x: float, limit: float, side: float) -> _Polygon:
-    """The part of the convex polygon in which side (o + r x) <= side limit (Sutherland and Hodgman 1974)."""
-    over = [side * (o + r * x - limit) for o, r in polygon]
+    """The part of the convex polygon in which side (o + r x) <= side limit (Sutherland and Hodgman 1974). A corner that
+    is on the line but for rounding stays, and is not cut off a second time: bounds that meet in a point, as with
+    constant delays, would pile up corners there."""
+    over = [side * (o + r * x - limit) - _ON_LINE_S for o, r in polygon]
     if max(over) <= 0.0:
         return polygon
     kept: _Polygon = []
     before, before_over = polygon[-1], over[-1]
     for vertex, vertex_over in zip(polygon, over, strict=True):
-        if (vertex_over > 0.0) != (before_over > 0.0):
+        if (vertex_over > 0.0) != (before_over > 0.0) and min(vertex_over, before_over) < -2 * _ON_LINE_S:
             share = before_over / (before_over - vertex_over)
             kept.append((before[0] + share * (vertex[0] - before[0]), before[1] + share * (vertex[1] - before[1])))
         if vertex_over <= 0.0:

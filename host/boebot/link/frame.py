@@ -16,6 +16,7 @@ NO_SESSION = 0xFFFFFFFF  # seed of a decoder that accepts the handshake's messag
 FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters counted
 LONGEST_PAYLOAD = max(message.LENGTH for message in messages.MESSAGES.values())
 
+_encode, _unpack = lib.codec_encode, ffi.unpack
 _SLICE = lib.CODEC_SLICE  # bytes for one call into C
 
 _Message = tuple[int, int, bytes]
@@ -37,7 +38,7 @@ def encode(message_id: int, sequence: int, payload: bytes, seed: int = SEED) -> 
     length = len(payload)
     if length > LONGEST_PAYLOAD:
         raise ValueError(f"a payload of {length} bytes; expected at most {LONGEST_PAYLOAD}")
-    wire: bytes = ffi.unpack(lib.codec_encode(message_id, sequence, payload, length, seed), length + FRAME_OVERHEAD)
+    wire: bytes = _unpack(_encode(message_id, sequence, payload, length, seed), length + FRAME_OVERHEAD)
     return wire
 
 
@@ -113,7 +114,7 @@ class Decoder:
         if count == 0:
             return []
         if count == 1:
-            return [(self._ids[0], self._sequences[0], ffi.unpack(self._payloads, self._ends[0]))]
+            return [(self._ids[0], self._sequences[0], _unpack(self._payloads, self._ends[0]))]
         ids, sequences, ends = (ffi.unpack(numbers, count) for numbers in (self._ids, self._sequences, self._ends))
         payloads = ffi.unpack(self._payloads, ends[-1])
         cut = [payloads[start:end] for start, end in zip([0, *ends], ends, strict=False)]

@@ -14,14 +14,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from matplotlib.transforms import Affine2D
 
-from boebot import robots
+from boebot import robots, vehicle_devices
 from boebot.report import scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boebot.record import Floats, Pose
     from boebot.result import RunResult
+    from boebot.series import Floats, Pose
 
 PAPER = "#fbfaf7"
 WALL = "#3b4252"
@@ -33,7 +33,7 @@ CONTACT = "#bf3f4a"
 START, END = "#4c9a6a", "#3f6fb5"
 BODY = "#e5e9f0"
 PATH_COLOURS = "viridis"
-PING_SHOWN_M = 0.35  # the Ping reaches 3 m; its cone is drawn this far at most
+CONE_SHOWN_M = 0.35  # the Ping reaches 3 m; a cone is drawn this far at most
 
 
 def write(result: RunResult, path: Path) -> Path:
@@ -116,11 +116,11 @@ def _draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, col
     for device in robot.device.values():
         if not device.on:
             continue
-        if isinstance(device, robots.InfraredPair | robots.Ping):
-            reach = device.range_m if isinstance(device, robots.InfraredPair) else PING_SHOWN_M
+        if isinstance(device, scene.RANGING):
+            reach = min(scene.reach(device), CONE_SHOWN_M)
             turn = math.degrees(device.heading_rad)
             half = math.degrees(device.beam_rad) / 2
-            alpha = 0.16 if isinstance(device, robots.InfraredPair) else 0.07
+            alpha = 0.16 if isinstance(device, scene.SEEING) else 0.07
             cone = Wedge(
                 device.position_m, reach, turn - half, turn + half,
                 facecolor=colour, edgecolor="none", alpha=alpha, transform=place, zorder=3,
@@ -128,7 +128,7 @@ def _draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, col
             axes.add_patch(cone)
             if floor is not None:
                 cone.set_clip_path(floor, axes.transData)
-        elif isinstance(device, robots.Whisker):
+        elif isinstance(device, robots.Whisker | vehicle_devices.TouchWhisker):
             (x0, y0), (x1, y1) = device.root_m, device.tip_m
             axes.plot((x0, x1), (y0, y1), color=INK, lw=1.0, transform=place, zorder=11, solid_capstyle="round")
     for side in (-1, 1):

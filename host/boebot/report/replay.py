@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boebot import robots
+from boebot import robots, vehicle_devices
 from boebot.link.messages import Status
 from boebot.report import scene
 
 if TYPE_CHECKING:
-    from boebot.record import Floats, Pose
     from boebot.result import RunResult
+    from boebot.series import Floats, Pose
 
 FRAMES_AT_MOST = 20_000
 _PAGE = Path(__file__).with_name("replay_page.html")
@@ -41,7 +41,7 @@ def page_data(result: RunResult) -> dict[str, Any]:
     series = result.series
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
     low, high = scene.bounds(view)
-    status = series.raw["status"]
+    status = series.status
     flags = (
         series.left_whisker * LEFT_WHISKER
         | series.right_whisker * RIGHT_WHISKER
@@ -80,10 +80,10 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
     for name, device in robot.device.items():
         if not device.on:
             continue
-        if isinstance(device, robots.Whisker):
+        if isinstance(device, robots.Whisker | vehicle_devices.TouchWhisker):
             drawn[name] = {"root": device.root_m, "tip": device.tip_m}
-        elif isinstance(device, robots.InfraredPair | robots.Ping):
-            reach = device.range_m if isinstance(device, robots.InfraredPair) else device.range_max_m
+        elif isinstance(device, scene.RANGING):
+            reach = scene.reach(device)
             drawn[name] = {
                 "position": device.position_m,
                 "heading": device.heading_rad,

@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from boebot.record import Bools, Floats, Pose
-    from boebot.result import RunResult
+from boebot import robots, vehicle_devices
+from boebot.series import touch_indices
 
+if TYPE_CHECKING:
+    from boebot.result import RunResult
+    from boebot.series import Bools, Floats, Pose
+
+SEEING = (robots.InfraredPair, vehicle_devices.InfraredProximity)
+RANGING = (*SEEING, robots.Ping, vehicle_devices.Sonar)  # devices that the pictures show as cones
 MARGIN = 0.02  # of the greater side
 
 
@@ -30,6 +35,15 @@ class View:
     """Where the robot was when a whisker was pressed, shape (n, 2)."""
 
 
+def reach(
+    device: robots.InfraredPair | vehicle_devices.InfraredProximity | robots.Ping | vehicle_devices.Sonar,
+) -> float:
+    """How far it sees (m)."""
+    if isinstance(device, robots.InfraredPair | vehicle_devices.InfraredProximity):
+        return device.range_m
+    return device.range_max_m
+
+
 def view(result: RunResult) -> View:
     """The run as the pictures show it."""
     known = result.true_pose is not None
@@ -40,7 +54,7 @@ def view(result: RunResult) -> View:
     contacts = np.empty((0, 2))
     if truth is not None and known:
         inside = truth.time >= result.clock_offset
-        begins = _onset_indices(truth.contact & inside)
+        begins = touch_indices(truth.time, truth.contact & inside)
         contacts = np.column_stack((truth.x[begins], truth.y[begins]))
     begins = _onset_indices(result.series.left_whisker | result.series.right_whisker)
     touches = np.column_stack((path.x[begins], path.y[begins]))

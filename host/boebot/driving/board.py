@@ -1,0 +1,305 @@
+"""Drives a robot over the link to its board, emulated or real.
+
+The brain's period is a whole number n of the board's control ticks; the brain steps on the first telemetry whose tick
+has reached the next multiple of n, and its command goes out at once. On a board in this process time stands still while
+the brain thinks; on a live board the newest telemetry counts.
+
+A board that was reset, or that has not heard the host for too long, is configured and armed again, and the run goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time as wall
+from collections.abc import Iterator
+from struct import Struct
+
+from boebot.boards import BoardSession
+from boebot.driving import PROGRESS_S, Task, check_period, whole_ticks
+from boebot.errors import BoardError, BoebotError, ProtocolError
+from boebot.link import messages
+from boebot.link.delivery import LatchedAgainError, SessionLostError
+from boebot.link.session import Link, text
+from boebot.link.session import Telemetry as Received
+from boebot.parameters import configure
+from boebot.record import Record
+from boebot.result import RunResult
+from boebot.robot import Equipment, Observation, Robot
+
+TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
+TIME_TO_LIVE_LIMIT_MS = 2000
+SILENCE_S = 3.0  # a board that says nothing for so long is lost; after a reset its boot loader waits for up to 2 s
+SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
+STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
+_ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
+_PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
+_BYTES_TO_LIVE = 300
+_Telemetry = messages.Telemetry
+_LATCH = 34  # offset in telemetry
+_TICK = Struct("<I")  # telemetry begins with it
+_NOT_YET = 1 << 32  # no tick is later
+
+
+def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
+    """The set-points' time to live (ms) at a brain period; at least `least_s`.
+
+    Raises:
+        BoebotError: the period is so long that the motors would stop between two steps.
+    """
+    check_period(period_s)
+    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
+    if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
+        raise BoebotError(
+            f"a brain period of {period_s * 1000:g} ms is too long; expected at most {TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
+        )
+    return time_to_live_ms
+
+
+class BoardDriver:
+    """Drives one robot over the link (see `boebot.driving.Driver`)."""
+
+    def __init__(self, session: BoardSession, task: Task) -> None:
+        """Opens the link, and finds out who is there; nothing moves yet.
+
+        Raises:
+            BoebotError: no board, or one that does not fit the robot.
+        """
+        self.session = session
+        self.task = task
+        request = task.request
+        self.link = Link(session.transport)
+        hello = self.link.open()
+        self.tick_s = 1.0 / hello.tick_rate
+        self.notices = self.link.notices
+        self.period_ticks = self._fitting_period(task.period_s, hello.telemetry_period)
+        self.telemetry_ticks = hello.telemetry_period
+        self.period_s = self.period_ticks * self.tick_s
+        self.time_to_live_ms = check_time_to_live(self.period_s, self._time_to_live_least())
+        self.identity = self.link.identity()
+        pin_map = text(self.identity.pin_map)
+        if pin_map != request.robot.pin_map:
+            raise ProtocolError(
+                f"the board at {session.transport.name} runs firmware for pin map {pin_map!r}, but robot "
+                f"{request.robot.name!r} needs {request.robot.pin_map!r}"
+            )
+        self.description = request.robot
+        self.equipment = Equipment(request.robot, self.tick_s)
+        self.robot = Robot(request.robot.name, self.period_s, request.seed)
+        self.record = Record()
+        self.resets = 0
+        self.late_steps = 0
+        self.clock_offset_s = 0.0  # transport's clock at the run's time 0
+        self._session = 0  # of the link that was configured and armed
+        self._armed_tick = -1
+        self._halted = False  # by the brain's emergency stop
+
+    def begin(self) -> None:
+        """Configures and arms the board."""
+        self._make_ready()
+        self.link.forget_telemetry()
+
+    # ---- before the first step, and after each new session ---------------------------------------------------
+
+    def _fitting_period(self, period_s: float, telemetry_ticks: int) -> int:
+        """The brain's period in ticks, such that each step has telemetry of its own tick."""
+        ticks = whole_ticks(period_s, self.tick_s)
+        fitting = -(-ticks // telemetry_ticks) * telemetry_ticks
+        if fitting != ticks:
+            self.notices.append(
+                f"the brain steps every {fitting * self.tick_s * 1000:g} ms, not every {period_s * 1000:g} ms: "
+                f"the board sends telemetry every {telemetry_ticks * self.tick_s * 1000:g} ms"
+            )
+        return fitting
+
+    def _time_to_live_least(self) -> float:
+        return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.byte_s
+
+    def _make_ready(self) -> None:
+        """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile."""
+        link = self.link
+        while self._session != link.sessions:
+            link.open()
+            session = link.sessions
+            try:
+                self.description = configure(link, self.task.request.robot)
+                if not self._halted:
+                    self._arm()
+            except SessionLostError:
+                continue
+            self._session = session
+        self.equipment = Equipment(self.description, self.tick_s)
+
+    def _arm(self) -> None:
+        for _ in range(_ARM_TRIES - 1):
+            with contextlib.suppress(LatchedAgainError):
+                self.link.arm()
+                break
+        else:
+            self.link.arm()
+        if self.link.latest is not None:
+            self._armed_tick = int.from_bytes(self.link.latest[:4], "little")
+
+    def _heed_emergency_stop(self) -> None:
+        """The brain has latched the motors off, or armed them again."""
+        if self.robot.latched and not self._halted:
+            self._halted = True
+            self.link.stop()
+        elif self._halted and not self.robot.latched:
+            with contextlib.suppress(SessionLostError):  # the new session is made ready in its turn
+                if self.link.is_open:
+                    self._arm()
+            self._halted = False
+
+    def _heed_latch(self, payload: bytes) -> None:
+        """The board has latched its motors off: a reason to end the run, unless a new session mends it.
+
+        Raises:
+            BoardError: the supply is low, or somebody else has stopped the robot.
+        """
+        telemetry, where = _Telemetry.unpack(payload), self.link.transport.name
+        if telemetry.latch == messages.Latch.SUPPLY_LOW:
+            raise BoardError(
+                f"the board at {where} has stopped its motors: its supply is low, {telemetry.supply / 1000:.2f} V; "
+                "charge or change the batteries"
+            )
+        if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
+            raise BoardError(f"the board at {where} has stopped its motors: a stop command came from elsewhere")
+
+    # ---- the run -----------------------------------------------------------------------------------------------------
+
+    def steps(self) -> Iterator[float]:
+        """See `boebot.driving.Driver`."""
+        link, robot, transport = self.link, self.robot, self.session.transport
+        poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK.unpack_from
+        make, waiting_events = _Telemetry._make, link.waiting_events
+        telemetry_log, times, steps = self.record.telemetry, self.record.times, self.record.steps
+        equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
+        paced = self.task.request.realtime and not transport.realtime
+        time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
+
+        period = self.telemetry_ticks
+        host_stamps = self.record.stamps
+        last = due = -1
+        time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
+        end_s = seconds - tick_s / 2
+        silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
+        started_s = heard_s = look_s = transport.now()
+        wait_until_s = heard_s + (period + 1) * tick_s
+        started = next_progress = wall.perf_counter()
+        while True:
+            received = poll(look_s, wait_until_s)
+            now_s = link.polled_s
+            if link.sessions != self._session:
+                received = self._in_new_session(received)
+                equipment = self.equipment
+                now_s = transport.now()
+            restarted = link.board_resets != self.resets
+            if not received:
+                if now_s - heard_s > silence_s + period * tick_s:
+                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
+                look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s
+                continue
+            for payload, board_s, host_s, bound_s in received:  # noqa: B007
+                (tick,) = tick_of(payload)
+                if due < 0:
+                    due = tick + -tick % n
+                    time_zero = -due * tick_s
+                    self.clock_offset_s = host_s + (due - tick) * tick_s
+                elif restarted or tick <= last:  # the board was reset: its ticks begin afresh
+                    restarted = False
+                    due = tick + -tick % n
+                    time_zero = self._time_after_reset(times, host_s) - tick * tick_s
+                    self.resets = link.board_resets
+                last = tick
+                if tick >= due or times:
+                    time_s = tick * tick_s + time_zero
+                    telemetry_log.append(payload)
+                    times.append(time_s)
+                    host_stamps.append((host_s, bound_s))
+            if payload[_LATCH] and last > self._armed_tick:
+                self._heed_latch(payload)
+            if waiting_events:
+                self.record.events += link.events()
+            heard_s = now_s
+            if time_s >= end_s:
+                break
+            if last >= due:
+                if last - due >= n:
+                    self.late_steps += (last - due) // n
+                if paced:
+                    ahead = (heard_s - started_s) - (wall.perf_counter() - started)
+                    if ahead > 0:
+                        wall.sleep(ahead)
+                if progress is not None and wall.perf_counter() >= next_progress:
+                    next_progress = wall.perf_counter() + PROGRESS_S
+                    progress(time_s)
+                robot.observation = Observation(make(unpack(payload)), equipment, time_s, board_s, host_s, bound_s)
+                yield time_s
+                if robot.latched or self._halted:
+                    self._heed_emergency_stop()
+                kind, left, right = robot.command
+                if kind == "signal":
+                    link.send_signal(left, right, time_to_live_ms, last)
+                elif kind == "speed":
+                    link.send_speed(left, right, time_to_live_ms, last)
+                else:
+                    link.send_coast(time_to_live_ms, last)
+                steps.append((len(times) - 1, kind, left, right))
+                due = last - last % n + n
+            ahead_ticks = min(due - last, (seconds - time_s) / tick_s)
+            look_s = heard_s + (ahead_ticks - 0.5) * tick_s
+            wait_until_s = heard_s + (ahead_ticks + period + 1) * tick_s
+
+    def _in_new_session(self, received: list[Received]) -> list[Received]:
+        """Makes the board ready again; returns the telemetry of the new session."""
+        self._armed_tick = _NOT_YET
+        self._make_ready()
+        if self._halted:
+            self._armed_tick = -1
+        return [*received, *self.link.fetch_telemetry()]
+
+    def _time_after_reset(self, times: list[float], host_s: float) -> float:
+        """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
+        passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
+        return max(passed_s, times[-1] + self.tick_s) if times else 0.0
+
+    def end(self) -> None:
+        """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
+        dead-man."""
+        with contextlib.suppress(BoebotError, KeyboardInterrupt):
+            self.link.stop_and_confirm(STOP_LIMIT_S)
+            self.record.events += self.link.events()
+            self.link.close()
+
+    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
+        """See `boebot.driving.Driver`."""
+        link = self.link
+        return RunResult(
+            brain=self.task.brain.name,
+            robot=self.description,
+            board=self.task.on,
+            description=self.session.description,
+            arena=self.task.request.arena,
+            seed=self.task.request.seed,
+            period=self.period_s,
+            tick=self.tick_s,
+            error=error,
+            record=self.record,
+            truth=self.session.truth(),
+            clock_offset=self.clock_offset_s,
+            steps=len(self.record.steps),
+            late_steps=self.late_steps,
+            resets=self.resets,
+            sessions_lost=link.sessions_lost,
+            lost_frames=link.decoder.lost,
+            bad_frames=link.decoder.bad,
+            run_time=self.record.times[-1] if self.record.times else 0.0,
+            wall_time=elapsed_s,
+            sent=link.sent,
+            received=link.received,
+            identity=self.identity,
+            link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
+            notices=self.notices,
+            counters=dict(self.session.counters()),
+        )

@@ -1,0 +1,133 @@
+"""The devices of one robot, ready to be read: from a board's telemetry, or from the readings of a robot without one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final, NoReturn
+
+from boebot import robots
+from boebot.devices.encoder import Encoder, EncoderReader
+from boebot.devices.infrared import Infrared, InfraredReader
+from boebot.devices.ping import Ping, PingReader
+from boebot.devices.servo import Servo, ServoReader
+from boebot.devices.whisker import Whisker, WhiskerReader
+from boebot.errors import BrainError
+from boebot.link import messages
+from boebot.readings import Heading, Layout, OdometerPose, Proximity, Reading, Scan, readers
+
+# What a brain may name in NEEDS besides a single device.
+GROUPS: Final[dict[str, tuple[str, ...]]] = {
+    "whiskers": ("left_whisker", "right_whisker"),
+    "infrared": ("left_ir", "right_ir"),
+    "encoders": ("left_encoder", "right_encoder"),
+    "servos": ("left_servo", "right_servo"),
+    "lights": ("left_light", "right_light"),
+}
+
+
+class Equipment:
+    """The devices of one robot, ready to be read: one reader per device, called with a telemetry message or, for a
+    robot without a board, with its readings.
+
+    In place of a device that the robot lacks stands a function that says so.
+    """
+
+    NAMES: Final = (
+        "left_whisker",
+        "right_whisker",
+        "left_ir",
+        "right_ir",
+        "ping",
+        "left_encoder",
+        "right_encoder",
+        "left_servo",
+        "right_servo",
+        "left_light",
+        "right_light",
+        "odometer",
+        "compass",
+        "laser",
+        "accelerometer",
+        "battery",
+    )
+    left_whisker: Callable[[Any], Whisker]
+    right_whisker: Callable[[Any], Whisker]
+    left_ir: Callable[[Any], Infrared | Proximity]
+    right_ir: Callable[[Any], Infrared | Proximity]
+    ping: Callable[[Any], Ping]
+    left_encoder: Callable[[Any], Encoder]
+    right_encoder: Callable[[Any], Encoder]
+    left_servo: Callable[[Any], Servo]
+    right_servo: Callable[[Any], Servo]
+    left_light: Callable[[Any], Reading]
+    right_light: Callable[[Any], Reading]
+    odometer: Callable[[Any], OdometerPose]
+    compass: Callable[[Any], Heading]
+    laser: Callable[[Any], Scan]
+    accelerometer: Callable[[Any], Reading]
+    battery: Callable[[Any], Reading]
+
+    def __init__(self, robot: robots.RobotDescription, tick_s: float, layout: Layout | None = None) -> None:
+        """`layout`: where the readings of a robot without a board stand, once that is known."""
+        self.robot_name = robot.name
+        self.tick_s = tick_s
+        found: dict[str, Any] = {}
+        if robot.has_board:
+            found = _board_readers(robot, tick_s)
+        else:
+            found.update(readers(robot, layout or {name: slice(0, 1) for name in robot.device if robot.has(name)}))
+        self._found = frozenset(found)
+        for name in self.NAMES:
+            setattr(self, name, found.get(name) or self._refusal(name))
+
+    def _refusal(self, name: str) -> Callable[[Any], NoReturn]:
+        sentence = f"robot {self.robot_name!r} has no {name}"
+
+        def refuse(_: object) -> NoReturn:
+            raise BrainError(sentence)
+
+        return refuse
+
+    def has(self, name: str) -> bool:
+        """Whether the robot has the device, by the name that a brain uses ("ping", "left_ir", ...)."""
+        return name in self._found
+
+    def missing(self, needs: Iterable[str]) -> list[str]:
+        """Which of the needed devices the robot lacks; a group such as "whiskers" needs all of its devices.
+
+        Raises:
+            BrainError: a need is no device at all.
+        """
+        lacking = []
+        for need in needs:
+            if need not in GROUPS and need not in self.NAMES:
+                known = ", ".join((*GROUPS, *self.NAMES))
+                raise BrainError(f"a brain cannot need {need!r}; expected one of {known}")
+            lacking += [name for name in GROUPS.get(need, (need,)) if not self.has(name)]
+        return lacking
+
+
+def _board_readers(robot: robots.RobotDescription, tick_s: float) -> dict[str, Any]:
+    """One reader of telemetry for each device of a board that a brain can see, by the brain's name of it."""
+    device = {name: entry for name, entry in robot.device.items() if entry.on}
+    schedule = device.get("infrared")
+    infrared_period = schedule.period_ticks if isinstance(schedule, robots.InfraredSchedule) else 5
+    found: dict[str, Any] = {}
+    for side, left in (("left", True), ("right", False)):
+        if isinstance(device.get(f"whisker_{side}"), robots.Whisker):
+            found[f"{side}_whisker"] = WhiskerReader(messages.Whiskers.LEFT if left else messages.Whiskers.RIGHT)
+        if isinstance(device.get(f"infrared_{side}"), robots.InfraredPair):
+            bit = messages.Infrared.LEFT if left else messages.Infrared.RIGHT
+            found[f"{side}_ir"] = InfraredReader(bit, infrared_period, tick_s)
+        encoder = device.get(f"encoder_{side}")
+        if isinstance(encoder, robots.Encoder | robots.QuadratureEncoder):
+            directed = isinstance(encoder, robots.QuadratureEncoder)
+            radius_m = robot.body.wheel_radius_m
+            found[f"{side}_encoder"] = EncoderReader(left, encoder.edges_per_turn, radius_m, directed)
+        servo = device.get(f"servo_{side}")
+        if isinstance(servo, robots.ContinuousServo):
+            found[f"{side}_servo"] = ServoReader(left, servo.centre_us, servo.gain_us)
+    sonar = device.get("ping")
+    if isinstance(sonar, robots.Ping):
+        found["ping"] = PingReader(sonar.range_min_m, sonar.range_max_m, sonar.period_ticks, tick_s)
+    return found

@@ -1,0 +1,152 @@
+"""Devices of robots without a board: what a simulated vehicle is driven by and senses with, in the notes' terms.
+
+They have no pins; brains meet their readings by the same names as those of a robot with a board. Models and symbols are
+those of the lecture notes (THEORY sections 1.2 to 1.10); every key carries its unit in its name.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import msgspec
+
+from boebot.device import Device
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
+Point = tuple[float, float]
+
+
+class VehicleDevice(Device, frozen=True, kw_only=True):
+    """What every device of a vehicle has: no pins. `on = false` leaves it out."""
+
+
+class DcMotor(VehicleDevice, tag="dc_motor", frozen=True, kw_only=True):
+    """A DC motor with a gear, quasi-static: (1.8) to (1.10). Defaults are the notes' motor."""
+
+    torque_constant_n_m_a: Positive = 0.0333  # c_t
+    emf_constant_v_s: Positive = 0.0333  # c_e
+    resistance_ohm: Positive = 0.62  # R
+    inductance_h: NotNegative = 0.0002  # L
+    coulomb_friction_n_m: NotNegative = 0.008  # c_C
+    viscous_friction_n_m_s: NotNegative = 0.02  # c_v
+    gear: Positive = 2.0  # G
+    efficiency: Share = 1.0
+    torque_maximum_n_m: Positive = 1.0
+    voltage_maximum_v: Positive = 12.0  # at motor signal 1
+
+
+class Sensor(VehicleDevice, frozen=True, kw_only=True):
+    """What every sensor has: between two samples the last one stands, with its age (rule S4 of section 1.3)."""
+
+    period_s: NotNegative = 0.0  # 0: every step
+
+
+class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=True):
+    """The notes' IR proximity sensor (3.9) to (3.14): a reading from 0 to 1."""
+
+    position_m: Point
+    heading_rad: float
+    beam_rad: NotNegative = 0.5  # full opening
+    rays: Annotated[int, msgspec.Meta(ge=1, le=64)] = 3
+    range_m: Positive = 1.0  # D
+    c1_m2: NotNegative = 0.03
+    c2: NotNegative = 0.1
+    sigma: NotNegative = 0.01  # relative, of (3.1)
+    height_m: NotNegative = 0.06
+    threshold: Share = 0.3  # a reading from here on is a thing detected
+
+
+class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
+    """The notes' sonar (section 1.6): a distance, or nothing heard."""
+
+    position_m: Point
+    heading_rad: float
+    beam_rad: NotNegative = 0.35
+    rays: Annotated[int, msgspec.Meta(ge=1, le=64)] = 3
+    range_min_m: Positive = 0.02
+    range_max_m: Positive = 3.0
+    sigma: NotNegative = 0.01
+    miss: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.02  # 1 - p
+    height_m: NotNegative = 0.08
+
+
+class Laser(Sensor, tag="laser_range_finder", frozen=True, kw_only=True):
+    """A laser range finder (section 1.7): distances from right to left. Defaults are the Hokuyo URG-04LX."""
+
+    position_m: Point
+    heading_rad: float = 0.0
+    rays: Annotated[int, msgspec.Meta(ge=1, le=4096)] = 683
+    step_rad: Positive = 2 * math.pi / 1024
+    range_m: Positive = 4.0
+    sigma: NotNegative = 0.01
+    height_m: NotNegative = 0.10
+
+
+class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
+    """The notes' odometer (sections 1.4, 2.2): a pose, calibrated once at the start."""
+
+    sigma_step_m: NotNegative = 0.0  # per wheel in 10 ms
+
+
+class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):
+    """The notes' compass (section 1.8): a heading."""
+
+    sigma_rad: NotNegative = 0.05
+    bias_rad: float = 0.0
+
+
+class Accelerometer(Sensor, tag="accelerometer", frozen=True, kw_only=True):
+    """A proof mass on a spring along the heading (Fig. 1.10)."""
+
+    proof_mass_kg: Positive = 1e-3
+    stiffness_n_m: Positive = 40.0
+    damping_n_s_m: Positive = 0.4  # critical
+    range_m_s2: Positive = 20.0
+    sigma_m_s2: NotNegative = 0.02
+    bias_m_s2: float = 0.0
+
+
+class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
+    """A light sensor (section 1.9): L = sum of P max(0, cos theta) / (d0^2 + d^2)."""
+
+    position_m: Point
+    heading_rad: float
+    near_distance_m: Positive = 0.05  # d0
+    ambient: NotNegative = 0.0
+    sigma: NotNegative = 0.01
+    height_m: NotNegative = 0.09
+
+
+class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True):
+    """A whisker without a switch: a segment that touches something or not."""
+
+    root_m: Point
+    tip_m: Point
+
+
+class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
+    """The notes' battery (section 1.9): its energy E in [0, 1] is read as a voltage."""
+
+    idle_per_s: NotNegative = 0.002  # p_0
+    signal_per_s: NotNegative = 0.004  # p_m
+    charger_per_s: NotNegative = 0.1  # p_c
+    empty_v: Positive = 10.0
+    full_v: Positive = 12.0
+    sigma_v: NotNegative = 0.0
+
+
+AnyVehicleDevice = (
+    DcMotor
+    | InfraredProximity
+    | Sonar
+    | Laser
+    | Odometer
+    | HeadingCompass
+    | Accelerometer
+    | Phototransistor
+    | TouchWhisker
+    | Energy
+)

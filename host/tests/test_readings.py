@@ -1,0 +1,97 @@
+"""What robots without a board tell: descriptions, views, ages, arrays."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from boebot.errors import BrainError, RobotError
+from boebot.readings import Readings, ages
+from boebot.robot import Equipment, Observation, Robot
+from boebot.robots import load_robot
+from boebot.series import touch_indices
+
+ARSIM = load_robot("arsim")
+LAYOUT = {
+    "infrared_left": slice(0, 1),
+    "infrared_right": slice(1, 2),
+    "odometer": slice(2, 5),
+    "compass": slice(5, 6),
+}
+
+
+def robot_reading(*values: float) -> Robot:
+    robot = Robot("arsim", 0.05)
+    sample = Readings(7, 1, (0.0,) * len(values), values)
+    robot.observation = Observation(sample, Equipment(ARSIM, 0.01, LAYOUT), 0.07)
+    return robot
+
+
+@pytest.mark.parametrize(("reading", "detected"), [(0.0, False), (0.2999, False), (0.3, True), (1.0, True)])
+def test_infrared_reading_becomes_a_detection_at_its_threshold(reading: float, detected: bool) -> None:
+    robot = robot_reading(reading, 0.1, 0, 0, 0, 0)
+    assert robot.left_ir == (detected, 0.0, True, reading)
+    assert not robot.right_ir.detected and robot.right_ir.valid and robot.right_ir.age == 0.0
+
+
+def test_names_of_the_notes_sensors() -> None:
+    robot = robot_reading(0, 0, 1.5, -0.5, 0.25, -3.0)
+    assert (robot.odometer.x, robot.odometer.y, robot.odometer.heading) == (1.5, -0.5, 0.25)
+    assert robot.compass.heading == -3.0
+    assert robot.tick == 7 and robot.has("infrared") and not robot.has("whiskers")
+    with pytest.raises(BrainError, match="'arsim' has no ping"):
+        _ = robot.ping
+    assert Equipment(ARSIM, 1.0).missing(["whiskers", "infrared"]) == ["left_whisker", "right_whisker"]
+
+
+@given(st.floats(0.011, 0.5), st.integers(0, 2000))
+def test_age_of_a_held_reading(period_s: float, tick: int) -> None:
+    """Against the definition: it was taken in the first step at or after the last due multiple of its period."""
+    tick_s = 0.01
+    due = [math.ceil(round(k * period_s / tick_s, 6)) for k in range(int(tick * tick_s / period_s) + 2)]
+    taken = max(step for step in due if step <= tick)
+    (age,) = ages((period_s,), tick * tick_s, tick_s)
+    assert age == pytest.approx((tick - taken) * tick_s, abs=1e-9) or abs(round(age / period_s, 6) % 1) < 1e-6
+    assert 0.0 <= age < period_s + tick_s
+
+
+def variant(folder: Path, text: str) -> Path:
+    path = folder / "variant.toml"
+    path.write_text(f'extends = "arsim"\n{text}\n')
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("remove = ['motor_left']", "device.motor_left is missing or off; a robot without a board needs a dc_motor"),
+        ("pin_map = 'shieldbot'", "pin_map is 'shieldbot', but a robot without a board has no pins"),
+        ("[device.buzzer]\ntype = 'buzzer'\npin = 4", "device.buzzer is buzzer, which needs a board's pins"),
+        ("[device.compass]\nsigma_rad = -1.0", "device.compass.sigma_rad: expected float >= 0.0"),
+        ("[device.laser]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\nrays = 0", "device.laser.rays: expected"),
+        ("[device.infrared_left]\nthreshold = 1.5", "device.infrared_left.threshold: expected"),
+    ],
+)
+def test_wrong_descriptions_get_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(variant(tmp_path, text))
+
+
+def test_devices_of_vehicles_are_not_for_boards(tmp_path: Path) -> None:
+    path = tmp_path / "mixed.toml"
+    path.write_text('extends = "shieldbot"\n[device.odometer]\ntype = "odometer"\n')
+    with pytest.raises(RobotError, match=r"device\.odometer is odometer, which only a robot without a board can have"):
+        load_robot(path)
+
+
+def test_touches_nearer_than_a_tenth_of_a_second_are_one() -> None:
+    time = np.linspace(0.0, 0.99, 100)
+    contact = np.zeros(100, dtype=np.bool_)
+    contact[[0, 1, 5, 9, 30, 31, 42, 90]] = True
+    assert touch_indices(time, contact).tolist() == [0, 30, 42, 90]
+    assert touch_indices(time, np.zeros(100, dtype=np.bool_)).tolist() == []
