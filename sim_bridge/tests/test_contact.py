@@ -287,7 +287,7 @@ def test_segment_on_the_body_touches_what_it_crosses() -> None:
         ([(0, 0), (1, 0), (1, 0), (1, 1)], lib.OUTLINE_EDGE),
         ([(0, 0), (1, 1), (1, 0), (0, 1)], lib.OUTLINE_CROSSING),
         ([(0, 0), (2, 0), (1, 0), (1, 1)], lib.OUTLINE_CROSSING),
-        ([(0, 0), (1, 0), (1, 3e-6), (0, 3e-6)], lib.OUTLINE_THIN),
+        ([(0, 0), (1, 0), (1, 3e-4), (0, 3e-4)], lib.OUTLINE_THIN),
     ],
 )
 def test_outline_that_is_none_is_refused(corners: Points, expected: int) -> None:

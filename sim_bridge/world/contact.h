@@ -12,6 +12,7 @@
 #include "body.h"
 
 #define CONTACTS_CAPACITY 32
+#define CONTACT_FAR 0.1     /* m: what is farther apart is not looked at closely */
 #define CONTACT_DEPTH 1e-10 /* m: less is not put out */
 
 typedef struct {
@@ -33,6 +34,9 @@ typedef struct {
 /* Contacts of a body with the arena and with movers, those moved on by `elapsed` seconds, where the gap is below
  * `margin`. */
 void contact_find(body *self, const scene *around, double elapsed, double margin, contacts *out);
+
+/* Contacts of one robot with another. */
+void contact_find_pair(body *self, body *other, double margin, contacts *out);
 
 /* Takes away the velocities into the contacts, but for what closes a gap within `within` seconds. Returns the largest
  * change, m/s. */

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define ROUNDING 1e-3
-#define ROUNDING_LEAST 1e-6
+#define ROUNDING_LEAST 1e-4
 #define EDGE_LEAST 1e-6
 
 static double cross(const double *o, const double *a, const double *b) {

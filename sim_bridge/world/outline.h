@@ -31,7 +31,7 @@ typedef struct {
 } body_outline;
 
 /* Takes a simple polygon of 3 to 32 corners, in either sense. Returns OUTLINE_OK or what is wrong with it: the number of
- * corners, a number that is not finite, an edge without length, edges that cross or touch, a place narrower than 4 um. */
+ * corners, a number that is not finite, an edge without length, edges that cross or touch, a place narrower than 0.4 mm. */
 int body_outline_make(body_outline *self, const double *xy, size_t corners);
 /* python: end */
 
