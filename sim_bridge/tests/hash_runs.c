@@ -65,16 +65,16 @@ static int add_sensors(vehicle_model *m) {
 
 static vehicle_model *model(int servos) {
   const body_parameters small = {.mass = 0.6,
-                                .inertia = 1.2e-3,
-                                .radius = 0.07,
-                                .half_track = 0.0525,
-                                .wheel_radius = 0.0331,
-                                .wheel_mass = 0.03,
-                                .wheel_inertia = 1.7e-5,
-                                .linear_damping = 1.0,
-                                .angular_damping = 0.004,
-                                .grip = 0.7,
-                                .slip = servos};
+                                 .inertia = 1.2e-3,
+                                 .radius = 0.07,
+                                 .half_track = 0.0525,
+                                 .wheel_radius = 0.0331,
+                                 .wheel_mass = 0.03,
+                                 .wheel_inertia = 1.7e-5,
+                                 .linear_damping = 1.0,
+                                 .angular_damping = 0.004,
+                                 .grip = 0.7,
+                                 .slip = servos};
   const body_parameters large = {.mass = 3.0,
                                  .inertia = 0.2,
                                  .radius = 0.2,

@@ -1,6 +1,6 @@
 """Experiments of the notes on the world without boards: rows E08-E11, E16, E18 and E69 of THEORY's table.
 
-E13, E14, E15 and E70 stand with their sensors in test_sensors.py, E11's other half in test_numbers_noise.py.
+E13, E14, E15 and E70 stand with their sensors in test_sensors*.py, E11's other half in test_numbers_noise.py.
 """
 
 from __future__ import annotations
