@@ -234,3 +234,15 @@ def test_a_moving_obstacle_is_seen_where_it_is() -> None:
         robot.run(wait)
         echo = ping_echo(robot, robot.sim.cycle + 1)
         assert echo == pytest.approx(2 * (centre - 0.1 - 0.06) / 343.5 * 1e6, abs=6)
+
+
+def test_too_many_moving_obstacles_are_refused() -> None:
+    from sim_bridge._core import ffi, lib
+
+    arena = arena_of()
+    way = ffi.new("path_waypoint[]", [(0.0, 2.0, 0.0, 0.0)])
+    for _ in range(65):
+        assert lib.arena_add_moving(arena.handle, ffi.NULL, 0, 0.1, ffi.NULL, way, 1, lib.PATH_ONCE) >= 0
+    lib.arena_build(arena.handle)
+    with pytest.raises(ArenaError, match="65 moving obstacles"):
+        Sim(arena)
