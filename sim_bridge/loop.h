@@ -31,6 +31,7 @@
 /* python: begin */
 enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
 enum { SIM_ANY = -1 };
+enum { SIM_OBSTACLES_MAXIMUM = 64 }; /* that move; robots: BODY_MAXIMUM */
 enum { SIM_OK = 0, SIM_NO_MEMORY = -1, SIM_WRONG_BOARD = -2, SIM_BAD_ARGUMENT = -3 };
 
 /* One row of the truth. */

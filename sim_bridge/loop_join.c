@@ -15,7 +15,7 @@ uint64_t line_idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t
 
 sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise) {
   if (where == NULL || step_cycles < 2 * PART_GUARD || record_cycles % step_cycles != 0) return NULL;
-  if (arena_moving_count(where) > OBSTACLES_MAXIMUM) return NULL;
+  if (arena_moving_count(where) > SIM_OBSTACLES_MAXIMUM) return NULL;
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->arena = where;

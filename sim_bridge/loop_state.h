@@ -8,7 +8,6 @@
 #include "parts/part.h"
 
 #define WAVES_MAXIMUM 4
-#define OBSTACLES_MAXIMUM 64
 
 /* A square wave that a test puts on a pin. */
 typedef struct {
@@ -61,7 +60,8 @@ struct sim {
   int robot_count;
   body *bodies[BODY_MAXIMUM]; /* of the robots, in their order */
   double torques[BODY_MAXIMUM][2];
-  mover movers[OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
+  mover
+      movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
   size_t obstacles;
   scene seen; /* arena and all movers */
 };

@@ -76,7 +76,7 @@ class BoardPins(BoardMemory):
         self._check(lib.sim_set_supply(self._handle, self._number, 0.0 if volts is None else volts), "supply")
 
     def brown_out(self, **changes: float) -> None:
-        """What a weak supply does to the board (C brown_out_parameters): reset_v, hysteresis_v, erratic_v, upsets_per_s.
+        """What a weak supply does to the board: reset_v, hysteresis_v, erratic_v, upsets_per_s (parts/brown_out.h).
 
         What is not named is as the data sheet has it; upsets 2 per second at the worst.
         """

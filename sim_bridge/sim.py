@@ -46,10 +46,17 @@ class Sim:
         """An arena without robots.
 
         Raises:
+            ArenaError: too many moving obstacles.
             BoardError: a world step that does not divide the control tick.
         """
         if step_cycles <= 0 or TICK_CYCLES % step_cycles:
             raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
+        moving = int(lib.arena_moving_count(arena.handle))
+        if moving > lib.SIM_OBSTACLES_MAXIMUM:
+            raise ArenaError(
+                f"arena {arena.name}: {moving} moving obstacles; a simulation with boards takes "
+                f"{lib.SIM_OBSTACLES_MAXIMUM} at most"
+            )
         self.arena, self.seed, self.noise = arena, seed, noise
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from boebot.errors import ArenaError, BoardError
+from sim_bridge.arena import Arena
+from sim_bridge.arena_description import ArenaDescription, Moving, Polygon, Waypoint
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, square
@@ -220,17 +222,23 @@ def test_what_is_far_turned_away_or_hidden_lights_nothing(distance: float, headi
 # ---- moving obstacles ------------------------------------------------------------------------------------
 
 
+def moving_arena(way: list[Waypoint], count: int = 1) -> Arena:
+    """A field with discs of 0.1 m on their way."""
+    field = [Polygon(square(0, 0, 12), "field")]
+    moving = [Moving(path=way, radius_m=0.1, repeat="once") for _ in range(count)]
+    return Arena(ArenaDescription(name="test", outline=field, moving=moving))
+
+
 def test_a_moving_obstacle_is_seen_where_it_is() -> None:
     """A disc of 0.1 m that comes from x = 2 m with 0.5 m/s: after 2 s its face is 0.84 m before the Ping."""
-    from sim_bridge._core import ffi, lib
-
-    arena = arena_of(outline=square(0, 0, 12))
-    way = ffi.new("path_waypoint[]", [(0.0, 2.0, 0.0, 0.0), (2.0, 1.0, 0.0, 0.0)])
-    nothing = ffi.NULL
-    assert lib.arena_add_moving(arena.handle, nothing, 0, 0.1, nothing, way, 2, lib.PATH_ONCE) >= 0
-    lib.arena_build(arena.handle)
+    arena = moving_arena([Waypoint(0.0, 2.0, 0.0), Waypoint(2.0, 1.0, 0.0)])
     for wait, centre in ((0.5, 1.75), (1.0, 1.5), (3.0, 1.0)):
         robot = add_scripted(Sim(arena, noise=False), pose=(0, 0, 0))
         robot.run(wait)
         echo = ping_echo(robot, robot.sim.cycle + 1)
         assert echo == pytest.approx(2 * (centre - 0.1 - 0.06) / 343.5 * 1e6, abs=6)
+
+
+def test_too_many_moving_obstacles_are_refused() -> None:
+    with pytest.raises(ArenaError, match="65 moving obstacles"):
+        Sim(moving_arena([Waypoint(0.0, 2.0, 0.0)], count=65))
