@@ -6,9 +6,10 @@
 
 #define CELL_SHARE 0.4             /* of a grid cell's side */
 #define CELL_LEAST 0.05            /* m */
-#define SIDE_MAXIMUM 1024          /* cells */
+#define SIDE_MAXIMUM 100           /* cells: more of them would not stay in the processor's cache */
 #define BORDER 1.0                 /* m around everything where rays may start */
-#define GATHER_ENOUGH 2048u        /* items that a cell looks at, if there are so many */
+#define GATHER_ENOUGH 256u         /* strips that a cell looks at, if there are so many: about 20 us of work */
+#define PATIENCE 128u              /* rays from a cell before it gets lists: by then they cost less than they save */
 #define LIST_LONGEST 48u           /* entries; the grid does the rest */
 #define MEMORY_LARGEST (64u << 20) /* bytes */
 #define LEVELS 512                 /* of distance, by which entries are sorted */
@@ -131,8 +132,7 @@ ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
   }
   cut_circle(self);
   make_strips(self);
-  /* By then the lists cost less than they save. */
-  self->patience = (unsigned)(self->strip_count < GATHER_ENOUGH ? self->strip_count : GATHER_ENOUGH);
+  self->patience = (unsigned)(self->strip_count < PATIENCE ? self->strip_count : PATIENCE);
   return self;
 }
 
