@@ -191,8 +191,9 @@ def devices_default(spec: schema.Schema, robot: RobotDescription) -> int:
 
 
 def devices_built(spec: schema.Schema, robot: RobotDescription) -> int:
-    """The devices bits of what the robot's map gives pins to, on or off."""
-    return sum(1 << i for i, device in enumerate(spec.flags["devices"].device) if device in robot.device)
+    """The devices bits of what the robot's map gives pins to, on or off, on one side at least."""
+    sides = [{device, device.replace("_left", "_right")} for device in spec.flags["devices"].device]
+    return sum(1 << i for i, either in enumerate(sides) if either & set(robot.device))
 
 
 def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:

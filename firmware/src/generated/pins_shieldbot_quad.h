@@ -129,7 +129,7 @@
 #define ENCODER_LINES 2 /* of each wheel */
 
 /* Devices bits of what the map has pins for. */
-#define DEVICES_BUILT 1823
+#define DEVICES_BUILT 1887
 
 /* Defaults of the parameters, in counts of their scale. */
 #define DEFAULT_DEVICES 31

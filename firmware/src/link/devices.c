@@ -45,8 +45,8 @@ void devices_task(void) {
     since++;
   }
   /* Neither must it take the room that a message waits for, nor that of the next telemetry. */
-  if (!session_is_open() || link_room != 0 || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) || !any_on() ||
-      !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
+  if (!session_is_open() || link_room != 0 || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) ||
+      !any_on() || !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
     return;
   }
   since = 0;
