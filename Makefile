@@ -170,6 +170,7 @@ $(VENV)/.done-check: $(DECLARED) | $(VENV)/.done-test
 	@echo "Installing Python packages for checks"
 	@$(call INSTALL,check)
 $(VENV)/.done-boebot: pyproject.toml $(VENV)/.done-run | build/.done-core
+	@rm -rf boebot.egg-info
 	@$(PIP) --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
 
