@@ -20,10 +20,14 @@ def test_wander_keeps_moving_for_a_minute(board_url: str, seed: int) -> None:
 
 
 def test_wander_visits_half_of_its_arena_in_five_minutes(board_url: str) -> None:
-    result = boebot.run("wander", on=board_url, seconds=300, seed=1)
-    assert result.truth is not None
-    visited, free = cells_visited(result.truth)
-    assert visited >= 0.5 * free, f"{visited} of {free} cells"
+    """On average over three seeds: single runs spread by some 6 % of the cells (docs/decisions/0001)."""
+    shares = []
+    for seed in (1, 2, 3):
+        result = boebot.run("wander", on=board_url, seconds=300, seed=seed)
+        assert result.truth is not None
+        visited, free = cells_visited(result.truth)
+        shares.append(visited / free)
+    assert np.mean(shares) >= 0.5, shares
 
 
 def test_brain_that_does_nothing_fails_both_measures(board_url: str) -> None:

@@ -21,7 +21,7 @@ from sim_bridge.arena import Arena, arena_names, load_arena
 from sim_bridge.arena_description import ArenaDescription, Disc, Moving, Polygon, Wall, Waypoint
 from sim_bridge.arena_picture import draw
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs" / "reference").is_dir())
 PAGE = (ROOT / "docs/reference/arenas.md").read_text(encoding="utf-8")
 TEXTS = [(resources.folder("arenas") / f"{name}.toml").read_text(encoding="utf-8") for name in arena_names()]
 FRAME = "name = 'mine'\n"
