@@ -26,9 +26,7 @@ def draw(arena: Arena, path: Path) -> Path:
     """Writes a picture of the arena, with its start, and its moving shapes at the start and along their way."""
     figure = Figure(figsize=(5.0, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
-    _draw_floor(axes, arena)
-    _draw_shapes(axes, arena)
-    _draw_moving(axes, arena)
+    draw_arena(axes, arena)
     _draw_start(axes, arena)
     axes.set_aspect("equal")
     if not arena.outlines:
@@ -41,6 +39,13 @@ def draw(arena: Arena, path: Path) -> Path:
     with mpl.rc_context({"svg.hashsalt": arena.name}):
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     return path
+
+
+def draw_arena(axes: Axes, arena: Arena) -> None:
+    """Draws what is in an arena, moving shapes at the start and along their way."""
+    _draw_floor(axes, arena)
+    _draw_shapes(axes, arena)
+    _draw_moving(axes, arena)
 
 
 def _draw_floor(axes: Axes, arena: Arena) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,8 @@ from sim_bridge.arena import Arena
 from sim_bridge.vehicle import STATE_BYTES, VehicleModel, place, worlds
 
 Floats = NDArray[np.float64]
+WANDER: Final = ffi.addressof(lib, "vehicle_wander")
+"""A compiled brain: the notes' wandering for two IR sensors (vehicles/wander.h), with a `vehicle_wander_state *`."""
 
 
 class Batch:

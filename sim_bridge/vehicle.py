@@ -14,6 +14,7 @@ from typing import Any, Final
 from boebot.errors import ArenaError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
+from sim_bridge.motor import DCMotor
 
 Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
@@ -62,13 +63,19 @@ class VehicleModel:
         self.dt = dt
         self.names: dict[str, slice] = {}
         """Readings by name: where they stand among all readings."""
+        self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
+        """Sensors with a beam by name: the beam, and how far it reaches (m)."""
+        self.body = dict(body)
         self._keep: list[Any] = []
-        handle = lib.vehicle_model_new(ffi.new("body_parameters *", dict(body)), dt)
+        parameters = ffi.new("body_parameters *", self.body)
+        handle = lib.vehicle_model_new(parameters, dt)
         if handle == ffi.NULL:
             raise RobotError(
                 f"vehicle: body {dict(body)} with dt = {dt} s; expected dt > 0, positive mass, inertia, radius, "
                 "half_track and wheel_radius, and no negative number"
             )
+        self.a: float = lib.body_a(parameters)  # 1/m, (2.26)
+        self.b: float = lib.body_b(parameters)  # (2.30)
         self.handle = ffi.gc(handle, lib.vehicle_model_destroy)
         lib.vehicle_model_switch(self.handle, noise, ends_at_collision)
 
@@ -97,13 +104,7 @@ class VehicleModel:
 
     def dc_motors(self, left: Mapping[str, float] | None = None, right: Mapping[str, float] | None = None) -> None:
         """Two DC motors (1.6)-(1.10); what is not said is as in the notes' default motor."""
-        motors = []
-        for changes in (left, right):
-            motor = ffi.new("motor_dc_parameters *")
-            lib.motor_dc_default(motor)
-            for key, value in (changes or {}).items():
-                setattr(motor, key, value)
-            motors.append(motor)
+        motors = [DCMotor(**(changes or {})).parameters for changes in (left, right)]
         self._done(lib.vehicle_model_drive_dc(self.handle, *motors, 0), "DC motors")
 
     def servos(self, left: Any, right: Any) -> None:
@@ -123,6 +124,9 @@ class VehicleModel:
     def _sensor(self, kind: str, name: str, parameters: Mapping[str, Any], *period: float, count: int = 1) -> None:
         adder = getattr(lib, f"vehicle_model_add_{kind}")
         self._add(name, adder(self.handle, ffi.new(f"{kind}_parameters *", dict(parameters)), *period), count)
+        if "beam" in parameters:
+            reach = (parameters[key] for key in ("range", "range_maximum", "reach") if key in parameters)
+            self.looks[name] = (parameters["beam"], float(next(reach, 0.0)))
 
     def infrared_proximity(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
         """The notes' IR sensor: beam, range, c1, c2, sigma, reflectance. One reading in [0, 1]."""
@@ -249,14 +253,28 @@ class Vehicle:
             RobotError: a number that is not finite, or a model without a drive.
         """
         self.model, self.arena = model, arena
+        self.seed, self.robot = seed, robot
         self.handle = worlds(model, 1, state_bytes)
-        place(self.handle, 0, arena, seed, robot, arena.start if pose is None else pose)
+        self.place(arena.start if pose is None else pose)
         count = lib.vehicles_reading_count(self.handle)
         pointer = lib.vehicles_readings(self.handle)
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
         self._body = lib.vehicles_body(self.handle, 0)
         self._flag = ffi.new("int8_t *")
         self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle)
+
+    def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
+        """Starts a new run at a pose (x, y, heading), at `speed` (m/s) and `turn_rate` (rad/s), wheels rolling.
+
+        Time begins at 0, the odometer is calibrated, the battery full, noise as from the start.
+
+        Raises:
+            ArenaError: that place is not free.
+            RobotError: a number is not finite, or too fast.
+        """
+        place(self.handle, 0, self.arena, self.seed, self.robot, pose)
+        if lib.vehicles_set_speeds(self.handle, 0, speed, turn_rate):
+            raise RobotError(f"vehicle: speed {speed} m/s, turn rate {turn_rate} rad/s; expected below 100 and 1000")
 
     def __getitem__(self, name: str) -> Any:
         """A reading by the name of its sensor: a number, or a view where the sensor has several."""

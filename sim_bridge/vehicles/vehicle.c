@@ -9,6 +9,8 @@
 
 #define SERVO_PERIOD_S 0.020
 #define FIRST_MOVER 0x80000000u /* ids of the arena's moving shapes */
+#define SPEED_LIMIT 100.0       /* m/s: as body.c limits it */
+#define TURN_LIMIT 1000.0       /* rad/s */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
   const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
@@ -83,6 +85,19 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
     servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
   vehicle_sensors_start(self, i);
   vehicle_sense(self, i);
+  return VEHICLE_OK;
+}
+
+int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
+  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  if (!(fabs(speed) < SPEED_LIMIT) || !(fabs(turn_rate) < TURN_LIMIT)) return VEHICLE_BAD_NUMBER;
+  body *b = &self->worlds[i].body;
+  b->state.speed = speed;
+  b->state.turn_rate = turn_rate;
+  b->state.lateral = 0.0;
+  b->state.rim_left = body_left_speed(b);
+  b->state.rim_right = body_right_speed(b);
+  b->state.slipping = 0;
   return VEHICLE_OK;
 }
 

@@ -31,6 +31,10 @@ void vehicles_destroy(vehicles *self);
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading);
 
+/* Vehicle `i`, placed, goes from here on at `speed` (m/s, along its heading) and `turn_rate` (rad/s), its wheels rolling
+ * without slip. */
+int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate);
+
 /* `steps` steps of worlds first ... first + count - 1 with motor signals (count, 2) that hold throughout. A world whose
  * run has ended stays as it is. Nothing moves where a signal is not finite. Different threads may step different worlds. */
 int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);

@@ -1,0 +1,89 @@
+"""docs/reference/imperfections.md says what the code has: every parameter, its value, its neutral value."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import boebot
+from boebot import vehicle_devices
+from sim_bridge import imperfections
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text()
+NUMBER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?(?:e-?\d+)?)( %)?")
+HEADERS = "\n".join(path.read_text() for path in sorted((ROOT / "sim_bridge" / "world").rglob("*.h")))
+Row = tuple[tuple[str, ...], list[float], str]
+
+
+def rows() -> list[Row]:
+    """Parameters, the numbers of nominal value and spread, and the neutral value of each row."""
+    found = []
+    for line in PAGE.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if not line.startswith("| ") or "`" not in line:
+            continue
+        parameter = next(index for index, cell in enumerate(cells) if cell.startswith("`"))
+        values = " ".join(cells[1 : parameter - 1])  # between what it is and where it is from
+        numbers = [float(number) / (100 if percent else 1) for number, percent in NUMBER.findall(values)]
+        off = cells[parameter + 1] if len(cells) > parameter + 1 else ""
+        found.append((tuple(re.findall(r"`([\w.]+)`", cells[parameter])), numbers, off))
+    return found
+
+
+def value(name: str) -> tuple[float, ...]:
+    """Of a parameter in the code, as a tuple."""
+    if "." in name:
+        struct, key = name.split(".")
+        fields = {field.name: field.default for field in msgspec.structs.fields(getattr(vehicle_devices, struct))}
+        return (float(fields[key]),)
+    if hasattr(imperfections, name):
+        found = getattr(imperfections, name)
+        return found if isinstance(found, tuple) else (float(found),)
+    (defined,) = re.findall(rf"^#define {name} ([\d.e-]+)", HEADERS, re.MULTILINE)
+    return (float(defined),)
+
+
+ROWS = rows()
+
+
+@pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
+def test_row_says_what_the_code_has(names: tuple[str, ...], numbers: list[float], off: str) -> None:
+    assert [pytest.approx(part) for name in names for part in value(name)] == numbers
+
+
+def test_every_parameter_has_one_row() -> None:
+    named = [name for names, _, _ in ROWS for name in names]
+    constants = {
+        name
+        for name, held in vars(imperfections).items()
+        if name.isupper() and not name.startswith("_") and name != "RPM" and isinstance(held, float | int | tuple)
+    }
+    noisy = {
+        f"{struct.__name__}.{field.name}"
+        for struct in vars(vehicle_devices).values()
+        if isinstance(struct, type) and issubclass(struct, vehicle_devices.VehicleDevice)
+        for field in msgspec.structs.fields(struct)
+        if re.match("sigma|miss|bias", field.name)
+    }
+    assert len(named) == len(set(named)) and constants | noisy <= set(named)
+
+
+def test_neutral_values_make_a_robot_that_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of them at once; full speed is then that of the curve, 51.25 rpm tanh(200 / 78.5) of a wheel of 33.1 mm."""
+    for names, _, off in ROWS:
+        if re.fullmatch(r"[\d.]+", off):
+            for name in names:
+                if "." not in name:
+                    monkeypatch.setattr(imperfections, name, float(off))
+    monkeypatch.setattr(imperfections, "SERVO_TOP_SPREAD", 0.0)
+    monkeypatch.setattr(imperfections, "SERVO_ASYMMETRY", 0.0)
+    monkeypatch.setattr(imperfections, "SERVO_CENTRE_SPREAD_US", 0.0)
+    result = boebot.run(lambda robot: robot.drive(1, 1), arena="empty", on="native", seconds=2)
+    speed = 51.25 * 2 * 3.141593 / 60 * 0.0331
+    assert result.true_pose is not None
+    late = result.true_pose.x[-1] - result.true_pose.x[-101]
+    assert late == pytest.approx(speed, rel=0.03)

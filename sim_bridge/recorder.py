@@ -1,0 +1,57 @@
+"""A log of a vehicle's run: one row a step, columns as numpy arrays. What ARSim calls motion results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_bridge.vehicle import Vehicle
+
+Floats = NDArray[np.float64]
+TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "distance", "touching")
+
+
+class Recorder:
+    """Rows of truth and readings. Given to `Vehicle.run` as `stage` it takes one after each step.
+
+    Attributes:
+        names: of the columns: `TRUTH`, then a column for each reading, such as "compass", "odometer[0]".
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Empty."""
+        self.vehicle = vehicle
+        self.names = list(TRUTH)
+        for name, where in vehicle.model.names.items():
+            count = where.stop - where.start
+            self.names += [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]
+        self._rows: list[tuple[float, ...]] = []
+
+    def append(self) -> None:
+        """A row of how things are now. Lengths in m, times in s, angles in rad."""
+        v, body = self.vehicle, self.vehicle.body
+        truth = (v.time, body.x, body.y, body.heading, body.speed, body.turn_rate, body.distance, body.touching)
+        self._rows.append((*truth, *v.readings))
+
+    def __call__(self, stage: str, vehicle: Vehicle) -> None:
+        """A row at the end of each step: as ARSim, with the readings that the step's brain got."""
+        if stage == "check":
+            self.append()
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, name: str) -> Floats:
+        """A column, shape (rows,); one of a sensor with several readings by "odometer[0]"."""
+        return self.table[:, self.names.index(name)]
+
+    @property
+    def table(self) -> Floats:
+        """All, shape (rows, columns)."""
+        return np.array(self._rows, dtype=np.float64).reshape(-1, len(self.names))
+
+    def save(self, path: str | Path) -> None:
+        """Writes a CSV file with the columns' names in its first line."""
+        np.savetxt(path, self.table, fmt="%.9g", delimiter=",", header=",".join(self.names), comments="")
