@@ -10,6 +10,7 @@ BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --
 # The tests go beside the libraries that they are to test, or pytest would take those of the checkout.
 rm -rf build/sanitized/lib/sim_bridge/tests
 cp -R sim_bridge/tests build/sanitized/lib/sim_bridge/tests
+cp conftest.py build/sanitized/lib/
 
 # What a run gives must not depend on how the C was compiled: the usual build leaves its bits for the other to compare.
 export BOEBOT_STATE_FILE="$PWD/build/state-bits"
