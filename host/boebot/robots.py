@@ -230,6 +230,9 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     body: Body
     device: dict[str, AnyDevice]
     pin_map: str = ""  # of the board's firmware
+    unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
+    """serial number of a simulated robot: what its parts are like is drawn by it and stays from run to run, whatever
+    the seed; 0: nominal. Without one each seed draws another robot."""
 
     @property
     def has_board(self) -> bool:
