@@ -99,15 +99,20 @@ _DRAW = 1000  # the draws that make a robot have device numbers of their own
 
 
 class Draw:
-    """Draws one robot's peculiarities: always the same ones for the same seed, robot and device."""
+    """Draws one robot's peculiarities: always the same ones for the same unit and device; of a robot that says no unit,
+    for the same seed, robot and device."""
 
-    def __init__(self, seed: int, noise: bool, robot: int = 0) -> None:
-        self._seed, self.noise, self._robot = seed & (2**64 - 1), noise, robot
+    def __init__(self, seed: int, noise: bool, robot: int = 0, unit: int | None = None) -> None:
+        """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout."""
+        self._seed, self.noise, self._robot, self._unit = seed & (2**64 - 1), noise, robot, unit
 
     def __call__(self, device: int, what: int) -> float:
         """Standard normal; 0 without noise."""
         if not self.noise:
             return 0.0
+        if self._unit is not None:
+            kept: float = lib.unit_normal(self._unit, _DRAW + device, what)
+            return kept
         value: float = lib.noise_normal(self._seed, self._robot, _DRAW + device, what)
         return value
 

@@ -96,7 +96,7 @@ class Sim:
         body = imperfections.body_parameters(description.body)
         done(lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading))
         self._members[number] = board, description
-        join(self.handle, number, description, imperfections.Draw(self.seed, self.noise, number))
+        join(self.handle, number, description, imperfections.Draw(self.seed, self.noise, number, description.unit))
         return self.robot(number)
 
     def robot(self, number: int) -> SimRobot:

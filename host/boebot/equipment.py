@@ -6,10 +6,17 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final, NoReturn
 
 from boebot import robots
+from boebot.devices.analog_infrared import AnalogInfrared, AnalogInfraredReader
+from boebot.devices.battery import Battery, BatteryReader
+from boebot.devices.buzzer import Buzzer, BuzzerReader
+from boebot.devices.compass import Compass, CompassReader
 from boebot.devices.encoder import Encoder, EncoderReader
-from boebot.devices.infrared import Infrared, InfraredReader
+from boebot.devices.infrared import Infrared, InfraredReader, InfraredZone, InfraredZoneReader
+from boebot.devices.light import Light, LightReader
 from boebot.devices.ping import Ping, PingReader
 from boebot.devices.servo import Servo, ServoReader
+from boebot.devices.told import Told
+from boebot.devices.turret import Turret, TurretReader
 from boebot.devices.whisker import Whisker, WhiskerReader
 from boebot.errors import BrainError
 from boebot.link import messages
@@ -22,12 +29,13 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "encoders": ("left_encoder", "right_encoder"),
     "servos": ("left_servo", "right_servo"),
     "lights": ("left_light", "right_light"),
+    "zones": ("left_zone", "right_zone"),
 }
 
 
 class Equipment:
-    """The devices of one robot, ready to be read: one reader per device, called with a telemetry message or, for a
-    robot without a board, with its readings.
+    """The devices of one robot, ready to be read: one reader per device, called with a telemetry message, those from
+    `left_light` on with what the board told of its slow devices; for a robot without a board all with its readings.
 
     In place of a device that the robot lacks stands a function that says so.
     """
@@ -42,13 +50,18 @@ class Equipment:
         "right_encoder",
         "left_servo",
         "right_servo",
-        "left_light",
-        "right_light",
         "odometer",
-        "compass",
         "laser",
         "accelerometer",
+        "left_light",
+        "right_light",
+        "compass",
         "battery",
+        "analog_ir",
+        "left_zone",
+        "right_zone",
+        "turret",
+        "buzzer",
     )
     left_whisker: Callable[[Any], Whisker]
     right_whisker: Callable[[Any], Whisker]
@@ -59,24 +72,33 @@ class Equipment:
     right_encoder: Callable[[Any], Encoder]
     left_servo: Callable[[Any], Servo]
     right_servo: Callable[[Any], Servo]
-    left_light: Callable[[Any], Reading]
-    right_light: Callable[[Any], Reading]
     odometer: Callable[[Any], OdometerPose]
-    compass: Callable[[Any], Heading]
     laser: Callable[[Any], Scan]
     accelerometer: Callable[[Any], Reading]
-    battery: Callable[[Any], Reading]
+    left_light: Callable[[Any], Light]
+    right_light: Callable[[Any], Light]
+    compass: Callable[[Any], Compass | Heading]
+    battery: Callable[[Any], Battery]
+    analog_ir: Callable[[Any], AnalogInfrared]
+    left_zone: Callable[[Any], InfraredZone]
+    right_zone: Callable[[Any], InfraredZone]
+    turret: Callable[[Any], Turret]
+    buzzer: Callable[[Any], Buzzer]
 
     def __init__(self, robot: robots.RobotDescription, tick_s: float, layout: Layout | None = None) -> None:
         """`layout`: where the readings of a robot without a board stand, once that is known."""
         self.robot_name = robot.name
         self.tick_s = tick_s
         found: dict[str, Any] = {}
+        slow: dict[str, Any] = {}
         if robot.has_board:
-            found = _board_readers(robot, tick_s)
+            slow = {name: _of_told(reader) for name, reader in slow_readers(robot, tick_s).items()}
+            found = _board_readers(robot, tick_s) | slow
         else:
             found.update(readers(robot, layout or {name: slice(0, 1) for name in robot.device if robot.has(name)}))
         self._found = frozenset(found)
+        self.tells_slowly = bool(slow)
+        """The board sends messages of slow devices."""
         for name in self.NAMES:
             setattr(self, name, found.get(name) or self._refusal(name))
 
@@ -105,6 +127,40 @@ class Equipment:
                 raise BrainError(f"a brain cannot need {need!r}; expected one of {known}")
             lacking += [name for name in GROUPS.get(need, (need,)) if not self.has(name)]
         return lacking
+
+
+SlowReader = Callable[[messages.DevicesTelemetry, float], Any]
+
+
+def slow_readers(robot: robots.RobotDescription, tick_s: float) -> dict[str, SlowReader]:
+    """One reader of devices_telemetry for each slow device of a board, by the brain's name of it."""
+    found: dict[str, SlowReader] = {}
+    for name, device in robot.device.items():
+        if not device.on:
+            continue
+        match device:
+            case robots.LightSensor() if name in ("light_left", "light_right"):
+                side = name.removeprefix("light_")
+                found[f"{side}_light"] = LightReader(side == "left", tick_s)
+            case robots.Compass() if name == "compass":
+                found["compass"] = CompassReader(tick_s, device.offset_counts)
+            case robots.Battery() if name == "battery":
+                found["battery"] = BatteryReader(device.ratio, tick_s)
+            case robots.AnalogInfrared() if name == "analog_infrared":
+                found["analog_ir"] = AnalogInfraredReader(tick_s)
+            case robots.PositionServo() if name == "turret":
+                found["turret"] = TurretReader(device.centre_us, device.gain_us_per_rad, tick_s)
+            case robots.Buzzer() if name == "buzzer":
+                found["buzzer"] = BuzzerReader(tick_s)
+            case robots.InfraredSchedule() if name == "infrared" and device.sweep:
+                for side in ("left", "right"):
+                    if robot.has(f"infrared_{side}"):
+                        found[f"{side}_zone"] = InfraredZoneReader(side == "left", device.period_ticks, tick_s)
+    return found
+
+
+def _of_told(reader: SlowReader) -> Callable[[Told], Any]:
+    return lambda told: reader(told.devices, told.since)
 
 
 def _board_readers(robot: robots.RobotDescription, tick_s: float) -> dict[str, Any]:

@@ -13,10 +13,10 @@ import msgspec
 
 from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS, Devices
 from boebot.link.session import Link
-from boebot.robots import RobotDescription
+from boebot.robots import InfraredSchedule, RobotDescription
 
 # parameter -> the keys of the description that it stands for besides its `default_from`
-_ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",)}
+_ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",), "infrared_sweep": ("infrared.sweep",)}
 
 
 def parameters_of(robot: RobotDescription) -> dict[str, float]:
@@ -28,6 +28,9 @@ def parameters_of(robot: RobotDescription) -> dict[str, float]:
             values[parameter] = float(getattr(robot.body, key))
         elif robot.has(owner):
             values[parameter] = float(getattr(robot.device[owner], key))
+    schedule = robot.device.get("infrared")
+    if isinstance(schedule, InfraredSchedule) and robot.has("infrared_left"):
+        values["infrared_sweep"] = float(schedule.sweep)
     return values
 
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from boebot import robots, vehicle_devices
+from boebot.devices.battery import Battery
+from boebot.devices.light import Light
 from boebot.devices.ping import Ping
 from boebot.devices.whisker import Whisker
 
@@ -76,7 +78,7 @@ class Scan(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """One number: an acceleration along the heading (m/s^2), a light's irradiance, a battery's voltage (V)."""
+    """One number: an acceleration along the heading (m/s^2)."""
 
     value: float
     age: float
@@ -147,7 +149,11 @@ def _reader(device: robots.AnyDevice, where: slice) -> Reader | None:
             return lambda sample: Heading(sample.values[first], sample.ages[first], True)
         case vehicle_devices.TouchWhisker():
             return lambda sample: _TOUCHING if sample.values[first] else _FREE
-        case vehicle_devices.Accelerometer() | vehicle_devices.Phototransistor() | vehicle_devices.Energy():
+        case vehicle_devices.Phototransistor():
+            return lambda sample: Light(None, sample.values[first], False, sample.ages[first], True)
+        case vehicle_devices.Energy():
+            return lambda sample: Battery(sample.values[first], sample.ages[first], True)
+        case vehicle_devices.Accelerometer():
             return lambda sample: Reading(sample.values[first], sample.ages[first], True)
     return None
 

@@ -16,15 +16,25 @@ from __future__ import annotations
 import random
 from typing import Final, NamedTuple
 
+from boebot.devices import buzzer, turret
+from boebot.devices.analog_infrared import AnalogInfrared
+from boebot.devices.battery import Battery
+from boebot.devices.buzzer import Buzzer
+from boebot.devices.compass import Compass
 from boebot.devices.encoder import Encoder
-from boebot.devices.infrared import Infrared
+from boebot.devices.infrared import Infrared, InfraredZone
+from boebot.devices.light import Light
 from boebot.devices.ping import Ping
 from boebot.devices.servo import Servo
+from boebot.devices.told import NOTHING_TOLD, Told
+from boebot.devices.turret import Turret
 from boebot.devices.whisker import Whisker
 from boebot.equipment import GROUPS
 from boebot.equipment import Equipment as Equipment
 from boebot.errors import BrainError
+from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import Status, Telemetry
+from boebot.link.messages import Turret as TurretMessage
 from boebot.readings import Heading, OdometerPose, Proximity, Reading, Readings, Scan
 
 SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol carries
@@ -41,6 +51,16 @@ class Command(NamedTuple):
 
 
 STOP: Final = Command("stop", 0.0, 0.0)
+
+
+class SlowCommand(NamedTuple):
+    """What a brain asks of turret and buzzer; None: nothing new."""
+
+    turret: TurretMessage | None = None
+    tone: BuzzerMessage | None = None
+
+
+NO_SLOW_COMMAND: Final = SlowCommand()
 
 
 class Observation(NamedTuple):
@@ -62,6 +82,8 @@ class Observation(NamedTuple):
     host_time_error: float = float("inf")
     """Error bound of `host_time` (s): the true instant lies within it, whatever the line's delays are, as long as the
     board's clock keeps its rate."""
+    slow: Told | Readings = NOTHING_TOLD
+    """What the slow devices said last; of a robot without a board the same as `sample`."""
 
     @property
     def tick(self) -> int:
@@ -119,24 +141,9 @@ class Observation(NamedTuple):
         return self.equipment.right_servo(self.sample)
 
     @property
-    def left_light(self) -> Reading:
-        """Left light sensor: `.value`."""
-        return self.equipment.left_light(self.sample)
-
-    @property
-    def right_light(self) -> Reading:
-        """Right light sensor: `.value`."""
-        return self.equipment.right_light(self.sample)
-
-    @property
     def odometer(self) -> OdometerPose:
         """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
         return self.equipment.odometer(self.sample)
-
-    @property
-    def compass(self) -> Heading:
-        """Compass: `.heading` (rad)."""
-        return self.equipment.compass(self.sample)
 
     @property
     def laser(self) -> Scan:
@@ -149,9 +156,49 @@ class Observation(NamedTuple):
         return self.equipment.accelerometer(self.sample)
 
     @property
-    def battery(self) -> Reading:
-        """Battery: `.value` (V)."""
-        return self.equipment.battery(self.sample)
+    def left_light(self) -> Light:
+        """Left light sensor: `.brightness`, twice as much in twice the light; or None."""
+        return self.equipment.left_light(self.slow)
+
+    @property
+    def right_light(self) -> Light:
+        """Right light sensor: `.brightness`, twice as much in twice the light; or None."""
+        return self.equipment.right_light(self.slow)
+
+    @property
+    def compass(self) -> Compass | Heading:
+        """Compass: `.heading` (rad), or None."""
+        return self.equipment.compass(self.slow)
+
+    @property
+    def battery(self) -> Battery:
+        """Battery: `.voltage` (V), or None."""
+        return self.equipment.battery(self.slow)
+
+    @property
+    def analog_ir(self) -> AnalogInfrared:
+        """Analog infra-red sensor: `.distance` in metres, or None."""
+        return self.equipment.analog_ir(self.slow)
+
+    @property
+    def left_zone(self) -> InfraredZone:
+        """Left infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
+        return self.equipment.left_zone(self.slow)
+
+    @property
+    def right_zone(self) -> InfraredZone:
+        """Right infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
+        return self.equipment.right_zone(self.slow)
+
+    @property
+    def turret(self) -> Turret:
+        """Turret as driven now: `.angle` (rad, counter-clockwise from ahead), or None: free."""
+        return self.equipment.turret(self.slow)
+
+    @property
+    def buzzer(self) -> Buzzer:
+        """Buzzer: `.token` of the last tone that the board began."""
+        return self.equipment.buzzer(self.slow)
 
 
 class Robot:
@@ -160,7 +207,17 @@ class Robot:
     The same object is handed to every step of a run; its sensors always show the newest observation.
     """
 
-    __slots__ = ("_chances", "_period", "_speed_limit", "command", "latched", "name", "observation", "random")
+    __slots__ = (
+        "_chances",
+        "_period",
+        "_speed_limit",
+        "command",
+        "latched",
+        "name",
+        "observation",
+        "random",
+        "slow_command",
+    )
 
     def __init__(self, name: str, period: float, seed: int = 1, speed_limit: float = SPEED_LIMIT) -> None:
         self.name: Final = name
@@ -168,6 +225,8 @@ class Robot:
         self._period = period
         self.observation: Observation
         self.command: Command = STOP
+        self.slow_command: SlowCommand | None = None
+        """What was asked of turret and buzzer and not yet carried out."""
         self.latched = False
         """The motors are latched off by `emergency_stop`, until `arm`."""
         self.random = random.Random(f"brain {seed}")
@@ -236,28 +295,10 @@ class Robot:
         return seen.equipment.right_encoder(seen.sample)
 
     @property
-    def left_light(self) -> Reading:
-        """Left light sensor: `.value`."""
-        seen = self.observation
-        return seen.equipment.left_light(seen.sample)
-
-    @property
-    def right_light(self) -> Reading:
-        """Right light sensor: `.value`."""
-        seen = self.observation
-        return seen.equipment.right_light(seen.sample)
-
-    @property
     def odometer(self) -> OdometerPose:
         """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
         seen = self.observation
         return seen.equipment.odometer(seen.sample)
-
-    @property
-    def compass(self) -> Heading:
-        """Compass: `.heading` (rad)."""
-        seen = self.observation
-        return seen.equipment.compass(seen.sample)
 
     @property
     def laser(self) -> Scan:
@@ -272,10 +313,58 @@ class Robot:
         return seen.equipment.accelerometer(seen.sample)
 
     @property
-    def battery(self) -> Reading:
-        """Battery: `.value` (V)."""
+    def left_light(self) -> Light:
+        """Left light sensor: `.brightness`, twice as much in twice the light; or None."""
         seen = self.observation
-        return seen.equipment.battery(seen.sample)
+        return seen.equipment.left_light(seen.slow)
+
+    @property
+    def right_light(self) -> Light:
+        """Right light sensor: `.brightness`, twice as much in twice the light; or None."""
+        seen = self.observation
+        return seen.equipment.right_light(seen.slow)
+
+    @property
+    def compass(self) -> Compass | Heading:
+        """Compass: `.heading` (rad), or None."""
+        seen = self.observation
+        return seen.equipment.compass(seen.slow)
+
+    @property
+    def battery(self) -> Battery:
+        """Battery: `.voltage` (V), or None."""
+        seen = self.observation
+        return seen.equipment.battery(seen.slow)
+
+    @property
+    def analog_ir(self) -> AnalogInfrared:
+        """Analog infra-red sensor: `.distance` in metres, or None."""
+        seen = self.observation
+        return seen.equipment.analog_ir(seen.slow)
+
+    @property
+    def left_zone(self) -> InfraredZone:
+        """Left infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
+        seen = self.observation
+        return seen.equipment.left_zone(seen.slow)
+
+    @property
+    def right_zone(self) -> InfraredZone:
+        """Right infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
+        seen = self.observation
+        return seen.equipment.right_zone(seen.slow)
+
+    @property
+    def turret(self) -> Turret:
+        """Turret as driven now: `.angle` (rad, counter-clockwise from ahead), or None: free."""
+        seen = self.observation
+        return seen.equipment.turret(seen.slow)
+
+    @property
+    def buzzer(self) -> Buzzer:
+        """Buzzer: `.token` of the last tone that the board began."""
+        seen = self.observation
+        return seen.equipment.buzzer(seen.slow)
 
     def has(self, name: str) -> bool:
         """Whether the robot has that device ("ping", "left_ir"), or all of that group ("whiskers", "infrared")."""
@@ -315,17 +404,67 @@ class Robot:
         self.command = Command("speed", left, right)
 
     def stop(self) -> None:
-        """Switches the motors off until the next command: no pulses, the wheels turn freely."""
+        """Switches the motors off until the next command: no pulses, the wheels turn freely. The turret stays, and a
+        tone goes on."""
         self.command = STOP
 
     def emergency_stop(self) -> None:
-        """Stops the motors and latches them off: no command moves them until `arm`."""
+        """Stops the motors and latches them off: no command moves them until `arm`. The turret is released and the
+        buzzer silenced; where the turret shall look then has to be said again, and it turns after `arm`."""
         self.command = STOP
+        self.slow_command = None
         self.latched = True
 
     def arm(self) -> None:
         """Ends what `emergency_stop` began: the next command moves the motors again."""
         self.latched = False
+
+    # ---- turret and buzzer ---------------------------------------------------------------------------------
+
+    def turn_turret(self, angle: float) -> None:
+        """Turns the turret to an angle in radians, counter-clockwise from straight ahead; it holds until the next one,
+        `release_turret` or `emergency_stop`. What stops the motors for a while (dead-man, reset) frees it meanwhile.
+
+        Raises:
+            BrainError: the robot has no turret, or the angle is beyond 1.6 rad or no number.
+        """
+        self._need("turret", "turn_turret")
+        try:
+            within = -turret.ANGLE_MAX <= angle <= turret.ANGLE_MAX
+        except (TypeError, ValueError):
+            raise BrainError(f"turn_turret({angle!r}) expects a number") from None
+        if not within:
+            raise BrainError(f"turn_turret({angle}): angles go from -{turret.ANGLE_MAX} to {turret.ANGLE_MAX} rad")
+        self.slow_command = (self.slow_command or NO_SLOW_COMMAND)._replace(turret=turret.command(angle))
+
+    def release_turret(self) -> None:
+        """No pulses for the turret: it is free.
+
+        Raises:
+            BrainError: the robot has no turret.
+        """
+        self._need("turret", "release_turret")
+        self.slow_command = (self.slow_command or NO_SLOW_COMMAND)._replace(turret=turret.command(None))
+
+    def beep(self, frequency: float, seconds: float) -> None:
+        """Sounds a tone (Hz, s) in place of the one that sounds, also while the motors are latched off; 0 Hz or 0 s:
+        silence. Whatever stops the motors silences it.
+
+        Raises:
+            BrainError: the robot has no buzzer, or it has no such tone.
+        """
+        self._need("buzzer", "beep")
+        try:
+            tone = buzzer.command(frequency, seconds, 0)  # the link gives it its token
+        except TypeError:
+            raise BrainError(f"beep({frequency!r}, {seconds!r}) expects two numbers") from None
+        except ValueError as error:
+            raise BrainError(f"beep({frequency}, {seconds}): {error}") from None
+        self.slow_command = (self.slow_command or NO_SLOW_COMMAND)._replace(tone=tone)
+
+    def _need(self, device: str, call: str) -> None:
+        if not self.observation.equipment.has(device):
+            raise BrainError(f"{call}(): robot {self.name!r} has no {device}")
 
     # ---- chance --------------------------------------------------------------------------------------------
 

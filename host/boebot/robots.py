@@ -117,6 +117,7 @@ class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=Tru
     """How often the IR pairs are read."""
 
     period_ticks: Annotated[int, msgspec.Meta(ge=2, le=250)]
+    sweep: bool = False  # flash at five frequencies in turn: zones of distance
 
 
 class Ping(Device, tag="ping", frozen=True, kw_only=True):
@@ -171,6 +172,7 @@ class Compass(Device, tag="compass", frozen=True, kw_only=True):
 
     sda_pin: int | str
     scl_pin: int | str
+    offset_counts: tuple[float, float] = (0.0, 0.0)  # of the robot's own iron along x and y, at 1090 counts a gauss
 
     PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
@@ -228,6 +230,9 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     body: Body
     device: dict[str, AnyDevice]
     pin_map: str = ""  # of the board's firmware
+    unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
+    """serial number of a simulated robot: what its parts are like is drawn by it and stays from run to run, whatever
+    the seed; 0: nominal. Without one each seed draws another robot."""
 
     @property
     def has_board(self) -> bool:

@@ -13,6 +13,8 @@ from boebot.devices.encoder import EDGE_PERIOD_SCALE, EncoderReader
 from boebot.devices.infrared import NEVER
 from boebot.devices.ping import PingReader
 from boebot.devices.servo import PULSE_SCALE_US
+from boebot.devices_series import DevicesSeries
+from boebot.equipment import slow_readers
 from boebot.link.messages import Infrared, Telemetry, Whiskers
 from boebot.odometry import Odometry, WheelDirection
 from boebot.record import Record
@@ -33,6 +35,7 @@ class TelemetrySeries(Series):
     def __init__(self, record: Record, robot: robots.RobotDescription, tick_s: float) -> None:
         super().__init__(record.times, record.steps)
         self._robot = robot
+        self._slow_messages = record.devices
         self._tick_s = tick_s
         self.raw: NDArray[np.void] = np.frombuffer(b"".join(record.telemetry), dtype=TELEMETRY_DTYPE)
         self.status = self.raw["status"]
@@ -111,6 +114,12 @@ class TelemetrySeries(Series):
         """What left and right wheel rolled from tick to tick (m, forward positive); the first entry is 0."""
         return self._travel("left", self.left_signal), self._travel("right", self.right_signal)
 
+    @cached_property
+    def devices(self) -> DevicesSeries:
+        """What the slow devices said; nothing, if there are none."""
+        readers = slow_readers(self._robot, self._tick_s)
+        return DevicesSeries(self._slow_messages, self.raw["tick"], self._restarted, readers, self._tick_s)
+
     def columns(self) -> dict[str, tuple[NDArray[np.generic], int | None]]:
         """See `Series`."""
         raw = self.raw
@@ -133,6 +142,7 @@ class TelemetrySeries(Series):
             "latch": (raw["latch"], None),
             "supply_v": (raw["supply"] / 1000, 3),
             "overruns": (raw["overruns"], None),
+            **self.devices.columns(),
         }
 
     def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:

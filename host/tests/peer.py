@@ -29,7 +29,7 @@ from boebot.boards import Truth
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
-from boebot.link.messages import AnswerStatus, EventKind, Latch, Status
+from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch, Status
 from boebot.parameters import parameters_of
 from boebot.robots import RobotDescription, load_robot
 
@@ -37,6 +37,10 @@ TICK_S = 0.01
 BYTE_S = 2e-5  # 500,000 baud
 ROOM_M = 1.5
 NONCES = 1 << 21
+SLOW_DEVICES = (
+    Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED | Devices.COMPASS | Devices.TURRET | Devices.BUZZER
+)
+FIELD_COUNTS = 200  # of the earth's field along the floor
 HELLO_TICKS, HELLO_SESSION_TICKS = 10, 20
 COUNTERS_TICKS = 64
 QUEUE = 4
@@ -69,6 +73,7 @@ class Peer:
         parameters: in force, by number, in counts.
         carried_out: requests carried out, in order, as (session, message).
         setpoints: those that arrived, and `setpoint_ticks`, when; `accepted`, those that count.
+        tones: (frequency in Hz, length in s) of those that were begun, in order.
         starts: how often it was started. openings: sessions that were opened.
     """
 
@@ -91,12 +96,15 @@ class Peer:
         self.overruns = 0  # modulo 256
         self.first_number = 0  # of requests and events in each session: to start near their roll-over
         self.supply_mv = 5000
+        self.battery_mv = 3600  # at the pin, behind the divider
+        self.light_us = (800, 1600)
         self.telemetry_period = 1
         self.saved: dict[int, int] | None = None
         self.carried_out: list[tuple[int, messages.Message]] = []
         self.setpoints: list[Setpoint] = []
         self.setpoint_ticks: list[int] = []
         self.accepted: list[Setpoint] = []
+        self.tones: list[tuple[int, float]] = []
         self.stops = 0
         self.openings: list[int] = []
         self.x = self.y = ROOM_M / 2
@@ -120,6 +128,9 @@ class Peer:
         self._sequence = self._random.randrange(256)
         self._frames = []
         self._edges = [0.0, 0.0]
+        self.turret_pulse = 0
+        self.sounding_until: float | None = None
+        self._tone_token = 0
         self._touching = False
         self.latch, self.latches = Latch.START, 1
         self.supply_measured = False
@@ -145,6 +156,7 @@ class Peer:
             "time_to_live": 250,
             "encoder_limit": 80,
             "telemetry_period": 1,
+            "devices_period": 2,
             "session_time_out": 1000,
             "retry_time": 0,
             "supply_minimum": 4200,
@@ -185,6 +197,7 @@ class Peer:
         self.openings.append(seed)
         self.decoder.seed = seed if self.protections.seed else SEED
         self._begin_numbers()
+        self._tone_token = 0
         if self._save_answer is not None:
             self._save_answer = None
         self._new_nonce()
@@ -235,6 +248,10 @@ class Peer:
             self.setpoints.append(message)
             self.setpoint_ticks.append(self.ticks)
             self._setpoint(message, sequence)
+        elif isinstance(message, messages.Turret):
+            self._turn(message)
+        elif isinstance(message, messages.Buzzer):
+            self._sound(message)
         elif isinstance(message, messages.Acknowledge):
             if self._event is not None and message.number == self._event.number:
                 self._event = None
@@ -320,7 +337,28 @@ class Peer:
         self._rest()
         self.status &= ~Status.DEAD_MAN
 
+    def _turn(self, message: messages.Turret) -> None:
+        if not message.hold:
+            self.turret_pulse = 0
+        elif self.latch != Latch.NONE or not self._is_on(Devices.TURRET) or abs(message.angle) > 16000:
+            self.counts["refused"] += 1
+        else:
+            pulse = self.parameter("turret_centre") + self.parameter("turret_gain") * message.angle / 10000
+            self.turret_pulse = round(min(max(pulse, 600 * 16), 2400 * 16))
+
+    def _sound(self, message: messages.Buzzer) -> None:
+        if not self._is_on(Devices.BUZZER) or (message.frequency and not 40 <= message.frequency <= 8000):
+            self.counts["refused"] += 1
+        elif message.token != self._tone_token:
+            self._tone_token = message.token
+            self.sounding_until = self.now() + message.duration / 100 if message.frequency else None
+            self.tones.append((message.frequency, message.duration / 100))
+
+    def _is_on(self, devices: Devices) -> bool:
+        return bool(Devices(self.parameter("devices")) & devices)
+
     def _rest(self) -> None:
+        self.turret_pulse, self.sounding_until = 0, None
         self.command, self._coasting, self._in_force = (0.0, 0.0), True, None
         self.status &= ~Status.MOTORS_ENABLED
 
@@ -412,6 +450,8 @@ class Peer:
             self._send(self._event)
         if self.ticks % period == 0:
             self._send(self._telemetry())
+        if self._is_on(SLOW_DEVICES) and self.ticks % self.parameter("devices_period") == 0:
+            self._send(self._devices_telemetry())
         if self.ticks % COUNTERS_TICKS == 0:
             self.counts["good"], self.counts["bad"] = self.decoder.good, self.decoder.bad
             self._send(messages.Counters(*(value & 0xFFFF for value in self.counts.values())))
@@ -445,6 +485,31 @@ class Peer:
             latches=self.latches,
             setpoint_sequence=self._setpoint_sequence,
             overruns=self.overruns % 256,
+        )
+
+    def _devices_telemetry(self) -> messages.DevicesTelemetry:
+        converted = round(self.battery_mv / self.supply_mv * 1024)
+        age = self.ticks % 4  # each is measured every fourth tick
+        return messages.DevicesTelemetry(
+            tick=self.ticks,
+            supply=self.supply_mv,
+            infrared_zone_left=0,
+            infrared_zone_right=0,
+            infrared_zone_age=255,
+            battery=converted if self._is_on(Devices.BATTERY) else 0,
+            battery_age=age if self._is_on(Devices.BATTERY) else 255,
+            analog_infrared=0,
+            analog_infrared_age=255,
+            light_left=self.light_us[0] if self._is_on(Devices.LIGHT) else 0,
+            light_right=self.light_us[1] if self._is_on(Devices.LIGHT) else 0,
+            light_age=age if self._is_on(Devices.LIGHT) else 255,
+            compass_x=round(FIELD_COUNTS * math.cos(self.heading)),
+            compass_y=round(-FIELD_COUNTS * math.sin(self.heading)),
+            compass_z=-400,
+            compass_age=age if self._is_on(Devices.COMPASS) else 255,
+            compass_status=messages.CompassStatus.OK if self._is_on(Devices.COMPASS) else messages.CompassStatus.OFF,
+            turret_pulse=self.turret_pulse,
+            buzzer_token=self._tone_token,
         )
 
     # ---- events ------------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ LAYOUT = {
 def robot_reading(*values: float) -> Robot:
     robot = Robot("arsim", 0.05)
     sample = Readings(7, 1, (0.0,) * len(values), values)
-    robot.observation = Observation(sample, Equipment(ARSIM, 0.01, LAYOUT), 0.07)
+    robot.observation = Observation(sample, Equipment(ARSIM, 0.01, LAYOUT), 0.07, slow=sample)
     return robot
 
 

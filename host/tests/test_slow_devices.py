@@ -110,13 +110,13 @@ def test_zone_of_each_side() -> None:
 def test_turret_told_and_read_back_is_the_same_angle(angle: float) -> None:
     message = turret.command(angle)
     pulse = round((1500.0 + 573.0 * message.angle * 1e-4) / 0.0625)
-    view = TurretReader(1500.0, 573.0)(NOTHING._replace(turret_pulse=pulse))
+    view = TurretReader(1500.0, 573.0, TICK_S)(NOTHING._replace(turret_pulse=pulse))
     assert message.hold == 1 and view.angle is not None and abs(view.angle - angle) <= 1.2e-4
 
 
 def test_turret_released_and_wrong_angles() -> None:
     assert turret.command(None).hold == 0
-    assert TurretReader(1500.0, 573.0)(NOTHING).angle is None
+    assert TurretReader(1500.0, 573.0, TICK_S)(NOTHING).angle is None
     assert turret.command(math.inf).angle == 16_000 and turret.command(-9.0).angle == -16_000
     with pytest.raises(ValueError, match="not a number"):
         turret.command(math.nan)
@@ -129,7 +129,7 @@ def test_buzzer_tokens_never_become_the_boards_own() -> None:
         seen.add(token)
     assert seen == set(range(1, 256))
     assert buzzer.command(440.0, 0.1, 7) == (440, 10, 7)
-    assert BuzzerReader()(NOTHING._replace(buzzer_token=9)).token == 9
+    assert BuzzerReader(TICK_S)(NOTHING._replace(buzzer_token=9)).token == 9
 
 
 @pytest.mark.parametrize(

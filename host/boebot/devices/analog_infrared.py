@@ -44,10 +44,11 @@ class AnalogInfraredReader:
     def __init__(self, tick_s: float) -> None:
         self._tick_s = tick_s
 
-    def __call__(self, devices: DevicesTelemetry) -> AnalogInfrared:
-        """The last reading as of that tick."""
-        ticks = devices.analog_infrared_age
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> AnalogInfrared:
+        """The last reading, `since` ticks after that message."""
+        told = devices.analog_infrared_age
+        ticks = told + since
         at_pin = voltage(devices.analog_infrared, devices.supply)
-        if ticks >= NEVER or at_pin is None:
+        if told >= NEVER or at_pin is None:
             return AnalogInfrared(None, None, float("inf"), False)
         return AnalogInfrared(distance(at_pin), at_pin, ticks * self._tick_s, ticks <= STALE_PERIODS * READ_TICKS)

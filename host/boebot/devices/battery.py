@@ -30,10 +30,11 @@ class BatteryReader:
         self._ratio = ratio
         self._tick_s = tick_s
 
-    def __call__(self, devices: DevicesTelemetry) -> Battery:
-        """The last measurement as of that tick."""
-        ticks = devices.battery_age
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Battery:
+        """The last measurement, `since` ticks after that message."""
+        told = devices.battery_age
+        ticks = told + since
         at_pin = voltage(devices.battery, devices.supply)
-        if ticks >= NEVER or at_pin is None:
+        if told >= NEVER or at_pin is None:
             return Battery(None, float("inf"), False)
         return Battery(at_pin * self._ratio, ticks * self._tick_s, ticks <= STALE_PERIODS * READ_TICKS)

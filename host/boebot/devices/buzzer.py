@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from boebot.devices.infrared import MESSAGE_TICKS, STALE_PERIODS
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
 
@@ -48,6 +49,9 @@ class Buzzer(NamedTuple):
 class BuzzerReader:
     """Reads the buzzer."""
 
-    def __call__(self, devices: DevicesTelemetry) -> Buzzer:
-        """The buzzer at that tick."""
-        return Buzzer(devices.buzzer_token, 0.0, True)
+    def __init__(self, tick_s: float) -> None:
+        self._tick_s = tick_s
+
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Buzzer:
+        """The buzzer as that message had it, `since` ticks ago."""
+        return Buzzer(devices.buzzer_token, since * self._tick_s, since <= STALE_PERIODS * MESSAGE_TICKS)

@@ -39,12 +39,13 @@ class CompassReader:
         self._tick_s = tick_s
         self._offset = offset
 
-    def __call__(self, devices: DevicesTelemetry) -> Compass:
-        """The last reading as of that tick."""
-        ticks, status = devices.compass_age, CompassStatus(devices.compass_status)
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Compass:
+        """The last reading, `since` ticks after that message."""
+        told, status = devices.compass_age, CompassStatus(devices.compass_status)
+        ticks = told + since
         counts = (devices.compass_x, devices.compass_y, devices.compass_z)
-        age = ticks * self._tick_s if ticks < NEVER else float("inf")
-        if ticks >= NEVER or OVERFLOW in counts:
+        age = ticks * self._tick_s if told < NEVER else float("inf")
+        if told >= NEVER or OVERFLOW in counts:
             return Compass(None, None, status, age, False)
         x, y, z = (count * TESLA_PER_COUNT for count in counts)
         ahead, aside = counts[0] - self._offset[0], counts[1] - self._offset[1]

@@ -13,6 +13,7 @@ from boebot.link.messages import DevicesTelemetry, Telemetry
 
 NEVER = 255  # age in telemetry: never measured, or older
 STALE_PERIODS = 3  # a reading older than this many of its periods is not valid
+MESSAGE_TICKS = 2  # from one message of the slow devices to the next, where the line is fast
 
 
 class Infrared(NamedTuple):
@@ -68,10 +69,11 @@ class InfraredZoneReader:
         self._fresh = min(STALE_PERIODS * max(period_ticks, SWEEP_TICKS), NEVER - 1)
         self._tick_s = tick_s
 
-    def __call__(self, devices: DevicesTelemetry) -> InfraredZone:
-        """The pair's last zone as of that tick."""
-        ticks = devices.infrared_zone_age
-        if ticks >= NEVER:
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> InfraredZone:
+        """The pair's last zone, `since` ticks after that message."""
+        told = devices.infrared_zone_age
+        ticks = told + since
+        if told >= NEVER:
             return InfraredZone(0, float("inf"), False)
         zone = devices.infrared_zone_left if self._left else devices.infrared_zone_right
         return InfraredZone(zone, ticks * self._tick_s, ticks <= self._fresh)

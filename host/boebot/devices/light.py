@@ -20,7 +20,8 @@ class Light(NamedTuple):
     decay_time: float | None
     """Seconds that the capacitor took; None if it could not be measured."""
     brightness: float | None
-    """1 / decay time (1/s): twice as much in twice the light. None if it could not be measured."""
+    """Twice as much in twice the light: 1 / decay time (1/s), or the irradiance in a robot without a board, whose
+    sensor needs no time. None if it could not be measured."""
     dark: bool
     """It took as long as the board waits, or longer."""
     age: float
@@ -36,11 +37,12 @@ class LightReader:
         self._left = left
         self._tick_s = tick_s
 
-    def __call__(self, devices: DevicesTelemetry) -> Light:
-        """The last reading as of that tick."""
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Light:
+        """The last reading, `since` ticks after that message."""
         us = devices.light_left if self._left else devices.light_right
-        ticks = devices.light_age
-        age = ticks * self._tick_s if ticks < NEVER else float("inf")
-        if ticks >= NEVER or us == 0:
+        told = devices.light_age
+        ticks = told + since
+        age = ticks * self._tick_s if told < NEVER else float("inf")
+        if told >= NEVER or us == 0:
             return Light(None, None, False, age, False)
         return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= STALE_PERIODS * FRAME_TICKS)

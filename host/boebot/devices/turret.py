@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from boebot.devices.infrared import MESSAGE_TICKS, STALE_PERIODS
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import DevicesTelemetry
 from boebot.link.messages import Turret as TurretMessage
 
 ANGLE_SCALE = 1e-4  # radians per count on the wire
 ANGLE_MAX = 1.6  # rad, either way
+PULSE_MIN_US, PULSE_MAX_US = 600.0, 2400.0  # the firmware goes no further
 
 
 def command(angle: float | None) -> TurretMessage:
@@ -26,6 +28,14 @@ def command(angle: float | None) -> TurretMessage:
     if angle != angle:
         raise ValueError("the turret's angle is not a number; expected radians, or None to release it")
     return TurretMessage(round(max(-ANGLE_MAX, min(ANGLE_MAX, angle)) / ANGLE_SCALE), 1)
+
+
+def pulse_of(message: TurretMessage, centre_us: float, gain_us_per_rad: float) -> int:
+    """The pulse (counts) by which the board shows that it has done so; 0: none."""
+    if not message.hold:
+        return 0
+    pulse_us = centre_us + gain_us_per_rad * message.angle * ANGLE_SCALE
+    return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
 
 
 class Turret(NamedTuple):
@@ -44,14 +54,16 @@ class Turret(NamedTuple):
 class TurretReader:
     """Reads the turret; centre and gain as its servo has them."""
 
-    def __init__(self, centre_us: float, gain_us_per_rad: float) -> None:
+    def __init__(self, centre_us: float, gain_us_per_rad: float, tick_s: float) -> None:
+        self._tick_s = tick_s
         self._centre_us = centre_us
         self._gain_us_per_rad = gain_us_per_rad
 
-    def __call__(self, devices: DevicesTelemetry) -> Turret:
-        """The turret at that tick."""
+    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Turret:
+        """The turret as that message had it, `since` ticks ago."""
+        age, valid = since * self._tick_s, since <= STALE_PERIODS * MESSAGE_TICKS
         if devices.turret_pulse == 0:
-            return Turret(None, None, 0.0, True)
+            return Turret(None, None, age, valid)
         pulse_us = devices.turret_pulse * PULSE_SCALE_US
         gain = self._gain_us_per_rad
-        return Turret((pulse_us - self._centre_us) / gain if gain else None, pulse_us, 0.0, True)
+        return Turret((pulse_us - self._centre_us) / gain if gain else None, pulse_us, age, valid)

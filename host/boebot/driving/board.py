@@ -15,7 +15,10 @@ import time as wall
 from collections.abc import Iterator
 from struct import Struct
 
+from boebot import robots
 from boebot.boards import BoardSession
+from boebot.devices import turret
+from boebot.devices.told import NOTHING_TOLD, Told, told
 from boebot.driving import PROGRESS_S, Task, check_period, whole_ticks
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
@@ -93,6 +96,8 @@ class BoardDriver:
         self._session = 0  # of the link that was configured and armed
         self._armed_tick = -1
         self._halted = False  # by the brain's emergency stop
+        self._told_payload: bytes | None = None
+        self._told = NOTHING_TOLD.devices  # that payload
 
     def begin(self) -> None:
         """Configures and arms the board."""
@@ -150,6 +155,33 @@ class BoardDriver:
                 if self.link.is_open:
                     self._arm()
             self._halted = False
+
+    def _heed_slow_command(self) -> None:
+        """The brain has asked something of turret or buzzer."""
+        asked, self.robot.slow_command = self.robot.slow_command, None
+        assert asked is not None
+        if asked.turret is not None:
+            servo = self.description.device["turret"]
+            assert isinstance(servo, robots.PositionServo)
+            pulse = turret.pulse_of(asked.turret, servo.centre_us, servo.gain_us_per_rad)
+            self.link.want_turret(asked.turret, pulse)
+        if asked.tone is not None:
+            self.link.want_tone(asked.tone)
+
+    def _slow(self, tick: int) -> Told:
+        """What the slow devices said last, as of that tick."""
+        payload = self.link.latest_devices
+        if payload is None:
+            return NOTHING_TOLD
+        if payload is not self._told_payload:
+            self._told_payload, self._told = payload, messages.DevicesTelemetry.unpack(payload)
+            self._put_devices_aside()
+        return told(self._told, tick)
+
+    def _put_devices_aside(self) -> None:
+        row = len(self.record.times) - 1
+        if row >= 0:
+            self.record.devices += [(row, payload) for payload in self.link.fetch_devices()]
 
     def _heed_latch(self, payload: bytes) -> None:
         """The board has latched its motors off: a reason to end the run, unless a new session mends it.
@@ -234,10 +266,14 @@ class BoardDriver:
                 if progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + PROGRESS_S
                     progress(time_s)
-                robot.observation = Observation(make(unpack(payload)), equipment, time_s, board_s, host_s, bound_s)
+                slow = self._slow(last) if equipment.tells_slowly else NOTHING_TOLD
+                sample = make(unpack(payload))
+                robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
                 yield time_s
                 if robot.latched or self._halted:
                     self._heed_emergency_stop()
+                if robot.slow_command is not None:
+                    self._heed_slow_command()
                 kind, left, right = robot.command
                 if kind == "signal":
                     link.send_signal(left, right, time_to_live_ms, last)
@@ -267,6 +303,7 @@ class BoardDriver:
     def end(self) -> None:
         """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
         dead-man."""
+        self._put_devices_aside()
         with contextlib.suppress(BoebotError, KeyboardInterrupt):
             self.link.stop_and_confirm(STOP_LIMIT_S)
             self.record.events += self.link.events()

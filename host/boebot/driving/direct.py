@@ -60,7 +60,7 @@ class DirectDriver:
             if progress is not None and wall.perf_counter() >= next_progress:
                 next_progress = wall.perf_counter() + PROGRESS_S
                 progress(time_s)
-            robot.observation = Observation(sample, equipment, time_s, time_s, time_s, 0.0)
+            robot.observation = Observation(sample, equipment, time_s, time_s, time_s, 0.0, sample)
             yield time_s
             command = robot.command
             steps.append((len(times) - 1, *command))

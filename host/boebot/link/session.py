@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from boebot.devices.buzzer import next_token
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.delivery import BoardEvent, LatchedAgainError, LinkTimes, RequestKind
@@ -123,11 +124,31 @@ class Link(Traffic):
         """No pulses, in answer to the observation of `tick`; nothing is latched."""
         self._send(_COAST.ID, _COAST.STRUCT.pack(time_to_live_ms, tick & 0xFFFF))
 
+    # ---- slow devices --------------------------------------------------------------------------------------------
+
+    def fetch_devices(self) -> list[bytes]:
+        """Payloads of the devices_telemetry that arrived since the last call, oldest first; does not wait."""
+        devices, self._devices = self._devices, []
+        return devices
+
+    def want_turret(self, turret: messages.Turret, pulse: int) -> None:
+        """Has the turret so until a stop: told until devices_telemetry shows `pulse` (counts; 0: none), and again when
+        a dead-man stop or a new session has released it. While the motors are latched it does not move."""
+        self._wants.turn(turret, pulse if turret.hold else 0)
+        self._tell_wanted(self._now())
+
+    def want_tone(self, tone: messages.Buzzer) -> None:
+        """Has a tone sound once, in place of the one before; its token is given here. Told until the board has begun
+        it or the session ends."""
+        self._wants.sound(tone._replace(token=next_token(self._wants.token)))
+        self._tell_wanted(self._now())
+
     # ---- stop --------------------------------------------------------------------------------------------------------
 
     def stop(self) -> None:
         """Stops the motors and latches them off until `arm`. Sent again, while anybody waits for the board, until it
-        is confirmed."""
+        is confirmed. The turret is free and the buzzer silent from then on, too."""
+        self._wants.stopped()
         self._stopping.begin()
         self._service(self._now())
 

@@ -1,5 +1,5 @@
 """The traffic of an open session: requests and stops that are sent until they are answered, events that are
-acknowledged, telemetry, clock probes (protocol/PROTOCOL.md, "Delivery", "Clock")."""
+acknowledged, telemetry, clock probes, turret and buzzer (protocol/PROTOCOL.md, "Delivery", "Clock")."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from boebot.link.line import NEVER
 from boebot.link.opening import Opening
 from boebot.link.probes import ClockProbes
 from boebot.link.transport import CountsOverruns, Transport
+from boebot.link.wanted import Wanted
 
 Telemetry = tuple[bytes, float, float, float]
 """(payload, board time of its tick in s, host time of that in s, error bound of the host time in s)"""
@@ -20,6 +21,8 @@ _PERIOD = messages.PARAMETERS["telemetry_period"]
 _STOP_BYTES = 20
 _PERIODS_LATE = 3  # telemetry that comes later than so many of its periods after its tick is counted
 _TELEMETRY_ROOM = 4096  # messages that nobody fetched
+_LATCH = 34  # offset in telemetry
+_FRAME_TICKS = 2  # of the servos: no pulse shows sooner
 
 
 class Traffic(Opening):
@@ -28,6 +31,7 @@ class Traffic(Opening):
     Attributes, besides those of `Opening` and `Line`:
         board_resets: how many ends of sessions were resets of the board; noticed by its count of ticks.
         latest: the newest telemetry of this session, or None.
+        latest_devices: the newest devices_telemetry of this session, or None: most robots have none.
         board_counters: what the board's end has counted.
     """
 
@@ -35,8 +39,11 @@ class Traffic(Opening):
         super().__init__(transport, record, times, take_over)
         self.board_resets = 0
         self.latest: bytes | None = None
+        self.latest_devices: bytes | None = None
         self.board_counters = BoardCounters()
         self._telemetry: list[Telemetry] = []
+        self._devices: list[bytes] = []
+        self._wants = Wanted()
         self._dropped = 0
         self._late = 0
         self._late_after_s = NEVER  # three telemetry periods
@@ -50,6 +57,7 @@ class Traffic(Opening):
         self._probe_due = NEVER
         self._handlers |= {
             messages.Telemetry.ID: self._hear_telemetry,
+            messages.DevicesTelemetry.ID: self._hear_devices,
             messages.Answer.ID: self._hear_answer,
             messages.Event.ID: self._hear_event,
             messages.Stopped.ID: self._hear_stopped,
@@ -65,7 +73,7 @@ class Traffic(Opening):
             bad=decoder.bad,
             resynchronised=decoder.resynchronised,
             lost=decoder.lost,
-            retransmitted=requests.retransmitted + self._stopping.retransmitted,
+            retransmitted=requests.retransmitted + self._stopping.retransmitted + self._wants.retransmitted,
             duplicate=requests.duplicate + events.duplicate,
             stray=requests.stray + events.stray,
             overrun=self.transport.overruns if isinstance(self.transport, CountsOverruns) else 0,
@@ -177,6 +185,7 @@ class Traffic(Opening):
         self._requests.new_session()
         self._events.new_session()
         self._stopping.wanted = False  # a new session begins latched
+        self._wants.new_session()
         self._probe_due = now
 
     def _end_session(self) -> None:
@@ -186,7 +195,8 @@ class Traffic(Opening):
         if self.latest is not None:
             self._last_tick = int.from_bytes(self.latest[:4], "little")
             self._last_heard_s = self._latest_s
-        self.latest = None
+        self.latest = self.latest_devices = None
+        self._devices = []
         self._probes.waiting.clear()
         self._probe_due = NEVER
 
@@ -232,6 +242,28 @@ class Traffic(Opening):
         if len(self._telemetry) > _TELEMETRY_ROOM:
             self._dropped += 1
             del self._telemetry[0]
+
+    def _hear_devices(self, payload: bytes, now: float) -> None:
+        if not self.is_open:
+            return
+        self.latest_devices = payload
+        self._devices.append(payload)
+        if len(self._devices) > _TELEMETRY_ROOM:
+            self._dropped += 1
+            del self._devices[0]
+        if self._wants.any:
+            self._wants.shown(payload)
+            self._tell_wanted(now)
+
+    def _tell_wanted(self, now: float) -> None:
+        """Tells the board what is wanted of turret and buzzer and not yet shown, unless that was done lately."""
+        if not self.is_open:
+            return
+        latched = self.latest is None or self.latest[_LATCH] != messages.Latch.NONE
+        retry_s = self.times.retry_after(self._tick_s, self.byte_s, self.round_trips.longest())
+        retry_s += _FRAME_TICKS * self._tick_s
+        for message in self._wants.due(now, retry_s, latched, self.latest_devices):
+            self._send(message.ID, message.pack())
 
     def _hear_first_telemetry(self, payload: bytes, now: float) -> None:
         """Of a session: a count of ticks that has not gone on from that of the session before tells of a reset."""
