@@ -25,16 +25,15 @@ class Strand:
     """
 
     def __init__(self, work: Callable[[], None], name: str) -> None:
-        """Nothing runs yet: see `resume`."""
+        """Nothing of it runs yet: see `resume`, which has to be called until it is done."""
         self.said = PAUSED
         self.error: BaseException | None = None
         self._work = work
         self._thrown: BaseException | None = None
-        self._running = False
-        self._started = False
+        self._running = False  # whose turn it is; what is in the queues only wakes who waits for it
         self._go: SimpleQueue[None] = SimpleQueue()
         self._paused: SimpleQueue[None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        threading.Thread(target=self._run, name=name, daemon=True).start()
 
     @property
     def is_done(self) -> bool:
@@ -50,16 +49,12 @@ class Strand:
         if self.is_done:
             return DONE
         self._thrown = error
-        self._running = True
-        if self._started:
-            self._go.put(None)
-        else:
-            self._started = True
-            self._thread.start()
         interrupted: KeyboardInterrupt | None = None
+        self._running = True
         while self._running:
             try:
-                self._paused.get()  # an earlier stretch's sign only turns the loop once more
+                self._go.put(None)
+                self._paused.get()
             except KeyboardInterrupt as caught:
                 interrupted = caught
         if interrupted is not None:
@@ -68,21 +63,25 @@ class Strand:
 
     def pause(self, saying: str = PAUSED) -> None:
         """Called by the function: ends the stretch. Returns, or raises what `resume` was given, when it goes on."""
+        self._give_back(saying)
+        self._await_turn()
+
+    def _give_back(self, saying: str) -> None:
         self.said = saying
         self._running = False
         self._paused.put(None)
-        self._go.get()
+
+    def _await_turn(self) -> None:
+        while not self._running:
+            self._go.get()
         thrown, self._thrown = self._thrown, None
         if thrown is not None:
             raise thrown
 
     def _run(self) -> None:
         try:
-            if self._thrown is not None:
-                raise self._thrown
+            self._await_turn()
             self._work()
         except BaseException as error:  # whoever resumes the strand hears of it
             self.error = error
-        self.said = DONE
-        self._running = False
-        self._paused.put(None)
+        self._give_back(DONE)
