@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 GAPS_M = (0.3, 0.1, 0.02)  # between robots, and to what is around, that places are looked for with, in this order
 WALL_GAP_M = 0.1  # at most
 CELL_M = 0.1
-FAR_M = 15.0  # from the first robot's place
-
+FAR_M = 15.0  # from the start that places are looked for, in a field without outline
 
 Pose = tuple[float, float, float]
 
@@ -163,18 +162,27 @@ def _found(arena: Arena, taken: Sequence[_Disc], number: int, radius: float) -> 
     x, y, _ = arena.start
     if arena.is_free(x, y, radius) and all(other.gap(x, y, radius) >= 0 for other in taken):
         return _Disc(number, x, y, radius)
+    reach = _reach(arena)
     for gap in GAPS_M:
         room = radius + min(gap, WALL_GAP_M)
-        for dx, dy in _around():
+        for dx, dy in _around(reach):
             place = x + dx, y + dy
             if all(other.gap(*place, radius) >= gap for other in taken) and arena.is_free(*place, room):
                 return _Disc(number, *place, radius)
     raise ArenaError(f"arena {arena.name} has no free place for robot {number}; expected fewer robots, or poses")
 
 
-def _around() -> Iterator[tuple[float, float]]:
+def _reach(arena: Arena) -> float:
+    """How far from its start the arena goes (m)."""
+    if not arena.description.outline:
+        return FAR_M
+    x, y, _ = arena.start
+    return max(abs(value) for outline in arena.outlines for corner in outline - (x, y) for value in corner)
+
+
+def _around(reach: float) -> Iterator[tuple[float, float]]:
     """Steps to the points of a lattice, in square rings about the middle, near ones first in each."""
-    for ring in range(1, round(FAR_M / CELL_M) + 1):
+    for ring in range(1, math.ceil(reach / CELL_M) + 1):
         edge = range(-ring, ring + 1)
         sides = itertools.product((-ring, ring), edge)
         cells = {cell for i, j in sides for cell in ((i, j), (j, i))}

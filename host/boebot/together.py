@@ -175,6 +175,7 @@ class _Robot:
         self.task = task
         self.driver: BoardDriver | None = None
         self.error: BaseException | None = None
+        self.result: RunResult | None = None
         self.is_ending = False  # its motors are being stopped
         self.time_s = 0.0
         self._session = session
@@ -192,6 +193,7 @@ class _Robot:
         finally:
             self.is_ending = True
             driver.end()
+            self.result = driver.result(None, 0.0)  # now: what comes later is the others' time
 
     def turn(self, error: BaseException | None = None) -> None:
         """Goes on until it waits for time to pass, or is done; the brain steps meanwhile.
@@ -289,8 +291,9 @@ class _Run:
         """Raises the error of a run that never began."""
         results: list[RunResult] = []
         for robot in self._robots:
-            if robot.driver is None:
+            if (result := robot.result) is None:
                 raise error if error is not None else BoebotError(f"robot {robot.number} did not begin")
-            own = error if isinstance(error, KeyboardInterrupt) else robot.failure
-            results.append(robot.driver.result(own, elapsed_s))
+            result.error = error if isinstance(error, KeyboardInterrupt) else robot.failure
+            result.wall_time = elapsed_s
+            results.append(result)
         return TogetherResult(robots=results, error=error)

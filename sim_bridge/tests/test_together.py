@@ -19,6 +19,8 @@ import boebot
 from boebot import Member
 from boebot.boards import BoardRequest
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
+from boebot.link import frame
+from boebot.link.messages import Hello, Stopped
 from boebot.report import scene
 from boebot.result import RunResult
 from boebot.robot import Robot
@@ -160,10 +162,11 @@ def fails(robot: Robot) -> None:
 
 
 def stopped(result: RunResult) -> bool:
-    """The board confirmed a stop: the last that it was told is to stop and to close, and its wheels are at rest."""
-    truth = result.truth
-    assert truth is not None and truth.left_speed is not None
-    return abs(truth.left_speed[-1]) < 0.08
+    """Its board has confirmed a stop."""
+    received = result.bytes_from_board
+    hellos = [payload for number, _, payload in frame.Decoder(frame.NO_SESSION).feed(received) if number == Hello.ID]
+    session = next(hello.session for hello in map(Hello.unpack, hellos) if hello.session)
+    return Stopped.ID in [number for number, _, _ in frame.Decoder(session).feed(received)]
 
 
 def test_error_in_one_brain_ends_the_run_and_names_the_robot() -> None:
@@ -225,7 +228,6 @@ def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
         ([Member(), Member()], {"on": "/dev/ttyACM0"}, BoardError, "run each robot by itself there"),
         ([Member(), Member()], {"on": "toaster"}, BoardError, "there is no board 'toaster'"),
         ([Member()] * 65, {"arena": "empty"}, BoardError, "65 robots are too many; expected at most 64"),
-        ([Member()] * 60, {"arena": "wedge"}, ArenaError, "has no free place for robot"),
         ([Member(pose=(0, 0, 0)), Member(pose=(0.1, 0, 0))], {"arena": "empty"}, ArenaError, "robots 1 and 2 overlap"),
         ([Member(pose=(9, 9, 0))], {"arena": "room"}, ArenaError, "robot 1 cannot start at x = 9 m, y = 9 m"),
         ([Member(pose=(math.nan, 0, 0))], {"arena": "empty"}, ArenaError, "robot 1 cannot start at nan"),
@@ -264,6 +266,16 @@ def test_places_given_are_kept_and_others_keep_off() -> None:
     places = places_of(arena, [BoardRequest(robot=robot), BoardRequest(robot=robot, start_pose=given)])
     assert places[1] == given
     assert math.hypot(places[0][0] - given[0], places[0][1] - given[1]) >= 2 * robot.body.radius_m + 0.3
+
+
+def test_no_place_left_is_told(tmp_path: Path) -> None:
+    box = tmp_path / "box.toml"
+    box.write_text(
+        'name = "box"\n[start]\nx_m = 0.2\ny_m = 0.2\nheading_rad = 0.0\n'
+        "[[outline]]\ncorners_m = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.4], [0.0, 0.4]]\n"
+    )
+    with pytest.raises(ArenaError, match=r"^arena box has no free place for robot [3-9]; expected fewer robots, or"):
+        boebot.run_together([Member()] * 9, box)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
