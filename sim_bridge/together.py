@@ -177,7 +177,7 @@ def _reach(arena: Arena) -> float:
     if not arena.description.outline:
         return FAR_M
     x, y, _ = arena.start
-    return max(abs(value) for outline in arena.outlines for corner in outline - (x, y) for value in corner)
+    return max(float(abs(value)) for outline in arena.outlines for corner in outline - (x, y) for value in corner)
 
 
 def _around(reach: float) -> Iterator[tuple[float, float]]:

@@ -115,10 +115,12 @@ def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:
         BoebotError: they contradict each other.
     """
     count = max(brains, kinds, poses) if robots is None else robots
-    for what, given, once in (("brains", brains, True), ("--robot", kinds, True), ("--pose", poses, False)):
-        if given > count or (once and given not in (1, count)):
-            fewer = f"1 or {count}" if once else f"at most {count}"
-            raise BoebotError(f"{given} of {what} are given for {count} robots; expected {fewer}")
+    given = {f"{brains} brains": brains, f"{kinds} times --robot": kinds}
+    for what, times in given.items():
+        if times not in (1, count):
+            raise BoebotError(f"there are {what} for {count} robots; expected 1 or {count}")
+    if poses > count:
+        raise BoebotError(f"there are {poses} times --pose for {count} robots; expected at most {count}")
     return count
 
 
