@@ -11,13 +11,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 import boebot
-from boebot import Member
-from boebot.boards import BoardRequest
+from boebot import Member, together
+from boebot.boards import BoardRequest, SharedWorld, open_together
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
@@ -27,7 +28,7 @@ from boebot.robot import Robot
 from boebot.robots import load_robot
 from boebot.together import StoppedError, execute_together
 from sim_bridge.arena import load_arena
-from sim_bridge.together import places_of
+from sim_bridge.together import SimWorld, places_of
 
 SECONDS = 8.0
 
@@ -123,6 +124,34 @@ def test_two_that_drive_head_on_bump_and_go_on() -> None:
         assert (robot.late_steps, robot.resets, robot.sessions_lost, robot.lost_frames, robot.dead_man_stops) == (
             0,
         ) * 5
+
+
+def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    worlds: list[SimWorld] = []
+
+    def opened(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
+        world = open_together(url, requests)
+        assert isinstance(world, SimWorld)
+        worlds.append(world)
+        return world
+
+    def unlucky(robot: Robot) -> None:
+        robot.drive(0.6, 0.6)
+        if robot.time == 1.0:
+            worlds[-1].sessions[1].board.reset("external")
+
+    monkeypatch.setattr(together, "open_together", opened)
+    far = (50.0, 0.0, 0.0)
+    calm, troubled = (
+        boebot.run_together([Member(), Member(brain=brain, pose=far)], "empty", 4.0) for brain in (ahead, unlucky)
+    )
+    assert digest(calm.robots[0]) == digest(troubled.robots[0])
+    first, second = troubled.robots
+    assert (first.resets, first.sessions_lost) == (0, 0)
+    assert (second.resets, second.sessions_lost) == (1, 1)
+    assert second.run_time == pytest.approx(4.0, abs=0.011) and second.distance > 0.2
 
 
 def test_same_run_twice_is_the_same() -> None:
