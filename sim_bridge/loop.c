@@ -3,7 +3,7 @@
 
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
 #define FIRST_OBSTACLE_ID 0x80000000u      /* among the movers; robots have those below */
-#define SLICE_CYCLES 4000u                 /* how often the line is looked at while bytes are coming */
+#define SLICE_CYCLES 4000u                 /* how often lines are looked at while somebody listens */
 
 /* ---- what boards do and ask ---------------------------------------------------------------------------------------- */
 
@@ -154,44 +154,66 @@ static void take_bytes(robot *r) {
   }
 }
 
-static int is_heard(const robot *r, int number) { return number == SIM_ANY || r->number == number; }
+/* Lines are looked at only at the ends of world steps and slices, counted from power-on: when a robot is heard does not
+ * depend on how the others cut the run. */
+static int is_look(const sim *self) { return self->now == self->world || self->now % SLICE_CYCLES == 0; }
 
-/* Bytes have come from a robot that is listened to. */
-static int bytes_wait(const sim *self, int number) {
+/* Bytes have come since somebody listens to the robot, and its line has been idle since. */
+static int message_waits(const robot *r, uint64_t now) {
+  return now >= r->listen_from && r->received.count > 0 && now >= r->last_byte + r->idle;
+}
+
+static int somebody_speaks(const sim *self) {
   for (int i = 0; i < self->robot_count; i++) {
-    const robot *r = self->robots[i];
-    if (is_heard(r, number) && r->received.count > 0) return 1;
+    if (message_waits(self->robots[i], self->now)) return 1;
   }
   return 0;
 }
 
-/* And a line of one of them has been idle since. */
-static int message_waits(const sim *self, int number, uint64_t now) {
+/* Up to where boards run next. */
+static uint64_t next_target(const sim *self, uint64_t deadline) {
+  uint64_t target = self->world < deadline ? self->world : deadline;
+  const uint64_t slice = self->now - self->now % SLICE_CYCLES + SLICE_CYCLES;
   for (int i = 0; i < self->robot_count; i++) {
-    const robot *r = self->robots[i];
-    if (is_heard(r, number) && r->received.count > 0 && now >= r->last_byte + r->idle) return 1;
+    if (slice < target && slice >= self->robots[i]->listen_from) target = slice;
   }
-  return 0;
+  return target;
 }
 
-int sim_run(sim *self, int number, uint64_t max_cycles, uint64_t quiet_cycles) {
-  const uint64_t deadline = self->now + max_cycles;
-  const uint64_t earliest = self->now + (quiet_cycles < max_cycles ? quiet_cycles : max_cycles);
+int sim_run_until(sim *self, uint64_t deadline) {
   while (self->now < deadline) {
     if (self->world <= self->now) step_world(self);
-    uint64_t target = self->world < deadline ? self->world : deadline;
-    if (self->now >= earliest && self->now + SLICE_CYCLES < target && bytes_wait(self, number)) {
-      target = self->now + SLICE_CYCLES;
-    }
+    const uint64_t target = next_target(self, deadline);
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];
       if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + r->number;
       take_bytes(r);
     }
     self->now = target;
-    if (self->now >= earliest && message_waits(self, number, target)) return 0;
+    if (is_look(self) && somebody_speaks(self)) return 0;
   }
   return 0;
+}
+
+int sim_run(sim *self, int number, uint64_t max_cycles, uint64_t quiet_cycles) {
+  const uint64_t from = self->now + (quiet_cycles > 0 ? quiet_cycles : 1);
+  for (int i = 0; i < self->robot_count; i++) {
+    robot *r = self->robots[i];
+    r->listen_from = number == SIM_ANY || r->number == number ? from : SIM_NEVER;
+  }
+  return sim_run_until(self, self->now + max_cycles);
+}
+
+int sim_listen(sim *self, int number, uint64_t from) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL) return SIM_BAD_ARGUMENT;
+  r->listen_from = from;
+  return SIM_OK;
+}
+
+int sim_speaks(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r != NULL && is_look(self) && message_waits(r, self->now);
 }
 
 uint64_t sim_now(const sim *self) { return self->now; }

@@ -79,6 +79,14 @@ int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_paramet
  * crashed. */
 int sim_run(sim *self, int robot, uint64_t max_cycles, uint64_t quiet_cycles);
 
+/* The same for several listeners: from that cycle on bytes from the robot end a run (2^64 - 1: never). `sim_run_until` runs
+ * until a cycle, or until they have come from a robot that is listened to and its line has been idle for two byte times;
+ * `sim_speaks` says whether that is so for a robot now. When a robot is heard does not depend on the other listeners.
+ * `sim_run` sets all of that anew. */
+int sim_listen(sim *self, int robot, uint64_t from);
+int sim_run_until(sim *self, uint64_t deadline);
+int sim_speaks(const sim *self, int robot);
+
 /* The cycle up to which the simulation has run. */
 uint64_t sim_now(const sim *self);
 

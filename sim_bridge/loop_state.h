@@ -8,6 +8,7 @@
 #include "parts/part.h"
 
 #define WAVES_MAXIMUM 4
+#define SIM_NEVER UINT64_MAX
 
 /* A square wave that a test puts on a pin. */
 typedef struct {
@@ -35,8 +36,9 @@ typedef struct {
   wave wave[WAVES_MAXIMUM];
   int waves;
   buffer received;
-  uint64_t last_byte; /* cycle of the end of the last byte received */
-  uint64_t idle;      /* cycles without a byte after which the line is idle: two bytes' time */
+  uint64_t last_byte;   /* cycle of the end of the last byte received */
+  uint64_t listen_from; /* bytes end a run from this cycle on */
+  uint64_t idle;        /* cycles without a byte after which the line is idle: two bytes' time */
   buffer truth;
   buffer looks;
   buffer tones;

@@ -1,6 +1,7 @@
 """A robot in a simulated world as the host opens it: bytes, pins, truth.
 
-`open_native` and `open_avr` are what the entry points of the group `boebot.boards` name. A session joins one emulated
+`open_native` and `open_avr` are what the entry points of the group `boebot.boards` name: called with one request they
+give a session, their `together` puts several robots into one world (sim_bridge.together). A session joins one emulated
 board to a body in an arena, by the robot's description; the loop that advances both is C (loop.h), and Python is called
 only where somebody reads or writes bytes.
 """
@@ -8,10 +9,11 @@ only where somebody reads or writes bytes.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 from boebot import robots
-from boebot.boards import BoardRequest, Truth
+from boebot.boards import BoardRequest, SharedWorld, Truth
 from boebot.errors import BoardError
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.board import CLOCK_HZ
@@ -22,19 +24,23 @@ from sim_bridge.sim import Floats, Sim, SimRobot
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
 
+Wait = Callable[[SimRobot, int, int], None]
+"""Lets time pass for a robot: at most so many cycles; after so many quiet ones, until its bytes have come."""
+
+
 class SimTransport:
     """The board's serial line, in this process. Time passes only while `read` waits."""
 
     realtime = False
     baud_given = False
 
-    def __init__(self, robot: SimRobot, name: str, paced: bool = False) -> None:
-        """`paced`: `read` also waits until as much time has passed on the wall."""
+    def __init__(self, robot: SimRobot, name: str, wait: Wait | None = None) -> None:
+        """`wait` lets time pass; None: for this robot alone."""
         self.name = name
         self.baud = _baud(robot.description)
         self._robot = robot
         self._sim = robot.sim
-        self._pace = Pace(robot.sim) if paced else None
+        self._wait = wait or alone(robot.sim)
         self._closed = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
@@ -48,10 +54,7 @@ class SimTransport:
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
-        sim = self._sim
-        sim.run(cycles, quiet, self._robot)
-        if self._pace is not None:
-            self._pace.wait()
+        self._wait(self._robot, cycles, quiet)
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
 
@@ -106,17 +109,31 @@ class Pace:
             self._start -= behind
 
 
+def alone(sim: Sim, paced: bool = False) -> Wait:
+    """Time passes for one robot only. `paced`: at most as fast as on the wall."""
+    pace = Pace(sim) if paced else None
+
+    def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
+        sim.run(cycles, quiet, robot)
+        if pace is not None:
+            pace.wait()
+
+    return wait
+
+
 class SimSession:
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
-    def __init__(self, robot: SimRobot, kind: str, paced: bool = False) -> None:
+    def __init__(self, robot: SimRobot, kind: str, wait: Wait, *, shared: bool = False) -> None:
+        """`shared`: the world is not this robot's alone, and is closed by somebody else."""
         self.robot = robot
         self.sim = robot.sim
         self.arena = robot.sim.arena
         self.description = f"{robot.board.description} in arena {self.arena.name}"
-        self.transport = SimTransport(robot, kind, paced)
+        self.transport = SimTransport(robot, kind, wait)
         self.transport.set_baud(self.transport.baud)
         self.board = BoardPins(robot)
+        self._shared = shared
         self._closed = False
 
     def truth(self) -> Truth | None:
@@ -159,41 +176,65 @@ class SimSession:
             return
         self._closed = True
         self.transport.close()
-        self.sim.close()
+        if not self._shared:
+            self.sim.close()
 
 
-def open_native(request: BoardRequest) -> SimSession:
-    """Opens the native board: the firmware's own C on this computer."""
-    library = native_library(request.robot.pin_map) if request.image is None else image_file(request.image)
-    return _open(request, "native", lambda: native_board(library))
+class BoardKind:
+    """A kind of emulated board (TogetherFactory of boebot.boards)."""
+
+    def __init__(self, name: str, find: Callable[[str], Path], make: Callable[[Path], EmulatedBoard]) -> None:
+        """`find`: the bundled firmware for a pin map; `make`: a board with some firmware."""
+        self.name = name
+        self._find, self._make = find, make
+
+    def __call__(self, request: BoardRequest) -> SimSession:
+        """Opens one robot in a world of its own."""
+        sim = new_sim(request)
+        try:
+            robot = self.add(sim, request)
+        except Exception:
+            sim.close()
+            raise
+        return SimSession(robot, self.name, alone(sim, request.realtime))
+
+    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
+        """Opens several robots in one world."""
+        from sim_bridge.together import SimWorld
+
+        return SimWorld(self, requests)
+
+    def add(self, sim: Sim, request: BoardRequest) -> SimRobot:
+        """Puts the request's robot with its board into a world."""
+        find = self._find
+        board = self._make(find(request.robot.pin_map) if request.image is None else image_file(request.image))
+        try:
+            return sim.add(board, request.robot, pose=request.start_pose)
+        except Exception:
+            board.close()
+            raise
 
 
-def open_avr(request: BoardRequest) -> SimSession:
-    """Opens the emulated ATmega328P with the image that would be flashed."""
-    image = avr_image(request.robot.pin_map) if request.image is None else image_file(request.image)
-    return _open(request, "avr", lambda: avr_board(image))
+open_native = BoardKind("native", native_library, native_board)
+"""The native board: the firmware's own C on this computer."""
+
+open_avr = BoardKind("avr", avr_image, avr_board)
+"""The emulated ATmega328P with the image that would be flashed."""
 
 
-def _baud(robot: robots.RobotDescription) -> int:
-    """Of the robot's serial line."""
-    uart = robot.device.get("uart")
-    return uart.baud if isinstance(uart, robots.Uart) else DEFAULT_BAUD
-
-
-def _open(request: BoardRequest, kind: str, make: Callable[[], EmulatedBoard]) -> SimSession:
+def new_sim(request: BoardRequest) -> Sim:
+    """The world that a request wants, without robots."""
     step_cycles = round(float(request.options.get("world_step_s", 0.001)) * CLOCK_HZ)
-    sim = Sim(
+    return Sim(
         load_arena(request.arena),
         seed=request.seed,
         noise=request.noise,
         record=request.record,
         step_cycles=step_cycles,
     )
-    board = make()
-    try:
-        robot = sim.add(board, request.robot, pose=request.start_pose)
-    except Exception:
-        sim.close()
-        board.close()
-        raise
-    return SimSession(robot, kind, request.realtime)
+
+
+def _baud(robot: robots.RobotDescription) -> int:
+    """Of the robot's serial line."""
+    uart = robot.device.get("uart")
+    return uart.baud if isinstance(uart, robots.Uart) else DEFAULT_BAUD

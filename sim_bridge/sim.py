@@ -20,6 +20,7 @@ from sim_bridge.joining import done, join
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
+NEVER = 2**64 - 1
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
 TONE = ("time", "duration", "frequency")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
@@ -138,12 +139,24 @@ class Sim:
         Raises:
             BoardError: a board's program crashed.
         """
-        crashed = lib.sim_run(self.handle, lib.SIM_ANY if hear is None else hear.number, cycles, quiet)
+        number = lib.SIM_ANY if hear is None else hear.number
+        self._check(lib.sim_run(self.handle, number, cycles, quiet))
+
+    def run_until(self, cycle: int) -> None:
+        """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`).
+
+        Raises:
+            BoardError: a board's program crashed.
+        """
+        self._check(lib.sim_run_until(self.handle, cycle))
+
+    def _check(self, crashed: int) -> None:
         if crashed:
             board, _ = self._members[crashed - 1]
+            whose = f" of robot {crashed}" if len(self._members) > 1 else ""
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
-            raise BoardError(f"the {board.description} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+            raise BoardError(f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
 
     def hash(self) -> int:
         """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""
@@ -177,6 +190,15 @@ class SimRobot:
     def send(self, data: bytes) -> None:
         """Bytes to the board, from now on."""
         lib.sim_send(self._handle, self.number, data, len(data))
+
+    def listen(self, cycle: int) -> None:
+        """From that cycle on its bytes end a run of `Sim.run_until`."""
+        lib.sim_listen(self._handle, self.number, cycle)
+
+    @property
+    def speaks(self) -> bool:
+        """Bytes have come since it is listened to, and the line has been idle since."""
+        return bool(lib.sim_speaks(self._handle, self.number))
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the outside's side of the serial line."""

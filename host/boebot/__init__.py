@@ -16,22 +16,38 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from boebot import boards
     from boebot.errors import BoebotError
-    from boebot.result import RunResult
+    from boebot.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
     from boebot.robots import load_robot
     from boebot.runner import run
+    from boebot.together import Member, run_together
 
-__all__ = ["BoebotError", "Command", "Observation", "Robot", "RunResult", "boards", "load_robot", "run"]
+__all__ = [
+    "BoebotError",
+    "Command",
+    "Member",
+    "Observation",
+    "Robot",
+    "RunResult",
+    "TogetherResult",
+    "boards",
+    "load_robot",
+    "run",
+    "run_together",
+]
 
 # Loaded when first asked for: the command catches Ctrl-C before numpy and the rest take their time.
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
+    "Member": "together",
     "Observation": "robot",
     "Robot": "robot",
     "RunResult": "result",
     "load_robot": "robots",
+    "TogetherResult": "result",
     "run": "runner",
+    "run_together": "together",
 }
 
 

@@ -147,6 +147,32 @@ class BoardFactory(Protocol):
         """Opens a board; raises a BoebotError with one sentence if it cannot."""
 
 
+class SharedWorld(Protocol):
+    """Several robots in one simulated world, opened. Time passes only in `advance`: a session's transport that waits
+    calls who turns the clock, and goes on once its robot has woken."""
+
+    @property
+    def sessions(self) -> Sequence[BoardSession]:
+        """One per robot, in the order of the requests."""
+
+    def on_wait(self, pause: Callable[[int], None]) -> None:
+        """Who is called with a robot's index when it waits, and returns once it has woken."""
+
+    def advance(self) -> list[int]:
+        """Lets time pass up to the earliest wake-up of a robot that waits; the indices of those that wake then."""
+
+    def close(self) -> None:
+        """Frees all boards and the world."""
+
+
+@runtime_checkable
+class TogetherFactory(Protocol):
+    """A board factory that can put several robots into one world."""
+
+    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
+        """Opens them; arena, seed of the world and pace are the first request's."""
+
+
 class Server(Protocol):
     """What an entry point of the group `boebot.servers` loads to: offers an emulated robot to other programs."""
 
@@ -203,6 +229,29 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     if is_live(url):
         transport = open_port(url, _default_baud(request.robot))
         return LiveSession(transport, f"board at {transport.name}")
+    raise BoardError(_unknown(url))
+
+
+def open_together(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
+    """Opens several robots in one simulated world, each on a board of the kind that `url` names.
+
+    Raises:
+        BoardError: no such kind, or one that cannot share a world; a robot without a board.
+    """
+    for request in requests:
+        if not request.robot.has_board:
+            raise BoardError(
+                f"robot {request.robot.name!r} has no board: it cannot yet run together with others; "
+                "run it alone, or take robots with boards"
+            )
+    if is_live(url):
+        raise BoardError(f"several robots in one run are simulated; {url!r} is a port: run each robot by itself there")
+    for point in entry_points(group=BOARDS_GROUP):
+        if point.name == url:
+            factory = _load(point.load, url)
+            if not isinstance(factory, TogetherFactory):
+                raise BoardError(f"board {url!r} cannot share a world with others")
+            return factory.together(requests)
     raise BoardError(_unknown(url))
 
 

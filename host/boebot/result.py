@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -204,6 +205,31 @@ class RunResult:
         from boebot.report import save
 
         return save(self, Path(folder))
+
+
+@dataclass(kw_only=True)
+class TogetherResult:
+    """What came of a run of several robots in one world.
+
+    Attributes:
+        robots: a result per robot, in the order of the members.
+        error: why the run ended before its time, or None; it says which robot was to blame.
+    """
+
+    robots: list[RunResult]
+    error: BaseException | None
+
+    def table(self) -> dict[str, Any]:
+        """The figures by name: of each robot, and how the run ended."""
+        ended = "complete" if self.error is None else _why(self.error)
+        return {"robots": [result.table() for result in self.robots], "ended": ended}
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Writes run.png and replay.html with all robots, and the files of each into robot-1, robot-2 and so on;
+        returns their paths."""
+        from boebot.report import save_together
+
+        return save_together(self, Path(folder))
 
 
 def _why(error: BaseException) -> str:

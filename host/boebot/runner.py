@@ -21,7 +21,7 @@ from boebot.driving.board import BoardDriver, check_time_to_live
 from boebot.driving.direct import DirectDriver
 from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult
-from boebot.robot import Equipment
+from boebot.robot import Equipment, Robot
 from boebot.robots import RobotDescription, load_robot
 
 DEFAULT_PERIOD = 0.05  # s
@@ -59,7 +59,7 @@ def run(
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
     if out is not None:
-        _expect("out", out, "a folder or None", str, Path)
+        expect("out", out, "a folder or None", str, Path)
         report.make_folder(Path(out))
     result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
     if out is not None:
@@ -92,25 +92,11 @@ def execute(
     Raises:
         BoebotError: the run could not begin.
     """
-    _expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
-    _expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
-    _expect("on", on, "the name of a board or a port", str, type(None))
-    _expect("seconds", seconds, "a number", Real)
-    _expect("seed", seed, "a whole number", Integral)
-    _expect("period", period, "seconds or None", Real, type(None))
-    if not seconds > 0:
-        raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
-    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
+    expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
+    expect("on", on, "the name of a board or a port", str, type(None))
+    expect("seed", seed, "a whole number", Integral)
+    loaded, description, period_s = prepare(brain, robot, seconds, period)
     on = default_board(description) if on is None else on
-    loaded = brains.load_brain(brain)
-    period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
-    if description.has_board:
-        check_time_to_live(period_s)
-    missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
-    if missing:
-        raise BrainError(
-            f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
-        )
     request = BoardRequest(robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime)
     task = Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, progress=progress)
     if not description.has_board:
@@ -124,6 +110,32 @@ def execute(
         return _drive(BoardDriver(session, task), loaded)
     finally:
         session.close()
+
+
+def prepare(
+    brain: object, robot: str | Path | RobotDescription, seconds: float, period: float | None
+) -> tuple[LoadedBrain, RobotDescription, float]:
+    """Brain, robot and the brain's period (s), found and checked to fit each other.
+
+    Raises:
+        BoebotError: in one sentence.
+    """
+    expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
+    expect("seconds", seconds, "a number", Real)
+    expect("period", period, "seconds or None", Real, type(None))
+    if not seconds > 0:
+        raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
+    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
+    loaded = brains.load_brain(brain)
+    period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
+    if description.has_board:
+        check_time_to_live(period_s)
+    missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
+    if missing:
+        raise BrainError(
+            f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
+        )
+    return loaded, description, period_s
 
 
 def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
@@ -144,15 +156,24 @@ def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
 
 
 def _loop(driver: Driver, brain: LoadedBrain) -> None:
-    robot, step = driver.robot, brain.step
+    robot = driver.robot
     for _ in driver.steps():
-        try:
-            step(robot)
-        except (Exception, SystemExit) as error:
-            raise BrainError(brains.explain(error, brain.path)) from error
+        step_once(robot, brain)
 
 
-def _expect(name: str, value: object, expected: str, *kinds: type) -> None:
+def step_once(robot: Robot, brain: LoadedBrain) -> None:
+    """One step of the brain.
+
+    Raises:
+        BrainError: whatever goes wrong in it, with its place.
+    """
+    try:
+        brain.step(robot)
+    except (Exception, SystemExit) as error:
+        raise BrainError(brains.explain(error, brain.path)) from error
+
+
+def expect(name: str, value: object, expected: str, *kinds: type) -> None:
     """Raises a BoebotError if an argument of `run` is of no such kind."""
     if not isinstance(value, kinds) or isinstance(value, bool):
         raise BoebotError(f"{name} is {value!r}; expected {expected}")

@@ -93,6 +93,20 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
         (("run", "wander", "--period", "15"), 1, "does not fit; expected a multiple of 10 ms"),
         (("run", "wander", "--seconds", "0"), 1, "a run cannot last 0 s"),
         (("run", "wander", "--seconds", "ten"), 2, "--seconds"),
+        (("run", "wander", "--robots", "0"), 2, "--robots"),
+        (("run", "wander", "wander", "wonder"), 1, "robot 3: there is no brain 'wonder'"),
+        (("run", "wander", "wander", "--robots", "3"), 1, "2 brains for 3 robots; expected 1 or 3"),
+        (
+            ("run", "wander", "--robots", "2", "--robot", "a", "--robot", "b", "--robot", "c"),
+            1,
+            "3 times --robot for 2",
+        ),
+        (("run", "wander", "--robots", "65", "--arena", "empty"), 1, "65 robots are too many; expected at most 64"),
+        (("run", "wander", "--pose", "1,2"), 1, "--pose '1,2' is no pose; expected X,Y,DEGREES, as in 0.5,1.2,90"),
+        (("run", "wander", "--pose", "9,9,0", "--arena", "room"), 1, "cannot start at x = 9 m, y = 9 m: no free space"),
+        (("run", "wander", "--pose", "0,0,0", "--pose", "0.1,0,90", "--arena", "empty"), 1, "robots 1 and 2 overlap"),
+        (("run", "wander", "--robots", "2", "--robot", "arsim"), 1, "it cannot yet run together with others"),
+        (("run", "wander", "--robots", "2", "--on", "COM3"), 1, "'COM3' is a port: run each robot by itself there"),
         (("run",), 2, "BRAIN"),
         (("run", "wander", "--sedes", "1"), 2, "No such option"),
         (("fly",), 2, "No such command"),
@@ -123,6 +137,29 @@ def test_mistakes_end_in_one_sentence(
     assert out == ""
     if code == 1:
         assert err.startswith("boebot: ") and err.count("\n") == 1
+
+
+def test_several_robots_print_a_row_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments = ("run", "wander", "--robots", "3", "--seconds", "1", "--arena", "room")
+    code, out, err = boebot(capsys, *arguments, "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    assert [line[0] for line in out.splitlines() if "shieldbot" in line] == ["1", "2", "3"]
+    assert f"files in {tmp_path}: run.png, replay.html, robot-1/, robot-2/, robot-3/" in out
+    code, out, _ = boebot(capsys, *arguments, "--json")
+    values = json.loads(out)
+    assert (code, len(values["robots"]), values["ended"]) == (0, 3, "complete")
+    assert [robot["seed"] for robot in values["robots"]] == [1, 2, 3]
+
+
+def test_what_is_given_several_times_goes_to_one_robot_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "still.py").write_text("def step(robot):\n    robot.stop()\n")
+    arguments = ("wander", str(tmp_path / "still.py"), "--robot", "shieldbot", "--robot", "shieldbot-quad")
+    poses = ("--pose", "0,0,0", "--pose", "0,2,90", "--arena", "empty", "--seconds", "2", "--json")
+    code, out, _ = boebot(capsys, "run", *arguments, *poses)
+    first, second = json.loads(out)["robots"]
+    assert code == 0
+    assert (first["brain"], first["robot"]) == ("wander", "shieldbot") and first["distance_m"] > 0.1
+    assert (second["brain"], second["robot"]) == ("still", "shieldbot-quad") and second["distance_m"] < 0.001
 
 
 def test_error_in_a_brain_comes_after_the_table(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -119,9 +119,10 @@ class Loads(HTMLParser):
 
 
 def data_of(page: str) -> dict[str, Any]:
-    match = re.search(r"const run = (\{.*\});\n", page)
+    """Of the first robot."""
+    match = re.search(r"const runs = (\[.*\]);\n", page)
     assert match
-    data: dict[str, Any] = json.loads(match[1].replace("<\\/", "</"))
+    data: dict[str, Any] = json.loads(match[1].replace("<\\/", "</"))[0]
     return data
 
 
@@ -156,7 +157,7 @@ def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest
 def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) -> None:
     result.brain, brain = "</script><b>", result.brain
     try:
-        page = replay.write(result, tmp_path / "page.html").read_text()
+        page = replay.write([result], tmp_path / "page.html").read_text()
     finally:
         result.brain = brain
     assert page.count("</script>") == 1

@@ -16,7 +16,7 @@ from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.session import SimTransport
+from sim_bridge.session import SimTransport, alone
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, square
 
@@ -93,7 +93,7 @@ def test_closed_transport_says_so() -> None:
 def test_paced_transport_keeps_to_the_wall_clock() -> None:
     import time
 
-    transport = SimTransport(scripted().robot, "script", paced=True)
+    transport = SimTransport(robot := scripted().robot, "script", alone(robot.sim, paced=True))
     start = time.monotonic()
     for _ in range(10):
         transport.read(0.01)

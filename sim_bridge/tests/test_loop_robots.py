@@ -12,7 +12,7 @@ from boebot.errors import ArenaError, BoardError
 from sim_bridge.arena import Arena
 from sim_bridge.arena_description import ArenaDescription, Moving, Polygon, Waypoint
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.sim import Sim
+from sim_bridge.sim import NEVER, Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, square
 
 LED, RECEIVER, PING, LEFT_WHISKER = 9, 10, 8, 5
@@ -123,13 +123,34 @@ def test_anybodys_byte_ends_a_run() -> None:
     assert 5 * MS < sim.cycle < 6 * MS
 
 
+def test_when_a_robot_is_heard_does_not_depend_on_the_cuts_of_others() -> None:
+    """A byte at 5 ms is heard at the first look after two idle byte times (40 us), wherever the run is cut."""
+    from sim_bridge._core import lib
+
+    heard = set()
+    for cut in (0, 4001, 80_333, 80_640, 81_999):
+        sim = sim_of()
+        robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
+        lib.script_board_byte(robots[0].script, 5 * MS, 10)
+        robots[0].robot.listen(1)
+        robots[1].robot.listen(NEVER)
+        if cut:
+            sim.run_until(cut)
+            assert sim.cycle == cut and not robots[0].robot.speaks
+        sim.run_until(CLOCK_HZ)
+        assert robots[0].robot.speaks and not robots[1].robot.speaks
+        heard.add(sim.cycle)
+    assert len(heard) == 1
+    assert 5 * MS + 40 * US <= heard.pop() <= 5 * MS + 40 * US + 4000
+
+
 def test_crash_names_the_board() -> None:
     from sim_bridge._core import lib
 
     sim = sim_of()
     robots = [add_scripted(sim, pose=(0.5 * i, 0, 0), number=4 * i) for i in range(2)]
     lib.script_board_crash(robots[1].script)
-    with pytest.raises(BoardError, match="crashed"):
+    with pytest.raises(BoardError, match="of robot 5 crashed"):
         sim.run(CLOCK_HZ)
 
 

@@ -15,9 +15,8 @@ from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.link.session import Link
 from boebot.robots import load_robot
-from sim_bridge.boards.board import Damage
+from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.session import SimSession, open_native
-from sim_bridge.tests.simulated import MS
 
 
 def open_with(**wishes: Any) -> SimSession:
@@ -117,7 +116,7 @@ def test_sessions_side_by_side_share_nothing() -> None:
 def test_reset_starts_the_program_again(session: SimSession) -> None:
     drive(session, 0.5, 0.5, 0.5)
     before = session.robot.body().x
-    at = round(session.transport.now() * 1000) * MS
+    at = round(session.transport.now() * CLOCK_HZ)
     session.board.reset("external")
     heard = frame.Decoder().feed(session.transport.read(0.2, 0.2))
     assert heard[0][0] == messages.Hello.ID

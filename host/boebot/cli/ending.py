@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from boebot import interrupts
 from boebot.cli import output
 from boebot.errors import BoebotError
 from boebot.report import IncompleteError
-from boebot.result import RunResult
+from boebot.result import RunResult, TogetherResult
+
+HEADER = ("robot", "distance (m)", "contacts", "whisker touches", "late steps", "resets", "brain")
 
 
 class InterruptedRunError(BoebotError):
@@ -23,12 +26,34 @@ def end(result: RunResult, out: Path | None, as_json: bool) -> None:
     """
     for notice in result.notices:
         output.say(notice)
+    _end(result, lambda: output.print_table(result.table()), out, as_json)
+
+
+def end_together(result: TogetherResult, out: Path | None, as_json: bool) -> None:
+    """The same for a run of several robots: a row for each."""
+    for number, robot in enumerate(result.robots, 1):
+        for notice in robot.notices:
+            output.say(f"robot {number}: {notice}")
+    _end(result, lambda: output.print_rows(HEADER, _rows(result)), out, as_json)
+
+
+def _rows(result: TogetherResult) -> list[tuple[str, ...]]:
+    rows = []
+    for number, robot in enumerate(result.robots, 1):
+        table = robot.table()
+        figures = (table[name] for name in ("distance_m", "contacts", "whisker_touches", "late_steps", "resets"))
+        ended = "complete" if robot.error is None else "ended early"
+        rows.append((f"{number}  {robot.robot.name}", *map(str, figures), f"{robot.brain}, {ended}"))
+    return rows
+
+
+def _end(result: RunResult | TogetherResult, show: Callable[[], None], out: Path | None, as_json: bool) -> None:
     with interrupts.ignored():
         files: list[Path] = []
         unsaved: BoebotError | None = None
         try:
             if not as_json:
-                output.print_table(result.table())
+                show()
         finally:
             if out is not None:
                 try:
@@ -39,7 +64,10 @@ def end(result: RunResult, out: Path | None, as_json: bool) -> None:
         if as_json:
             output.print_json(result.table() | {"files": [str(path) for path in files]})
         elif files:
-            print(f"files in {out}: {', '.join(path.name for path in files)}")
+            assert out is not None
+            here = [path.name for path in files if path.parent == out]
+            folders = sorted({f"{path.relative_to(out).parts[0]}/" for path in files if path.parent != out})
+            print(f"files in {out}: {', '.join(here + folders)}")
     interrupted = isinstance(result.error, KeyboardInterrupt)
     first = InterruptedRunError("interrupted") if interrupted else result.error
     if first is not None:

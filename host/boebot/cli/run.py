@@ -1,7 +1,8 @@
-"""`boebot run BRAIN`: a brain drives a robot, emulated or real."""
+"""`boebot run BRAIN`: a brain drives a robot, emulated or real; or several robots share one simulated world."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -9,14 +10,46 @@ import typer
 
 from boebot import report
 from boebot.cli import options, output
-from boebot.cli.ending import end
+from boebot.cli.ending import end, end_together
+from boebot.errors import BoebotError
 from boebot.runner import execute
+
+DEFAULT_ROBOT = "shieldbot"
+_HELP = """Let a brain drive a robot, and say what happened.
+
+Several robots in one simulated world:
+
+  boebot run wander --robots 3              three robots, the same brain
+
+  boebot run wander chase.py                two robots, a brain for each
+
+  boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
+
+What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on."""
 
 
 def run(
-    brain: Annotated[str, typer.Argument(metavar="BRAIN", help="Bundled brain (wander) or Python file.")],
+    brain: Annotated[
+        list[str],
+        typer.Argument(metavar="BRAIN", help="Bundled brain (wander) or Python file; several: a robot for each."),
+    ],
     on: options.RunOn = None,
-    robot: options.RobotName = "shieldbot",
+    robot: Annotated[
+        list[str] | None,
+        typer.Option("--robot", metavar="R", help="Bundled robot or .toml file; again for each further robot."),
+    ] = None,
+    robots: Annotated[
+        int | None, typer.Option("--robots", metavar="N", min=1, help="How many robots share the world.")
+    ] = None,
+    pose: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--pose",
+            metavar="X,Y,DEG",
+            help="Where a robot starts: m, m, degrees; again for each further robot. Else at the arena's start, "
+            "further ones at free places near it.",
+        ),
+    ] = None,
     arena: options.ArenaName = None,
     seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
     seed: options.Seed = 1,
@@ -28,22 +61,77 @@ def run(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """Let a brain drive a robot, and say what happened."""
+    """See `_HELP`."""
+    period_s = None if period is None else period / 1000
+    kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
+    count = _count(robots, len(brain), len(kinds), len(poses))
     if out is not None:
         report.make_folder(out)
+    name = brain[0] if len(brain) == 1 else f"{count} robots"
     with (
-        output.progress_bar(brain if on is None else f"{brain} on {on}", seconds) as bar,
+        output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
         output.step_watch(bar) as progress,
     ):
-        result = execute(
-            brain,
-            robot=robot,
-            arena=arena,
-            on=on,
-            seconds=seconds,
-            seed=seed,
-            realtime=realtime,
-            period=None if period is None else period / 1000,
-            progress=progress,
-        )
-    end(result, out, json)
+        if count == 1 and not poses:
+            result = execute(
+                brain[0],
+                robot=kinds[0],
+                arena=arena,
+                on=on,
+                seconds=seconds,
+                seed=seed,
+                realtime=realtime,
+                period=period_s,
+                progress=progress,
+            )
+        else:
+            from boebot.together import DEFAULT_KIND, Member, execute_together
+
+            members = [
+                Member(
+                    brain=brain[index % len(brain)],
+                    robot=kinds[index % len(kinds)],
+                    pose=poses[index] if index < len(poses) else None,
+                    period=period_s,
+                )
+                for index in range(count)
+            ]
+            together = execute_together(
+                members, arena, seconds, DEFAULT_KIND if on is None else on, seed, realtime, progress
+            )
+    if count == 1 and not poses:
+        end(result, out, json)
+    else:
+        end_together(together, out, json)
+
+
+run.__doc__ = _HELP
+
+
+def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:
+    """How many robots those options mean.
+
+    Raises:
+        BoebotError: they contradict each other.
+    """
+    count = max(brains, kinds, poses) if robots is None else robots
+    given = {f"{brains} brains": brains, f"{kinds} times --robot": kinds}
+    for what, times in given.items():
+        if times not in (1, count):
+            raise BoebotError(f"there are {what} for {count} robots; expected 1 or {count}")
+    if poses > count:
+        raise BoebotError(f"there are {poses} times --pose for {count} robots; expected at most {count}")
+    return count
+
+
+def _pose(text: str) -> tuple[float, float, float]:
+    """Of "X,Y,DEG".
+
+    Raises:
+        BoebotError: it is no pose.
+    """
+    try:
+        x, y, degrees = (float(part) for part in text.split(","))
+    except ValueError:
+        raise BoebotError(f"--pose {text!r} is no pose; expected X,Y,DEGREES, as in 0.5,1.2,90") from None
+    return x, y, math.radians(degrees)

@@ -88,7 +88,7 @@ class BoardDriver:
             )
         self.description = request.robot
         self.equipment = Equipment(request.robot, self.tick_s)
-        self.robot = Robot(request.robot.name, self.period_s, request.seed)
+        self.robot = Robot(request.robot.name, self.period_s, task.chance)
         self.record = Record()
         self.resets = 0
         self.late_steps = 0
@@ -318,7 +318,7 @@ class BoardDriver:
             board=self.task.on,
             description=self.session.description,
             arena=self.task.request.arena,
-            seed=self.task.request.seed,
+            seed=self.task.chance,
             period=self.period_s,
             tick=self.tick_s,
             error=error,

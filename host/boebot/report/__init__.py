@@ -6,19 +6,24 @@ to_board.bin   every byte that went to the board; to_host.bin: every byte that c
 wire.csv       when which stretch of those two files crossed the wire
 run.png        a picture of the run
 replay.html    a page that plays it; needs no network
+
+A run of several robots leaves the last two with all of them, and a folder of all files for each.
 """
 
 from __future__ import annotations
 
 import errno
 import os
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
 
 if TYPE_CHECKING:
-    from boebot.result import RunResult
+    from collections.abc import Callable
+
+    from boebot.result import RunResult, TogetherResult
 
 
 class IncompleteError(BoebotError):
@@ -67,18 +72,53 @@ def save(result: RunResult, folder: Path) -> list[Path]:
         raise _unwritable(folder, error) from None
     if not result.ticks:
         return paths
-    failed = []
-    for name, write in (("run.png", _write_picture), ("replay.html", _write_page)):
+    drawn, failed = _draw(
+        folder, {"run.png": partial(_write_picture, result), "replay.html": partial(_write_page, result)}
+    )
+    paths += drawn
+    if failed:
+        raise IncompleteError(f"{'; '.join(failed)}; the run's other files are in {folder}", paths)
+    return paths
+
+
+def save_together(result: TogetherResult, folder: Path) -> list[Path]:
+    """Writes picture and page of all robots into `folder`, and the files of each into a folder of its own; returns
+    their paths.
+
+    Raises: as `save`.
+    """
+    make_folder(folder)
+    paths: list[Path] = []
+    failed: list[str] = []
+    for number, robot in enumerate(result.robots, 1):
         try:
-            paths.append(write(result, folder / name))
+            paths += save(robot, folder / f"robot-{number}")
+        except IncompleteError as error:
+            paths += error.files
+            failed.append(str(error))
+    if any(robot.ticks for robot in result.robots):
+        drawn, missing = _draw(
+            folder,
+            {"run.png": partial(_write_common_picture, result), "replay.html": partial(_write_common_page, result)},
+        )
+        paths, failed = drawn + paths, missing + failed
+    if failed:
+        raise IncompleteError("; ".join(failed), paths)
+    return paths
+
+
+def _draw(folder: Path, files: dict[str, Callable[[Path], Path]]) -> tuple[list[Path], list[str]]:
+    """Writes those files; returns the paths of those that could be made, and why others could not."""
+    paths, failed = [], []
+    for name, write in files.items():
+        try:
+            paths.append(write(folder / name))
         except OSError as error:
             raise _unwritable(folder, error) from None
         except Exception as error:  # whatever drawing meets: the run is worth more than its picture
             what = str(error).strip().partition("\n")[0]
             failed.append(f"{name} cannot be made: {type(error).__name__}" + (f": {what}" if what else ""))
-    if failed:
-        raise IncompleteError(f"{'; '.join(failed)}; the run's other files are in {folder}", paths)
-    return paths
+    return paths, failed
 
 
 def _write_picture(result: RunResult, path: Path) -> Path:
@@ -90,4 +130,16 @@ def _write_picture(result: RunResult, path: Path) -> Path:
 def _write_page(result: RunResult, path: Path) -> Path:
     from boebot.report import replay
 
-    return replay.write(result, path)
+    return replay.write([result], path)
+
+
+def _write_common_picture(result: TogetherResult, path: Path) -> Path:
+    from boebot.report import together_picture
+
+    return together_picture.write(result, path)
+
+
+def _write_common_page(result: TogetherResult, path: Path) -> Path:
+    from boebot.report import replay
+
+    return replay.write([robot for robot in result.robots if robot.ticks], path)

@@ -51,21 +51,21 @@ def write(result: RunResult, path: Path) -> Path:
     axes.set_aspect("equal")
     axes.axis("off")
 
-    _draw_arena(axes, view.outlines)
+    draw_arena(axes, view.outlines)
     _draw_path(axes, view.path, result.series.time)
     if view.estimate is not None:
         axes.plot(view.estimate.x, view.estimate.y, color=ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=4)
         _draw_ghost(axes, result.robot.body.radius_m, view.estimate)
     _draw_contacts(axes, view)
-    _draw_robot(axes, result, view, 0, START)
-    _draw_robot(axes, result, view, -1, END)
-    _draw_scale(axes, low, high)
+    draw_robot(axes, result, view, 0, START)
+    draw_robot(axes, result, view, -1, END)
+    draw_scale(axes, low, high)
     _draw_texts(figure, result, view, total)
     figure.savefig(path, facecolor=PAPER, metadata={"Title": _title(result, view), "Description": _caption(result)})
     return path
 
 
-def _draw_arena(axes: Axes, outlines: list[Floats]) -> None:
+def draw_arena(axes: Axes, outlines: list[Floats]) -> None:
     for index, outline in enumerate(outlines):
         if index == 0:  # the outer wall, around the floor
             axes.add_patch(Polygon(outline, closed=True, facecolor=FLOOR, edgecolor=WALL, lw=3.0, zorder=1))
@@ -103,7 +103,7 @@ def _draw_contacts(axes: Axes, view: scene.View) -> None:
         axes.scatter(x, y, s=46, marker="x", color=CONTACT, lw=1.8, zorder=8)
 
 
-def _draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, colour: str) -> None:
+def draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, colour: str) -> None:
     """The robot with its wheels, whiskers and sensor cones; walls cut the cones off."""
     robot, path = result.robot, view.path
     floor = Polygon(view.outlines[0], closed=True).get_path() if view.outlines else None
@@ -150,7 +150,7 @@ def _draw_robot(axes: Axes, result: RunResult, view: scene.View, index: int, col
     axes.add_patch(Polygon(nose, closed=True, facecolor=colour, edgecolor="none", transform=place, zorder=12))
 
 
-def _draw_scale(axes: Axes, low: Floats, high: Floats) -> None:
+def draw_scale(axes: Axes, low: Floats, high: Floats) -> None:
     """A scale bar below the arena, a quarter of its width or so."""
     wanted = (high[0] - low[0]) / 4
     length = max(size for size in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0) if size <= max(wanted, 0.1))
@@ -169,8 +169,8 @@ def _caption(result: RunResult) -> str:
     parts = [
         f"{result.run_time:.1f} s",
         f"{result.distance:.2f} m",
-        _counted(result.contacts, "contact", "contacts"),
-        _counted(result.whisker_touches, "whisker touch", "whisker touches"),
+        counted(result.contacts, "contact", "contacts"),
+        counted(result.whisker_touches, "whisker touch", "whisker touches"),
     ]
     if error is not None:
         parts.append(f"odometry off by {error:.2f} m at the end")
@@ -207,5 +207,5 @@ def _draw_texts(figure: Figure, result: RunResult, view: scene.View, height: flo
     )  # fmt: skip
 
 
-def _counted(number: int, one: str, many: str) -> str:
+def counted(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"

@@ -1,11 +1,12 @@
-"""replay.html: one page, offline, that plays and scrubs the run. The page itself is `replay_page.html` beside
-this file; the run's data are put into it as base64 arrays."""
+"""replay.html: one page, offline, that plays and scrubs a run, of one robot or of several. The page itself is
+`replay_page.html` beside this file; the run's data are put into it as base64 arrays."""
 
 from __future__ import annotations
 
 import base64
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,22 +22,23 @@ if TYPE_CHECKING:
 
 FRAMES_AT_MOST = 20_000
 _PAGE = Path(__file__).with_name("replay_page.html")
-_PLACEHOLDER = "/*RUN*/null"
+_PLACEHOLDER = "/*RUNS*/null"
 
 # bits of the page's `flags` array
 LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF = (1 << bit for bit in range(7))
 
 
-def write(result: RunResult, path: Path) -> Path:
-    """Writes the page."""
-    data = json.dumps(page_data(result), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+def write(results: Sequence[RunResult], path: Path) -> Path:
+    """Writes the page of the robots of one run."""
+    robots = [page_data(result) | {"colour": scene.colour(number)} for number, result in enumerate(results, 1)]
+    data = json.dumps(robots, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     page = _PAGE.read_text(encoding="utf-8")
     path.write_text(page.replace(_PLACEHOLDER, data), encoding="utf-8")
     return path
 
 
 def page_data(result: RunResult) -> dict[str, Any]:
-    """All that the page shows. Arrays are base64 of little-endian float32 (`flags`: uint8), one entry per frame."""
+    """What the page shows of one robot. Arrays are base64 of little-endian float32 (`flags`: uint8), by frame."""
     view = scene.view(result)
     series = result.series
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
@@ -53,6 +55,8 @@ def page_data(result: RunResult) -> dict[str, Any]:
     )
     return {
         "title": f"{result.brain} on {result.board}",
+        "brain": result.brain,
+        "begin": result.clock_offset,
         "known": view.known,
         "table": result.table(),
         "bounds": [*low.tolist(), *high.tolist()],

@@ -71,6 +71,15 @@ def bounds(scene: View) -> tuple[Floats, Floats]:
     return low - edge, high + edge
 
 
+COLOURS = ("#3f6fb5", "#d0682f", "#3d9363", "#8e5fb0", "#b8912a", "#bf3f6f", "#2b96a8", "#6b7280")
+"""Of the robots of a run of several, by number, over and over."""
+
+
+def colour(number: int) -> str:
+    """Of the robot of that number, from 1."""
+    return COLOURS[(number - 1) % len(COLOURS)]
+
+
 def margin(low: Floats, high: Floats) -> float:
     """How far the corners that `bounds` gave stand off from what there is to see (m)."""
     return float((high - low).max()) * MARGIN / (1 + 2 * MARGIN)
