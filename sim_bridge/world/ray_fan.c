@@ -4,62 +4,29 @@
  * is computed once. Each lane does the operations of ray_edge in the same order, so its distance has the same bits; a
  * processor with wider registers does the same operations on more lanes and gives the same bits as well.
  */
+#include <string.h>
+
 #include "arena_data.h"
+
+#define LANES 4u
+
+/* `some` rays, 1 to LANES, and what their question is. */
+typedef struct {
+  double x, y;
+  const double *cosine, *sine;
+  size_t some;
+  double limit, height;
+} fan;
 
 #ifdef __GNUC__
 
-#include <string.h>
-
-#define LANES 4u
+#define INLINE static inline __attribute__((always_inline))
+#define NOT_INLINE __attribute__((noinline))
 
 typedef double lanes __attribute__((vector_size(8 * LANES)));
 typedef int64_t masks __attribute__((vector_size(8 * LANES)));
 
-typedef struct {
-  double x, y, reach, height;
-  const double *cosine, *sine; /* of LANES rays */
-} fan;
-
-/* Rays along the edge, where no division can tell. */
-__attribute__((noinline)) static void ask_along(const arena_edge *e, const fan *f, double *nearest) {
-  for (unsigned i = 0; i < LANES; i++) {
-    const ray r = {f->x, f->y, f->cosine[i], f->sine[i]};
-    const double d = ray_edge(e, &r, nearest[i]);
-    if (d < nearest[i]) nearest[i] = d;
-  }
-}
-
-__attribute__((noinline)) static void ask_disc(const arena_disc *disc, const fan *f, double *nearest) {
-  for (unsigned i = 0; i < LANES; i++) {
-    const ray r = {f->x, f->y, f->cosine[i], f->sine[i]};
-    const double d = ray_disc(disc, &r);
-    if (d < nearest[i]) nearest[i] = d;
-  }
-}
-
-#define INLINE static inline __attribute__((always_inline))
-
-/* ray_edge for LANES rays. */
-INLINE void ask_edge(const arena_edge *e, const fan *f, const lanes *cosine, const lanes *sine, lanes *nearest) {
-  const double wx = f->x - e->ax;
-  const double wy = f->y - e->ay;
-  const double numerator = e->ex * wy - e->ey * wx;
-  const lanes none = {0};
-  const lanes signed_den = e->ey * *cosine - e->ex * *sine;
-  const masks sign = (masks)signed_den & INT64_MIN;
-  const lanes den = (lanes)((masks)signed_den & INT64_MAX);
-  const lanes t = (lanes)((masks)(numerator + none) ^ sign);
-  const lanes u = (lanes)((masks)(*cosine * wy - *sine * wx) ^ sign);
-  const masks across = den * den > 1e-24 * e->length_squared;
-  if ((across[0] & across[1] & across[2] & across[3]) == 0) {
-    ask_along(e, f, (double *)nearest);
-    return;
-  }
-  const lanes slack = RAY_CRACK * den;
-  const lanes distance = t / den;
-  const masks nearer = (t >= none) & (u >= -slack) & (u <= den + slack) & (distance < *nearest);
-  *nearest = (lanes)(((masks)distance & nearer) | ((masks)*nearest & ~nearer));
-}
+INLINE int any(const masks *m) { return ((*m)[0] | (*m)[1] | (*m)[2] | (*m)[3]) != 0; }
 
 INLINE double largest(const lanes *value) {
   const double a = (*value)[0] > (*value)[1] ? (*value)[0] : (*value)[1];
@@ -67,91 +34,121 @@ INLINE double largest(const lanes *value) {
   return a > b ? a : b;
 }
 
+/* The last ray fills the lanes that are left. */
+INLINE void load(const double *from, size_t some, lanes *to) {
+  const size_t second = some > 1 ? 1 : 0;
+  const size_t third = some > 2 ? 2 : second;
+  *to = (lanes){from[0], from[second], from[third], from[some - 1]};
+}
+
+/* ray_edge for LANES rays. Lanes along the edge, where no division can tell, are noted in `along`. */
+INLINE void ask_edge(const arena_edge *e, const fan *f, const lanes *cosine, const lanes *sine, lanes *nearest,
+                     masks *along) {
+  const double wx = f->x - e->ax;
+  const double wy = f->y - e->ay;
+  const double numerator = e->ex * wy - e->ey * wx;
+  const double least = 1e-24 * e->length_squared;
+  const lanes signed_den = e->ey * *cosine - e->ex * *sine;
+  const masks sign = (masks)signed_den & INT64_MIN;
+  const lanes den = (lanes)((masks)signed_den & INT64_MAX);
+  const lanes t = (lanes)((masks)(lanes){numerator, numerator, numerator, numerator} ^ sign);
+  const lanes u = (lanes)((masks)(*cosine * wy - *sine * wx) ^ sign);
+  const lanes slack = RAY_CRACK * den;
+  const lanes distance = t / den;
+  const masks nearer =
+      (t >= 0.0) & (u >= (lanes)((masks)slack ^ INT64_MIN)) & (u <= den + slack) & (distance < *nearest);
+  *along |= den * den <= least;
+  *nearest = (lanes)(((masks)distance & nearer) | ((masks)*nearest & ~nearer));
+}
+
+NOT_INLINE static void ask_disc(const arena_disc *disc, const fan *f, double *nearest) {
+  for (size_t i = 0; i < LANES; i++) {
+    const size_t from = i < f->some ? i : f->some - 1;
+    const ray r = {f->x, f->y, f->cosine[from], f->sine[from]};
+    const double d = ray_disc(disc, &r);
+    if (d < nearest[i]) nearest[i] = d;
+  }
+}
+
 /* Asks the list until the rest cannot be nearer to any ray. Returns 0 if that does not settle the answer. */
-INLINE int ask_list(const arena *self, const fan *f, const ray_list_entry *entry, double *nearest) {
-  lanes cosine, sine, best;
-  memcpy(&cosine, f->cosine, sizeof cosine);
-  memcpy(&sine, f->sine, sizeof sine);
-  memcpy(&best, nearest, sizeof best);
+INLINE int ask_list(const arena *self, const fan *f, const ray_list_entry *entry, const lanes *cosine,
+                    const lanes *sine, lanes *nearest) {
+  lanes best = *nearest;
+  masks along = {0};
   for (; (double)entry->bound <= largest(&best); entry++) {
     if (entry->strip == RAY_LIST_END) return 0;
     const uint32_t first = ray_strip_first(entry->strip);
     if (first >= self->edge_count) {
       const arena_disc *disc = &self->disc[first - self->edge_count];
-      if (disc->height >= f->height) ask_disc(disc, f, (double *)&best);
+      if (!(disc->height >= f->height)) continue;
+      double values[LANES];
+      memcpy(values, &best, sizeof values);
+      ask_disc(disc, f, values);
+      memcpy(&best, values, sizeof values);
       continue;
     }
     const arena_edge *e = &self->edge[first];
     for (uint32_t left = ray_strip_count(entry->strip); left > 0; left--, e++) {
-      if (e->height >= f->height) ask_edge(e, f, &cosine, &sine, &best);
+      if (e->height >= f->height) ask_edge(e, f, cosine, sine, &best, &along);
     }
   }
-  memcpy(nearest, &best, sizeof best);
-  return 1;
+  *nearest = best;
+  return !any(&along);
 }
 
-static int ask_any(const arena *self, const fan *f, const ray_list_entry *entry, double *nearest) {
-  return ask_list(self, f, entry, nearest);
-}
-
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) static int ask_avx2(const arena *self, const fan *f, const ray_list_entry *entry,
-                                                    double *nearest) {
-  return ask_list(self, f, entry, nearest);
-}
-#endif
-
-static int ask(const arena *self, const fan *f, const ray_list_entry *entry, double *nearest) {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return ask_avx2(self, f, entry, nearest);
-#endif
-  return ask_any(self, f, entry, nearest);
-}
-
-/* The list that serves all of the fan's rays. NULL: there is none, as the fan is too wide or its cell has no lists. */
-static const ray_list_entry *list_of(const ray_lists *lists, const fan *f) {
-  size_t number_of_cell;
-  const ray_list_cell *cell = ray_lists_at(lists, f->x, f->y, &number_of_cell);
+/* The list that serves all directions within the angle of RAY_FAN_COSINE to the left of the first. NULL: there is none,
+ * as the cell has no lists, or some ray lies outside or is not of length 1. */
+INLINE const ray_list_entry *list_of(const ray_lists *lists, const fan *f, const lanes *cosine, const lanes *sine) {
+  size_t number;
+  const ray_list_cell *cell = ray_lists_at(lists, f->x, f->y, &number);
   if (cell == NULL) return NULL;
   const unsigned first = ray_sector(lists, f->cosine[0], f->sine[0]);
   if (first >= RAY_SECTORS_MOST) return NULL;
-  const unsigned number = first / RAY_FAN_STEP;
-  const unsigned from = number * RAY_FAN_STEP;
-  for (unsigned i = 1; i < LANES; i++) {
-    const unsigned sector = ray_sector(lists, f->cosine[i], f->sine[i]);
-    const unsigned after = sector >= from ? sector - from : sector + (unsigned)lists->sectors - from;
-    if (sector >= RAY_SECTORS_MOST || after >= RAY_FAN_SECTORS) return NULL;
-  }
-  return &cell->entry[cell->fan_start[number]];
+  const lanes square = *cosine * *cosine + *sine * *sine;
+  const lanes dot = f->cosine[0] * *cosine + f->sine[0] * *sine;
+  const lanes cross = f->cosine[0] * *sine - f->sine[0] * *cosine;
+  const masks outside = (cross < 0.0) | (dot < RAY_FAN_COSINE) | (square < 1.0 - 1e-9) | (square > 1.0 + 1e-9);
+  if (any(&outside)) return NULL;
+  return &cell->entry[cell->fan_start[first / RAY_FAN_STEP]];
 }
 
-/* Up to LANES rays. Returns 0 where they are to be asked one by one. */
-static int few(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, double *distances) {
-  double c[LANES], s[LANES], nearest[LANES];
-  const double limit = reach < 1e9 ? reach : 1e9;
-  for (size_t i = 0; i < LANES; i++) { /* the last ray fills the lanes that are left */
-    const size_t from = i < count ? i : count - 1;
-    c[i] = cosine[from];
-    s[i] = sine[from];
-    nearest[i] = limit;
-    const double length = c[i] * c[i] + s[i] * s[i];
-    if (!(length > 0.5 && length < 2.0)) return 0;
-  }
-  const fan f = {x, y, limit, height, c, s};
-  const ray_list_entry *entry = list_of(self->lists, &f);
-  if (entry == NULL || !ask(self, &f, entry, nearest)) return 0;
-  for (size_t i = 0; i < count; i++) distances[i] = nearest[i] < limit ? nearest[i] : -1.0;
+/* Returns 0 where the rays are to be asked one by one. */
+INLINE int few(const arena *self, const fan *f, double *distances) {
+  lanes cosine, sine;
+  load(f->cosine, f->some, &cosine);
+  load(f->sine, f->some, &sine);
+  const ray_list_entry *entry = list_of(self->lists, f, &cosine, &sine);
+  if (entry == NULL) return 0;
+  const lanes limit = {f->limit, f->limit, f->limit, f->limit};
+  lanes nearest = limit;
+  if (!ask_list(self, f, entry, &cosine, &sine, &nearest)) return 0;
+  const masks met = nearest < limit;
+  const lanes found = (lanes)(((masks)nearest & met) | ((masks)(lanes){-1.0, -1.0, -1.0, -1.0} & ~met));
+  for (size_t i = 0; i < f->some; i++) distances[i] = found[i];
   return 1;
+}
+
+NOT_INLINE static int few_anywhere(const arena *self, const fan *f, double *distances) {
+  return few(self, f, distances);
+}
+
+#if defined(__x86_64__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
+NOT_INLINE __attribute__((target("avx2"))) static int few_by_avx2(const arena *self, const fan *f, double *distances) {
+  return few(self, f, distances);
+}
+#endif
+
+static int ask_few(const arena *self, const fan *f, double *distances) {
+#if defined(__x86_64__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
+  if (__builtin_cpu_supports("avx2")) return few_by_avx2(self, f, distances);
+#endif
+  return few_anywhere(self, f, distances);
 }
 
 #else
 
-#define LANES 4u
-
-static int few(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, double *distances) {
-  (void)self, (void)x, (void)y, (void)cosine, (void)sine, (void)count, (void)reach, (void)height, (void)distances;
+static int ask_few(const arena *self, const fan *f, double *distances) {
+  (void)self, (void)f, (void)distances;
   return 0;
 }
 
@@ -160,11 +157,11 @@ static int few(const arena *self, double x, double y, const double *cosine, cons
 void arena_fan(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
                double reach, double height, double *distances) {
   const int usable = self->lists != NULL && self->grid.columns > 0 && reach > 0.0 && x * x + y * y < 1e18;
+  const double limit = reach < 1e9 ? reach : 1e9;
   for (size_t first = 0; first < count; first += LANES) {
     const size_t some = count - first < LANES ? count - first : LANES;
-    if (usable && some > 1 &&
-        few(self, x, y, cosine + first, sine + first, some, reach, height, distances + first))
-      continue;
+    const fan f = {x, y, cosine + first, sine + first, some, limit, height};
+    if (usable && some > 1 && ask_few(self, &f, distances + first)) continue;
     for (size_t i = first; i < first + some; i++)
       distances[i] = arena_ray(self, x, y, cosine[i], sine[i], reach, height, NULL);
   }

@@ -46,7 +46,7 @@ static void cut_circle(ray_lists *self) {
   }
   qsort(turn, (size_t)count, sizeof *turn, by_size);
   turn[count] = 4.0;
-  self->sectors = count;
+  self->sectors = count; /* 4 (2 n - 1): a multiple of RAY_FAN_STEP */
   memset(self->sector_of, RAY_SECTORS_MOST, sizeof self->sector_of);
   for (int k = 0; k < count; k++) {
     /* A direction in the middle of the sector: of length 1, for the sector's cell. */
@@ -377,11 +377,13 @@ static void each_list(layout *self, const gathered *all, with_list *call, void *
   for (size_t i = 0; i < all->count; i++) {
     const sight *s = &all->sights[i];
     for (unsigned k = 0; k <= s->more; k++) call(self, (s->first + k) % self->sectors, s, cell);
-    for (unsigned fan = 0; fan < self->fans; fan++) { /* either begins within the other */
-      const unsigned from = fan * RAY_FAN_STEP;
-      const int meets = (s->first + self->sectors - from) % self->sectors < RAY_FAN_SECTORS ||
-                        (from + self->sectors - s->first) % self->sectors <= s->more;
-      if (meets) call(self, self->sectors + fan, s, cell);
+    /* Fans that begin before the sight ends, and end after it begins. */
+    const unsigned end = s->first + self->sectors + s->more;
+    const unsigned begin = s->first + self->sectors - (RAY_FAN_SECTORS - 1);
+    const unsigned last = end / RAY_FAN_STEP;
+    const unsigned first = (begin + RAY_FAN_STEP - 1) / RAY_FAN_STEP;
+    for (unsigned k = 0; k < self->fans && first + k <= last; k++) {
+      call(self, self->sectors + (first + k) % self->fans, s, cell);
     }
   }
 }
@@ -400,7 +402,7 @@ static void write_sight(layout *self, unsigned list, const sight *s, void *cell)
 /* The lists of all sectors and fans in one block, each with its end. */
 static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t *size) {
   layout out = {.sectors = (unsigned)self->sectors};
-  out.fans = (out.sectors + RAY_FAN_STEP - 1) / RAY_FAN_STEP;
+  out.fans = out.sectors / RAY_FAN_STEP;
   const unsigned lists = out.sectors + out.fans;
   each_list(&out, all, count_sight, NULL);
   size_t total = 0;
@@ -416,8 +418,7 @@ static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t 
   for (unsigned k = 0; k < lists; k++) {
     *(k < out.sectors ? &cell->start[k] : &cell->fan_start[k - out.sectors]) = (uint16_t)out.start[k];
     if (out.length[k] > LIST_LONGEST) continue;
-    cell->entry[out.start[k] + out.length[k]] =
-        (ray_list_entry){(float)(all->complete * (1.0 - 1e-6)), RAY_LIST_END};
+    cell->entry[out.start[k] + out.length[k]] = (ray_list_entry){(float)(all->complete * (1.0 - 1e-6)), RAY_LIST_END};
   }
   return cell;
 }

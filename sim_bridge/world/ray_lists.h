@@ -16,8 +16,9 @@
 #define RAY_SECTORS_PER_UNIT 16                       /* cells of the table of directions along a unit vector */
 #define RAY_TABLE_SIDE (2 * RAY_SECTORS_PER_UNIT + 1) /* of that table */
 #define RAY_SECTORS_MOST 128
-#define RAY_FAN_STEP 4        /* sectors from one fan's beginning to the next one's */
-#define RAY_FAN_SECTORS 18    /* that a fan covers: 0.8 rad at least, less RAY_FAN_STEP - 1 sectors 0.65 rad */
+#define RAY_FAN_STEP 4       /* sectors from one fan's beginning to the next one's */
+#define RAY_FAN_SECTORS 18   /* that a fan covers */
+#define RAY_FAN_COSINE 0.819 /* of 0.61 rad: RAY_FAN_SECTORS - RAY_FAN_STEP sectors are wider than that */
 #define RAY_FANS_MOST (RAY_SECTORS_MOST / RAY_FAN_STEP)
 #define RAY_STRIP_LONGEST 15u /* edges */
 #define RAY_LIST_END UINT32_MAX
@@ -33,8 +34,9 @@ static inline uint32_t ray_strip_first(uint32_t strip) { return strip & 0x0fffff
 static inline uint32_t ray_strip_count(uint32_t strip) { return (strip >> 28) + 1; }
 
 typedef struct {
-  uint16_t start[RAY_SECTORS_MOST];  /* of each sector's list */
-  uint16_t fan_start[RAY_FANS_MOST]; /* of the list of RAY_FAN_SECTORS sectors together, from sector RAY_FAN_STEP i on */
+  uint16_t start[RAY_SECTORS_MOST]; /* of each sector's list */
+  uint16_t
+      fan_start[RAY_FANS_MOST]; /* of the list of RAY_FAN_SECTORS sectors together, from sector RAY_FAN_STEP i on */
   ray_list_entry entry[];
 } ray_list_cell;
 
