@@ -32,6 +32,26 @@ def test_an_index_changes_no_answer(
     assert answers[0] == answers[1] == answers[2]
 
 
+@given(
+    scenes(), coordinates, coordinates, angles, st.floats(0, 4), st.integers(1, 9), st.sampled_from([0.3, 1.0, 30.0])
+)
+def test_rays_asked_together_get_the_same_bits(
+    scene: Shapes, x: float, y: float, turn: float, opening: float, rays: int, reach: float
+) -> None:
+    """Fans of any width, also along the axes and towards corners, where rays lie along edges and ties are decided."""
+    toward = [math.atan2(ring.coords[0][1] - y, ring.coords[0][0] - x) for ring in scene.rings]
+    for middle in (turn, 0.0, math.pi / 2, *toward):
+        looks = [middle + opening * (k / (rays - 1) - 0.5) if rays > 1 else middle for k in range(rays)]
+        cosines, sines = [math.cos(look) for look in looks], [math.sin(look) for look in looks]
+        together = ffi.new("double[]", rays)
+        for index in INDEXES:
+            scene.build(index)
+            for height in (0.0, 0.1):
+                alone = [scene.ray(x, y, look, reach, height)[0] for look in looks]
+                lib.arena_fan(scene.handle, x, y, cosines, sines, rays, reach, height, together)
+                assert list(together) == alone
+
+
 @given(scenes(), coordinates, coordinates)
 def test_an_index_changes_nothing_about_what_is_near(scene: Shapes, x: float, y: float) -> None:
     def answers() -> list[Any]:

@@ -95,6 +95,10 @@ const arena_charger *arena_charger_of(const arena *self);
 double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t *item);
 
+/* The same distances, bit for bit, along `count` rays from one point: faster where they point much the same way. */
+void arena_fan(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
+               double reach, double height, double *distances);
+
 /* Distance from (x, y) to the nearest edge or circle, at most `limit`. */
 double arena_clearance(const arena *self, double x, double y, double limit);
 

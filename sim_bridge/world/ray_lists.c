@@ -46,7 +46,7 @@ static void cut_circle(ray_lists *self) {
   }
   qsort(turn, (size_t)count, sizeof *turn, by_size);
   turn[count] = 4.0;
-  self->sectors = count;
+  self->sectors = count; /* 4 (2 n - 1): a multiple of RAY_FAN_STEP */
   memset(self->sector_of, RAY_SECTORS_MOST, sizeof self->sector_of);
   for (int k = 0; k < count; k++) {
     /* A direction in the middle of the sector: of length 1, for the sector's cell. */
@@ -363,37 +363,62 @@ static int sort(gathered *all) {
   return 0;
 }
 
-/* The lists of all sectors in one block, each with its end. */
-static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t *size) {
-  const unsigned sectors = (unsigned)self->sectors;
-  uint32_t length[RAY_SECTORS_MOST] = {0};
+/* Lists of one cell, while they are written. */
+typedef struct {
+  uint32_t start[RAY_SECTORS_MOST + RAY_FANS_MOST]; /* sectors, then fans */
+  uint32_t length[RAY_SECTORS_MOST + RAY_FANS_MOST];
+  unsigned sectors, fans;
+} layout;
+
+/* Calls for each list that a sight belongs to. */
+typedef void with_list(layout *self, unsigned list, const sight *s, void *cell);
+
+static void each_list(layout *self, const gathered *all, with_list *call, void *cell) {
   for (size_t i = 0; i < all->count; i++) {
     const sight *s = &all->sights[i];
-    for (unsigned k = 0; k <= s->more; k++) length[(s->first + k) % sectors]++;
+    for (unsigned k = 0; k <= s->more; k++) call(self, (s->first + k) % self->sectors, s, cell);
+    /* Fans that begin before the sight ends, and end after it begins. */
+    const unsigned end = s->first + self->sectors + s->more;
+    const unsigned begin = s->first + self->sectors - (RAY_FAN_SECTORS - 1);
+    const unsigned last = end / RAY_FAN_STEP;
+    const unsigned first = (begin + RAY_FAN_STEP - 1) / RAY_FAN_STEP;
+    for (unsigned k = 0; k < self->fans && first + k <= last; k++) {
+      call(self, self->sectors + (first + k) % self->fans, s, cell);
+    }
   }
+}
+
+static void count_sight(layout *self, unsigned list, const sight *s, void *cell) {
+  (void)s, (void)cell;
+  self->length[list]++;
+}
+
+static void write_sight(layout *self, unsigned list, const sight *s, void *cell) {
+  if (self->length[list] > LIST_LONGEST) return;
+  const uint32_t strip = self->length[list] < LIST_LONGEST ? s->strip : RAY_LIST_END;
+  ((ray_list_cell *)cell)->entry[self->start[list] + self->length[list]++] = (ray_list_entry){s->bound, strip};
+}
+
+/* The lists of all sectors and fans in one block, each with its end. */
+static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t *size) {
+  layout out = {.sectors = (unsigned)self->sectors};
+  out.fans = out.sectors / RAY_FAN_STEP;
+  const unsigned lists = out.sectors + out.fans;
+  each_list(&out, all, count_sight, NULL);
   size_t total = 0;
-  uint32_t start[RAY_SECTORS_MOST];
-  for (int k = 0; k < (int)sectors; k++) {
-    start[k] = (uint32_t)total;
-    total += (length[k] < LIST_LONGEST ? length[k] : LIST_LONGEST) + 1;
+  for (unsigned k = 0; k < lists; k++) {
+    out.start[k] = (uint32_t)total;
+    total += (out.length[k] < LIST_LONGEST ? out.length[k] : LIST_LONGEST) + 1;
+    out.length[k] = 0;
   }
   *size = sizeof(ray_list_cell) + total * sizeof(ray_list_entry);
   ray_list_cell *cell = malloc(*size);
   if (cell == NULL) return NULL;
-  uint32_t filled[RAY_SECTORS_MOST] = {0};
-  for (size_t i = 0; i < all->count; i++) {
-    const sight *s = &all->sights[i];
-    for (unsigned k = 0; k <= s->more; k++) {
-      const unsigned sector = (s->first + k) % sectors;
-      if (filled[sector] > LIST_LONGEST) continue;
-      const uint32_t strip = filled[sector] < LIST_LONGEST ? s->strip : RAY_LIST_END;
-      cell->entry[start[sector] + filled[sector]++] = (ray_list_entry){s->bound, strip};
-    }
-  }
-  for (int k = 0; k < (int)sectors; k++) {
-    cell->start[k] = (uint16_t)start[k];
-    if (filled[k] > LIST_LONGEST) continue;
-    cell->entry[start[k] + filled[k]] = (ray_list_entry){(float)(all->complete * (1.0 - 1e-6)), RAY_LIST_END};
+  each_list(&out, all, write_sight, cell);
+  for (unsigned k = 0; k < lists; k++) {
+    *(k < out.sectors ? &cell->start[k] : &cell->fan_start[k - out.sectors]) = (uint16_t)out.start[k];
+    if (out.length[k] > LIST_LONGEST) continue;
+    cell->entry[out.start[k] + out.length[k]] = (ray_list_entry){(float)(all->complete * (1.0 - 1e-6)), RAY_LIST_END};
   }
   return cell;
 }

@@ -16,6 +16,10 @@
 #define RAY_SECTORS_PER_UNIT 16                       /* cells of the table of directions along a unit vector */
 #define RAY_TABLE_SIDE (2 * RAY_SECTORS_PER_UNIT + 1) /* of that table */
 #define RAY_SECTORS_MOST 128
+#define RAY_FAN_STEP 4       /* sectors from one fan's beginning to the next one's */
+#define RAY_FAN_SECTORS 18   /* that a fan covers */
+#define RAY_FAN_COSINE 0.819 /* of 0.61 rad: RAY_FAN_SECTORS - RAY_FAN_STEP sectors are wider than that */
+#define RAY_FANS_MOST (RAY_SECTORS_MOST / RAY_FAN_STEP)
 #define RAY_STRIP_LONGEST 15u /* edges */
 #define RAY_LIST_END UINT32_MAX
 
@@ -30,7 +34,9 @@ static inline uint32_t ray_strip_first(uint32_t strip) { return strip & 0x0fffff
 static inline uint32_t ray_strip_count(uint32_t strip) { return (strip >> 28) + 1; }
 
 typedef struct {
-  uint16_t start[RAY_SECTORS_MOST];
+  uint16_t start[RAY_SECTORS_MOST]; /* of each sector's list */
+  uint16_t
+      fan_start[RAY_FANS_MOST]; /* of the list of RAY_FAN_SECTORS sectors together, from sector RAY_FAN_STEP i on */
   ray_list_entry entry[];
 } ray_list_cell;
 
@@ -59,6 +65,18 @@ void ray_lists_destroy(ray_lists *self);
 
 /* Counts a ray that starts in a cell without lists, and makes them when it is time. NULL: there are none. */
 const ray_list_cell *ray_lists_visit(ray_lists *self, size_t cell);
+
+#ifdef __GNUC__
+/* The lists of the cell around (x, y). NULL: there are none; then `*number` is that of the cell, or SIZE_MAX outside. */
+static inline const ray_list_cell *ray_lists_at(const ray_lists *self, double x, double y, size_t *number) {
+  const double gx = (x - self->x0) * self->per_metre;
+  const double gy = (y - self->y0) * self->per_metre;
+  *number = SIZE_MAX;
+  if (!(gx >= 0.0 && gy >= 0.0 && gx < self->columns && gy < self->rows)) return NULL;
+  *number = (size_t)(int)gy * (size_t)self->columns + (size_t)(int)gx;
+  return __atomic_load_n(&self->cells[*number], __ATOMIC_ACQUIRE);
+}
+#endif
 
 /* The sector of a direction; RAY_SECTORS_MOST: none, the vector's length is not 1. */
 static inline unsigned ray_sector(const ray_lists *self, double cosine, double sine) {

@@ -140,12 +140,9 @@ NOT_INLINE static void ask_strip(const arena *self, const ray *r, double height,
 /* Asks the list of the ray's cell and sector. Returns 0 if that does not settle the answer. */
 INLINE int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   ray_lists *lists = self->lists;
-  const double gx = (r->x - lists->x0) * lists->per_metre;
-  const double gy = (r->y - lists->y0) * lists->per_metre;
-  if (!(gx >= 0.0 && gy >= 0.0 && gx < lists->columns && gy < lists->rows)) return 0;
-  const size_t number = (size_t)(int)gy * (size_t)lists->columns + (size_t)(int)gx;
-  const ray_list_cell *cell = __atomic_load_n(&lists->cells[number], __ATOMIC_ACQUIRE);
-  if (cell == NULL && (cell = ray_lists_visit(lists, number)) == NULL) return 0;
+  size_t number;
+  const ray_list_cell *cell = ray_lists_at(lists, r->x, r->y, &number);
+  if (cell == NULL && (number == SIZE_MAX || (cell = ray_lists_visit(lists, number)) == NULL)) return 0;
   const unsigned sector = ray_sector(lists, r->cosine, r->sine);
   if (sector >= RAY_SECTORS_MOST) return 0;
   const ray_list_entry *entry = &cell->entry[cell->start[sector]];

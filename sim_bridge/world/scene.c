@@ -114,6 +114,20 @@ double scene_ray(const scene *self, double x, double y, double c, double s, doub
   return best;
 }
 
+void scene_fan(const scene *self, double x, double y, const double *cosine, const double *sine, size_t count,
+               double reach, double height, uint32_t self_id, double *distances) {
+  arena_fan(self->arena, x, y, cosine, sine, count, reach, height, distances);
+  for (size_t k = 0; k < self->movers_count; k++) {
+    const mover *m = &self->movers[k];
+    if ((self_id != 0 && m->id == self_id) || !(m->height >= height)) continue;
+    for (size_t i = 0; i < count; i++) {
+      const double best = distances[i];
+      const double d = mover_ray(m, x, y, cosine[i], sine[i], best < 0.0 ? reach : best, NULL);
+      if (d >= 0.0) distances[i] = d;
+    }
+  }
+}
+
 void scene_moving(const arena *where, double time, uint32_t first_id, mover *out) {
   const arena_moving *moving = arena_movings(where);
   for (size_t i = 0; i < arena_moving_count(where); i++) {

@@ -11,7 +11,9 @@
 #include "vehicles/vehicle.h"
 #include "vehicles/wander.h"
 
+#ifndef STEPS
 #define STEPS 400000u
+#endif
 #define PITCH 1.0 /* m from pillar to pillar */
 
 static double seconds(void) {

@@ -64,6 +64,13 @@ static inline double beam_ray(const beam *self, const viewpoint *from, beam_orig
   return scene_ray(from->around, at.x, at.y, cosine, sine, reach, self->height, from->id, hit);
 }
 
+/* Distances along all rays, see beam_ray. */
+static inline void beam_fan(const beam *self, const viewpoint *from, beam_origin at, double reach, double *distances) {
+  double cosine[BEAM_RAYS], sine[BEAM_RAYS];
+  for (int i = 0; i < self->rays; i++) beam_direction(self, from, i, &cosine[i], &sine[i]);
+  scene_fan(from->around, at.x, at.y, cosine, sine, (size_t)self->rays, reach, self->height, from->id, distances);
+}
+
 /* A source whose next draws are those of `step`, at most 1024 per step: a reading is a function of key and step alone. */
 static inline void noise_at(noise_source *self, uint64_t step) { self->step = step << 10; }
 
