@@ -7,7 +7,6 @@ It has the face of a board session, so that a Rig speaks with the board as with 
 
 from __future__ import annotations
 
-from boebot.link import messages
 from boebot.robots import load_robot
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge._core import ffi, lib
@@ -160,7 +159,7 @@ class DeviceBench:
 
 
 class DeviceRig(Rig):
-    """A rig that also keeps the slow devices' telemetry."""
+    """A rig around a board whose devices are ours."""
 
     def __init__(self, url: str, pin_map: str = "boebot", bench: DeviceBench | None = None) -> None:
         self.bench = bench or DeviceBench(url, pin_map)
@@ -168,14 +167,3 @@ class DeviceRig(Rig):
 
     def __enter__(self) -> DeviceRig:
         return self
-
-    def devices(self, after_s: float = 0.0) -> messages.DevicesTelemetry:
-        """The slow devices as they are told after that long."""
-        self.listen(after_s)
-        self.answers.clear()
-        return self.next(messages.DevicesTelemetry, 0.2)
-
-    def set(self, parameter: str, value: int) -> None:
-        """Sets a parameter, in counts."""
-        answer = self.request(messages.SetParameter, messages.PARAMETERS[parameter].id, value)
-        assert answer.status == messages.AnswerStatus.OK, messages.AnswerStatus(answer.status)

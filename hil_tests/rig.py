@@ -157,6 +157,17 @@ class Rig:
         self.wait_for(lambda: len(self.telemetry) > count + 1, 5 * TICK_S, "telemetry")
         return self.telemetry[-1]
 
+    def devices(self, after_s: float = 0.0) -> messages.DevicesTelemetry:
+        """The slow devices as they are told after that long."""
+        self.listen(after_s)
+        self.answers.clear()
+        return self.next(messages.DevicesTelemetry, 0.2)
+
+    def set(self, parameter: str, value: int) -> None:
+        """Sets a parameter, in counts."""
+        answer = self.request(messages.SetParameter, messages.PARAMETERS[parameter].id, value)
+        assert answer.status == messages.AnswerStatus.OK, messages.AnswerStatus(answer.status)
+
     @property
     def tick(self) -> int:
         """The tick of the newest telemetry, as a set-point names it."""

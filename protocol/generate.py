@@ -197,11 +197,12 @@ def devices_built(spec: schema.Schema, robot: RobotDescription) -> int:
 
 
 def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
-    """The parameter's default for that robot in counts: a key of its body or of one of its devices."""
+    """The parameter's default for that robot in counts: a key of its body, its supply or one of its devices."""
     owner_name, key = parameter.default_from.split(".")
-    if owner_name != "body" and owner_name not in robot.device and parameter.default is not None:
+    parts = {"body": robot.body, "supply": robot.supply, **robot.device}
+    if owner_name not in parts and parameter.default is not None:
         return parameter.default
-    owner = robot.body if owner_name == "body" else robot.device[owner_name]
+    owner = parts[owner_name]
     counts = round(float(getattr(owner, key)) / parameter.scale)
     if not parameter.min <= counts <= parameter.max:
         raise ValueError(f"{robot.name}: {parameter.default_from} is outside parameter {parameter.name}'s range")

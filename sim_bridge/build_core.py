@@ -70,7 +70,8 @@ int body_advance(body *self, const scene *around, double torque_left, double tor
 void body_as_mover(const body *self, mover *out);
 double body_energy(const body *self);
 double body_wheel_hold(const body *self, double dt);
-int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1);
+int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
+                         double height);
 """
 SOURCES = [
     "world/*.c",

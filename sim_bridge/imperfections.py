@@ -30,6 +30,7 @@ SERVO_COAST_N_M = 0.05  # (chosen)
 SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its gear of about 1:250 (chosen)
 TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
+WHISKER_HEIGHT_M = 0.03
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
 
 INFRARED_RAYS = 5
@@ -45,17 +46,11 @@ PING_MISS = 0.02  # (notes, p = 0.98)
 PING_GRAZING_RAD = 0.785  # surfaces met flatter than this to their normal send nothing back (chosen)
 TEMPERATURE_C = 20.0
 
-# Five alkaline AA cells (data: 1.5 V, about 2,000 mA h at this load; the rest chosen).
-BATTERY_FULL_V = 7.75
-BATTERY_EMPTY_V = 5.0
-BATTERY_CAPACITY_AS = 7200.0
-BATTERY_RESISTANCE_OHM = 0.6
-BATTERY_DROP_OUT_V = 0.5
-BOARD_A = 0.08
+# What board and servos draw from the pack; the pack itself is the description's.
+BOARD_A = 0.08  # (chosen)
 SERVO_IDLE_A = 0.015  # (data)
 SERVO_RUN_A_S_M = 0.74  # free-running: 140 mA at top speed (data)
 SERVO_A_PER_N_M = 3.7  # 1 A at stall (chosen)
-BATTERY_DIVIDER = 0.5
 BATTERY_NOISE_V = 0.005
 
 # Encoder: an edge that the sensor does not see takes its neighbour with it; an extra one is a short flicker (chosen).
@@ -63,7 +58,6 @@ ENCODER_MISSED = 0.0005
 ENCODER_EXTRA = 0.0005
 ENCODER_FLICKER_S = 0.0002
 
-SHARP_M = (0.06, 0.0)
 SHARP_HEIGHT_M = 0.08
 SHARP_REACH_M = 1.5  # 0.8 specified, beyond it less and less (chosen)
 SHARP_SPREAD = 0.01  # of the voltage (chosen)
@@ -73,8 +67,6 @@ SHARP_PERIOD_SPREAD_S = 0.0032  # 9.6 ms are three of them (data)
 SHARP_LATE_S = 0.0076  # (data)
 
 # Phototransistor and 10 nF: 1 to 2 ms in a room (data).
-LIGHT_M = (0.05, 0.04)
-LIGHT_HEADING_RAD = 0.5  # outwards (chosen)
 LIGHT_HEIGHT_M = 0.09
 LIGHT_NEAR_M = 0.05  # d0 of the notes
 LIGHT_AMBIENT = 1.0
@@ -92,7 +84,6 @@ COMPASS_BIAS_RAD = 0.05  # of the mounting (chosen)
 COMPASS_IRON = 0.2  # (chosen)
 COMPASS_PER_AMPERE = 0.05  # (chosen)
 
-TURRET_M = (0.045, 0.0)
 TURRET_CENTRE_SPREAD_US = 10.0  # (chosen)
 
 _DRAW = 1000  # the draws that make a robot have device numbers of their own
@@ -167,7 +158,7 @@ def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int
 
 def whisker_parameters(whisker: robots.Whisker) -> Any:
     """The whisker in C."""
-    return ffi.new("whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_BOUNCE_S])
+    return ffi.new("whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_HEIGHT_M, WHISKER_BOUNCE_S])
 
 
 def infrared_parameters(pair: robots.InfraredPair) -> Any:
@@ -207,23 +198,24 @@ def _beam(position: tuple[float, float], heading: float, opening: float, height:
     return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
 
 
-def battery_parameters() -> Any:
-    """The battery in C."""
+def battery_parameters(supply: robots.Supply, ratio: float = 2.0) -> Any:
+    """The battery in C; `ratio`: the pack's voltage for each volt at the analog pin."""
     return ffi.new(
         "battery_parameters *",
         {
             "supply": {
-                "full_v": BATTERY_FULL_V,
-                "empty_v": BATTERY_EMPTY_V,
-                "capacity_as": BATTERY_CAPACITY_AS,
-                "resistance_ohm": BATTERY_RESISTANCE_OHM,
-                "drop_out_v": BATTERY_DROP_OUT_V,
+                "full_v": supply.full_v,
+                "empty_v": supply.empty_v,
+                "capacity_as": supply.capacity_as,
+                "resistance_ohm": supply.resistance_ohm,
+                "drop_out_v": supply.drop_out_v,
                 "board_a": BOARD_A,
                 "servo_idle_a": SERVO_IDLE_A,
                 "servo_run_a_s_m": SERVO_RUN_A_S_M,
                 "servo_a_per_n_m": SERVO_A_PER_N_M,
+                "unregulated": float(supply.servos == "pack"),
             },
-            "divider": BATTERY_DIVIDER,
+            "divider": 1.0 / ratio,
             "noise_v": BATTERY_NOISE_V,
         },
     )
@@ -242,12 +234,12 @@ def encoder_parameters(edges_per_turn: int) -> Any:
     )
 
 
-def analog_infrared_parameters(draw: Draw) -> Any:
-    """The Sharp sensor in C, looking straight ahead."""
+def analog_infrared_parameters(sharp: robots.AnalogInfrared, draw: Draw) -> Any:
+    """The Sharp sensor in C."""
     return ffi.new(
         "sharp_infrared_parameters *",
         {
-            "beam": _beam(SHARP_M, 0.0, 0.0, SHARP_HEIGHT_M, 1),
+            "beam": _beam(sharp.position_m, sharp.heading_rad, 0.0, SHARP_HEIGHT_M, 1),
             "reach": SHARP_REACH_M,
             "sigma": SHARP_SPREAD if draw.noise else 0.0,
             "gain": 1.0 + SHARP_GAIN_SPREAD * draw(66, 0),
@@ -257,17 +249,16 @@ def analog_infrared_parameters(draw: Draw) -> Any:
     )
 
 
-def light_parameters(side: int, draw: Draw) -> Any:
+def light_parameters(light: robots.LightSensor, side: int, draw: Draw) -> Any:
     """The phototransistor of `side` (0 left, 1 right) in C."""
-    x, y = LIGHT_M
-    way = -1.0 if side else 1.0
+    x, y = light.position_m
     return ffi.new(
         "light_sensor_parameters *",
         {
             "light": {
                 "x": x,
-                "y": way * y,
-                "heading": way * LIGHT_HEADING_RAD,
+                "y": y,
+                "heading": light.heading_rad,
                 "height": LIGHT_HEIGHT_M,
                 "near_distance": LIGHT_NEAR_M,
                 "ambient": LIGHT_AMBIENT,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from boebot import robots
+from boebot.errors import BoardError
 from sim_bridge import imperfections
 from sim_bridge._core import lib
 
@@ -18,10 +19,10 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
     Devices without a part in the world are left alone. A Ping sits on the turret where there are both.
 
     Raises:
-        MemoryError: there is none; descriptions are checked when they are loaded, so nothing else can fail.
+        BoardError: a device cannot be joined; one sentence names it.
+        MemoryError: there is none.
     """
-    battery = imperfections.battery_parameters()
-    done(lib.sim_add_battery(handle, number, _battery_channel(description), battery))
+    _join_supply(handle, number, description)
     for name, device in description.device.items():
         if device.on:
             _join_drive(handle, number, name, device, description.body, draw)
@@ -31,21 +32,39 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
             _mount(handle, number, device, description)
 
 
-def done(status: int) -> None:
-    """Raises what a status of loop.h means."""
-    if status < 0:
-        raise MemoryError(f"simulation: error {status}")
+def done(status: int, what: str) -> None:
+    """Raises what a status of loop.h means for `what` was to be joined.
+
+    Raises:
+        BoardError: a pin is taken, a parameter is out of its range, the board was built for another interface.
+        MemoryError: there is none.
+    """
+    if status == lib.SIM_OK:
+        return
+    if status == lib.SIM_NO_MEMORY:
+        raise MemoryError("simulation")
+    why = {
+        lib.SIM_PIN_TAKEN: "another device listens on its pins",
+        lib.SIM_WRONG_BOARD: "it was built for another interface of boards",
+    }
+    raise BoardError(f"{what} cannot be joined to the simulation: {why.get(status, 'a value is out of its range')}")
 
 
 def _pin(pin: int | str) -> int:
     return robots.pin_number(pin)
 
 
-def _battery_channel(description: robots.RobotDescription) -> int:
-    for device in description.device.values():
-        if isinstance(device, robots.Battery) and device.on:
-            return _pin(device.pin) - FIRST_ANALOG_PIN
-    return NO_PIN
+def _join_supply(handle: Any, number: int, description: robots.RobotDescription) -> None:
+    """The pack, and where the board measures it."""
+    if description.supply is None:
+        return
+    gauges = [d for d in description.device.values() if isinstance(d, robots.Battery) and d.on]
+    channel = _pin(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
+    ratio = gauges[0].ratio if gauges else 2.0
+    done(
+        lib.sim_add_battery(handle, number, channel, imperfections.battery_parameters(description.supply, ratio)),
+        "the battery",
+    )
 
 
 def _side(name: str) -> int:
@@ -55,48 +74,49 @@ def _side(name: str) -> int:
 def _join_drive(
     handle: Any, number: int, name: str, device: robots.Device, body: robots.Body, draw: imperfections.Draw
 ) -> None:
-    side = _side(name)
+    side, what = _side(name), f"device {name!r}"
     match device:
         case robots.ContinuousServo():
             servo = imperfections.servo_parameters(device, body, side, draw)
-            done(lib.sim_add_servo(handle, number, side, _pin(device.pin), servo))
+            done(lib.sim_add_servo(handle, number, side, _pin(device.pin), servo), what)
         case robots.Encoder():
             encoder = imperfections.encoder_parameters(device.edges_per_turn)
-            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin), NO_PIN, encoder))
+            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin), NO_PIN, encoder), what)
         case robots.QuadratureEncoder():
             encoder = imperfections.encoder_parameters(device.edges_per_turn)
-            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin_a), _pin(device.pin_b), encoder))
+            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin_a), _pin(device.pin_b), encoder), what)
         case robots.PositionServo():
-            x, y = imperfections.TURRET_M
+            x, y = device.position_m
             turret = imperfections.turret_parameters(device, draw)
-            done(lib.sim_add_turret(handle, number, _pin(device.pin), x, y, turret))
+            done(lib.sim_add_turret(handle, number, _pin(device.pin), x, y, turret), what)
         case robots.Buzzer():
-            done(lib.sim_add_buzzer(handle, number, _pin(device.pin)))
+            done(lib.sim_add_buzzer(handle, number, _pin(device.pin)), what)
 
 
 def _join_sensor(handle: Any, number: int, name: str, device: robots.Device, draw: imperfections.Draw) -> None:
+    what = f"device {name!r}"
     match device:
         case robots.Whisker():
             whisker = imperfections.whisker_parameters(device)
-            done(lib.sim_add_whisker(handle, number, _pin(device.pin), whisker))
+            done(lib.sim_add_whisker(handle, number, _pin(device.pin), whisker), what)
         case robots.InfraredPair():
             pair = imperfections.infrared_parameters(device)
-            done(lib.sim_add_infrared(handle, number, _pin(device.led_pin), _pin(device.receiver_pin), pair))
+            done(lib.sim_add_infrared(handle, number, _pin(device.led_pin), _pin(device.receiver_pin), pair), what)
         case robots.Ping():
-            done(lib.sim_add_ping(handle, number, _pin(device.pin), imperfections.ping_parameters(device)))
+            done(lib.sim_add_ping(handle, number, _pin(device.pin), imperfections.ping_parameters(device)), what)
         case robots.AnalogInfrared():
-            sharp = imperfections.analog_infrared_parameters(draw)
-            done(lib.sim_add_analog_infrared(handle, number, _pin(device.pin) - FIRST_ANALOG_PIN, sharp))
+            sharp = imperfections.analog_infrared_parameters(device, draw)
+            done(lib.sim_add_analog_infrared(handle, number, _pin(device.pin) - FIRST_ANALOG_PIN, sharp), what)
         case robots.LightSensor():
-            light = imperfections.light_parameters(_side(name), draw)
-            done(lib.sim_add_light_sensor(handle, number, _pin(device.pin), light))
+            light = imperfections.light_parameters(device, _side(name), draw)
+            done(lib.sim_add_light_sensor(handle, number, _pin(device.pin), light), what)
         case robots.Compass():
             compass = imperfections.compass_parameters(draw)
-            done(lib.sim_add_compass(handle, number, _pin(device.sda_pin), _pin(device.scl_pin), compass))
+            done(lib.sim_add_compass(handle, number, _pin(device.sda_pin), _pin(device.scl_pin), compass), what)
 
 
 def _mount(handle: Any, number: int, turret: robots.PositionServo, description: robots.RobotDescription) -> None:
     """The Ping sits on the turret where there are both."""
     for device in description.device.values():
         if isinstance(device, robots.Ping) and device.on:
-            done(lib.sim_mount(handle, number, _pin(turret.pin), _pin(device.pin)))
+            done(lib.sim_mount(handle, number, _pin(turret.pin), _pin(device.pin)), "the Ping on the turret")

@@ -32,7 +32,14 @@
 enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
 enum { SIM_ANY = -1 };
 enum { SIM_OBSTACLES_MAXIMUM = 64 }; /* that move; robots: BODY_MAXIMUM */
-enum { SIM_OK = 0, SIM_NO_MEMORY = -1, SIM_WRONG_BOARD = -2, SIM_BAD_ARGUMENT = -3 };
+enum {
+  SIM_OK = 0,
+  SIM_NO_MEMORY = -1,
+  SIM_WRONG_BOARD = -2,
+  SIM_BAD_ARGUMENT = -3,
+  SIM_NOT_FREE = -4,  /* something is in that place: arena, obstacle on its way, robot */
+  SIM_PIN_TAKEN = -5, /* another device listens there */
+};
 
 /* One row of the truth. */
 typedef struct {
@@ -116,7 +123,7 @@ double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 wher
 size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
 uint64_t sim_edges_seen(const sim *self, int robot);
 
-/* For tests: a robot put elsewhere, at rest (0, or SIM_BAD_ARGUMENT if the place is not free); a pin taken from its part
+/* For tests: a robot put elsewhere, at rest (or SIM_NOT_FREE); a pin taken from its part
  * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
  * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; voltage of the rail that board and servos run
  * on, 0: what the regulator gives. */

@@ -5,7 +5,8 @@ static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 
 int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
-  if (r == NULL || !arena_is_free(self->arena, x, y, r->body.parameters.radius)) return SIM_BAD_ARGUMENT;
+  if (r == NULL) return SIM_BAD_ARGUMENT;
+  if (!scene_is_free(&self->seen, x, y, r->body.parameters.radius, r->chassis.self_id)) return SIM_NOT_FREE;
   body_place(&r->body, x, y, heading);
   r->chassis.x = x;
   r->chassis.y = y;

@@ -78,6 +78,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   board *b = (board *)address;
   if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
   if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
+  if (!scene_is_free(&self->seen, x, y, parameters->radius, 0)) return SIM_NOT_FREE;
   robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
   if (robots == NULL) return SIM_NO_MEMORY;
   self->robots = robots;
@@ -136,8 +137,18 @@ static void *new_part(robot *r, size_t size) {
   return calloc(1, size);
 }
 
-/* The robot has the part from now on; it hears its pins, beginning with what the board does to them now. */
+/* The robot has the part from now on; it hears its pins, beginning with what the board does to them now. A part is
+ * refused, and freed, where another one hears one of its pins already, or gives the voltage there. */
 static int join(robot *r, part *p) {
+  for (int i = 0; i < PART_PINS; i++) {
+    const uint8_t pin = p->pins[i].pin;
+    if (!is_pin(pin)) continue;
+    const int heard = (p->pins[i].role & PART_HEARS) && r->hears[pin] != NULL;
+    const int given = (p->pins[i].role & PART_ANALOG) && r->analog[pin - BOARD_FIRST_ANALOG_PIN] != NULL;
+    if (!heard && !given) continue;
+    free(p);
+    return SIM_PIN_TAKEN;
+  }
   r->parts[r->part_count++] = p;
   for (int i = 0; i < PART_PINS; i++) {
     const uint8_t pin = p->pins[i].pin;
@@ -229,8 +240,9 @@ int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parame
   if (b == NULL) return SIM_NO_MEMORY;
   const part_place place = place_of(r, PART_BATTERY);
   battery_init(b, &place, channel, parameters);
-  r->battery = b;
-  return join(r, &b->part);
+  const int status = join(r, &b->part);
+  if (status == SIM_OK) r->battery = b;
+  return status;
 }
 
 static two_wire *bus_at(const robot *r, uint8_t sda_pin, uint8_t scl_pin) {
@@ -249,20 +261,25 @@ static two_wire *bus_of(robot *r, uint8_t sda_pin, uint8_t scl_pin) {
   if (bus == NULL) return NULL;
   const part_place place = next_place(r, PART_TWO_WIRE);
   two_wire_init(bus, &place, sda_pin, scl_pin);
-  join(r, &bus->part);
-  return bus;
+  return join(r, &bus->part) == SIM_OK ? bus : NULL; /* whoever asks has seen to it that the pins are free */
 }
 
 int sim_add_compass(sim *self, int number, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !is_pin(sda_pin) || !is_pin(scl_pin) || sda_pin == scl_pin) return SIM_BAD_ARGUMENT;
+  if (bus_at(r, sda_pin, scl_pin) == NULL && (r->hears[sda_pin] != NULL || r->hears[scl_pin] != NULL)) {
+    return SIM_PIN_TAKEN;
+  }
   two_wire *bus = bus_of(r, sda_pin, scl_pin);
   compass *c = bus == NULL ? NULL : new_part(r, sizeof *c);
   if (c == NULL) return SIM_NO_MEMORY;
   const part_place place = next_place(r, PART_COMPASS);
-  int status = compass_init(c, &place, parameters);
-  if (status == 0) status = two_wire_attach(bus, &c->device);
-  return join_if(r, &c->part, status);
+  const int usable = compass_init(c, &place, parameters) == 0;
+  if (usable && two_wire_attach(bus, &c->device) != 0) { /* two of them have one address */
+    free(c);
+    return SIM_PIN_TAKEN;
+  }
+  return join_if(r, &c->part, usable ? 0 : -1);
 }
 
 int sim_add_analog_infrared(sim *self, int number, uint8_t channel, const sharp_infrared_parameters *parameters) {

@@ -95,9 +95,7 @@ class BoardPins(BoardMemory):
         Raises:
             ArenaError: that place is not free.
         """
-        radius, number = self._robot.description.body.radius_m, self._number
-        free = self._sim.is_free(x, y, radius, without=number)
-        if not free or lib.sim_place(self._handle, number, x, y, heading) != lib.SIM_OK:
+        if lib.sim_place(self._handle, self._number, x, y, heading) != lib.SIM_OK:
             raise ArenaError(f"the robot cannot be put at x = {x:g} m, y = {y:g} m: no free space")
 
     def reset(self, cause: str = "external") -> None:

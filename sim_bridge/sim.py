@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -90,12 +89,13 @@ class Sim:
         if len(self._members) == lib.BODY_MAXIMUM:
             raise BoardError(f"a simulation takes {len(self._members)} robots at most")
         x, y, heading = self.arena.start if pose is None else pose
-        if not self.is_free(x, y, description.body.radius_m):
+        body = imperfections.body_parameters(description.body)
+        status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
+        if status == lib.SIM_NOT_FREE:
             raise ArenaError(
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
-        body = imperfections.body_parameters(description.body)
-        done(lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading))
+        done(status, f"the {board.description}")
         self._members[number] = board, description
         join(self.handle, number, description, imperfections.Draw(self.seed, self.noise, number, description.unit))
         return self.robot(number)
@@ -114,17 +114,6 @@ class Sim:
     def robots(self) -> list[SimRobot]:
         """All of them, by increasing number."""
         return [self.robot(number) for number in sorted(self._members)]
-
-    def is_free(self, x: float, y: float, radius: float, without: int | None = None) -> bool:
-        """Whether a disc lies in free space, and on no robot (but `without`)."""
-        if not self.arena.is_free(x, y, radius):
-            return False
-        for robot in self.robots:
-            body = robot.body()
-            near = math.hypot(body.x - x, body.y - y) < radius + robot.description.body.radius_m
-            if near and robot.number != without:
-                return False
-        return True
 
     @property
     def cycle(self) -> int:

@@ -8,7 +8,7 @@ keys' names; lengths are in the robot's frame, x forward, y left, origin at the 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 
@@ -39,6 +39,18 @@ class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     wheel_speed_maximum_m_s: Positive
 
 
+class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Battery pack and regulator of a robot with a board."""
+
+    full_v: Positive  # open-circuit voltage of the full pack
+    empty_v: NotNegative  # and of the empty one
+    capacity_as: Positive  # between the two
+    resistance_ohm: NotNegative  # inside the pack and on the way from it
+    drop_out_v: NotNegative  # of the 5 V regulator
+    servos: Literal["regulated", "pack"]  # what they run on
+    minimum_v: Annotated[float, msgspec.Meta(ge=0, le=5.5)]  # of the board, below which its motors are off
+
+
 _ANALOG = tuple(range(14, 20))
 
 
@@ -55,9 +67,10 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
 
 
 class PositionServo(Device, tag="position_servo", frozen=True, kw_only=True):
-    """A servo that turns to an angle: pulse = centre + gain * angle."""
+    """A servo that turns to an angle: pulse = centre + gain * angle. A Ping, where there is one, is mounted on it."""
 
     pin: int | str
+    position_m: Point  # of its axis
     centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
     gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
 
@@ -151,6 +164,8 @@ class AnalogInfrared(Device, tag="analog_infrared", frozen=True, kw_only=True):
     """Sharp analog infra-red distance sensor."""
 
     pin: int | str
+    position_m: Point
+    heading_rad: float
 
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
@@ -161,6 +176,8 @@ class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
     """Phototransistor read by its RC decay time."""
 
     pin: int | str
+    position_m: Point
+    heading_rad: float
 
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge.
@@ -230,6 +247,7 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     body: Body
     device: dict[str, AnyDevice]
     pin_map: str = ""  # of the board's firmware
+    supply: Supply | None = None  # of the board; a robot without a board has none
     unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
     """serial number of a simulated robot: what its parts are like is drawn by it and stays from run to run, whatever
     the seed; 0: nominal. Without one each seed draws another robot."""
@@ -258,6 +276,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
     path = toml_files.find("robots", robot, RobotError)
     description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
     if description.has_board:
+        _check_supply(description, path.name)
         _check_pins(description, path.name)
         _check_image(description, path)
     else:
@@ -300,6 +319,17 @@ def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def _check_supply(robot: RobotDescription, file: str) -> None:
+    """Refuses a board without a supply, and a pack that is fuller empty than full."""
+    supply = robot.supply
+    if supply is None:
+        raise RobotError(f"{file}: supply is missing; expected the table of the pack that the board runs on")
+    if not supply.full_v > supply.empty_v:
+        raise RobotError(
+            f"{file}: supply.full_v is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
+        )
+
+
 def _check_pins(robot: RobotDescription, file: str) -> None:
     """Refuses devices that cannot share a pin or a unit of the chip (ATmega328P data sheet), naming both."""
     pin_owner: dict[int, str] = {}
@@ -329,7 +359,11 @@ def _check_pins(robot: RobotDescription, file: str) -> None:
 
 
 def _check_vehicle(robot: RobotDescription, file: str) -> None:
-    """Refuses pins and a drive that is none."""
+    """Refuses pins, a supply and a drive that is none."""
+    if robot.supply is not None:
+        raise RobotError(
+            f"{file}: supply is given, but a robot without a board has none; its devices say their voltages"
+        )
     if robot.pin_map:
         raise RobotError(f"{file}: pin_map is {robot.pin_map!r}, but a robot without a board has no pins")
     for name, device in robot.device.items():

@@ -32,7 +32,7 @@ static void step(part *base) {
   } else {
     const whisker_parameters *p = &self->parameters;
     const chassis *c = base->chassis;
-    pressed = (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y);
+    pressed = (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y, p->height);
   }
   if (pressed == self->pressed) return;
   self->pressed = pressed;

@@ -11,11 +11,10 @@
 /* python: begin */
 typedef struct {
   double root_x, root_y, tip_x, tip_y; /* in the body's frame, m */
+  double height;                       /* above the floor, m: what is lower does not bend it */
   double bounce_s;                     /* mean length of a bounce; 0: none */
 } whisker_parameters;
 /* python: end */
-
-#define WHISKER_HEIGHT_M 0.03 /* above the floor */
 
 typedef struct {
   part part;

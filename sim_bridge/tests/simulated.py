@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from boebot.robots import RobotDescription, load_robot
+from boebot.robots import RobotDescription, Supply, load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
 from sim_bridge.boards.board import CLOCK_HZ
@@ -17,6 +17,7 @@ from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
 
 MS = CLOCK_HZ // 1000
+SUPPLY = Supply(7.75, 5.0, 7200.0, 0.6, 0.5, "regulated", 4.2)  # full, empty, A s, ohm, drop-out, servos, minimum
 US = CLOCK_HZ // 1_000_000
 
 

@@ -256,7 +256,7 @@ def test_segment_on_the_body_touches_what_it_crosses() -> None:
 
     def touches(scene: Any = None) -> bool:
         where = body.scene if scene is None else scene
-        return bool(lib.body_segment_touches(body.body, where, 0.045, 0.03, 0.1, 0.055))
+        return bool(lib.body_segment_touches(body.body, where, 0.045, 0.03, 0.1, 0.055, 0.03))
 
     for x, expected in ((0.39, False), (0.3999, False), (0.4001, True), (0.42, True)):
         body.place(x, 0, 0)

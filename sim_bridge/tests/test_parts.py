@@ -18,7 +18,7 @@ from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, square
 
 LEFT, RIGHT = 13, 12
 ENCODERS = 16, 17
@@ -115,17 +115,21 @@ def test_pulse_that_a_reset_cuts_short_still_twitches() -> None:
     assert robot.robot.body().wheel_left < -0.01
 
 
-def test_weak_supply_slows_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
-    def speed() -> float:
-        robot = scripted()
+def supplied(**supply: float) -> robots.RobotDescription:
+    """The shieldbot with another pack."""
+    robot = load_robot("shieldbot")
+    assert robot.supply is not None
+    return msgspec.structs.replace(robot, supply=msgspec.structs.replace(robot.supply, **supply))
+
+
+def test_weak_supply_slows_the_servos() -> None:
+    def speed(**supply: float) -> float:
+        robot = scripted(robot=supplied(**supply))
         robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
         robot.run(1.0)
         return float(robot.robot.body().speed)
 
-    full = speed()
-    monkeypatch.setattr(imperfections, "BATTERY_FULL_V", 4.9)
-    monkeypatch.setattr(imperfections, "BATTERY_EMPTY_V", 4.5)
-    assert 0.70 * full < speed() < 0.90 * full
+    assert 0.70 * speed() < speed(full_v=4.9, empty_v=4.5) < 0.90 * speed()
 
 
 def test_units_differ_by_seed_and_keep_their_nature() -> None:
@@ -475,7 +479,7 @@ def test_voltage_at_the_analog_pin() -> None:
 
 
 def test_charge_runs_out() -> None:
-    parameters = imperfections.battery_parameters()
+    parameters = imperfections.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     robot = scripted()
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
@@ -488,7 +492,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     robot = scripted()
     supply = 128  # BOARD_ANALOG_SUPPLY
     assert lib.script_board_volts(robot.script, supply) == 5.0
-    parameters = imperfections.battery_parameters()
+    parameters = imperfections.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)

@@ -264,7 +264,7 @@ def test_one_address_is_for_one_chip() -> None:
     robot = scripted()
     handle = robot.sim.handle
     assert lib.sim_add_compass(handle, 0, SDA, SCL, parameters()) == 0
-    assert lib.sim_add_compass(handle, 0, SDA, SCL, parameters()) == lib.SIM_BAD_ARGUMENT
+    assert lib.sim_add_compass(handle, 0, SDA, SCL, parameters()) == lib.SIM_PIN_TAKEN
     assert lib.sim_add_compass(handle, 0, SDA, SDA, parameters()) == lib.SIM_BAD_ARGUMENT
     assert lib.sim_add_compass(handle, 0, 20, SCL, parameters()) == lib.SIM_BAD_ARGUMENT
     assert lib.sim_add_compass(handle, 0, 16, 17, parameters(sigma=-1.0)) == lib.SIM_BAD_ARGUMENT

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import msgspec
 import pytest
 
 from boebot import robots
+from boebot.errors import ArenaError, BoardError
 from boebot.robots import load_robot
-from sim_bridge import imperfections
 from sim_bridge._core import lib
+from sim_bridge.arena import Arena, ArenaDescription
+from sim_bridge.arena_description import Moving, Waypoint
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, square
 
 DEVICES: dict[str, robots.AnyDevice] = {
-    "turret": robots.PositionServo(pin=11),
+    "turret": robots.PositionServo(pin=11, position_m=(0.045, 0.0)),
     "compass": robots.Compass(sda_pin="A4", scl_pin="A5"),
-    "analog_infrared": robots.AnalogInfrared(pin="A2"),
+    "analog_infrared": robots.AnalogInfrared(pin="A2", position_m=(0.02, 0.0), heading_rad=0.3),
     "battery": robots.Battery(pin="A0"),
-    "light_left": robots.LightSensor(pin=6),
+    "light_left": robots.LightSensor(pin=6, position_m=(0.05, 0.04), heading_rad=0.5),
     "buzzer": robots.Buzzer(pin=4),
 }
 
@@ -49,10 +52,58 @@ def test_each_device_sits_at_its_pins() -> None:
     lows = [cycle for cycle, level in robot.inputs(6) if level == 0]
     assert lows[-1] - 501 * MS == pytest.approx(1500 * US, abs=2)
     assert robot.robot.tones()["frequency"] == pytest.approx([1000.0])
-    ahead = 100 * (1.0 - imperfections.SHARP_M[0])
+    ahead = 100 * (1.0 - 0.02) / math.cos(0.3)  # as it is mounted here
     assert lib.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (ahead + 4.74))
     assert lib.script_board_volts(robot.script, 0) == pytest.approx(robot.robot.pack_voltage / 2)
     assert {robot.inputs(pin)[0][1] for pin in (18, 19)} == {1}  # the compass board's pull-ups
+
+
+@pytest.mark.parametrize(
+    ("name", "device"),
+    [
+        ("second_compass", robots.Compass(sda_pin="A4", scl_pin="A5")),
+        ("horn", robots.Buzzer(pin=4)),
+        ("light_right", robots.LightSensor(pin=8, position_m=(0.05, -0.04), heading_rad=-0.5)),
+        ("second_sharp", robots.AnalogInfrared(pin="A2", position_m=(0.0, 0.0), heading_rad=0.0)),
+        ("second_turret", robots.PositionServo(pin=13, position_m=(0.0, 0.0))),
+        ("bus_on_servos", robots.Compass(sda_pin=12, scl_pin=13)),
+    ],
+)
+def test_two_devices_that_listen_at_one_place_are_refused_in_one_sentence(name: str, device: robots.AnyDevice) -> None:
+    robot = equipped()
+    doubled = msgspec.structs.replace(robot, device={**robot.device, name: device})
+    sim = Sim(arena_of(), noise=False)
+    with pytest.raises(BoardError, match=f"^device '{name}' cannot be joined .*: another device listens on its pins$"):
+        add_scripted(sim, doubled)
+
+
+def test_values_out_of_range_are_refused_in_one_sentence() -> None:
+    robot = equipped()
+    sensor = robots.AnalogInfrared(pin="A2", position_m=(0.0, 0.0), heading_rad=math.nan)
+    wrong = msgspec.structs.replace(robot, device={**robot.device, "analog_infrared": sensor})
+    with pytest.raises(BoardError, match=r"^device 'analog_infrared' cannot be joined .* is out of its range$"):
+        add_scripted(Sim(arena_of(), noise=False), wrong)
+
+
+def test_a_start_on_a_robot_or_on_an_obstacle_on_its_way_is_refused() -> None:
+    """Two discs of 0.07 m, and the cart's disc of 0.10 m."""
+    cart = Moving(path=[Waypoint(0.0, 1.0, 0.0), Waypoint(10.0, 2.0, 0.0)], radius_m=0.10)
+    sim = Sim(Arena(ArenaDescription(name="busy", moving=[cart])), noise=False)
+    first = add_scripted(sim, pose=(0.0, 0.0, 0.0))
+    for x, free in ((0.139, False), (0.831, False), (0.829, True)):
+        if free:
+            second = add_scripted(sim, pose=(x, 0.0, 0.0))
+        else:
+            with pytest.raises(ArenaError, match="no free space"):
+                add_scripted(sim, pose=(x, 0.0, 0.0))
+    sim.run(5 * CLOCK_HZ, 5 * CLOCK_HZ)
+    for x, free in ((0.141, True), (0.0, False), (1.34, False), (1.2, True), (1.7, True)):
+        if free:
+            second.pins.place(x, 0.0, 0.0)
+        else:
+            with pytest.raises(ArenaError, match="no free space"):
+                second.pins.place(x, 0.0, 0.0)
+    first.pins.place(0.0, 0.0, 1.0)  # a robot is not in its own way
 
 
 def firmware_run(order: tuple[int, ...]) -> tuple[int, list[bytes]]:

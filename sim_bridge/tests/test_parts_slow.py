@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boebot import robots
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
@@ -16,6 +17,8 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
+LIGHT_SENSOR = robots.LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
+SHARP = robots.AnalogInfrared(pin="A2", position_m=(0.06, 0.0), heading_rad=0.0)
 RELEASED = 2
 ON, OFF = imperfections.Draw(1, noise=True), imperfections.Draw(1, noise=False)
 
@@ -25,8 +28,7 @@ ON, OFF = imperfections.Draw(1, noise=True), imperfections.Draw(1, noise=False)
 
 def lit(arena: Arena, heading: float = 0.0, **changes: float) -> Scripted:
     """A robot with one phototransistor at its middle that looks straight ahead."""
-    parameters = imperfections.light_parameters(0, OFF)
-    parameters.light.x = parameters.light.y = parameters.light.heading = 0.0
+    parameters = imperfections.light_parameters(LIGHT_SENSOR, 0, OFF)
     for name, value in changes.items():
         setattr(parameters.light if hasattr(parameters.light, name) else parameters, name, value)
     robot = scripted(arena, pose=(0, 0, heading))
@@ -95,7 +97,7 @@ def test_charging_again_takes_back_the_decay() -> None:
 
 def test_bad_light_parameters_are_refused() -> None:
     for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
-        parameters = imperfections.light_parameters(0, OFF)
+        parameters = imperfections.light_parameters(LIGHT_SENSOR, 0, OFF)
         setattr(parameters, name, value)
         assert lib.sim_add_light_sensor(scripted().sim.handle, 0, LIGHT, parameters) == lib.SIM_BAD_ARGUMENT
 
@@ -107,7 +109,9 @@ def sharp_before(distance: float, draw: imperfections.Draw = OFF) -> Scripted:
     """A robot that looks at a wall from that distance."""
     x = 0.06 + distance
     robot = scripted(arena_of([(x, -3), (x + 0.1, -3), (x + 0.1, 3), (x, 3)]), pose=(0, 0, 0))
-    assert lib.sim_add_analog_infrared(robot.sim.handle, 0, 2, imperfections.analog_infrared_parameters(draw)) == 0
+    assert (
+        lib.sim_add_analog_infrared(robot.sim.handle, 0, 2, imperfections.analog_infrared_parameters(SHARP, draw)) == 0
+    )
     return robot
 
 

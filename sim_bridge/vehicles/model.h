@@ -112,6 +112,8 @@ typedef struct {
   double x0, y0, x1, y1;
 } whisker_segment;
 
+#define WHISKER_HEIGHT_M 0.03 /* above the floor: what is lower does not bend it */
+
 typedef struct {
   double empty, full, sigma;
 } battery_gauge;

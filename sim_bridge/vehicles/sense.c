@@ -97,7 +97,9 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
       break;
     case SENSOR_WHISKER: {
       const whisker_segment *w = &sensor->as.whisker;
-      *out = body_segment_touches(&s->world->body, s->from.around, w->x0, w->y0, w->x1, w->y1) ? 1.0 : 0.0;
+      const int touches =
+          body_segment_touches(&s->world->body, s->from.around, w->x0, w->y0, w->x1, w->y1, WHISKER_HEIGHT_M);
+      *out = touches ? 1.0 : 0.0;
       break;
     }
     default: {

@@ -188,7 +188,7 @@ static int mover_meets_segment(const mover *m, double ax, double ay, double bx, 
   return 0;
 }
 
-int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1) {
+int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1, double height) {
   const arena *where = around->arena;
   const int clear = body_is_clear(self, where);
   if (clear && around->movers_count == 0) return 0;
@@ -200,15 +200,17 @@ int body_segment_touches(body *self, const scene *around, double x0, double y0, 
   size_t count;
   const uint32_t *list = body_near_edges(self, where, &count);
   for (size_t i = 0; i < count; i++) {
-    if (arena_edge_meets_segment(&arena_edges(where)[list != NULL ? list[i] : i], ax, ay, bx, by)) return 1;
+    const arena_edge *edge = &arena_edges(where)[list != NULL ? list[i] : i];
+    if (edge->height >= height && arena_edge_meets_segment(edge, ax, ay, bx, by)) return 1;
   }
   list = body_near_discs(self, where, &count);
   for (size_t i = 0; i < count; i++) {
-    if (arena_disc_meets_segment(&arena_discs(where)[list != NULL ? list[i] : i], ax, ay, bx, by)) return 1;
+    const arena_disc *disc = &arena_discs(where)[list != NULL ? list[i] : i];
+    if (disc->height >= height && arena_disc_meets_segment(disc, ax, ay, bx, by)) return 1;
   }
   for (size_t i = 0; i < around->movers_count; i++) {
     const mover *m = &around->movers[i];
-    if (m->id == self->id && self->id != 0) continue;
+    if ((m->id == self->id && self->id != 0) || m->height < height) continue;
     const double reach = m->radius + self->reach;
     if ((m->x - s->x) * (m->x - s->x) + (m->y - s->y) * (m->y - s->y) > reach * reach) continue;
     if (mover_meets_segment(m, ax, ay, bx, by)) return 1;

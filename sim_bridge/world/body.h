@@ -126,9 +126,9 @@ static inline double body_right_speed(const body *self) {
   return self->state.speed + self->parameters.half_track * self->state.turn_rate;
 }
 
-/* 1 if the segment from (x0, y0) to (x1, y1), in the body's frame and within its reach, meets something: an edge or disc
- * of the arena, a mover with another id. */
-int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1);
+/* 1 if the segment from (x0, y0) to (x1, y1), in the body's frame and within its reach, meets something that is at least
+ * `height` high: an edge or disc of the arena, a mover with another id. */
+int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1, double height);
 
 /* 1 if nothing of the arena is within the body's reach, without looking at it. */
 int body_is_clear(body *self, const arena *where);

@@ -47,7 +47,7 @@
   X(TELEMETRY_PERIOD, u16, 1, 100, 1)                                  \
   X(SESSION_TIME_OUT, u16, 200, 1500, 1000)                            \
   X(RETRY_TIME, u16, 0, 2000, 0)                                       \
-  X(SUPPLY_MINIMUM, u16, 0, 5500, 4200)                                \
+  X(SUPPLY_MINIMUM, u16, 0, 5500, DEFAULT_SUPPLY_MINIMUM)              \
   X(BANDGAP, u16, 1000, 1200, 1100)                                    \
   X(BAUD_RATE, u16, 96, 10000, DEFAULT_BAUD_RATE)                      \
   X(INFRARED_SWEEP, u16, 0, 1, 0)                                      \

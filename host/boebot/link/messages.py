@@ -983,7 +983,7 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "telemetry_period": ParameterSpec(13, "ticks", 1.0, 1, 100, "ticks between two telemetry messages, where the baud rate allows it"),
     "session_time_out": ParameterSpec(14, "ms", 1.0, 200, 1500, "silence of the host after which the session ends and the motors are latched off"),
     "retry_time": ParameterSpec(15, "ms", 1.0, 0, 2000, "time after which an unacknowledged event is sent again; 0: follows from tick and baud rate"),
-    "supply_minimum": ParameterSpec(16, "V", 0.001, 0, 5500, "supply below which motors and EEPROM writes are refused; 0: never"),
+    "supply_minimum": ParameterSpec(16, "V", 0.001, 0, 5500, "supply below which motors and EEPROM writes are refused; 0: never", "supply.minimum_v"),
     "bandgap": ParameterSpec(17, "V", 0.001, 1000, 1200, "this chip's bandgap voltage, against which the supply is measured"),
     "baud_rate": ParameterSpec(18, "bit/s", 100.0, 96, 10000, "rate of the serial line after the next reset: 9600, 19200, 38400, 57600, 115200, 250000, 500000 or 1000000", "uart.baud"),
     "infrared_sweep": ParameterSpec(19, "flag", 1.0, 0, 1, "1: bursts go through 38, 39, 40, 41 and 42 kHz in five ticks and count zones; 0: 38 kHz only"),
