@@ -23,6 +23,9 @@ typedef struct {
 #define INLINE static inline __attribute__((always_inline))
 #define NOT_INLINE __attribute__((noinline))
 
+#define ASIDE \
+  1e-10 /* lists know more than that beside their sectors; the first ray's own cross product may be rounded */
+
 typedef double lanes __attribute__((vector_size(8 * LANES)));
 typedef int64_t masks __attribute__((vector_size(8 * LANES)));
 
@@ -107,7 +110,7 @@ INLINE const ray_list_entry *list_of(const ray_lists *lists, const fan *f, const
   const lanes square = *cosine * *cosine + *sine * *sine;
   const lanes dot = f->cosine[0] * *cosine + f->sine[0] * *sine;
   const lanes cross = f->cosine[0] * *sine - f->sine[0] * *cosine;
-  const masks outside = (cross < 0.0) | (dot < RAY_FAN_COSINE) | (square < 1.0 - 1e-9) | (square > 1.0 + 1e-9);
+  const masks outside = (cross < -ASIDE) | (dot < RAY_FAN_COSINE) | (square < 1.0 - 1e-9) | (square > 1.0 + 1e-9);
   if (any(&outside)) return NULL;
   return &cell->entry[cell->fan_start[first / RAY_FAN_STEP]];
 }
@@ -124,7 +127,10 @@ INLINE int few(const arena *self, const fan *f, double *distances) {
   if (!ask_list(self, f, entry, &cosine, &sine, &nearest)) return 0;
   const masks met = nearest < limit;
   const lanes found = (lanes)(((masks)nearest & met) | ((masks)(lanes){-1.0, -1.0, -1.0, -1.0} & ~met));
-  for (size_t i = 0; i < f->some; i++) distances[i] = found[i];
+  distances[0] = found[0];
+  if (f->some > 1) distances[1] = found[1];
+  if (f->some > 2) distances[2] = found[2];
+  if (f->some > 3) distances[3] = found[3];
   return 1;
 }
 
