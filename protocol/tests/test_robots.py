@@ -48,9 +48,24 @@ def test_boebot_has_every_device_but_encoders_on_pins_of_its_own() -> None:
     assert pins["light_left"] == {"": 15} and pins["light_right"] == {"": 6}
 
 
+def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulator() -> None:
+    """HARDWARE section 1: 5.3 V idle, 4.6 V running; 5 V regulated."""
+    supplies = {name: load_robot(name).supply for name in ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")}
+    assert all(supply is not None for supply in supplies.values())
+    assert {name: supply.servos for name, supply in supplies.items() if supply} == {
+        "shieldbot": "regulated",
+        "shieldbot-basic": "regulated",
+        "shieldbot-quad": "regulated",
+        "boebot": "pack",
+    }
+    assert load_robot("arsim").supply is None
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
+        ("[supply]\nfull_v = 4.0", "supply.full_v is 4; expected more than empty_v, 5 V"),
+        ("[supply]\nservos = 'mains'", "servos"),
         ("[device.buzzer]\ntype = 'buzzer'\npin = 5", "whisker_left and buzzer cannot share pin 5"),
         (
             "[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
