@@ -16,17 +16,20 @@ from sim_bridge._core import ffi
 from sim_bridge.imperfections import Draw
 
 SHIELDBOT = robots.load_robot("shieldbot")
+SHARP = robots.load_robot("boebot").device["analog_infrared"]
 
 
 def parts(draw: Draw) -> list[bytes]:
     """All that is drawn of a robot, as the C structs have it."""
     servo = SHIELDBOT.device["servo_left"]
     turret = SHIELDBOT.device["turret"]
+    light = SHIELDBOT.device["light_right"]
     assert isinstance(servo, robots.ContinuousServo) and isinstance(turret, robots.PositionServo)
+    assert isinstance(light, robots.LightSensor) and isinstance(SHARP, robots.AnalogInfrared)
     made: list[Any] = [
         imperfections.servo_parameters(servo, SHIELDBOT.body, 0, draw),
-        imperfections.analog_infrared_parameters(draw),
-        imperfections.light_parameters(1, draw),
+        imperfections.analog_infrared_parameters(SHARP, draw),
+        imperfections.light_parameters(light, 1, draw),
         imperfections.compass_parameters(draw),
         imperfections.turret_parameters(turret, draw),
     ]
