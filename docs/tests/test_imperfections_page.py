@@ -10,6 +10,7 @@ import pytest
 
 import boebot
 from boebot import vehicle_devices
+from boebot.robots import load_robot
 from sim_bridge import imperfections
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +37,8 @@ def rows() -> list[Row]:
 
 def value(name: str) -> tuple[float, ...]:
     """Of a parameter in the code, as a tuple."""
+    if name.startswith("supply."):
+        return (float(getattr(load_robot("shieldbot").supply, name.removeprefix("supply."))),)
     if "." in name:
         struct, key = name.split(".")
         fields = {field.name: field.default for field in msgspec.structs.fields(getattr(vehicle_devices, struct))}

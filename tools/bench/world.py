@@ -2,7 +2,7 @@
 
 One thread, steps of 10 ms, nine rays, motors and noise on. The scene: a square room with pillars a metre apart
 (world_steps.c); the robot: the notes' default with a third IR sensor. It wanders on its own motors, turns away from
-what its IR sensors see, and slides on where it bumps into something all the same: a tenth of the work is contacts.
+what its IR sensors see, and slides on where it bumps into something all the same: a sixth of the work is contacts.
 The brain decides in every step. ir-sim and pymunk get neither brain nor sensor model, only motion and rays (less).
 "portable" is the build that gives the same bits
 everywhere; "native" (BOEBOT_NATIVE=1 at build) is for the machine at hand and may contract operations: the ratio of the
