@@ -143,7 +143,7 @@ static void put_bit(uint8_t bit) {
   if (bit == BITS - 1u) {
     data_line(doing == RECEIVE && acknowledge);
   } else {
-    data_line(doing == SEND && (data >> (7u - bit) & 1u) == 0);
+    data_line(doing == SEND && ((unsigned)data >> (7u - bit) & 1u) == 0);
   }
 }
 
