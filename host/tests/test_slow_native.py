@@ -93,7 +93,7 @@ def test_compass_has_the_true_heading(heading: float) -> None:
 
 
 def test_battery_sags_under_load() -> None:
-    """7.75 V behind 0.6 ohm: 0.11 A at rest (board and two idle servos), and more when the wheels run."""
+    """5.5 V behind 2.5 ohm: 0.11 A at rest (board and two idle servos); running, 4.6 V as measured on a robot."""
 
     def step(robot: Robot) -> None:
         if robot.time > 0.5:
@@ -104,8 +104,8 @@ def test_battery_sags_under_load() -> None:
     assert all(volt is not None for volt in volts)
     resting, running = volts[2], volts[-1]
     assert resting is not None and running is not None
-    assert resting == pytest.approx(7.75 - 0.6 * 0.11, abs=0.03)
-    assert 0.05 < resting - running < 0.6
+    assert resting == pytest.approx(5.5 - 2.5 * 0.11, abs=0.03)
+    assert running == pytest.approx(4.6, abs=0.15)
 
 
 def test_turret_turns_the_range_finder() -> None:
@@ -143,7 +143,7 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
         if robot.has("compass"):
             assert robot.compass.valid and robot.compass.heading is not None
         if robot.has("battery"):
-            assert robot.battery.valid and 5.0 < (robot.battery.voltage or 0.0) < 8.0
+            assert robot.battery.valid and 4.0 < (robot.battery.voltage or 0.0) < 8.0
         if robot.has("buzzer") and robot.tick % 50 == 0:
             robot.beep(440, 0.1)
 
