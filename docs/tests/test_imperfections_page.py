@@ -1,4 +1,4 @@
-"""docs/reference/imperfections.md says what the code has: every parameter, its value, the switch that makes it neutral."""
+"""docs/reference/imperfections.md says what the code has: every parameter, its value, and its switch."""
 
 from __future__ import annotations
 
@@ -79,7 +79,8 @@ def test_every_parameter_has_one_row() -> None:
 @pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
 def test_row_names_its_switch(names: tuple[str, ...], numbers: list[float], off: str) -> None:
     """And the neutral value of what the switch sets, where that is not 0; no other switch sets anything of the row."""
-    switched = {name: switch.neutral[key] for name, switch in SWITCHES.items() for key in names if key in switch.neutral}
+    pairs = [(name, switch.neutral) for name, switch in SWITCHES.items()]
+    switched = {name: neutral[key] for name, neutral in pairs for key in names if key in neutral}
     if off in ("", "–"):
         assert not switched
         return
