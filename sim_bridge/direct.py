@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from boebot.boards import BoardRequest, Truth
 from boebot.errors import RobotError
 from sim_bridge import imperfections
 from sim_bridge.arena import load_arena
+from sim_bridge.switches import idealised
 from sim_bridge.vehicle import Vehicle, VehicleModel, beam
 
 STEP_S = 0.01  # THEORY section 2.4
@@ -83,19 +84,21 @@ def open_direct(request: BoardRequest) -> DirectSession:
     Raises:
         RobotError: its description is none of such a robot.
         ArenaError: no such arena, or its start is not free.
+        BoardError: no such imperfection.
     """
     arena = load_arena(request.arena or DEFAULT_ARENA)
-    model = vehicle_model(request.robot, noise=request.noise)
+    model = vehicle_model(request.robot, noise=request.noise, without=request.without)
     return DirectSession(Vehicle(model, arena, pose=request.start_pose, seed=request.seed), request.record)
 
 
-def vehicle_model(robot: robots.RobotDescription, *, noise: bool = True) -> VehicleModel:
-    """The vehicle of a description; touching something does not end its run.
+def vehicle_model(robot: robots.RobotDescription, *, noise: bool = True, without: Sequence[str] = ()) -> VehicleModel:
+    """The vehicle of a description; touching something does not end its run. `without`: names of switches.py.
 
     Raises:
         RobotError: a device that no vehicle has, or a parameter outside its range.
+        BoardError: no such imperfection.
     """
-    body = robot.body
+    robot, body = idealised(robot, without), robot.body
     model = VehicleModel(
         {
             "mass": body.mass_kg,
@@ -107,7 +110,7 @@ def vehicle_model(robot: robots.RobotDescription, *, noise: bool = True) -> Vehi
             "wheel_inertia": body.wheel_inertia_kg_m2,
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
-            "grip": imperfections.TYRE_GRIP,
+            "grip": imperfections.Draw(0, noise, without=without)["TYRE_GRIP"],
         },
         dt=STEP_S,
         noise=noise,

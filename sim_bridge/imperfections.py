@@ -1,15 +1,17 @@
 """What a built robot is like: nominal values of its parts, their spreads, and one robot drawn from them by seed.
 
 Sources are named beside the values: "data" is a manufacturer's or published measurement, "chosen" is ours and to be
-measured. Without noise every part is nominal.
+measured. Without noise every part is nominal; what else can be switched off, and by which name, is in switches.py.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from boebot import robots
+from sim_bridge import switches
 from sim_bridge._core import ffi, lib
 
 RPM = 2.0 * math.pi / 60.0  # rad/s
@@ -28,6 +30,7 @@ SERVO_COAST_N_S = 0.3  # unpowered gear train (chosen)
 SERVO_COAST_N_M = 0.05  # (chosen)
 
 SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its gear of about 1:250 (chosen)
+TYRE_SLIP = 1  # beyond that coefficient they slip; 0: wheels always roll
 TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
 WHISKER_HEIGHT_M = 0.03
@@ -91,10 +94,18 @@ _DRAW = 1000  # the draws that make a robot have device numbers of their own
 
 class Draw:
     """Draws one robot's peculiarities: always the same ones for the same unit and device; of a robot that says no unit,
-    for the same seed, robot and device."""
+    for the same seed, robot and device. `draw["SERVO_LAG_S"]` is a parameter of this module as this robot has it."""
 
-    def __init__(self, seed: int, noise: bool, robot: int = 0, unit: int | None = None) -> None:
-        """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout."""
+    def __init__(
+        self, seed: int, noise: bool, robot: int = 0, unit: int | None = None, without: Iterable[str] = ()
+    ) -> None:
+        """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout. `without`:
+        names of switches.py.
+
+        Raises:
+            BoardError: there is no such name.
+        """
+        self._neutral = switches.neutral(without)
         self._seed, self.noise, self._robot, self._unit = seed & (2**64 - 1), noise, robot, unit
 
     def __call__(self, device: int, what: int) -> float:
@@ -107,8 +118,17 @@ class Draw:
         value: float = lib.noise_normal(self._seed, self._robot, _DRAW + device, what)
         return value
 
+    def __getitem__(self, name: str) -> float:
+        """A parameter of this module, or its neutral value if what it belongs to is switched off."""
+        value: float = self._neutral.get(name, globals()[name])
+        return value
 
-def body_parameters(body: robots.Body) -> Any:
+
+AS_BUILT = Draw(0, noise=False)
+"""Nothing is drawn, and nothing switched off."""
+
+
+def body_parameters(body: robots.Body, draw: Draw = AS_BUILT) -> Any:
     """The body in C."""
     return ffi.new(
         "body_parameters *",
@@ -122,60 +142,62 @@ def body_parameters(body: robots.Body) -> Any:
             "wheel_inertia": body.wheel_inertia_kg_m2,
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
-            "grip": TYRE_GRIP,
+            "grip": draw["TYRE_GRIP"],
             "spin_inertia": SPIN_INERTIA_KG_M2,
-            "slip": 1,
+            "slip": int(draw["TYRE_SLIP"]),
         },
     )
 
 
 def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int, draw: Draw) -> Any:
     """The servo of `side` (0 left, 1 right) in C."""
-    unit = 1.0 + SERVO_TOP_SPREAD * draw(1 + side, 0)
-    lean = 0.5 * SERVO_ASYMMETRY * draw(1 + side, 1)
-    offset = SERVO_CENTRE_SPREAD_US * draw(1 + side, 2)
+    unit = 1.0 + draw["SERVO_TOP_SPREAD"] * draw(1 + side, 0)
+    lean = 0.5 * draw["SERVO_ASYMMETRY"] * draw(1 + side, 1)
+    offset = draw["SERVO_CENTRE_SPREAD_US"] * draw(1 + side, 2)
     return ffi.new(
         "servo_motor_parameters *",
         {
             "mount": math.copysign(1.0, servo.gain_us),
             "wheel_radius": body.wheel_radius_m,
             "centre_us": servo.centre_us + offset,
-            "dead_band_us": SERVO_DEAD_BAND_US,
+            "dead_band_us": draw["SERVO_DEAD_BAND_US"],
             "top_ccw_rad_s": SERVO_TOP_RPM * RPM * unit * (1.0 + lean),
             "scale_ccw_us": SERVO_SCALE_US,
             "top_cw_rad_s": SERVO_TOP_RPM * RPM * unit * (1.0 - lean),
             "scale_cw_us": SERVO_SCALE_US,
-            "lag_s": SERVO_LAG_S,
+            "lag_s": draw["SERVO_LAG_S"],
             "motor": {
                 "gain_n_s": SERVO_GAIN_N_S,
                 "torque_maximum_n_m": SERVO_TORQUE_N_M,
-                "coast_n_s": SERVO_COAST_N_S,
-                "coast_maximum_n_m": SERVO_COAST_N_M,
+                "coast_n_s": draw["SERVO_COAST_N_S"],
+                "coast_maximum_n_m": draw["SERVO_COAST_N_M"],
             },
         },
     )
 
 
-def whisker_parameters(whisker: robots.Whisker) -> Any:
+def whisker_parameters(whisker: robots.Whisker, draw: Draw = AS_BUILT) -> Any:
     """The whisker in C."""
-    return ffi.new("whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_HEIGHT_M, WHISKER_BOUNCE_S])
+    return ffi.new(
+        "whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_HEIGHT_M, draw["WHISKER_BOUNCE_S"]]
+    )
 
 
-def infrared_parameters(pair: robots.InfraredPair) -> Any:
+def infrared_parameters(pair: robots.InfraredPair, draw: Draw = AS_BUILT) -> Any:
     """The IR pair in C."""
     return ffi.new(
         "infrared_pair_parameters *",
         {
             "beam": _beam(pair.position_m, pair.heading_rad, pair.beam_rad, INFRARED_HEIGHT_M, INFRARED_RAYS),
             "range": pair.range_m,
-            "range_sigma": INFRARED_SPREAD,
-            "false_hit": INFRARED_FALSE_HIT,
-            "direct": INFRARED_DIRECT_M,
+            "range_sigma": draw["INFRARED_SPREAD"],
+            "false_hit": draw["INFRARED_FALSE_HIT"],
+            "direct": draw["INFRARED_DIRECT_M"],
         },
     )
 
 
-def ping_parameters(ping: robots.Ping) -> Any:
+def ping_parameters(ping: robots.Ping, draw: Draw = AS_BUILT) -> Any:
     """The Ping))) in C."""
     return ffi.new(
         "sonar_parameters *",
@@ -183,9 +205,9 @@ def ping_parameters(ping: robots.Ping) -> Any:
             "beam": _beam(ping.position_m, ping.heading_rad, ping.beam_rad, PING_HEIGHT_M, PING_RAYS),
             "range_minimum": ping.range_min_m,
             "range_maximum": ping.range_max_m,
-            "sigma": PING_SPREAD,
-            "miss": PING_MISS,
-            "grazing_cosine": math.cos(PING_GRAZING_RAD),
+            "sigma": draw["PING_SPREAD"],
+            "miss": draw["PING_MISS"],
+            "grazing_cosine": math.cos(draw["PING_GRAZING_RAD"]),
             "temperature": TEMPERATURE_C,
             "absorption": 1,
         },
@@ -198,7 +220,7 @@ def _beam(position: tuple[float, float], heading: float, opening: float, height:
     return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
 
 
-def battery_parameters(supply: robots.Supply, ratio: float = 2.0) -> Any:
+def battery_parameters(supply: robots.Supply, ratio: float = 2.0, draw: Draw = AS_BUILT) -> Any:
     """The battery in C; `ratio`: the pack's voltage for each volt at the analog pin."""
     return ffi.new(
         "battery_parameters *",
@@ -209,26 +231,26 @@ def battery_parameters(supply: robots.Supply, ratio: float = 2.0) -> Any:
                 "capacity_as": supply.capacity_as,
                 "resistance_ohm": supply.resistance_ohm,
                 "drop_out_v": supply.drop_out_v,
-                "board_a": BOARD_A,
-                "servo_idle_a": SERVO_IDLE_A,
-                "servo_run_a_s_m": SERVO_RUN_A_S_M,
-                "servo_a_per_n_m": SERVO_A_PER_N_M,
+                "board_a": draw["BOARD_A"],
+                "servo_idle_a": draw["SERVO_IDLE_A"],
+                "servo_run_a_s_m": draw["SERVO_RUN_A_S_M"],
+                "servo_a_per_n_m": draw["SERVO_A_PER_N_M"],
                 "unregulated": float(supply.servos == "pack"),
             },
             "divider": 1.0 / ratio,
-            "noise_v": BATTERY_NOISE_V,
+            "noise_v": draw["BATTERY_NOISE_V"],
         },
     )
 
 
-def encoder_parameters(edges_per_turn: int) -> Any:
+def encoder_parameters(edges_per_turn: int, draw: Draw = AS_BUILT) -> Any:
     """A wheel encoder in C."""
     return ffi.new(
         "encoder_parameters *",
         {
             "edges_per_turn": edges_per_turn,
-            "missed": ENCODER_MISSED,
-            "extra": ENCODER_EXTRA,
+            "missed": draw["ENCODER_MISSED"],
+            "extra": draw["ENCODER_EXTRA"],
             "flicker_s": ENCODER_FLICKER_S,
         },
     )
@@ -241,10 +263,10 @@ def analog_infrared_parameters(sharp: robots.AnalogInfrared, draw: Draw) -> Any:
         {
             "beam": _beam(sharp.position_m, sharp.heading_rad, 0.0, SHARP_HEIGHT_M, 1),
             "reach": SHARP_REACH_M,
-            "sigma": SHARP_SPREAD if draw.noise else 0.0,
-            "gain": 1.0 + SHARP_GAIN_SPREAD * draw(66, 0),
+            "sigma": draw["SHARP_SPREAD"] if draw.noise else 0.0,
+            "gain": 1.0 + draw["SHARP_GAIN_SPREAD"] * draw(66, 0),
             "period": SHARP_PERIOD_S + SHARP_PERIOD_SPREAD_S * draw(66, 1),
-            "late": SHARP_LATE_S,
+            "late": draw["SHARP_LATE_S"],
         },
     )
 
@@ -261,9 +283,9 @@ def light_parameters(light: robots.LightSensor, side: int, draw: Draw) -> Any:
                 "heading": light.heading_rad,
                 "height": LIGHT_HEIGHT_M,
                 "near_distance": LIGHT_NEAR_M,
-                "ambient": LIGHT_AMBIENT,
-                "sigma": LIGHT_SPREAD if draw.noise else 0.0,
-                "gain": max(0.1, 1.0 + LIGHT_GAIN_SPREAD * draw(71 + side, 0)),
+                "ambient": draw["LIGHT_AMBIENT"],
+                "sigma": draw["LIGHT_SPREAD"] if draw.noise else 0.0,
+                "gain": max(0.1, 1.0 + draw["LIGHT_GAIN_SPREAD"] * draw(71 + side, 0)),
             },
             "decay_s": LIGHT_DECAY_S,
             "maximum_s": LIGHT_MAXIMUM_S,
@@ -280,12 +302,12 @@ def compass_parameters(draw: Draw) -> Any:
         "hmc5883l_parameters *",
         {
             "field": {
-                "sigma": COMPASS_SIGMA * on,
-                "bias": COMPASS_BIAS_RAD * draw(61, 0),
-                "iron_x": COMPASS_IRON * draw(61, 1),
-                "iron_y": COMPASS_IRON * draw(61, 2),
-                "current_x": COMPASS_PER_AMPERE * draw(61, 3),
-                "current_y": COMPASS_PER_AMPERE * draw(61, 4),
+                "sigma": draw["COMPASS_SIGMA"] * on,
+                "bias": draw["COMPASS_BIAS_RAD"] * draw(61, 0),
+                "iron_x": draw["COMPASS_IRON"] * draw(61, 1),
+                "iron_y": draw["COMPASS_IRON"] * draw(61, 2),
+                "current_x": draw["COMPASS_PER_AMPERE"] * draw(61, 3),
+                "current_y": draw["COMPASS_PER_AMPERE"] * draw(61, 4),
             },
             "horizontal_gauss": COMPASS_HORIZONTAL_G,
             "down_gauss": COMPASS_DOWN_G,
@@ -300,5 +322,5 @@ def turret_parameters(turret: robots.PositionServo, draw: Draw) -> Any:
     gain = turret.gain_us_per_rad
     out.mount = math.copysign(1.0, gain)
     out.us_per_rad = abs(gain)
-    out.centre_us = turret.centre_us + TURRET_CENTRE_SPREAD_US * draw(76, 0)
+    out.centre_us = turret.centre_us + draw["TURRET_CENTRE_SPREAD_US"] * draw(76, 0)
     return out

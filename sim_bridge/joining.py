@@ -22,7 +22,7 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
         BoardError: a device cannot be joined; one sentence names it.
         MemoryError: there is none.
     """
-    _join_supply(handle, number, description)
+    _join_supply(handle, number, description, draw)
     for name, device in description.device.items():
         if device.on:
             _join_drive(handle, number, name, device, description.body, draw)
@@ -54,17 +54,15 @@ def _pin(pin: int | str) -> int:
     return robots.pin_number(pin)
 
 
-def _join_supply(handle: Any, number: int, description: robots.RobotDescription) -> None:
+def _join_supply(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
     """The pack, and where the board measures it."""
     if description.supply is None:
         return
     gauges = [d for d in description.device.values() if isinstance(d, robots.Battery) and d.on]
     channel = _pin(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
     ratio = gauges[0].ratio if gauges else 2.0
-    done(
-        lib.sim_add_battery(handle, number, channel, imperfections.battery_parameters(description.supply, ratio)),
-        "the battery",
-    )
+    battery = imperfections.battery_parameters(description.supply, ratio, draw)
+    done(lib.sim_add_battery(handle, number, channel, battery), "the battery")
 
 
 def _side(name: str) -> int:
@@ -80,10 +78,10 @@ def _join_drive(
             servo = imperfections.servo_parameters(device, body, side, draw)
             done(lib.sim_add_servo(handle, number, side, _pin(device.pin), servo), what)
         case robots.Encoder():
-            encoder = imperfections.encoder_parameters(device.edges_per_turn)
+            encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
             done(lib.sim_add_encoder(handle, number, side, _pin(device.pin), NO_PIN, encoder), what)
         case robots.QuadratureEncoder():
-            encoder = imperfections.encoder_parameters(device.edges_per_turn)
+            encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
             done(lib.sim_add_encoder(handle, number, side, _pin(device.pin_a), _pin(device.pin_b), encoder), what)
         case robots.PositionServo():
             x, y = device.position_m
@@ -97,13 +95,14 @@ def _join_sensor(handle: Any, number: int, name: str, device: robots.Device, dra
     what = f"device {name!r}"
     match device:
         case robots.Whisker():
-            whisker = imperfections.whisker_parameters(device)
+            whisker = imperfections.whisker_parameters(device, draw)
             done(lib.sim_add_whisker(handle, number, _pin(device.pin), whisker), what)
         case robots.InfraredPair():
-            pair = imperfections.infrared_parameters(device)
+            pair = imperfections.infrared_parameters(device, draw)
             done(lib.sim_add_infrared(handle, number, _pin(device.led_pin), _pin(device.receiver_pin), pair), what)
         case robots.Ping():
-            done(lib.sim_add_ping(handle, number, _pin(device.pin), imperfections.ping_parameters(device)), what)
+            ping = imperfections.ping_parameters(device, draw)
+            done(lib.sim_add_ping(handle, number, _pin(device.pin), ping), what)
         case robots.AnalogInfrared():
             sharp = imperfections.analog_infrared_parameters(device, draw)
             done(lib.sim_add_analog_infrared(handle, number, _pin(device.pin) - FIRST_ANALOG_PIN, sharp), what)

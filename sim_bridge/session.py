@@ -20,6 +20,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Floats, Sim, SimRobot
+from sim_bridge.switches import SWITCHES
 
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
@@ -186,6 +187,7 @@ class BoardKind:
     def __init__(self, name: str, find: Callable[[str], Path], make: Callable[[Path], EmulatedBoard]) -> None:
         """`find`: the bundled firmware for a pin map; `make`: a board with some firmware."""
         self.name = name
+        self.switches = {name: switch.what for name, switch in SWITCHES.items()}
         self._find, self._make = find, make
 
     def __call__(self, request: BoardRequest) -> SimSession:
@@ -209,7 +211,7 @@ class BoardKind:
         find = self._find
         board = self._make(find(request.robot.pin_map) if request.image is None else image_file(request.image))
         try:
-            return sim.add(board, request.robot, pose=request.start_pose)
+            return sim.add(board, request.robot, pose=request.start_pose, without=request.without)
         except Exception:
             board.close()
             raise

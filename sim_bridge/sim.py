@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import imperfections
+from sim_bridge import imperfections, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
@@ -73,14 +74,16 @@ class Sim:
         *,
         pose: tuple[float, float, float] | None = None,
         number: int | None = None,
+        without: Sequence[str] = (),
     ) -> SimRobot:
         """Puts a robot at `pose` (x, y, heading; m, m, rad), or where the arena says.
 
         `number` is its name in the run and the key of its noise and its imperfections: the next one if None.
+        `without`: its imperfections that are switched off (switches.py).
 
         Raises:
             ArenaError: that place is not free.
-            BoardError: the number is taken or negative, or there are too many robots.
+            BoardError: the number is taken or negative, there are too many robots, or no such imperfection.
         """
         if number is None:
             number = max(self._members, default=-1) + 1
@@ -89,7 +92,8 @@ class Sim:
         if len(self._members) == lib.BODY_MAXIMUM:
             raise BoardError(f"a simulation takes {len(self._members)} robots at most")
         x, y, heading = self.arena.start if pose is None else pose
-        body = imperfections.body_parameters(description.body)
+        draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
+        body = imperfections.body_parameters(description.body, draw)
         status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
         if status == lib.SIM_NOT_FREE:
             raise ArenaError(
@@ -97,7 +101,7 @@ class Sim:
             )
         done(status, f"the {board.description}")
         self._members[number] = board, description
-        join(self.handle, number, description, imperfections.Draw(self.seed, self.noise, number, description.unit))
+        join(self.handle, number, switches.idealised(description, without), draw)
         return self.robot(number)
 
     def robot(self, number: int) -> SimRobot:

@@ -1,4 +1,4 @@
-"""docs/reference/imperfections.md says what the code has: every parameter, its value, its neutral value."""
+"""docs/reference/imperfections.md says what the code has: every parameter, its value, and its switch."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import boebot
 from boebot import vehicle_devices
 from boebot.robots import load_robot
 from sim_bridge import imperfections
+from sim_bridge.switches import SWITCHES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text()
@@ -21,7 +22,7 @@ Row = tuple[tuple[str, ...], list[float], str]
 
 
 def rows() -> list[Row]:
-    """Parameters, the numbers of nominal value and spread, and the neutral value of each row."""
+    """Parameters, the numbers of nominal value and spread, and what is said of switching it off, of each row."""
     found = []
     for line in PAGE.splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
@@ -75,17 +76,26 @@ def test_every_parameter_has_one_row() -> None:
     assert len(named) == len(set(named)) and constants | noisy <= set(named)
 
 
-def test_neutral_values_make_a_robot_that_drives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All of them at once; full speed is then that of the curve, 51.25 rpm tanh(200 / 78.5) of a wheel of 33.1 mm."""
-    for names, _, off in ROWS:
-        if re.fullmatch(r"[\d.]+", off):
-            for name in names:
-                if "." not in name:
-                    monkeypatch.setattr(imperfections, name, float(off))
-    monkeypatch.setattr(imperfections, "SERVO_TOP_SPREAD", 0.0)
-    monkeypatch.setattr(imperfections, "SERVO_ASYMMETRY", 0.0)
-    monkeypatch.setattr(imperfections, "SERVO_CENTRE_SPREAD_US", 0.0)
-    result = boebot.run(lambda robot: robot.drive(1, 1), arena="empty", on="native", seconds=2)
+@pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
+def test_row_names_its_switch(names: tuple[str, ...], numbers: list[float], off: str) -> None:
+    """And the neutral value of what the switch sets, where that is not 0; no other switch sets anything of the row."""
+    pairs = [(name, switch.neutral) for name, switch in SWITCHES.items()]
+    switched = {name: neutral[key] for name, neutral in pairs for key in names if key in neutral}
+    if off in ("", "–"):
+        assert not switched
+        return
+    said = re.fullmatch(r"`(\w+)`(?:, noise)?(?:: ([\d.]+))?", off)
+    assert said is not None and switched == {said[1]: float(said[2] or 0)}
+
+
+def test_everything_switched_has_a_row() -> None:
+    named = {name for names, _, _ in ROWS for name in names}
+    assert {key for switch in SWITCHES.values() for key in switch.neutral} <= named
+
+
+def test_a_robot_without_any_imperfection_drives() -> None:
+    """Full speed is then that of the curve, 51.25 rpm tanh(200 / 78.5) of a wheel of 33.1 mm."""
+    result = boebot.run(lambda robot: robot.drive(1, 1), arena="empty", on="native", seconds=2, without=tuple(SWITCHES))
     speed = 51.25 * 2 * 3.141593 / 60 * 0.0331
     assert result.true_pose is not None
     late = result.true_pose.x[-1] - result.true_pose.x[-101]

@@ -46,6 +46,7 @@ class BoardRequest:
     image: str | None = None  # firmware to load in place of the bundled one
     record: bool = True  # keep the truth for the pictures
     noise: bool = True
+    without: Sequence[str] = ()  # imperfections of this robot that are switched off; names: `imperfections`
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -147,6 +148,15 @@ class BoardFactory(Protocol):
         """Opens a board; raises a BoebotError with one sentence if it cannot."""
 
 
+@runtime_checkable
+class HasSwitches(Protocol):
+    """A board factory whose robots' imperfections can be switched off."""
+
+    @property
+    def switches(self) -> Mapping[str, str]:
+        """Names that `BoardRequest.without` may have, with a line each."""
+
+
 class SharedWorld(Protocol):
     """Several robots in one simulated world, opened. Time passes only in `advance`: a session's transport that waits
     calls who turns the clock, and goes on once its robot has woken."""
@@ -215,11 +225,17 @@ def board_kinds() -> list[str]:
     return sorted(point.name for point in entry_points(group=BOARDS_GROUP))
 
 
+def imperfections() -> dict[str, str]:
+    """What of a simulated robot can be switched off, with a line each; empty without a simulator."""
+    factories = (_load(point.load, point.name) for point in entry_points(group=BOARDS_GROUP))
+    return next((dict(factory.switches) for factory in factories if isinstance(factory, HasSwitches)), {})
+
+
 def open_board(url: str, request: BoardRequest) -> BoardSession:
     """Opens the board that `url` names.
 
     Raises:
-        BoardError: no such board, or it cannot be opened, or the robot has none.
+        BoardError: no such board, or it cannot be opened, or the robot has none; no such imperfection.
     """
     check_board(url, request.robot)
     for point in entry_points(group=BOARDS_GROUP):
@@ -227,6 +243,8 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
             factory: BoardFactory = _load(point.load, url)
             return factory(request)
     if is_live(url):
+        if request.without:
+            raise BoardError(f"nothing can be switched off of the robot at {url!r}: that is for simulated runs")
         transport = open_port(url, _default_baud(request.robot))
         return LiveSession(transport, f"board at {transport.name}")
     raise BoardError(_unknown(url))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -38,6 +39,7 @@ class RunResult:
         run_time: length of the run by the board's clock. wall_time: by the wall clock.
         sent, received: (stamp in s on the transport's clock, bytes), oldest first.
         link: what the two ends of the link counted, "host" and "board".
+        without: imperfections of the simulated robot that were switched off.
         notices: what the user should know, in sentences.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
@@ -70,6 +72,7 @@ class RunResult:
     notices: list[str] = field(default_factory=list)
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
+    without: Sequence[str] = ()
 
     # ---- arrays --------------------------------------------------------------------------------------------
 
@@ -173,6 +176,7 @@ class RunResult:
             "board": self.board,
             "arena": (self.truth.arena_name if self.truth is not None else self.arena),
             "seed": self.seed,
+            "without": ", ".join(self.without) or None,
             "period_ms": round(self.period * 1000, 3),
             "run_time_s": round(self.run_time, 3),
             "distance_m": round(self.distance, 3),

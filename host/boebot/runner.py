@@ -10,6 +10,7 @@ the motors are stopped and the record is complete up to there.
 from __future__ import annotations
 
 import time as wall
+from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def run(
     out: str | Path | None = None,
     period: float | None = None,
     progress: Progress | None = None,
+    without: Sequence[str] = (),
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -50,7 +52,8 @@ def run(
         may be infinite. seed: of the brain's chance, and of the noise of the simulated world. realtime: slow
         a simulated run down to the wall clock. out: folder for run.csv, run.png, replay.html and the raw
         bytes. period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05. progress:
-        called with the seconds that have passed, about ten times a second.
+        called with the seconds that have passed, about ten times a second. without: imperfections of a simulated
+        robot that are switched off, such as ("slip", "bounce"); docs/reference/imperfections.md names them.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board
@@ -61,7 +64,7 @@ def run(
     if out is not None:
         expect("out", out, "a folder or None", str, Path)
         report.make_folder(Path(out))
-    result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress)
+    result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress, without)
     if out is not None:
         try:
             with interrupts.ignored():
@@ -85,6 +88,7 @@ def execute(
     realtime: bool = False,
     period: float | None = None,
     progress: Progress | None = None,
+    without: Sequence[str] = (),
 ) -> RunResult:
     """As `run`, but once the run has begun every end of it, even by an error, is a result: see
     `RunResult.error`.
@@ -97,7 +101,13 @@ def execute(
     expect("seed", seed, "a whole number", Integral)
     loaded, description, period_s = prepare(brain, robot, seconds, period)
     on = default_board(description) if on is None else on
-    request = BoardRequest(robot=description, arena=None if arena is None else str(arena), seed=seed, realtime=realtime)
+    request = BoardRequest(
+        robot=description,
+        arena=None if arena is None else str(arena),
+        seed=seed,
+        realtime=realtime,
+        without=switched_off(without),
+    )
     task = Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, progress=progress)
     if not description.has_board:
         vehicle = open_vehicle(on, request)
@@ -171,6 +181,17 @@ def step_once(robot: Robot, brain: LoadedBrain) -> None:
         brain.step(robot)
     except (Exception, SystemExit) as error:
         raise BrainError(brains.explain(error, brain.path)) from error
+
+
+def switched_off(without: object) -> tuple[str, ...]:
+    """The names in the argument `without` of `run`, each once.
+
+    Raises:
+        BoebotError: it is no list of names.
+    """
+    if not isinstance(without, list | tuple) or not all(isinstance(name, str) for name in without):
+        raise BoebotError(f'without is {without!r}; expected a list of names, as in ("slip", "bounce")')
+    return tuple(dict.fromkeys(without))
 
 
 def expect(name: str, value: object, expected: str, *kinds: type) -> None:

@@ -24,7 +24,7 @@ from boebot.driving.strand import PAUSED, Strand
 from boebot.errors import BoebotError
 from boebot.result import RunResult, TogetherResult
 from boebot.robots import RobotDescription
-from boebot.runner import expect, prepare, step_once
+from boebot.runner import expect, prepare, step_once, switched_off
 
 DEFAULT_KIND = "native"
 _STEP = "step"  # what a strand says when the brain is to step
@@ -41,6 +41,7 @@ class Member:
             places near it.
         seed: of the brain's chance. None: the run's seed for the first robot, one more for each further one.
         period: seconds from step to step of the brain. None: the brain's PERIOD, or 0.05.
+        without: its imperfections that are switched off, as for `boebot.run`.
     """
 
     brain: object = "wander"
@@ -48,6 +49,7 @@ class Member:
     pose: tuple[float, float, float] | None = None
     seed: int | None = None
     period: float | None = None
+    without: Sequence[str] = ()
 
 
 class StoppedError(BoebotError):
@@ -146,6 +148,7 @@ def _task(
         seed=seed,
         realtime=realtime,
         start_pose=_pose(member.pose),
+        without=switched_off(member.without),
     )
     own = seed + number - 1 if member.seed is None else member.seed
     return Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, brain_seed=own)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from boebot import cli, runner
-from boebot.boards import BoardRequest, board_kinds
+from boebot.boards import BoardRequest, board_kinds, imperfections
 from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
@@ -160,6 +161,26 @@ def test_what_is_given_several_times_goes_to_one_robot_each(capsys: pytest.Captu
     assert code == 0
     assert (first["brain"], first["robot"]) == ("wander", "shieldbot") and first["distance_m"] > 0.1
     assert (second["brain"], second["robot"]) == ("still", "shieldbot-quad") and second["distance_m"] < 0.001
+
+
+@pytest.mark.parametrize("robots", ["1", "2"])
+def test_imperfections_are_switched_off_by_name(capsys: pytest.CaptureFixture[str], robots: str) -> None:
+    arguments = ("run", "wander", "--robots", robots, "--arena", "empty", "--seconds", "0.5", "--json", "--without")
+    code, out, _ = boebot(capsys, *arguments, "slip, bounce")
+    values = json.loads(out)
+    assert code == 0
+    assert [table["without"] for table in values.get("robots", [values])] == int(robots) * ["slip, bounce"]
+    code, _, err = boebot(capsys, *arguments, "slip,bouncy")
+    assert code == 1 and "no imperfection 'bouncy' to switch off; expected some of" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_help_names_the_imperfections(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = boebot(capsys, "run", "--help")
+    lines = [line.strip() for line in out.splitlines()]
+    for name, what in imperfections().items():
+        assert any(re.match(rf"{name} +{re.escape(what[:30])}", line) for line in lines), name
+    assert code == 0 and len(imperfections()) > 20
 
 
 def test_error_in_a_brain_comes_after_the_table(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -104,10 +105,11 @@ def scripted(
     noise: bool = False,
     seed: int = 1,
     step_cycles: int = 16_000,
+    without: Sequence[str] = (),
 ) -> Scripted:
     """A robot on a script board, in an empty field if no arena is given."""
     sim = Sim(arena_of() if arena is None else arena, noise=noise, seed=seed, step_cycles=step_cycles)
-    return add_scripted(sim, robot, pose)
+    return add_scripted(sim, robot, pose, without=without)
 
 
 def add_scripted(
@@ -115,11 +117,12 @@ def add_scripted(
     robot: RobotDescription | None = None,
     pose: tuple[float, float, float] | None = None,
     number: int | None = None,
+    without: Sequence[str] = (),
 ) -> Scripted:
     """One more robot on a script board of its own."""
     script, board = script_board()
     description = load_robot("shieldbot") if robot is None else robot
-    return Scripted(sim.add(board, description, pose=pose, number=number), script)
+    return Scripted(sim.add(board, description, pose=pose, number=number, without=without), script)
 
 
 def distance_to_segments(arena: Arena, x: float, y: float) -> float:

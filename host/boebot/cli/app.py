@@ -20,7 +20,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run")(run.run)
+app.command("run", cls=run.Command)(run.run)
 app.command("serve")(serve.serve)
 app.command("info")(info.info)
 app.command("teleop")(teleop.teleop)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from boebot import report
+from boebot.boards import imperfections
 from boebot.cli import options, output
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
@@ -26,6 +28,15 @@ Several robots in one simulated world:
   boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
 
 What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on."""
+
+
+class Command(TyperCommand):
+    """`boebot run`, whose help ends with the imperfections that can be switched off."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Name and line of each; they are the simulator's to say."""
+        with formatter.section("Imperfections, and what is so --without them"):
+            formatter.write_dl(list(imperfections().items()))
 
 
 def run(
@@ -54,6 +65,12 @@ def run(
     seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
     seed: options.Seed = 1,
     period: options.Period = None,
+    without: Annotated[
+        str | None,
+        typer.Option(
+            "--without", metavar="NAME,...", help="Switch off imperfections of simulated robots, named below."
+        ),
+    ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     out: Annotated[
         Path | None,
@@ -63,6 +80,7 @@ def run(
 ) -> None:
     """See `_HELP`."""
     period_s = None if period is None else period / 1000
+    ideal = () if without is None else tuple(name.strip() for name in without.split(","))
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     if out is not None:
@@ -83,6 +101,7 @@ def run(
                 realtime=realtime,
                 period=period_s,
                 progress=progress,
+                without=ideal,
             )
         else:
             from boebot.together import DEFAULT_KIND, Member, execute_together
@@ -93,6 +112,7 @@ def run(
                     robot=kinds[index % len(kinds)],
                     pose=poses[index] if index < len(poses) else None,
                     period=period_s,
+                    without=ideal,
                 )
                 for index in range(count)
             ]

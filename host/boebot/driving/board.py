@@ -339,4 +339,5 @@ class BoardDriver:
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
             notices=self.notices,
             counters=dict(self.session.counters()),
+            without=self.task.request.without,
         )

@@ -122,4 +122,5 @@ class DirectDriver:
             received=[],
             counters=dict(self.session.counters()),
             layout=self.session.layout,
+            without=request.without,
         )

@@ -175,6 +175,8 @@ def _caption(result: RunResult) -> str:
     if error is not None:
         parts.append(f"odometry off by {error:.2f} m at the end")
     parts.append(f"seed {result.seed}")
+    if result.without:
+        parts.append(f"without {counted(len(result.without), 'imperfection', 'imperfections')}")
     if result.error is not None:
         parts.append("ended early")
     return "   ·   ".join(parts)
