@@ -109,12 +109,19 @@ class Batch:
             BrainError: it gave a signal that is not finite.
         """
         function = ffi.cast("vehicle_brain *", brain)
+        if function == ffi.NULL:
+            raise BrainError("batch: brain is a null pointer; expected a C function or its address")
         self._each(lambda first, count: lib.vehicles_run(self.handle, first, count, function, steps))
         return self.readings
 
     def state(self, index: int, kind: str = "unsigned char *") -> Any:
         """The compiled brain's memory in a world, as a pointer of that C type."""
-        return ffi.cast(kind, lib.vehicles_brain_state(self.handle, index))
+        return ffi.cast(kind, lib.vehicles_brain_state(self.handle, self._index(index)))
+
+    def _index(self, index: int) -> int:
+        if not 0 <= index < self.count:
+            raise RobotError(f"batch: there is no world {index}; expected 0 to {self.count - 1}")
+        return index
 
     @property
     def poses(self) -> Floats:
@@ -139,16 +146,16 @@ class Batch:
     def save(self, index: int) -> bytes:
         """The state of one world; `restore` takes it into any world of the same model and arena."""
         room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(self.handle))
-        lib.vehicles_save(self.handle, index, room)
+        lib.vehicles_save(self.handle, self._index(index), room)
         return bytes(ffi.buffer(room))
 
     def restore(self, index: int, state: bytes) -> None:
         """Raises RobotError: it is of another model or version, or damaged."""
-        if lib.vehicles_restore(self.handle, index, state, len(state)):
+        if lib.vehicles_restore(self.handle, self._index(index), state, len(state)):
             raise RobotError("batch: this is no saved state of this model and version; expected what save() gave")
 
     def hashes(self) -> NDArray[np.uint64]:
-        """Shape (N,): of each world's whole state."""
+        """Shape (N,): of each world's body, drive, battery and readings."""
         return np.array([lib.vehicles_hash(self.handle, i) for i in range(self.count)], dtype=np.uint64)
 
     @property

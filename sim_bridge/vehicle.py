@@ -66,6 +66,7 @@ class VehicleModel:
         self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
         """Sensors with a beam by name: the beam, and how far it reaches (m)."""
         self.body = dict(body)
+        self.in_use = False
         self._keep: list[Any] = []
         parameters = ffi.new("body_parameters *", self.body)
         handle = lib.vehicle_model_new(parameters, dt)
@@ -83,6 +84,15 @@ class VehicleModel:
     def euler_limit(self) -> float:
         """The step, s, from which on Euler's method diverges."""
         return float(lib.vehicle_model_euler_limit(self.handle))
+
+    @property
+    def _open(self) -> Any:
+        """The C model, while it may still grow: worlds have room for what it was when they were made."""
+        if self.in_use:
+            raise RobotError(
+                "vehicle: worlds of this model exist; expected all of its devices before the first of them"
+            )
+        return self.handle
 
     def _done(self, status: int, what: str) -> int:
         if status >= 0:
@@ -105,11 +115,11 @@ class VehicleModel:
     def dc_motors(self, left: Mapping[str, float] | None = None, right: Mapping[str, float] | None = None) -> None:
         """Two DC motors (1.6)-(1.10); what is not said is as in the notes' default motor."""
         motors = [DCMotor(**(changes or {})).parameters for changes in (left, right)]
-        self._done(lib.vehicle_model_drive_dc(self.handle, *motors, 0), "DC motors")
+        self._done(lib.vehicle_model_drive_dc(self._open, *motors, 0), "DC motors")
 
     def servos(self, left: Any, right: Any) -> None:
         """Two continuous-rotation servos (C structs servo_motor_parameters) driven by signal: 1500 us +- 200 us s."""
-        self._done(lib.vehicle_model_drive_servo(self.handle, left, right), "servos")
+        self._done(lib.vehicle_model_drive_servo(self._open, left, right), "servos")
 
     def battery(
         self, name: str, *, empty: float = 5.0, full: float = 7.75, sigma: float = 0.0, **energy: float
@@ -119,11 +129,11 @@ class VehicleModel:
         lib.energy_default(parameters)
         for key, value in energy.items():
             setattr(parameters, key, value)
-        self._add(name, lib.vehicle_model_battery(self.handle, parameters, empty, full, sigma))
+        self._add(name, lib.vehicle_model_battery(self._open, parameters, empty, full, sigma))
 
     def _sensor(self, kind: str, name: str, parameters: Mapping[str, Any], *period: float, count: int = 1) -> None:
         adder = getattr(lib, f"vehicle_model_add_{kind}")
-        self._add(name, adder(self.handle, ffi.new(f"{kind}_parameters *", dict(parameters)), *period), count)
+        self._add(name, adder(self._open, ffi.new(f"{kind}_parameters *", dict(parameters)), *period), count)
         if "beam" in parameters:
             reach = (parameters[key] for key in ("range", "range_maximum", "reach") if key in parameters)
             self.looks[name] = (parameters["beam"], float(next(reach, 0.0)))
@@ -167,11 +177,11 @@ class VehicleModel:
         """A sensor known by its table of samples (C handle table_noise): one ray of the beam `look`."""
         self._keep.append(samples)
         parameters = ffi.new("beam_parameters *", dict(look))
-        self._add(name, lib.vehicle_model_add_table(self.handle, parameters, samples, reach, none, period))
+        self._add(name, lib.vehicle_model_add_table(self._open, parameters, samples, reach, none, period))
 
     def whisker(self, name: str, root: tuple[float, float], tip: tuple[float, float]) -> None:
         """A whisker from `root` to `tip` on the body. One reading: 1 while it touches something."""
-        self._add(name, lib.vehicle_model_add_whisker(self.handle, *root, *tip))
+        self._add(name, lib.vehicle_model_add_whisker(self._open, *root, *tip))
 
 
 def arsim(
@@ -206,6 +216,7 @@ def worlds(model: VehicleModel, count: int, state_bytes: int) -> Any:
     handle = lib.vehicles_new(model.handle, count, state_bytes)
     if handle == ffi.NULL:
         raise MemoryError("vehicles")
+    model.in_use = True
     return ffi.gc(handle, lambda handle, model=model: lib.vehicles_destroy(handle))  # the model outlives them
 
 
@@ -380,7 +391,7 @@ class Vehicle:
             raise RobotError("vehicle: this is no saved state of this model and version; expected what save() gave")
 
     def hash(self) -> int:
-        """Of the whole state: equal for runs that are equal bit for bit."""
+        """Of body, drive, battery and readings: equal for runs that are equal bit for bit."""
         return int(lib.vehicles_hash(self.handle, 0))
 
 

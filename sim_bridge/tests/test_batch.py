@@ -181,3 +181,25 @@ def test_every_compiler_gives_the_same_bits(tmp_path: Path) -> None:
     for line in results[0]:
         together = (together * 31 + int(line, 16)) % 2**64
     assert together == RUNS_HASH, hex(together)
+
+
+@pytest.mark.parametrize("index", [-1, 12, 500_000])
+def test_a_world_that_is_not_there_is_one_sentence(index: int) -> None:
+    batch = Batch(model(), load_arena("arsim"), STARTS, np.arange(12))
+    state = batch.save(3)
+    for ask in (batch.save, batch.state, lambda k: batch.restore(k, state)):
+        with pytest.raises(RobotError, match=f"no world {index}; expected 0 to 11"):
+            ask(index)
+
+
+def test_no_brain_is_one_sentence() -> None:
+    with pytest.raises(BrainError, match="null pointer"):
+        Batch(model(), load_arena("arsim"), STARTS[:2], [5, 6]).run(0, 5)
+
+
+def test_a_model_whose_worlds_exist_does_not_grow() -> None:
+    built = model()
+    vehicle = Vehicle(built, load_arena("arsim"))
+    with pytest.raises(RobotError, match="expected all of its devices before"):
+        built.compass("second")
+    vehicle.step(0.5, 0.5)

@@ -260,9 +260,9 @@ def test_bad_models_are_refused() -> None:
     for dt in (0.0, -0.01, math.nan, math.inf):
         with pytest.raises(RobotError):
             arsim(dt=dt)
-    model = VehicleModel(ARSIM_BODY)
     with pytest.raises(RobotError, match="no drive"):
-        Vehicle(model, load_arena("arsim"))
+        Vehicle(VehicleModel(ARSIM_BODY), load_arena("arsim"))
+    model = VehicleModel(ARSIM_BODY)
     with pytest.raises(RobotError, match="not finite or outside"):
         model.dc_motors({"resistance_ohm": 0.0})
     model.dc_motors()
