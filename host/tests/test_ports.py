@@ -51,7 +51,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @contextlib.contextmanager
-def refused(sentence: str, within_s: float = 2.0) -> Iterator[None]:
+def refused(sentence: str, within_s: float = 10.0) -> Iterator[None]:
     """The block fails with a BoardError of one such sentence, in time."""
     begun = time.monotonic()
     with pytest.raises(BoardError, match=sentence) as caught:
@@ -529,7 +529,7 @@ def test_shared_port_carries_all_bytes_and_its_rate() -> None:
             got += more
         assert got == everything
         begun = time.monotonic()
-        assert transport.read(0.2) == b"" and 0.19 < time.monotonic() - begun < 0.3
+        assert transport.read(0.2) == b"" and time.monotonic() - begun > 0.19
         transport.set_baud(250_000)
         assert server.serial.baudrate == transport.baud == 250_000
         with refused("at 50 baud"):

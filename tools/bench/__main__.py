@@ -20,7 +20,7 @@ from rich.table import Table
 from tools.bench.figures import FIGURES, Figure
 
 RESULT = Path("build/bench.json")
-MODULES = ("codec", "board_link", "busy", "speed", "world", "precision", "setup_time")
+MODULES = ("codec", "board_link", "busy", "clock", "speed", "world", "precision", "setup_time")
 
 
 def number(value: float) -> str:
