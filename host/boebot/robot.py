@@ -210,6 +210,7 @@ class Robot:
     __slots__ = (
         "_chances",
         "_period",
+        "_seed",
         "_speed_limit",
         "command",
         "latched",
@@ -223,6 +224,7 @@ class Robot:
         self.name: Final = name
         self._speed_limit = speed_limit  # m/s
         self._period = period
+        self._seed = seed
         self.observation: Observation
         self.command: Command = STOP
         self.slow_command: SlowCommand | None = None
@@ -484,6 +486,10 @@ class Robot:
                 self._chances[key] = 1.0 - (1.0 - probability) ** (self._period / per)
             probability = self._chances[key]
         return self.random.random() < probability
+
+    def stream(self, name: str) -> random.Random:
+        """A `random.Random` for one part of the brain, of its own: what other parts draw changes none of its numbers."""
+        return random.Random(f"brain {self._seed} {name}")
 
 
 def _no_numbers(call: str, left: object, right: object) -> BrainError:

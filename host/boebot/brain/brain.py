@@ -1,0 +1,257 @@
+"""A brain of processes: state variables, utilities, activation (section 8.2 of the notes).
+
+A step, always in this order: state variables; decay of gamma; utilities; switches; the active cognitive processes, in
+the order in which they were given; the active motor behavior.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
+from boebot.brain.utility import Utilities
+from boebot.brain.variables import StateVariable
+from boebot.errors import BrainError
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+_ON_TIME = 1e-9  # s; times are sums of ticks
+
+
+class Switch(NamedTuple):
+    """A process became active in place of another (motor behaviors), or became active or inactive (cognitive ones)."""
+
+    time: float
+    """s"""
+    off: str
+    """what was active, or "" """
+    on: str
+    """what is active now, or "" """
+    reason: str
+    """utilities, and what drives them most"""
+
+
+class BrainStep(NamedTuple):
+    """What one step of the brain came to."""
+
+    time: float
+    """s"""
+    motor: str
+    """the active motor behavior"""
+    variables: tuple[float, ...]
+    """in the order of `Brain.variables`"""
+    utilities: tuple[float, ...]
+    """in the order of `Brain.processes`"""
+    gammas: tuple[float, ...]
+    """in the same order"""
+
+
+class Brain:
+    """Processes and the state variables that their utilities depend on. Give it to `boebot.run`.
+
+    Attributes:
+        processes: all of them, with those that others brought along.
+        variables: the state variables.
+        steps: one BrainStep for each step of the present or last run.
+        switches: one Switch for each change of what is active.
+    """
+
+    def __init__(
+        self,
+        processes: Iterable[Process],
+        variables: Iterable[StateVariable] = (),
+        *,
+        period: float = 0.05,
+        margin: float = 0.0,
+    ) -> None:
+        """
+        Args:
+            processes: at least one motor behavior; cognitive processes are carried out in this order.
+            variables: state variables that the utilities' weights name.
+            period: seconds from step to step.
+            margin: by how much a motor behavior's utility must exceed the active one's to take over; the notes need
+                none, their utilities' lag keeps behaviors from flickering.
+
+        Raises:
+            BrainError: the parts do not fit together.
+        """
+        given = list(processes)
+        self.processes: tuple[Process, ...] = tuple(given + [one for each in given for one in each.companions()])
+        self.variables = tuple(variables)
+        self.steps: list[BrainStep] = []
+        self.switches: list[Switch] = []
+        self.PERIOD = period
+        self._margin = margin
+        self._check()
+        self.NEEDS = _united([*(each.NEEDS for each in self.processes), *(each.needs for each in self.variables)])
+        self._utilities = Utilities(
+            [process.utility for process in self.processes], [variable.name for variable in self.variables]
+        )
+        self._motor = [index for index, each in enumerate(self.processes) if isinstance(each, MotorBehavior)]
+        self._cognitive = [index for index, each in enumerate(self.processes) if isinstance(each, CognitiveProcess)]
+        self._active: list[bool] = []
+        self._due: list[float] = []
+        self._driving = -1
+        self._robot: Robot | None = None
+        self._time = 0.0
+
+    def _check(self) -> None:
+        if not self.processes or not any(isinstance(each, MotorBehavior) for each in self.processes):
+            raise BrainError("a brain needs at least one motor behavior")
+        for kind, names in (
+            ("processes", [process.name for process in self.processes]),
+            ("state variables", [variable.name for variable in self.variables]),
+        ):
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise BrainError(f"two {kind} are called {twice!r}; expected a name= of its own for each")
+        if not (isinstance(self.PERIOD, int | float) and 0 < self.PERIOD < math.inf):
+            raise BrainError(f"a brain's period of {self.PERIOD!r}; expected seconds from step to step")
+        if not (isinstance(self._margin, int | float) and 0 <= self._margin < math.inf):
+            raise BrainError(f"a margin of {self._margin!r}; expected 0 or more")
+
+    # ---- a run -------------------------------------------------------------------------------------------------
+
+    def step(self, robot: Robot) -> None:
+        """One step, of a new run if that robot has not been seen before."""
+        if robot is not self._robot:
+            self._begin(robot)
+        else:
+            z = self._read(robot)
+            self._utilities.advance(z, robot.time - self._time)
+        self._time = robot.time
+        z = self._z
+        self._activate(robot, z)
+        before = robot.command
+        for index in self._cognitive:
+            if self._active[index]:
+                self._step_if_due(index, robot)
+                if robot.command != before:
+                    name = self.processes[index].name
+                    raise BrainError(f"cognitive process {name!r} drives the motors; only motor behaviors may")
+        self._step_if_due(self._driving, robot)
+        utilities = self._utilities
+        self.steps.append(
+            BrainStep(
+                robot.time,
+                self.processes[self._driving].name,
+                tuple(z),
+                tuple(utilities.values),
+                tuple(utilities.gammas),
+            )
+        )
+
+    @property
+    def active(self) -> str:
+        """Name of the active motor behavior."""
+        return self.processes[self._driving].name if self._driving >= 0 else ""
+
+    def is_active(self, process: Process) -> bool:
+        """Whether one of the brain's processes is active."""
+        return bool(self._active) and self._active[self.processes.index(process)]
+
+    def utility(self, process: Process) -> float:
+        """The present utility of one of the brain's processes."""
+        return self._utilities.values[self.processes.index(process)]
+
+    def gamma(self, process: Process) -> float:
+        """The present gamma parameter of one of the brain's processes."""
+        return self._utilities.gammas[self.processes.index(process)]
+
+    def _begin(self, robot: Robot) -> None:
+        self._robot = robot
+        self.steps, self.switches = [], []
+        count = len(self.processes)
+        self._active, self._due = [False] * count, [-math.inf] * count
+        self._driving = -1
+        for process in self.processes:
+            period = process.period or robot.period
+            ratio = period / robot.period
+            if ratio < 1 - _ON_TIME or abs(ratio - round(ratio)) > 1e-6:
+                raise BrainError(
+                    f"{process.name}: a period of {period:g} s; expected a multiple of the brain's, {robot.period:g} s"
+                )
+            process.begin(period, robot.stream(process.name), self._find, self._kick)
+        self._utilities.start(self._read(robot))
+
+    def _read(self, robot: Robot) -> Sequence[float]:
+        self._z = [variable.value(robot) for variable in self.variables]
+        return self._z
+
+    def _activate(self, robot: Robot, z: Sequence[float]) -> None:
+        """Motor behaviors: the one of the highest utility. Cognitive processes: all with a utility above 0."""
+        values = self._utilities.values
+        best = max(self._motor, key=values.__getitem__)  # of equals, the first
+        if self._driving < 0 or values[best] > values[self._driving] + self._margin:
+            self._switch_motor(robot, best, z)
+        for index in self._cognitive:
+            wanted = values[index] > 0
+            if wanted != self._active[index]:
+                name = self.processes[index].name
+                self._note(robot, "" if wanted else name, name if wanted else "", self._reason(index, z))
+                self._turn(robot, index, wanted)
+
+    def _switch_motor(self, robot: Robot, index: int, z: Sequence[float]) -> None:
+        last = self._driving
+        reason = self._reason(index, z)
+        if last >= 0:
+            reason += f", above {self._named(last)}"
+        self._note(robot, self.active, self.processes[index].name, reason)
+        if last >= 0:
+            self._turn(robot, last, False)
+            robot.stop()  # what the last one wanted of the motors is over
+        self._driving = index
+        self._turn(robot, index, True)
+
+    def _turn(self, robot: Robot, index: int, on: bool) -> None:
+        self._active[index] = on
+        if on:
+            self._due[index] = -math.inf
+            self.processes[index].enter(robot)
+        else:
+            self.processes[index].exit(robot)
+
+    def _step_if_due(self, index: int, robot: Robot) -> None:
+        process = self.processes[index]
+        if robot.time >= self._due[index] - _ON_TIME:
+            self._due[index] = robot.time + process.step_time
+            process.step(robot)
+
+    # ---- what processes ask ---------------------------------------------------------------------------------------
+
+    def _find(self, wanted: object) -> Process:
+        if isinstance(wanted, str):
+            found = [process for process in self.processes if process.name == wanted]
+            what = repr(wanted)
+        else:
+            assert isinstance(wanted, type)
+            found = [process for process in self.processes if isinstance(process, wanted)]
+            what = wanted.__name__
+        if len(found) != 1:
+            names = ", ".join(process.name for process in self.processes)
+            raise BrainError(f"{'no' if not found else 'more than one'} process {what}; this brain has {names}")
+        return found[0]
+
+    def _kick(self, process: Process, gamma: float) -> None:
+        self._utilities.gammas[self.processes.index(process)] = gamma
+
+    # ---- reasons -------------------------------------------------------------------------------------------------
+
+    def _note(self, robot: Robot, off: str, on: str, reason: str) -> None:
+        self.switches.append(Switch(robot.time, off, on, reason))
+
+    def _named(self, index: int) -> str:
+        return f"{self.processes[index].name} {self._utilities.values[index]:.3f}"
+
+    def _reason(self, index: int, z: Sequence[float]) -> str:
+        shares = self._utilities.shares(index, z)[:2]
+        text = ", ".join(f"{share.cause} {share.value:+.2f}" for share in shares)
+        return f"{self._named(index)} ({text or 'no input'})"
+
+
+def _united(lists: Iterable[Sequence[str]]) -> tuple[str, ...]:
+    """All names, each once, in the order of their first appearance."""
+    return tuple(dict.fromkeys(name for names in lists for name in names))

@@ -1,0 +1,66 @@
+"""State variables: what sensory preprocessing makes of readings (section 8.2.1 of the notes, Fig. 8.1).
+
+A state variable is a number from 0 to 1, made at each step of the brain from what its sensors say:
+
+    z = (1/j) Σ Σ_i  (8.1)        z = min Σ_i  (8.2)        z = max Σ_i  (8.3)
+
+What is missing or stale is left out of the sums; where nothing is left, z is 0. The lag of the utilities filters such
+gaps out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.errors import BrainError
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+Read = Callable[["Robot"], float | None]
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """One state variable."""
+
+    name: str
+    read: Read
+    """gives its value; beyond 0..1 it is limited, None: nothing is known, 0"""
+    needs: tuple[str, ...] = ()
+    """devices without which it cannot be told, as `Robot.has` names them"""
+
+    def value(self, robot: Robot) -> float:
+        """z, from 0 to 1.
+
+        Raises:
+            BrainError: `read` gave no number.
+        """
+        raw = self.read(robot)
+        if raw is None:
+            return 0.0
+        try:
+            if math.isnan(raw):
+                raise ValueError
+            return min(max(float(raw), 0.0), 1.0)
+        except (TypeError, ValueError):
+            raise BrainError(f"state variable {self.name!r} is {raw!r}; expected a number from 0 to 1") from None
+
+
+def mean(readings: Iterable[float | None]) -> float | None:
+    """(8.1), of those that are known."""
+    known = [reading for reading in readings if reading is not None]
+    return sum(known) / len(known) if known else None
+
+
+def minimum(readings: Iterable[float | None]) -> float | None:
+    """(8.2), of those that are known."""
+    return min((reading for reading in readings if reading is not None), default=None)
+
+
+def maximum(readings: Iterable[float | None]) -> float | None:
+    """(8.3), of those that are known."""
+    return max((reading for reading in readings if reading is not None), default=None)
