@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final, NoReturn
+from typing import Any, Final, NamedTuple, NoReturn
 
 from boebot import robots
 from boebot.devices.analog_infrared import AnalogInfrared, AnalogInfraredReader
@@ -31,6 +31,19 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "lights": ("left_light", "right_light"),
     "zones": ("left_zone", "right_zone"),
 }
+
+
+class Dimensions(NamedTuple):
+    """What is known of a robot by its description; those of the one at hand may be a little different."""
+
+    track_width: float
+    """m, between the wheels' middles"""
+    wheel_radius: float
+    """m"""
+    radius: float
+    """m, of the circle about the body"""
+    speed: float
+    """m/s along the ground at motor signal 1"""
 
 
 class Equipment:
@@ -89,6 +102,10 @@ class Equipment:
         """`layout`: where the readings of a robot without a board stand, once that is known."""
         self.robot_name = robot.name
         self.tick_s = tick_s
+        body = robot.body
+        self.dimensions = Dimensions(
+            body.track_width_m, body.wheel_radius_m, body.radius_m, body.wheel_speed_maximum_m_s
+        )
         found: dict[str, Any] = {}
         slow: dict[str, Any] = {}
         if robot.has_board:

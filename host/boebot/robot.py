@@ -29,7 +29,7 @@ from boebot.devices.servo import Servo
 from boebot.devices.told import NOTHING_TOLD, Told
 from boebot.devices.turret import Turret
 from boebot.devices.whisker import Whisker
-from boebot.equipment import GROUPS
+from boebot.equipment import GROUPS, Dimensions
 from boebot.equipment import Equipment as Equipment
 from boebot.errors import BrainError
 from boebot.link.messages import Buzzer as BuzzerMessage
@@ -373,6 +373,11 @@ class Robot:
         equipment = self.observation.equipment
         return all(equipment.has(one) for one in GROUPS.get(name, (name,)))
 
+    @property
+    def dimensions(self) -> Dimensions:
+        """Lengths of the robot, and how fast it is, by its description."""
+        return self.observation.equipment.dimensions
+
     # ---- motors --------------------------------------------------------------------------------------------
 
     def drive(self, left: float, right: float) -> None:
@@ -488,7 +493,7 @@ class Robot:
         return self.random.random() < probability
 
     def stream(self, name: str) -> random.Random:
-        """A `random.Random` for one part of the brain, of its own: what other parts draw changes none of its numbers."""
+        """A `random.Random` for one part of the brain, whose numbers do not depend on what others draw."""
         return random.Random(f"brain {self._seed} {name}")
 
 

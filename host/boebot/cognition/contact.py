@@ -1,0 +1,49 @@
+"""Contact: touched whiskers, and for how long they have been."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.brain.process import CognitiveProcess
+from boebot.brain.variables import StateVariable
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+
+@dataclass(kw_only=True)
+class Contact(CognitiveProcess):
+    """Counts touches.
+
+    Attributes:
+        touches: how often a whisker was touched since the run began.
+        left: the left whisker is touched.
+        right: the right one is.
+        last: time (s) of the last step in which one was, or None.
+    """
+
+    NEEDS = ("whiskers",)
+
+    def enter(self, robot: Robot) -> None:
+        self.touches = 0
+        self.left = self.right = False
+        self.last: float | None = None
+
+    def step(self, robot: Robot) -> None:
+        left, right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        self.touches += (left and not self.left) + (right and not self.right)
+        self.left, self.right = left, right
+        if left or right:
+            self.last = robot.time
+
+
+def contact() -> StateVariable:
+    """State variable "contact": 1 while a whisker is touched; 0 on a robot without whiskers."""
+
+    def read(robot: Robot) -> float:
+        if not robot.has("whiskers"):
+            return 0.0
+        return float(robot.left_whisker.pressed or robot.right_whisker.pressed)
+
+    return StateVariable("contact", read)

@@ -1,0 +1,87 @@
+"""How near things are, by all that the robot senses them with (IR pairs and their zones, analog IR, Ping)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.brain.process import CognitiveProcess
+from boebot.brain.variables import StateVariable, maximum
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+REACH_M = 0.4  # distances become nearness: 1 at the sensor, 0 from here on
+ZONES = 5
+
+
+@dataclass(kw_only=True)
+class Proximity(CognitiveProcess):
+    """Remembers where something was seen last.
+
+    Attributes:
+        left: nearness by the left IR sensor, 0 (nothing) to 1 (touching); None: nothing is known.
+        right: by the right one.
+        ahead: by what looks straight ahead.
+        last_left: time (s) at which the left sensor last saw something, or None.
+        last_right: of the right one.
+    """
+
+    threshold: float = 0.3
+    """nearness from which on something is seen"""
+
+    def enter(self, robot: Robot) -> None:
+        self.left: float | None = None
+        self.right: float | None = None
+        self.ahead: float | None = None
+        self.last_left: float | None = None
+        self.last_right: float | None = None
+
+    def step(self, robot: Robot) -> None:
+        self.left, self.right, self.ahead = left_nearness(robot), right_nearness(robot), nearness_ahead(robot)
+        if (self.left or 0.0) >= self.threshold:
+            self.last_left = robot.time
+        if (self.right or 0.0) >= self.threshold:
+            self.last_right = robot.time
+
+
+def left_nearness(robot: Robot) -> float | None:
+    """Nearness of what the left IR sensor sees, 0..1; None: no fresh reading."""
+    return _sided(robot, "left_ir", "left_zone")
+
+
+def right_nearness(robot: Robot) -> float | None:
+    """The same of the right one."""
+    return _sided(robot, "right_ir", "right_zone")
+
+
+def nearness_ahead(robot: Robot) -> float | None:
+    """Nearness of what Ping or analog IR sees straight ahead: 1 - distance / 0.4 m, 0 where there is nothing."""
+    found = []
+    for name in ("ping", "analog_ir"):
+        if robot.has(name):
+            device = getattr(robot, name)
+            if device.valid:
+                found.append(0.0 if device.distance is None else max(0.0, 1 - device.distance / REACH_M))
+    return maximum(found)
+
+
+def near() -> StateVariable:
+    """State variable "near": the nearest of all that is seen (8.3)."""
+    return StateVariable(
+        "near", lambda robot: maximum((left_nearness(robot), right_nearness(robot), nearness_ahead(robot)))
+    )
+
+
+def _sided(robot: Robot, pair: str, zone: str) -> float | None:
+    """An analog sensor's reading; of a pair its zone if it sweeps, else 1 for seen and 0 for not."""
+    found: list[float | None] = []
+    if robot.has(zone):
+        swept = getattr(robot, zone)
+        if swept.valid:
+            return float(swept.zone / ZONES)
+    if robot.has(pair):
+        sensor = getattr(robot, pair)
+        if sensor.valid:
+            found.append(float(getattr(sensor, "reading", sensor.detected)))
+    return maximum(found)

@@ -1,0 +1,55 @@
+"""A compass by the sky, as desert ants have it: the sun's pattern turns, and an ephemeris function makes up for it.
+
+    φ = θ_sky + ψ(t),   ψ(t) = ψ_0 + ω_s t,   ω_s = 2π / 86,400 s
+
+θ_sky is the heading against the pattern, ψ the sun's azimuth, taken to grow evenly through the day (section 4.8 of the
+specification). Here a magnetic or given heading plays the sky's part.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.brain.process import CognitiveProcess
+from boebot.cognition.odometry import wrapped
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+DAY_S = 86_400.0
+
+
+def sun_azimuth(time: float, at_start: float = 0.0) -> float:
+    """ψ(t) (rad in (-pi, pi]): the sun's azimuth a time (s) after it was `at_start` (rad)."""
+    return wrapped(at_start + 2 * math.pi / DAY_S * time)
+
+
+@dataclass(kw_only=True)
+class SunCompass(CognitiveProcess):
+    """Heading from the sky's pattern and the time of day.
+
+    Attributes:
+        heading: rad in (-pi, pi], or None while the sky has not been seen.
+    """
+
+    NEEDS = ("compass",)
+
+    azimuth_at_start: float = 0.0
+    """ψ_0 (rad)"""
+    turning: bool = False
+    """the compass shows a pattern that turns with the sun; False: it shows the heading itself"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.heading: float | None = None
+
+    def enter(self, robot: Robot) -> None:
+        self.heading = None
+
+    def step(self, robot: Robot) -> None:
+        compass = robot.compass
+        if compass.valid and compass.heading is not None:
+            azimuth = sun_azimuth(robot.time, self.azimuth_at_start) if self.turning else 0.0
+            self.heading = wrapped(compass.heading + azimuth)
