@@ -174,7 +174,7 @@ class Brain:
                 raise BrainError(
                     f"{process.name}: a period of {period:g} s; expected a multiple of the brain's, {robot.period:g} s"
                 )
-            process.begin(period, robot.stream(process.name), self._find, self._kick)
+            process.join(period, robot.stream(process.name), self._find, self._kick)
         self._utilities.start(self._read(robot))
 
     def _read(self, robot: Robot) -> Sequence[float]:

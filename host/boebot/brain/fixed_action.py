@@ -12,14 +12,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
-from boebot.brain.utility import Utility
+from boebot.brain.utility import HOLD, Utility
 from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
-
-HOLD = 10.0
-"""gamma that no weighted sum of state variables outdoes in usual brains: tanh(c HOLD) is 1 to nine digits"""
 
 
 class Action(NamedTuple):

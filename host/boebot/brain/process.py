@@ -122,7 +122,7 @@ class Process:
 
     # ---- for the brain ----------------------------------------------------------------------------------------------
 
-    def begin(
+    def join(
         self,
         step_time: float,
         source: random.Random,
