@@ -1,4 +1,4 @@
-"""Obstacle avoidance by infra-red sensors (named in chapter 4 of the notes; law of section 4.9 of the specification)."""
+"""Obstacle avoidance by infra-red sensors (chapter 4 of the notes; law of section 4.9 of the specification)."""
 
 from __future__ import annotations
 

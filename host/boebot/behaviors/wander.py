@@ -1,7 +1,7 @@
 """Wandering: code listings 5.1 and 5.2 of the notes.
 
-Straight ahead; now and then, by chance, a turn on the spot to a side and for a time that chance chooses. Alone it is for
-empty space: it looks at nothing.
+Straight ahead; now and then, by chance, a turn on the spot to a side and for a time that chance chooses. Alone it is
+for empty space: it looks at nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PER_S = 0.01  # the notes' step, which their probabilities are meant for
 
 @dataclass(kw_only=True)
 class Wander(MotorBehavior):
-    """The notes' parameters; in a robot of a fifth of their robot's speed, `turn_probability` 0.002 gives the same paths.
+    """The notes' parameters; a robot of a fifth of their robot's speed has the same paths with `turn_probability` 0.002.
 
     Attributes:
         left: it turns, or turned last, to the left.

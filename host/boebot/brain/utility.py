@@ -20,7 +20,7 @@ from typing import NamedTuple
 from boebot.errors import BrainError
 
 HOLD = 10.0
-"""A gamma parameter with which a process is active whatever the state variables: no usual weighted sum is that large."""
+"""A gamma parameter with which a process is active whatever the state variables: no usual sum is that large."""
 
 
 @dataclass(frozen=True, kw_only=True)
