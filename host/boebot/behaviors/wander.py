@@ -20,7 +20,7 @@ PER_S = 0.01  # the notes' step, which their probabilities are meant for
 
 @dataclass(kw_only=True)
 class Wander(MotorBehavior):
-    """The notes' parameters; a robot of a fifth of their robot's speed has the same paths with `turn_probability` 0.002.
+    """The notes' parameters; where a robot is a fifth as fast, `turn_probability` 0.002 gives the same paths.
 
     Attributes:
         left: it turns, or turned last, to the left.
