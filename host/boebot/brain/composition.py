@@ -1,0 +1,157 @@
+"""Brains composed in TOML: which processes, with which parameters and utilities, and which state variables.
+
+    period_s = 0.05
+
+    [variable.near]                  # by its kind,
+    [variable.tired]
+    of = "battery_level"             # or of a process that offers one
+
+    [process.wander]                 # kind = "wander" unless it says otherwise
+    turn_probability = 0.002
+    utility = { b = 0.5 }
+
+    [process.dodge]
+    kind = "avoid"
+    utility = { b = -1.0, w = { near = 3.0 } }
+
+Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case with underscores.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import typing
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import msgspec
+
+from boebot import toml_files
+from boebot.brain.brain import Brain
+from boebot.brain.process import Process, snake_case
+from boebot.brain.utility import Utility
+from boebot.brain.variables import StateVariable
+from boebot.errors import BrainError
+
+_NO_PARAMETERS = {"name", "utility"}
+
+
+class _Utility(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """As boebot.brain.Utility."""
+
+    b: float = 0.0
+    w: dict[str, float] = {}
+    tau: float = 0.2
+    c: float = 1.0
+    tau_gamma: float = 0.5
+
+
+class _Variable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One state variable: of a kind, by default its name, or of a process."""
+
+    kind: str | None = None
+    of: str | None = None
+
+
+@cache
+def process_kinds() -> MappingProxyType[str, type[Process]]:
+    """The classes of processes that a file may name."""
+    from boebot import behaviors, cognition
+
+    found = [getattr(module, name) for module in (behaviors, cognition) for name in module.__all__]
+    classes = [one for one in found if inspect.isclass(one) and issubclass(one, Process)]
+    return MappingProxyType({snake_case(one.__name__): one for one in classes})
+
+
+@cache
+def variable_kinds() -> MappingProxyType[str, Callable[[], StateVariable]]:
+    """What makes the state variables that a file may name without a process."""
+    from boebot.cognition import contact, near
+
+    return MappingProxyType({"contact": contact, "near": near})
+
+
+def load(path: Path) -> Brain:
+    """The brain that a file describes.
+
+    Raises:
+        BrainError: one sentence with the file, the line, the key and what was expected.
+    """
+    table = toml_files.read(path, BrainError)
+    processes = table.get("process")
+    if isinstance(processes, dict):
+        for name, process in processes.items():
+            if isinstance(process, dict):
+                process.setdefault("kind", name)
+    described: Any = toml_files.convert(table, _file_type(), path.name, BrainError)
+    try:
+        made = {name: _process(name, one) for name, one in described.process.items()}
+        variables = [_variable(name, one, made) for name, one in described.variable.items()]
+        return Brain(made.values(), variables, period=described.period_s, margin=described.margin)
+    except BrainError as error:
+        raise BrainError(f"{path.name}: {error}") from None
+
+
+@cache
+def _file_type() -> type[msgspec.Struct]:
+    """The type of a whole file."""
+    choices = tuple(_table_type(kind, one) for kind, one in process_kinds().items())
+    return msgspec.defstruct(
+        "BrainFile",
+        [
+            ("process", dict[str, typing.Union[choices]]),  # type: ignore[valid-type]  # noqa: UP007
+            ("variable", dict[str, _Variable], msgspec.field(default_factory=dict)),
+            ("period_s", float, 0.05),
+            ("margin", float, 0.0),
+        ],
+        forbid_unknown_fields=True,
+    )
+
+
+def _table_type(kind: str, process: type[Process]) -> type[msgspec.Struct]:
+    """The type of the table of one process: its parameters with their types and defaults."""
+    types = typing.get_type_hints(process)
+    fields: list[Any] = [("utility", _Utility | None, None)]
+    for field in dataclasses.fields(process):
+        if field.init and field.name not in _NO_PARAMETERS:
+            required = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+            fields.append(
+                (field.name, types[field.name]) if required else (field.name, types[field.name], msgspec.UNSET)
+            )
+    return msgspec.defstruct(
+        process.__name__, fields, kw_only=True, forbid_unknown_fields=True, tag=kind, tag_field="kind"
+    )
+
+
+def _process(name: str, table: msgspec.Struct) -> Process:
+    given = msgspec.structs.asdict(table)
+    utility = given.pop("utility")
+    given = {key: value for key, value in given.items() if value is not msgspec.UNSET}
+    if utility is not None:
+        given["utility"] = Utility(**msgspec.structs.asdict(utility))
+    kind = str(table.__struct_config__.tag)
+    return process_kinds()[kind](name=name, **given)
+
+
+def _variable(name: str, table: _Variable, processes: dict[str, Process]) -> StateVariable:
+    if table.of is not None:
+        process = processes.get(table.of)
+        make = getattr(process, "variable", None)
+        if make is None:
+            offering = [each.name for each in processes.values() if hasattr(each, "variable")]
+            raise BrainError(
+                f"variable.{name}.of is {table.of!r}; expected a process that has a state variable: "
+                f"{', '.join(offering) or 'there is none'}"
+            )
+    else:
+        kind = table.kind or name
+        make = variable_kinds().get(kind)
+        if make is None:
+            raise BrainError(
+                f"variable.{name}: there is no kind {kind!r}; expected {', '.join(variable_kinds())}, or of ="
+            )
+    return dataclasses.replace(make(), name=name)
