@@ -1,0 +1,88 @@
+"""Taxis: movement along a gradient, to the light or away from it (section 4.4 of the specification).
+
+With two sensors, crossed excitation:   a = (I_l - I_r) / (I_l + I_r),   s_L = s_0 - k a,   s_R = s_0 + k a
+With one (klinotaxis), as fly maggots do: swing to one side and to the other, and go where it was brighter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.behaviors.straight_run import within_signals
+from boebot.brain.process import MotorBehavior
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+
+@dataclass(kw_only=True)
+class Phototaxis(MotorBehavior):
+    """To the light by two sensors, or away from it; in the dark it turns on the spot and looks for light."""
+
+    NEEDS = ("lights",)
+
+    signal: float = 0.5
+    """s_0"""
+    gain: float | None = None
+    """k; None: 0.6 s_0"""
+    flee: bool = False
+    """away from the light"""
+    dark: float = 0.0
+    """brightness of both together up to which it is dark"""
+
+    def step(self, robot: Robot) -> None:
+        left, right = brightness(robot.left_light), brightness(robot.right_light)
+        if left + right <= self.dark:
+            if self.flee:
+                robot.drive(0.0, 0.0)
+            else:
+                robot.drive(-self.signal / 2, self.signal / 2)
+            return
+        gain = 0.6 * self.signal if self.gain is None else self.gain
+        steer = gain * (left - right) / (left + right) * (-1 if self.flee else 1)
+        robot.drive(within_signals(self.signal - steer), within_signals(self.signal + steer))
+
+
+@dataclass(kw_only=True)
+class Klinotaxis(MotorBehavior):
+    """To the light by one sensor, or away from it: swings left and right, and compares the last two swings."""
+
+    NEEDS = ("left_light",)
+
+    signal: float = 0.4
+    """s_0"""
+    swing: float = 0.25
+    """difference of the motor signals while it swings to a side"""
+    seconds: float = 0.5
+    """of one swing"""
+    gain: float = 3.0
+    """difference of the motor signals for each unit of (I_left - I_right) / (I_left + I_right)"""
+    flee: bool = False
+
+    def enter(self, robot: Robot) -> None:
+        self._side = 1  # +1: swings to the left
+        self._until = robot.time + self.seconds / 2
+        self._sum, self._count = 0.0, 0
+        self._seen = {1: 0.0, -1: 0.0}
+        self._steer = 0.0
+
+    def step(self, robot: Robot) -> None:
+        self._sum += brightness(robot.left_light)
+        self._count += 1
+        if robot.time >= self._until - 1e-9:
+            self._seen[self._side] = self._sum / self._count
+            both = self._seen[1] + self._seen[-1]
+            better = (self._seen[1] - self._seen[-1]) / both if both > 0 else 0.0
+            self._steer = self.gain * better * (-1 if self.flee else 1)
+            self._side = -self._side
+            self._until = robot.time + self.seconds
+            self._sum, self._count = 0.0, 0
+        half = (self._side * self.swing + min(max(self._steer, -self.swing), self.swing)) / 2
+        robot.drive(within_signals(self.signal - half), within_signals(self.signal + half))
+
+
+def brightness(light: object) -> float:
+    """What a light sensor says, 0 where it says nothing."""
+    value = getattr(light, "brightness", None)
+    return float(value) if value is not None and getattr(light, "valid", False) else 0.0
