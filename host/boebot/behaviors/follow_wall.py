@@ -2,8 +2,8 @@
 
     e = S_side - S_ref,   s_L = s_0 ∓ k e,   s_R = s_0 ± k e        upper signs: the wall is on the right
 
-The nearer, the larger S: too close to a wall on the right (e > 0), it turns left. Something ahead: it turns on the spot,
-away from the wall.
+The nearer, the larger S: too close to a wall on the right (e > 0), it turns left. Something ahead: it turns on the
+spot, away from the wall.
 """
 
 from __future__ import annotations

@@ -36,6 +36,7 @@ from boebot.brain.process import Process, snake_case
 from boebot.brain.utility import Utility
 from boebot.brain.variables import StateVariable
 from boebot.errors import BrainError
+from boebot.robot import Robot
 
 _NO_PARAMETERS = {"name", "utility"}
 
@@ -89,9 +90,12 @@ def load(path: Path) -> Brain:
                 process.setdefault("kind", name)
     described: Any = toml_files.convert(table, _file_type(), path.name, BrainError)
     try:
-        made = {name: _process(name, one) for name, one in described.process.items()}
-        variables = [_variable(name, one, made) for name, one in described.variable.items()]
-        return Brain(made.values(), variables, period=described.period_s, margin=described.margin)
+        variables: dict[str, StateVariable] = {}
+        made = {name: _process(name, one, variables) for name, one in described.process.items()}
+        variables |= {name: _variable(name, one, made) for name, one in described.variable.items()}
+        for name, process in made.items():
+            _check_readings(name, process)
+        return Brain(made.values(), variables.values(), period=described.period_s, margin=described.margin)
     except BrainError as error:
         raise BrainError(f"{path.name}: {error}") from None
 
@@ -114,7 +118,7 @@ def _file_type() -> type[msgspec.Struct]:
 
 def _table_type(kind: str, process: type[Process]) -> type[msgspec.Struct]:
     """The type of the table of one process: its parameters with their types and defaults."""
-    types = typing.get_type_hints(process)
+    types = typing.get_type_hints(process, localns={"Robot": Robot})
     fields: list[Any] = [("utility", _Utility | None, None)]
     for field in dataclasses.fields(process):
         if field.init and field.name not in _NO_PARAMETERS:
@@ -127,14 +131,42 @@ def _table_type(kind: str, process: type[Process]) -> type[msgspec.Struct]:
     )
 
 
-def _process(name: str, table: msgspec.Struct) -> Process:
+def _is_function(kind: Any) -> bool:
+    """Parameters that are functions of the robot: a file names a state variable there."""
+    return typing.get_origin(kind) is Callable
+
+
+def _process(name: str, table: msgspec.Struct, variables: dict[str, StateVariable]) -> Process:
     given = msgspec.structs.asdict(table)
     utility = given.pop("utility")
     given = {key: value for key, value in given.items() if value is not msgspec.UNSET}
     if utility is not None:
         given["utility"] = Utility(**msgspec.structs.asdict(utility))
-    kind = str(table.__struct_config__.tag)
-    return process_kinds()[kind](name=name, **given)
+    process = process_kinds()[str(table.__struct_config__.tag)]
+    for key, hint in typing.get_type_hints(process, localns={"Robot": Robot}).items():
+        if key in given and _is_function(hint):
+            given[key] = _Reading(given[key], variables)
+    return process(name=name, **given)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Reading:
+    """What the state variable of that name reads; processes are made before the state variables are."""
+
+    variable: str
+    variables: dict[str, StateVariable]
+
+    def __call__(self, robot: Robot) -> float | None:
+        return self.variables[self.variable].read(robot)
+
+
+def _check_readings(name: str, process: Process) -> None:
+    for key, value in vars(process).items():
+        if isinstance(value, _Reading) and value.variable not in value.variables:
+            known = ", ".join(value.variables) or "none"
+            raise BrainError(
+                f"process.{name}.{key} names the state variable {value.variable!r}; this brain has {known}"
+            )
 
 
 def _variable(name: str, table: _Variable, processes: dict[str, Process]) -> StateVariable:
