@@ -116,18 +116,17 @@ def _file_type() -> type[msgspec.Struct]:
     )
 
 
-def _table_type(kind: str, process: type[Process]) -> type[msgspec.Struct]:
+def _table_type(tag: str, process: type[Process]) -> type[msgspec.Struct]:
     """The type of the table of one process: its parameters with their types and defaults."""
     types = typing.get_type_hints(process, localns={"Robot": Robot})
     fields: list[Any] = [("utility", _Utility | None, None)]
     for field in dataclasses.fields(process):
         if field.init and field.name not in _NO_PARAMETERS:
+            kind = str if _is_function(types[field.name]) else types[field.name]
             required = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-            fields.append(
-                (field.name, types[field.name]) if required else (field.name, types[field.name], msgspec.UNSET)
-            )
+            fields.append((field.name, kind) if required else (field.name, kind, msgspec.UNSET))
     return msgspec.defstruct(
-        process.__name__, fields, kw_only=True, forbid_unknown_fields=True, tag=kind, tag_field="kind"
+        process.__name__, fields, kw_only=True, forbid_unknown_fields=True, tag=tag, tag_field="kind"
     )
 
 
