@@ -1,0 +1,118 @@
+"""What an experiment is: a run of its own, what it measured against what was expected, a figure, and its data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Progress = Callable[[float], None]
+"""Called now and then with the share that is done, 0 to 1."""
+Draw = Callable[["Figure"], None]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One figure and its criterion: at least `least`, at most `most`."""
+
+    name: str
+    value: float
+    unit: str = ""
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def is_met(self) -> bool:
+        """The value is within its bounds."""
+        return self.least <= self.value <= self.most
+
+    @property
+    def expected(self) -> str:
+        """The criterion in words."""
+        if self.least == self.most:
+            return f"{self.least:g}"
+        if math.isinf(self.least):
+            return f"at most {self.most:g}"
+        if math.isinf(self.most):
+            return f"at least {self.least:g}"
+        return f"{self.least:g} to {self.most:g}"
+
+
+def about(name: str, value: float, expected: float, tolerance: float, unit: str = "") -> Measured:
+    """A figure that should be `expected`, plus or minus `tolerance`."""
+    return Measured(name, float(value), unit, expected - tolerance, expected + tolerance)
+
+
+def exactly(name: str, value: float, expected: float, unit: str = "") -> Measured:
+    """A figure that should be just that."""
+    return Measured(name, float(value), unit, expected, expected)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of an experiment."""
+
+    measured: Sequence[Measured]
+    data: Mapping[str, Any]
+    """columns of the CSV file, units in their names; all of the same length"""
+    draw: Draw
+    """draws the figure that the notes' caption describes"""
+
+    @property
+    def is_met(self) -> bool:
+        """All criteria are met."""
+        return all(one.is_met for one in self.measured)
+
+    def columns(self) -> dict[str, np.ndarray[Any, Any]]:
+        """The data as arrays."""
+        return {name: np.asarray(column) for name, column in self.data.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One experiment, to be run by `boebot experiment NAME`."""
+
+    name: str
+    """as in `boebot experiment list`, such as "E22\""""
+    title: str
+    source: str
+    """where in the notes"""
+    caption: str
+    """of its figure"""
+    robot: str
+    """the robot that it runs on, or "none" """
+    run: Callable[[int, Progress], Outcome]
+    """with a seed"""
+    topic: str = field(default="")
+    """the file that it stands in"""
+
+
+EXPERIMENTS: dict[str, Experiment] = {}
+
+
+def experiment(
+    name: str, *, title: str, source: str, caption: str, robot: str = "none"
+) -> Callable[[Callable[[int, Progress], Outcome]], Callable[[int, Progress], Outcome]]:
+    """Marks a function of a seed and a progress function as an experiment."""
+
+    def register(run: Callable[[int, Progress], Outcome]) -> Callable[[int, Progress], Outcome]:
+        if name in EXPERIMENTS:
+            raise ValueError(f"there are two experiments {name}")
+        EXPERIMENTS[name] = Experiment(
+            name=name,
+            title=title,
+            source=source,
+            caption=caption,
+            robot=robot,
+            run=run,
+            topic=run.__module__.rpartition(".")[2],
+        )
+        return run
+
+    return register
