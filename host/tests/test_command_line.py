@@ -305,6 +305,17 @@ cli.main()
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 
 
+def test_interrupt_within_an_exec_ends_with_the_same_code() -> None:
+    """CPython remembers that one left an exec of a text, and would end by the signal even if it was caught since."""
+    code = """
+import boebot.cli as cli
+cli._run = lambda: exec("raise KeyboardInterrupt")
+cli.main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=False)
+    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
+
+
 def test_heavy_modules_wait_until_ctrl_c_is_caught() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", "import boebot.cli, sys; print(*sys.modules)"],

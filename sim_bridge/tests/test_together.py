@@ -226,13 +226,17 @@ def test_interrupt_in_a_brain_stops_all() -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 @pytest.mark.parametrize("after_s", [0.0, 0.7])
 def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) -> None:
+    brain, begun = tmp_path / "brain.py", tmp_path / "begun"
+    brain.write_text(f"import pathlib\n\ndef step(robot):\n    pathlib.Path({str(begun)!r}).touch()\n")
     process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", "wander", "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path),
+        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path),
          "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
     )  # fmt: skip
-    time.sleep(2.5 + after_s)
+    while not begun.exists() and process.poll() is None:
+        time.sleep(0.02)
+    time.sleep(after_s)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
