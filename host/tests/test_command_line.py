@@ -305,14 +305,16 @@ cli.main()
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 
 
-def test_interrupt_within_an_exec_ends_with_the_same_code() -> None:
-    """CPython remembers that one left an exec of a text, and would end by the signal even if it was caught since."""
-    code = """
+def test_interrupt_within_an_exec_ends_with_the_same_code(tmp_path: Path) -> None:
+    """CPython's -m remembers that one left an exec of a text, and ends by the signal even if it was caught since."""
+    (tmp_path / "again.py").write_text("""
 import boebot.cli as cli
 cli._run = lambda: exec("raise KeyboardInterrupt")
 cli.main()
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=False)
+""")
+    done = subprocess.run(
+        [sys.executable, "-m", "again"], cwd=tmp_path, capture_output=True, text=True, timeout=20, check=False
+    )
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 
 
