@@ -272,7 +272,7 @@ class Vehicle:
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
         self._body = lib.vehicles_body(self.handle, 0)
         self._flag = ffi.new("int8_t *")
-        self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle)
+        self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle, 0)
 
     def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
         """Starts a new run at a pose (x, y, heading), at `speed` (m/s) and `turn_rate` (rad/s), wheels rolling.

@@ -74,7 +74,7 @@ double vehicles_energy(const vehicles *self, size_t i);
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
 /* One world as bytes, and back into a world of the same model that is placed in the same arena. */
-size_t vehicles_snapshot_size(const vehicles *self);
+size_t vehicles_snapshot_size(const vehicles *self, size_t i);
 void vehicles_save(const vehicles *self, size_t i, void *bytes);
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
 
