@@ -195,8 +195,7 @@ class VehicleModel:
         if table is None:
             self._sensor("infrared_proximity", name, parameters, None, period, "range")
         else:
-            given = known(self._named(name), parameters, ("beam", "range"))
-            self._by_table(name, table, given, "range", period, seen_nothing=0.0)
+            self._by_table(name, table, parameters, "range", 0.0, period)
 
     def sonar(self, name: str, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any) -> None:
         """Sonar: beam, range_minimum, range_maximum, sigma, miss, ... One reading, m; D_max: nothing heard.
@@ -206,43 +205,29 @@ class VehicleModel:
         if table is None:
             self._sensor("sonar", name, parameters, None, period, "range_maximum")
         else:
-            given = known(self._named(name), parameters, ("beam", "range_maximum"))
-            self._by_table(name, table, given, "range_maximum", period)
+            self._by_table(name, table, parameters, "range_maximum", None, period)
 
     def _by_table(
-        self,
-        name: str,
-        table: ReadingTable,
-        given: Mapping[str, Any],
-        reach: str,
-        period: float,
-        seen_nothing: float | None = None,
+        self, name: str, table: ReadingTable, given: Any, reach: str, none: float | None, period: float
     ) -> None:
-        """Adds it with the `given` beam and the key `reach`, which it also reads where nothing else is said."""
-        far = number(self._named(name), reach, given.get(reach), POSITIVE)
-        none = far if seen_nothing is None else seen_nothing
-        self.table(name, table, beam=given.get("beam"), reach=far, none=none, period=period)
+        """Adds a table of a sensor whose key for its range is `reach`, which it also reads where `none` is None."""
+        where = self._named(name)
+        known(where, given, ("beam", reach))
+        far = number(where, reach, given.get(reach), POSITIVE)
+        self.table(name, table, beam=given.get("beam"), reach=far, none=far if none is None else none, period=period)
 
-    def table(
-        self,
-        name: str,
-        table: ReadingTable,
-        *,
-        beam: Mapping[str, float] | None = None,
-        reach: float = 0.0,
-        none: float = 0.0,
-        period: float = 0.0,
-    ) -> None:
-        """A sensor known by its table of readings (rule S3). One reading, drawn from there.
+    def table(self, name: str, table: ReadingTable, *, period: float = 0.0, **parameters: Any) -> None:
+        """A sensor known by its table of readings (rule S3): beam, reach, none. One reading, drawn from the table.
 
         It is that for the distance and the angle of incidence of the nearest thing that the beam's rays meet within
-        `reach` (m), and `none` where there is nothing.
+        `reach` (m), and `none` (0 unless said) where there is nothing.
         """
         where = self._named(name)
         if not isinstance(table, ReadingTable):
             raise RobotError(f"{where}: table is {shown(table)}; expected a ReadingTable")
-        look = struct("beam_parameters", f"{where}: beam", beam)
-        far, free = number(where, "reach", reach, POSITIVE), number(where, "none", none, FINITE)
+        given = {"beam": None, "reach": None, "none": 0.0} | known(where, parameters, ("beam", "reach", "none"))
+        look = struct("beam_parameters", f"{where}: beam", given["beam"])
+        far, free = number(where, "reach", given["reach"], POSITIVE), number(where, "none", given["none"], FINITE)
         time = number(where, "period", period, NOT_NEGATIVE)
         first = lib.vehicle_model_add_table(self._open, look, table.handle, far, free, time)
         self._keep.append(table)

@@ -137,7 +137,7 @@ def several(where: str, key: str, value: Any, names: Sequence[str], allowed: Ran
     return tuple(number(where, f"{key}: {name}", part, allowed) for name, part in zip(names, found, strict=True))
 
 
-def known(where: str, given: Any, keys: Iterable[str]) -> Mapping[str, Any]:
+def known(where: str, given: Any, keys: Iterable[str]) -> dict[str, Any]:
     """`given`, if it is a mapping of these keys; raises RobotError if it is not."""
     names = list(keys)
     if not isinstance(given, Mapping):
@@ -145,7 +145,7 @@ def known(where: str, given: Any, keys: Iterable[str]) -> Mapping[str, Any]:
     for key in given:
         if key not in names:
             raise RobotError(f"{where}: there is no key {shown(key)}; expected {', '.join(names)}")
-    return given
+    return dict(given)
 
 
 def struct(kind: str, where: str, given: Any, usual: Mapping[str, Any] | None = None) -> Any:
