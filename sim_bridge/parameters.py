@@ -181,9 +181,7 @@ def _values(kind: str, where: str, inside: str, given: Any, usual: Mapping[str, 
         allowed = RANGES[kind].get(key, FINITE)
         if key not in given and key not in usual:
             if field.type.kind == "struct" or (field.type.kind == "primitive" and 0 not in allowed):
-                what = f"a mapping, {', '.join(keys_of(field.type.cname))}"
-                wanted = what if field.type.kind == "struct" else allowed.text(_is_whole(field))
-                raise RobotError(f"{where}: the key '{inside}{key}' is missing; expected {wanted}")
+                raise RobotError(f"{where}: the key '{inside}{key}' is missing; expected {_wanted(field, allowed)}")
             continue
         value = given[key] if key in given else usual[key]
         if field.type.kind == "struct":
@@ -195,6 +193,12 @@ def _values(kind: str, where: str, inside: str, given: Any, usual: Mapping[str, 
             found = number(where, inside + key, value, allowed, whole=_is_whole(field))
             values[key] = int(found) if _is_whole(field) else found
     return values
+
+
+def _wanted(field: Any, allowed: Range) -> str:
+    if field.type.kind == "struct":
+        return f"a mapping, {', '.join(keys_of(field.type.cname))}"
+    return allowed.text(_is_whole(field))
 
 
 def _is_whole(field: Any) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -27,7 +27,7 @@ BODY = ARSIM_BODY | {"wheel_mass": 0.1, "wheel_inertia": 2e-4, "grip": 10.0}
 Phases = Sequence[tuple[float, float]]
 
 
-def driven(dt: float, full: bool = True, **motor: float) -> VehicleModel:
+def driven(dt: float, motor: dict[str, float], full: bool = True) -> VehicleModel:
     model = VehicleModel(BODY, dt=dt)
     model.dc_motors(motor, motor, full=full)
     return model
@@ -93,7 +93,7 @@ class FullEquations:
 
 def simulated(motor: dict[str, float], dt: float) -> Any:
     """The same state at the end of the phases, as the vehicle has it."""
-    vehicle = Vehicle(driven(dt, torque_maximum_n_m=100.0, **motor), arena_of())
+    vehicle = Vehicle(driven(dt, motor | {"torque_maximum_n_m": 100.0}), arena_of())
     vehicle.place((0, 0, 0.3), speed=0.3)
     for left, right in PHASES:
         for _ in range(round(PHASE_S / dt)):
@@ -127,7 +127,6 @@ def test_full_motor_is_scipys_solution_of_all_equations(motor: dict[str, float])
     assert errors[2][:2] == pytest.approx([0, 0], abs=0.02 * np.abs(truth[:2]).max())
 
 
-@settings(deadline=None, max_examples=60)
 @given(
     inductance=st.floats(-9, 4).map(lambda power: 10.0**power),
     share=st.floats(0.05, 0.999),
@@ -141,8 +140,8 @@ def test_full_motor_is_stable_wherever_the_quasi_static_one_is(
     """For any inductance: motor_dc.h shows that both eigenvalues of a step lie within the unit circle."""
     motor = {"torque_constant": emf, "emf_constant": emf, "viscous_n_m_s": viscous, "coulomb_n_m": 0.0}
     motor |= {"torque_maximum_n_m": 1e9, "inductance_h": inductance}
-    limit = driven(1e-9, **motor).euler_limit
-    vehicle = Vehicle(driven(share * limit, **motor), arena_of())
+    limit = driven(1e-9, motor).euler_limit
+    vehicle = Vehicle(driven(share * limit, motor), arena_of())
     vehicle.place((0, 0, 0), speed=0.0 if around else 1.0, turn_rate=1.0 if around else 0.0)
     highest = []
     for _ in range(20):
@@ -153,11 +152,11 @@ def test_full_motor_is_stable_wherever_the_quasi_static_one_is(
         highest.append(max(speeds))
     assert highest[0] < 3.0 and highest[-1] <= highest[0] * (1 + 1e-9)
     with pytest.raises(RobotError, match="Euler limit"):
-        driven(1.001 * limit, **motor)
+        driven(1.001 * limit, motor)
 
 
 def test_without_inductance_full_and_quasi_static_are_one() -> None:
-    a, b = (Vehicle(driven(0.01, full, inductance_h=0.0), arena_of()) for full in (True, False))
+    a, b = (Vehicle(driven(0.01, {"inductance_h": 0.0}, full), arena_of()) for full in (True, False))
     for step in range(200):
         for vehicle in (a, b):
             vehicle.step(0.5 + 0.4 * math.sin(step / 20), 0.6)
@@ -183,7 +182,7 @@ def test_current_of_a_full_motor_rises_with_its_time_constant_and_that_of_the_ot
 
 def test_compass_is_disturbed_by_the_current_that_flows() -> None:
     """Fields of (1, 0) and 0.1 per ampere across it: the reading follows the slow current, not its settled value."""
-    model = driven(0.01, inductance_h=0.5)
+    model = driven(0.01, {"inductance_h": 0.5})
     model.compass("compass", current_y=0.1)
     vehicle = Vehicle(model, arena_of())
     for _ in range(30):
@@ -194,7 +193,7 @@ def test_compass_is_disturbed_by_the_current_that_flows() -> None:
 
 
 def test_saved_state_and_hash_carry_the_current() -> None:
-    whole, other = (Vehicle(driven(0.01, **SLOW), load_arena("arsim"), seed=3) for _ in range(2))
+    whole, other = (Vehicle(driven(0.01, SLOW), load_arena("arsim"), seed=3) for _ in range(2))
     for _ in range(7):
         whole.step(0.9, -0.4)
     state, currents = whole.save(), whole.currents
@@ -205,14 +204,14 @@ def test_saved_state_and_hash_carry_the_current() -> None:
         for _ in range(50):
             vehicle.step(0.2, 0.5)
     assert other.hash() == whole.hash() and other.currents == whole.currents
-    quiet = Vehicle(driven(0.01, **SLOW), load_arena("arsim"), seed=3)
+    quiet = Vehicle(driven(0.01, SLOW), load_arena("arsim"), seed=3)
     before = quiet.hash()
     quiet.step(0.001, 0.001)  # Coulomb friction holds it: nothing but time, signals and current is new
-    other = Vehicle(driven(0.01, **SLOW | {"inductance_h": 0.06}), load_arena("arsim"), seed=3)
+    other = Vehicle(driven(0.01, SLOW | {"inductance_h": 0.06}), load_arena("arsim"), seed=3)
     other.step(0.001, 0.001)
     assert quiet.pose == other.pose and quiet.hash() not in (before, other.hash())
     with pytest.raises(RobotError, match="no saved state"):
-        Vehicle(driven(0.01, full=False, **SLOW), load_arena("arsim")).restore(state)
+        Vehicle(driven(0.01, SLOW, full=False), load_arena("arsim")).restore(state)
 
 
 # ---- the regulated motor ---------------------------------------------------------------------------------------------
