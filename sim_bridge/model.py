@@ -18,6 +18,7 @@ from sim_bridge.reading_table import ReadingTable
 
 SENSORS_MAXIMUM: Final = 24
 SIDES: Final = ("left", "right")
+UNTIMED: Final = ("sharp_infrared", "odometer")  # sensors that keep their own time, or read in each step
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
 
 
@@ -167,13 +168,13 @@ class VehicleModel:
         name: str,
         given: Mapping[str, Any],
         usual: Mapping[str, Any] | None = None,
-        period: float | None = None,
+        period: float = 0.0,
         reach: str = "",
     ) -> None:
         """Adds a sensor of a C kind. `reach`: the key that says how far it looks."""
         where = self._named(name)
         parameters = struct(f"{kind}_parameters", where, given, usual)
-        times = [] if period is None else [number(where, "period", period, NOT_NEGATIVE)]
+        times = [] if kind in UNTIMED else [number(where, "period", period, NOT_NEGATIVE)]
         first = getattr(lib, f"vehicle_model_add_{kind}")(self._open, parameters, *times)
         if kind == "laser" and first == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a laser already; expected one")

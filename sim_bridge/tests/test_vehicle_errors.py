@@ -88,6 +88,7 @@ def settles(build: Callable[[], VehicleModel]) -> None:
 
 
 @given(sensors)
+@example(("accelerometer", {"period": None}))
 @example(("light", {"near_distance": 1e-300, "gain": 1e11}))
 @example(("sonar", {"beam": beam(rays=3.0), "range_maximum": True}))  # type: ignore[arg-type]
 def test_sensors_take_any_dictionary(chosen: tuple[str, dict[str, Any]]) -> None:
