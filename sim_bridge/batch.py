@@ -145,8 +145,9 @@ class Batch:
 
     def save(self, index: int) -> bytes:
         """The state of one world; `restore` takes it into any world of the same model and arena."""
-        room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(self.handle))
-        lib.vehicles_save(self.handle, self._index(index), room)
+        world = self._index(index)
+        room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(self.handle, world))
+        lib.vehicles_save(self.handle, world, room)
         return bytes(ffi.buffer(room))
 
     def restore(self, index: int, state: bytes) -> None:

@@ -149,7 +149,7 @@ def test_an_empty_batch() -> None:
 # ---- the same bits from every compiler -------------------------------------------------------------------------------
 
 # Of hash_runs.c, as one number. It changes with every change of the world's behaviour, and then is to be renewed.
-RUNS_HASH = 0x10EF6BF6F36CF21C
+RUNS_HASH = 0x93A9E99FB231B94B
 
 
 def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:

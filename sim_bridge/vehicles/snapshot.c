@@ -4,7 +4,7 @@
 
 #include "vehicle.h"
 
-#define MAGIC UINT64_C(0x31766f6265623176) /* with the layout's version in it */
+#define MAGIC UINT64_C(0x31766f6265623276) /* with the layout's version in it */
 
 typedef struct {
   uint64_t magic, print, size, checksum;
@@ -25,6 +25,16 @@ static uint64_t mixed(uint64_t sum, const void *bytes, size_t size) {
   return sum;
 }
 
+/* What a moving shape has come to. */
+typedef struct {
+  double waited;
+  uint64_t waits;
+} moving_part;
+
+static size_t moving_count(const vehicle *w) { return vehicle_scene(w).movers_count; }
+
+static moving_part part_of(const mover *m) { return (moving_part){m->waited, (uint64_t)(m->waits != 0)}; }
+
 uint64_t vehicles_hash(const vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   const vehicle *w = &self->worlds[i];
@@ -35,6 +45,10 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
                            s->signals[1], s->currents[0], s->currents[1], s->acceleration, s->energy};
   const uint64_t counts[] = {s->step, s->id, (uint64_t)(uint32_t)s->flag, (uint64_t)(b->touching != 0)};
   uint64_t sum = mixed(mixed(0, values, sizeof values), counts, sizeof counts);
+  for (size_t k = 0; k < moving_count(w); k++) {
+    const moving_part moving = part_of(&w->movers[k]);
+    sum = mixed(sum, &moving, sizeof moving);
+  }
   return mixed(sum, &self->readings[i * m->readings], m->readings * sizeof(double));
 }
 
@@ -42,8 +56,9 @@ static size_t slots_size(const vehicles *self) { return self->model->sensors_cou
 
 static size_t readings_size(const vehicles *self) { return self->model->readings * sizeof(double); }
 
-size_t vehicles_snapshot_size(const vehicles *self) {
-  return sizeof(heading_of_snapshot) + sizeof(fixed_part) + slots_size(self) + readings_size(self) + self->state_size;
+size_t vehicles_snapshot_size(const vehicles *self, size_t i) {
+  return sizeof(heading_of_snapshot) + sizeof(fixed_part) + slots_size(self) + readings_size(self) + self->state_size +
+         moving_count(&self->worlds[i]) * sizeof(moving_part);
 }
 
 void vehicles_save(const vehicles *self, size_t i, void *bytes) {
@@ -59,7 +74,12 @@ void vehicles_save(const vehicles *self, size_t i, void *bytes) {
   memcpy(at, &self->readings[i * self->model->readings], readings_size(self));
   at += readings_size(self);
   memcpy(at, self->brains + i * self->state_size, self->state_size);
-  const size_t size = vehicles_snapshot_size(self);
+  at += self->state_size;
+  for (size_t k = 0; k < moving_count(&self->worlds[i]); k++) {
+    const moving_part moving = part_of(&self->worlds[i].movers[k]);
+    memcpy(at + k * sizeof moving, &moving, sizeof moving);
+  }
+  const size_t size = vehicles_snapshot_size(self, i);
   const unsigned char *rest = (const unsigned char *)bytes + sizeof(heading_of_snapshot);
   const heading_of_snapshot heading = {MAGIC, vehicle_model_print(self->model), size,
                                        mixed(MAGIC, rest, size - sizeof(heading_of_snapshot))};
@@ -70,7 +90,7 @@ int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
   heading_of_snapshot heading;
   vehicle *w = &self->worlds[i];
   if (w->where == NULL) return VEHICLE_NOT_PLACED;
-  if (size != vehicles_snapshot_size(self)) return VEHICLE_BAD_SNAPSHOT;
+  if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
   memcpy(&heading, bytes, sizeof heading);
   const unsigned char *at = (const unsigned char *)bytes + sizeof heading;
   if (heading.magic != MAGIC || heading.size != size || heading.print != vehicle_model_print(self->model) ||
@@ -84,6 +104,13 @@ int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
   memcpy(&self->readings[i * self->model->readings], at, readings_size(self));
   at += readings_size(self);
   memcpy(self->brains + i * self->state_size, at, self->state_size);
+  at += self->state_size;
+  for (size_t k = 0; k < moving_count(w); k++) {
+    moving_part moving;
+    memcpy(&moving, at + k * sizeof moving, sizeof moving);
+    w->movers[k].waited = moving.waited;
+    w->movers[k].waits = moving.waits != 0;
+  }
   body_place(&w->body, fixed.body.x, fixed.body.y, fixed.body.heading); /* forgets what was near */
   w->body.state = fixed.body;
   w->state = fixed.state;

@@ -55,7 +55,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
   if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
-  scene_moving(where, 0.0, FIRST_MOVER, movers);
+  scene_moving(where, 0.0, m->dt, FIRST_MOVER, movers);
   body at;
   body_init(&at, &m->body, m->reach);
   const scene around = {.arena = where, .movers = movers, .movers_count = moving};
@@ -128,6 +128,13 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
     }
     return;
   }
+  if (m->drive == DRIVE_REGULATED) {
+    for (int side = 0; side < 2; side++) {
+      const motor_regulated_parameters *motor = &m->regulated[side];
+      out[side] = motor_regulated(motor, motor_regulated_reference(motor, s->signals[side]), rims[side], 1.0);
+    }
+    return;
+  }
   const int pulse = s->step >= s->next_pulse;
   for (int side = 0; side < 2; side++) {
     const servo_motor_parameters *servo = &m->servo[side];
@@ -150,23 +157,16 @@ void vehicles_move(vehicles *self, size_t i) {
 
 void vehicles_update_arena(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
-  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * self->model->dt, FIRST_MOVER, w->movers);
-}
-
-/* 1 at a charging station. */
-static int charges(const vehicle *w) {
-  const arena_charger *charger = arena_charger_of(w->where);
-  if (charger == NULL) return 0;
-  const double dx = w->body.state.x - charger->x;
-  const double dy = w->body.state.y - charger->y;
-  return dx * dx + dy * dy < charger->radius * charger->radius;
+  const double dt = self->model->dt;
+  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, FIRST_MOVER, w->movers);
 }
 
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
-  if (m->has_battery)
-    s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], charges(&self->worlds[i]), m->dt);
+  const body_state *b = &self->worlds[i].body.state;
+  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].where, b->x, b->y);
+  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
   if (m->ends_at_collision && self->worlds[i].body.state.touching) {
     s->flag = VEHICLE_COLLIDED;
   } else if (m->has_battery && s->energy <= 0.0) {
@@ -259,6 +259,20 @@ const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
 
 double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
+
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  for (int side = 0; side < 2; side++) {
+    currents[side] = 0.0;
+    if (m->drive != DRIVE_DC) continue;
+    const motor_dc_parameters *motor = &m->dc[side];
+    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
+    currents[side] =
+        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
+  }
+}
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;

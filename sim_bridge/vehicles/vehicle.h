@@ -70,11 +70,15 @@ const body_state *vehicles_body(const vehicles *self, size_t i);
 uint64_t vehicles_steps_done(const vehicles *self, size_t i);
 double vehicles_energy(const vehicles *self, size_t i);
 
+/* Currents of the DC motors, left and right, A: the state of the full motor, else what the last signals and the speed now
+ * give; 0 with another drive. */
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
+
 /* Of everything that a world has come to; equal for runs that are equal bit for bit. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
 /* One world as bytes, and back into a world of the same model that is placed in the same arena. */
-size_t vehicles_snapshot_size(const vehicles *self);
+size_t vehicles_snapshot_size(const vehicles *self, size_t i);
 void vehicles_save(const vehicles *self, size_t i, void *bytes);
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
 
