@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from boebot.errors import ArenaError, BrainError, RobotError
+from boebot.errors import BrainError, RobotError
+from sim_bridge import arguments, worlds
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.motor import DCMotor
@@ -24,8 +25,8 @@ ENDS: Final[dict[int, str]] = {
     lib.VEHICLE_RUNS: "",
     lib.VEHICLE_COLLIDED: "collision",
     lib.VEHICLE_EXHAUSTED: "battery empty",
+    lib.VEHICLE_BRAIN_FAILED: "brain failed",
 }
-STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
 
 # The default robot of ARSim (THEORY section 1.2).
 ARSIM_BODY: Final = {
@@ -40,6 +41,8 @@ ARSIM_BODY: Final = {
     "angular_damping": 0.1,
     "grip": 0.7,
 }
+SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
+TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
 ARSIM_INFRARED_RAD: Final = 0.7854  # left and right of straight ahead
 ARSIM_INFRARED: Final = {"range": 1.0, "c1": 0.03, "c2": 0.1, "sigma": 0.01}
 
@@ -211,34 +214,6 @@ def arsim(
     return model
 
 
-def worlds(model: VehicleModel, count: int, state_bytes: int) -> Any:
-    """`count` worlds of the model in C, not yet placed."""
-    handle = lib.vehicles_new(model.handle, count, state_bytes)
-    if handle == ffi.NULL:
-        raise MemoryError("vehicles")
-    model.in_use = True
-    return ffi.gc(handle, lambda handle, model=model: lib.vehicles_destroy(handle))  # the model outlives them
-
-
-def place(handle: Any, index: int, arena: Arena, seed: int, robot: int, pose: Sequence[float]) -> None:
-    """Puts the vehicle of world `index` at a pose (x, y, heading).
-
-    Raises:
-        ArenaError: that is no free space.
-        RobotError: a number that is not finite, a number of the robot that is not positive, or a model without a drive.
-    """
-    x, y, heading = (float(value) for value in pose)
-    status = lib.vehicles_place(handle, index, arena.handle, seed & (2**64 - 1), robot, x, y, heading)
-    if status == lib.VEHICLE_NOT_FREE:
-        raise ArenaError(f"arena {arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space")
-    if status == lib.VEHICLE_NOT_PLACED:
-        raise RobotError("vehicle: the model has no drive; expected dc_motors or servos")
-    if status:
-        raise RobotError(
-            f"vehicle: pose {(x, y, heading)}, robot {robot}; expected finite numbers and 1 <= robot < 2^31"
-        )
-
-
 class Vehicle:
     """One vehicle in one world. Its readings are there from the start; `step` takes motor signals to the next ones.
 
@@ -255,24 +230,24 @@ class Vehicle:
         pose: Sequence[float] | None = None,
         seed: int = 1,
         robot: int = 1,
-        state_bytes: int = STATE_BYTES,
+        state_bytes: int = worlds.STATE_BYTES,
     ) -> None:
         """Puts it at `pose` (x, y, heading), or where the arena says. `seed` and `robot` are the keys of its noise.
 
         Raises:
             ArenaError: that place is not free.
-            RobotError: a number that is not finite, or a model without a drive.
+            RobotError: what is given is no model, arena, pose or seed, or the model has no drive.
         """
+        worlds.check_arena("vehicle", arena)
         self.model, self.arena = model, arena
         self.seed, self.robot = seed, robot
-        self.handle = worlds(model, 1, state_bytes)
+        self.handle = worlds.make_worlds("vehicle", model, 1, state_bytes)
         self.place(arena.start if pose is None else pose)
         count = lib.vehicles_reading_count(self.handle)
-        pointer = lib.vehicles_readings(self.handle)
+        pointer = worlds.kept(lib.vehicles_readings(self.handle), self.handle)
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
-        self._body = lib.vehicles_body(self.handle, 0)
+        self._body = worlds.kept(lib.vehicles_body(self.handle, 0), self.handle)
         self._flag = ffi.new("int8_t *")
-        self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle)
 
     def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
         """Starts a new run at a pose (x, y, heading), at `speed` (m/s) and `turn_rate` (rad/s), wheels rolling.
@@ -283,9 +258,11 @@ class Vehicle:
             ArenaError: that place is not free.
             RobotError: a number is not finite, or too fast.
         """
-        place(self.handle, 0, self.arena, self.seed, self.robot, pose)
-        if lib.vehicles_set_speeds(self.handle, 0, speed, turn_rate):
-            raise RobotError(f"vehicle: speed {speed} m/s, turn rate {turn_rate} rad/s; expected below 100 and 1000")
+        speeds = arguments.point(
+            "vehicle: the speed", (speed, turn_rate), RobotError, "m/s and rad/s", (SPEED_MAXIMUM, TURN_RATE_MAXIMUM)
+        )
+        worlds.place("vehicle", self.handle, 0, self.model, self.arena, self.seed, self.robot, pose)
+        lib.vehicles_set_speeds(self.handle, 0, *speeds)
 
     def __getitem__(self, name: str) -> Any:
         """A reading by the name of its sensor: a number, or a view where the sensor has several."""
@@ -329,8 +306,12 @@ class Vehicle:
         Raises:
             BrainError: a signal is not a finite number.
         """
-        if lib.vehicles_step_one(self.handle, 0, left, right) < 0:
-            raise _bad_signal(left, right)
+        try:
+            if lib.vehicles_step_one(self.handle, 0, left, right) >= 0:
+                return
+        except (TypeError, OverflowError):
+            pass
+        raise _bad_signals((left, right))
 
     def run(self, brain: Brain, steps: int, *, stage: Stage | None = None) -> int:
         """The loop of Fig. 3.1 until it ends or for `steps` steps; `brain` takes the vehicle and gives the signals.
@@ -338,62 +319,74 @@ class Vehicle:
         `stage`, if there is one, is called after each of `STAGES` of each step. Returns the steps done.
 
         Raises:
-            BrainError: a signal is not a finite number.
+            BrainError: it gave no two finite numbers. Whatever is raised, the steps before are done as a whole.
         """
+        arguments.whole("vehicle: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
         if self.ended:
             return 0
         if stage is not None:
             return self._run_by_stages(brain, steps, stage)
         handle, step = self.handle, lib.vehicles_step_one
         for done in range(1, steps + 1):
-            left, right = brain(self)
-            status = step(handle, 0, left, right)
+            signals = brain(self)
+            try:
+                left, right = signals
+                status = step(handle, 0, left, right)
+            except (TypeError, ValueError, OverflowError):
+                raise _bad_signals(signals) from None
             if status:
                 if status < 0:
-                    raise _bad_signal(left, right)
+                    raise _bad_signals(signals)
                 return done
         return steps
 
     def _run_by_stages(self, brain: Brain, steps: int, stage: Stage) -> int:
-        for done in range(steps):
+        for done in range(1, steps + 1):
             lib.vehicles_sense(self.handle, 0)
             stage("sense", self)
-            left, right = brain(self)
+            signals = brain(self)
             stage("process", self)
-            if lib.vehicles_send(self.handle, 0, left, right):
-                raise _bad_signal(left, right)
-            stage("send", self)
-            lib.vehicles_move(self.handle, 0)
-            stage("move", self)
-            lib.vehicles_update_arena(self.handle, 0)
-            stage("arena", self)
-            ended = lib.vehicles_check(self.handle, 0)
-            stage("check", self)
-            if ended:
+            self._send(signals)
+            rest = [("move", lib.vehicles_move), ("arena", lib.vehicles_update_arena), ("check", lib.vehicles_check)]
+            try:
+                stage("send", self)
+                while rest:
+                    name, part = rest.pop(0)
+                    part(self.handle, 0)
+                    stage(name, self)
+            finally:  # a step is done as a whole, even if Ctrl-C comes in the middle
+                for _, part in rest:
+                    part(self.handle, 0)
                 lib.vehicles_sense(self.handle, 0)
-                return done + 1
-        lib.vehicles_sense(self.handle, 0)
+            if self.ended:
+                return done
         return steps
 
+    def _send(self, signals: Any) -> None:
+        try:
+            left, right = signals
+            if lib.vehicles_send(self.handle, 0, left, right) == lib.VEHICLE_OK:
+                return
+        except (TypeError, ValueError, OverflowError):
+            pass
+        raise _bad_signals(signals)
+
     def save(self) -> bytes:
-        """The state of the whole world, in mid-run."""
-        room = ffi.new("unsigned char[]", self._snapshot_bytes)
-        lib.vehicles_save(self.handle, 0, room)
-        return bytes(ffi.buffer(room))
+        """The state of the whole world, in mid-run: the same bytes on every machine."""
+        return worlds.save(self.handle, 0)
 
     def restore(self, state: bytes) -> None:
-        """Goes on from a saved state of the same model in the same arena, bit for bit.
+        """Goes on from a saved state of the same model in the same arena, bit for bit. What is refused changes nothing.
 
         Raises:
-            RobotError: it is of another model or version, or damaged.
+            RobotError: it is of another model, arena, size of a brain's memory or version, or damaged.
         """
-        if lib.vehicles_restore(self.handle, 0, state, len(state)):
-            raise RobotError("vehicle: this is no saved state of this model and version; expected what save() gave")
+        worlds.restore("vehicle", self.handle, 0, self.arena, state)
 
     def hash(self) -> int:
-        """Of body, drive, battery and readings: equal for runs that are equal bit for bit."""
+        """Of all that `save` writes, in the same order: equal for runs that are equal bit for bit, on every machine."""
         return int(lib.vehicles_hash(self.handle, 0))
 
 
-def _bad_signal(left: float, right: float) -> BrainError:
-    return BrainError(f"motor signals {left}, {right}; expected two finite numbers")
+def _bad_signals(signals: Any) -> BrainError:
+    return BrainError(f"motor signals {arguments.shown(signals)}; expected two finite numbers, left and right")
