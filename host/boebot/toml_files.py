@@ -5,6 +5,7 @@ What is wrong is said in one sentence with the file, the line, the full key and 
 
 from __future__ import annotations
 
+import sys
 import tomllib
 import types
 import typing
@@ -14,13 +15,15 @@ from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from boebot import resources
+from boebot import resources, toml_numbers
 from boebot.errors import BoebotError
 from boebot.toml_lines import line_of, lines_of
 
 _T = TypeVar("_T")
 
 SIZE_MAXIMUM = 8_000_000  # bytes of a file
+LARGE = 50_000  # from here on it is worth while to read rows of points by themselves ...
+SLOW = 2_000_000  # ... and from here on it takes seconds, and somebody waits
 
 
 class Table(dict[str, Any]):
@@ -69,8 +72,10 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         size = path.stat().st_size
         if size > SIZE_MAXIMUM:
             raise error(f"{path.name} has {size:,} bytes; expected at most {SIZE_MAXIMUM:,}")
+        if size > SLOW:
+            print(f"reading {path.name}, {size / 1e6:.1f} MB ...", file=sys.stderr)
         text = path.read_text(encoding="utf-8")
-        table = Table(tomllib.loads(text))
+        table = Table(toml_numbers.loads(text) if size > LARGE else tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
     except RecursionError:
