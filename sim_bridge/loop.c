@@ -2,7 +2,6 @@
 #include "loop_state.h"
 
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
-#define FIRST_OBSTACLE_ID 0x80000000u      /* among the movers; robots have those below */
 #define SLICE_CYCLES 4000u                 /* how often lines are looked at while somebody listens */
 
 /* ---- what boards do and ask ---------------------------------------------------------------------------------------- */
@@ -51,7 +50,7 @@ void robot_update_supply(robot *self) {
 
 void sim_update_scene(sim *self) {
   if (self->obstacles > 0) {
-    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, self->dt, FIRST_OBSTACLE_ID, self->movers);
+    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, self->dt, SCENE_FIRST_MOVER, self->movers);
   }
   mover *robots = self->movers + self->obstacles;
   for (int i = 0; i < self->robot_count; i++) body_as_mover(&self->robots[i]->body, &robots[i]);

@@ -12,9 +12,10 @@ from typing import Any, Final
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
+from sim_bridge.arguments import shown
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.outline import collision_outline
-from sim_bridge.parameters import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, shown, struct
+from sim_bridge.parameters import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, struct
 from sim_bridge.reading_table import ReadingTable
 
 SENSORS_MAXIMUM: Final = 24

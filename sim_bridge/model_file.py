@@ -16,8 +16,9 @@ import msgspec
 from boebot import robots, vehicle_devices
 from boebot.errors import RobotError
 from sim_bridge import imperfections
+from sim_bridge.arguments import shown
 from sim_bridge.model import SIDES, VehicleModel, beam
-from sim_bridge.parameters import FINITE, number, shown
+from sim_bridge.parameters import FINITE, number
 from sim_bridge.switches import idealised
 
 STEP_S: Final = 0.01  # THEORY section 2.4

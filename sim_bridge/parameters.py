@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import numbers
-import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
+from sim_bridge.arguments import shown
 
 LIMIT: Final = 1e12  # of any number: products of some of them stay finite
 
@@ -90,14 +90,6 @@ RANGES: Final[Mapping[str, Mapping[str, Range]]] = {
 }
 
 
-def shown(value: Any) -> str:
-    """A value in a message, not too long."""
-    try:
-        return f"{value:g}" if isinstance(value, float) else reprlib.repr(value)
-    except Exception:  # whatever the caller's own __repr__ raises
-        return f"a {type(value).__name__}"
-
-
 def number(where: str, key: str, value: Any, allowed: Range = FINITE, whole: bool = False) -> float:
     """`value` as a float within `allowed`; raises RobotError if it is none."""
     found = math.nan
@@ -109,21 +101,6 @@ def number(where: str, key: str, value: Any, allowed: Range = FINITE, whole: boo
     if not math.isfinite(found) or found not in allowed or (whole and not found.is_integer()):
         raise RobotError(f"{where}: {key} is {shown(value)}; expected {allowed.text(whole)}")
     return found
-
-
-def whole_number(where: str, key: str, value: Any, low: int, high: int) -> int:
-    """`value` as an int from `low` to `high`; raises RobotError if it is none."""
-    found: int | None = None
-    try:
-        if isinstance(value, numbers.Integral):
-            found = int(value)
-        elif isinstance(value, numbers.Real):
-            found = int(float(value))
-    except (OverflowError, ValueError, TypeError):
-        found = None
-    if found is not None and found == value and low <= found <= high:
-        return found
-    raise RobotError(f"{where}: {key} is {shown(value)}; expected a whole number from {low} to {high}")
 
 
 def several(where: str, key: str, value: Any, names: Sequence[str], allowed: Range = FINITE) -> tuple[float, ...]:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.parameters import number, shown, whole_number
+from sim_bridge.arguments import shown, whole
+from sim_bridge.parameters import number
 
 COLUMNS: Final = ("distance_m", "angle_rad", "reading")
 
@@ -89,9 +90,9 @@ class ReadingTable:
             RobotError: a number is not finite, or `count` negative.
         """
         place = number("table", "distance", distance), number("table", "angle", angle)
-        key = whole_number("table", "seed", seed, -(2**63), 2**64 - 1) & (2**64 - 1)
+        key = whole("table: seed", seed, RobotError, least=-(2**63), most=2**64 - 1) & (2**64 - 1)
         source = ffi.new("noise_source *", {"seed": key, "on": 1})
-        many = whole_number("table", "count", count, 0, 10**8)
+        many = whole("table: count", count, RobotError, least=0, most=10**8)
         return np.array([lib.table_noise_read(self.handle, *place, source) for _ in range(many)], dtype=np.float64)
 
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from boebot.errors import ArenaError, BrainError, RobotError
+from boebot.errors import BrainError, RobotError
+from sim_bridge import arguments, worlds
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.model import VehicleModel as VehicleModel
@@ -19,7 +20,6 @@ from sim_bridge.model import beam as beam
 from sim_bridge.model_file import ARSIM_BODY as ARSIM_BODY
 from sim_bridge.model_file import arsim as arsim
 from sim_bridge.model_file import vehicle_model as vehicle_model
-from sim_bridge.parameters import HEADING, Range, number, several, shown, whole_number
 
 Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
@@ -29,52 +29,10 @@ ENDS: Final[dict[int, str]] = {
     lib.VEHICLE_RUNS: "",
     lib.VEHICLE_COLLIDED: "collision",
     lib.VEHICLE_EXHAUSTED: "battery empty",
+    lib.VEHICLE_BRAIN_FAILED: "brain failed",
 }
-STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
-STATE_MAXIMUM: Final = 1 << 30  # bytes
-SPEED: Final = Range(-99.0, 99.0)  # m/s and rad/s: as body.c limits them
-TURN_RATE: Final = Range(-999.0, 999.0)
-ROBOT_MAXIMUM: Final = (1 << 31) - 1
-
-
-def worlds(model: VehicleModel, count: int, state_bytes: int) -> Any:
-    """`count` worlds of the model in C, not yet placed.
-
-    Raises:
-        RobotError: there is no memory for them, or the model steps too far for its drive.
-    """
-    room = whole_number("vehicle", "state_bytes", state_bytes, 0, STATE_MAXIMUM)
-    if not model.dt < model.euler_limit:
-        raise model.bad_step()
-    handle = lib.vehicles_new(model.handle, count, room)
-    if handle == ffi.NULL:
-        raise RobotError(f"vehicle: there is no memory for {count} worlds with {room} bytes of brain each")
-    model.in_use = True
-    return ffi.gc(handle, lambda handle, model=model: lib.vehicles_destroy(handle))  # the model outlives them
-
-
-def place(handle: Any, index: int, arena: Arena, seed: int, robot: int, pose: Sequence[float]) -> None:
-    """Puts the vehicle of world `index` at a pose (x, y, heading).
-
-    Raises:
-        ArenaError: that is no free space.
-        RobotError: a pose, seed or robot's number that is none, a model without a drive, or no memory.
-    """
-    x, y, heading = several("vehicle", "pose", pose, ("x (m)", "y (m)", "heading (rad)"))
-    number("vehicle", "pose: heading (rad)", heading, HEADING)
-    key = whole_number("vehicle", "seed", seed, -(2**63), 2**64 - 1) & (2**64 - 1)
-    name = whole_number("vehicle", "robot", robot, 1, ROBOT_MAXIMUM)
-    status = lib.vehicles_place(handle, index, arena.handle, key, name, x, y, heading)
-    if status == lib.VEHICLE_NOT_FREE:
-        raise ArenaError(f"arena {arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space")
-    if status == lib.VEHICLE_NOT_PLACED:
-        raise RobotError("vehicle: the model has no drive; expected dc_motors, regulated_motors or servos")
-    if status == lib.VEHICLE_NO_MEMORY:
-        raise RobotError(f"vehicle: there is no memory to place it in arena {arena.name}")
-    if status == lib.VEHICLE_BAD_STEP:
-        raise RobotError("vehicle: the model's dt is at or beyond the Euler limit of its drive; expected a smaller one")
-    if status:
-        raise RobotError(f"vehicle: pose is {(x, y, heading)}, robot {name}; expected numbers that the world can hold")
+SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
+TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
 
 
 class Vehicle:
@@ -93,27 +51,25 @@ class Vehicle:
         pose: Sequence[float] | None = None,
         seed: int = 1,
         robot: int = 1,
-        state_bytes: int = STATE_BYTES,
+        state_bytes: int = worlds.STATE_BYTES,
     ) -> None:
         """Puts it at `pose` (x, y, heading), or where the arena says. `seed` and `robot` are the keys of its noise.
 
         Raises:
             ArenaError: that place is not free.
-            RobotError: a pose, seed, robot or state_bytes that is none, or a model without a drive.
+            RobotError: what is given is no model, arena, pose or seed, or the model has no drive.
         """
-        if not isinstance(model, VehicleModel) or not isinstance(arena, Arena):
-            raise RobotError(f"vehicle: got {shown(model)} and {shown(arena)}; expected a VehicleModel and an Arena")
+        worlds.check_arena("vehicle", arena)
         self.model, self.arena = model, arena
         self.seed, self.robot = seed, robot
-        self.handle = worlds(model, 1, state_bytes)
+        self.handle = worlds.make_worlds("vehicle", model, 1, state_bytes)
         self.place(arena.start if pose is None else pose)
         count = lib.vehicles_reading_count(self.handle)
-        pointer = lib.vehicles_readings(self.handle)
+        pointer = worlds.kept(lib.vehicles_readings(self.handle), self.handle)
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
-        self._body = lib.vehicles_body(self.handle, 0)
+        self._body = worlds.kept(lib.vehicles_body(self.handle, 0), self.handle)
         self._flag = ffi.new("int8_t *")
         self._pair = ffi.new("double[2]")
-        self._snapshot_bytes = lib.vehicles_snapshot_size(self.handle, 0)
 
     def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
         """Starts a new run at a pose (x, y, heading), at `speed` (m/s) and `turn_rate` (rad/s), wheels rolling.
@@ -124,10 +80,11 @@ class Vehicle:
             ArenaError: that place is not free.
             RobotError: a number is not finite, or too fast.
         """
-        along = number("vehicle", "speed", speed, SPEED)
-        around = number("vehicle", "turn_rate", turn_rate, TURN_RATE)
-        place(self.handle, 0, self.arena, self.seed, self.robot, pose)
-        lib.vehicles_set_speeds(self.handle, 0, along, around)
+        speeds = arguments.point(
+            "vehicle: the speed", (speed, turn_rate), RobotError, "m/s and rad/s", (SPEED_MAXIMUM, TURN_RATE_MAXIMUM)
+        )
+        worlds.place("vehicle", self.handle, 0, self.model, self.arena, self.seed, self.robot, pose)
+        lib.vehicles_set_speeds(self.handle, 0, *speeds)
 
     def __getitem__(self, name: str) -> Any:
         """A reading by the name of its sensor: a number, or a view where the sensor has several.
@@ -139,7 +96,7 @@ class Vehicle:
             where = self.model.names[name]
         except (KeyError, TypeError):
             there = ", ".join(self.model.names) or "none: the model has no sensor"
-            raise RobotError(f"vehicle: there is no sensor {shown(name)}; expected {there}") from None
+            raise RobotError(f"vehicle: there is no sensor {arguments.shown(name)}; expected {there}") from None
         return self.readings[where.start] if where.stop - where.start == 1 else self.readings[where]
 
     @property
@@ -186,11 +143,11 @@ class Vehicle:
             BrainError: a signal is not a finite number.
         """
         try:
-            status = lib.vehicles_step_one(self.handle, 0, left, right)
+            if lib.vehicles_step_one(self.handle, 0, left, right) >= 0:
+                return
         except (TypeError, OverflowError):
-            raise _bad_signal((left, right)) from None
-        if status < 0:
-            raise _bad_signal((left, right))
+            pass
+        raise _bad_signals((left, right))
 
     def run(self, brain: Brain, steps: int, *, stage: Stage | None = None) -> int:
         """The loop of Fig. 3.1 until it ends or for `steps` steps; `brain` takes the vehicle and gives the signals.
@@ -198,10 +155,9 @@ class Vehicle:
         `stage`, if there is one, is called after each of `STAGES` of each step. Returns the steps done.
 
         Raises:
-            BrainError: a signal is not a finite number.
-            RobotError: `steps` is no number of steps.
+            BrainError: it gave no two finite numbers. Whatever is raised, the steps before are done as a whole.
         """
-        steps = whole_number("vehicle", "steps", steps, 0, 2**63 - 1)
+        arguments.whole("vehicle: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
         if self.ended:
             return 0
         if stage is not None:
@@ -213,58 +169,60 @@ class Vehicle:
                 left, right = signals
                 status = step(handle, 0, left, right)
             except (TypeError, ValueError, OverflowError):
-                raise _bad_signal(signals) from None
+                raise _bad_signals(signals) from None
             if status:
                 if status < 0:
-                    raise _bad_signal(signals)
+                    raise _bad_signals(signals)
                 return done
         return steps
 
     def _run_by_stages(self, brain: Brain, steps: int, stage: Stage) -> int:
-        for done in range(steps):
+        for done in range(1, steps + 1):
             lib.vehicles_sense(self.handle, 0)
             stage("sense", self)
             signals = brain(self)
             stage("process", self)
+            self._send(signals)
+            rest = [("move", lib.vehicles_move), ("arena", lib.vehicles_update_arena), ("check", lib.vehicles_check)]
             try:
-                left, right = signals
-                status = lib.vehicles_send(self.handle, 0, left, right)
-            except (TypeError, ValueError, OverflowError):
-                raise _bad_signal(signals) from None
-            if status:
-                raise _bad_signal(signals)
-            stage("send", self)
-            lib.vehicles_move(self.handle, 0)
-            stage("move", self)
-            lib.vehicles_update_arena(self.handle, 0)
-            stage("arena", self)
-            ended = lib.vehicles_check(self.handle, 0)
-            stage("check", self)
-            if ended:
+                stage("send", self)
+                while rest:
+                    name, part = rest.pop(0)
+                    part(self.handle, 0)
+                    stage(name, self)
+            finally:  # a step is done as a whole, even if Ctrl-C comes in the middle
+                for _, part in rest:
+                    part(self.handle, 0)
                 lib.vehicles_sense(self.handle, 0)
-                return done + 1
-        lib.vehicles_sense(self.handle, 0)
+            if self.ended:
+                return done
         return steps
 
+    def _send(self, signals: Any) -> None:
+        try:
+            left, right = signals
+            if lib.vehicles_send(self.handle, 0, left, right) == lib.VEHICLE_OK:
+                return
+        except (TypeError, ValueError, OverflowError):
+            pass
+        raise _bad_signals(signals)
+
     def save(self) -> bytes:
-        """The state of the whole world, in mid-run."""
-        room = ffi.new("unsigned char[]", self._snapshot_bytes)
-        lib.vehicles_save(self.handle, 0, room)
-        return bytes(ffi.buffer(room))
+        """The state of the whole world, in mid-run: the same bytes on every machine."""
+        return worlds.save(self.handle, 0)
 
     def restore(self, state: bytes) -> None:
-        """Goes on from a saved state of the same model in the same arena, bit for bit.
+        """Goes on from a saved state of the same model in the same arena, bit for bit. What is refused changes nothing.
 
         Raises:
-            RobotError: it is of another model or version, or damaged.
+            RobotError: it is of another model, arena, size of a brain's memory or version, or damaged.
         """
-        if not isinstance(state, bytes) or lib.vehicles_restore(self.handle, 0, state, len(state)):
-            raise RobotError("vehicle: this is no saved state of this model and version; expected what save() gave")
+        worlds.restore("vehicle", self.handle, 0, self.arena, state)
 
     def hash(self) -> int:
-        """Of body, drive, battery and readings: equal for runs that are equal bit for bit."""
+        """Of all that `save` writes, in the same order: equal for runs that are equal bit for bit, on every machine."""
         return int(lib.vehicles_hash(self.handle, 0))
 
 
-def _bad_signal(signals: object) -> BrainError:
-    return BrainError(f"vehicle: motor signals are {shown(signals)}; expected two finite numbers, left and right")
+def _bad_signals(signals: Any) -> BrainError:
+    return BrainError(f"motor signals {arguments.shown(signals)}; expected two finite numbers, left and right")

@@ -110,28 +110,6 @@ def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) ->
     assert arena.is_free(x, y, 0.07) == (not solid.contains(point) and edges_apart)
 
 
-def test_free_cells_of_a_room() -> None:
-    arena = arena_of(square(0.1, 0.1, 0.19), outline=square(0, 0, 1))
-    cells = arena.free_cells(0.2, 0.05)
-    # Cells of 0.2 m on a lattice through the origin: between -0.5 and 0.5 lie four whole ones each way and two halves,
-    # whose centres are on the wall; the obstacle fills one.
-    assert len(cells) == 15
-    assert not any(np.allclose(cell, (0.1, 0.1)) for cell in cells)
-    assert len(arena_of().free_cells(0.2, 0.05)) == 0
-
-
-def test_moved_polygon_is_met_where_it_is() -> None:
-    for index in (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID):
-        arena = arena_of(square(1, 0, 0.2), square(0, 3, 0.2))
-        lib.arena_use_index(arena.handle, index)
-        assert arena.ray(0, 0, 0, 5) == pytest.approx(0.9)
-        arena.move("0", 1.0, 0.0)
-        assert arena.ray(0, 0, 0, 5) == pytest.approx(1.9)
-        assert arena.outlines[0].min() == pytest.approx(-0.1)
-    with pytest.raises(ArenaError, match="no polygon 'nobody'"):
-        arena.move("nobody", 0, 0)
-
-
 @pytest.mark.parametrize("name", arena_names())
 def test_bundled_arenas_load_and_let_the_robot_start(name: str) -> None:
     arena = load_arena(name)

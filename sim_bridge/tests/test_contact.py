@@ -240,17 +240,6 @@ def test_disc_is_met_like_a_wall() -> None:
         assert body.state.touching
 
 
-def test_obstacle_pushed_near_is_noticed() -> None:
-    """Lists of near edges are renewed when the arena changes."""
-    arena = arena_of(square(5, 0, 1))
-    body = Body(arena)
-    body.regulate(constant(0.1, 0.1), 1.2, 0.5, 0.001)
-    arena.move("0", -5 + body.state.x + 0.5 + RADIUS + 0.02, 0)
-    body.regulate(constant(0.1, 0.1), 1.2, 2.0, 0.001)
-    assert body.state.touching
-    assert body.depth < 1e-6
-
-
 def test_segment_on_the_body_touches_what_it_crosses() -> None:
     body = Body(arena_of(square(1, 0, 1)))  # face at x = 0.5
 

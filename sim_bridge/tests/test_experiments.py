@@ -18,7 +18,7 @@ import pytest
 
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import load_arena
-from sim_bridge.batch import Batch
+from sim_bridge.batch import WANDER, Batch
 from sim_bridge.geometry import ray_segment
 from sim_bridge.recorder import Recorder
 from sim_bridge.tests.simulated import arena_of, square
@@ -376,7 +376,7 @@ def test_e18_with_the_wander_brain_many_seeds() -> None:
         batch = Batch(arsim(infrared_rad=(angle, -angle)), load_arena("arsim"), np.zeros((64, 3)), np.arange(64))
         for index in range(64):
             batch.state(index, "vehicle_wander_state *").seed = index
-        batch.run(ffi.addressof(lib, "vehicle_wander"), 3000)
+        batch.run(WANDER, 3000)
         ended = batch.flags == lib.VEHICLE_COLLIDED
         assert (batch.steps[~ended] == 3000).all() and (batch.steps[ended] < 3000).all()
         return int(ended.sum())

@@ -94,7 +94,7 @@ def test_placed_at_a_speed_it_rolls_on() -> None:
     assert vehicle.body.speed == pytest.approx(1.0 + gained, rel=1e-9)
     vehicle.place((0, 0, 0), turn_rate=2.0)
     assert vehicle.body.rim_right == -vehicle.body.rim_left == pytest.approx(2.0 * 0.2)
-    with pytest.raises(RobotError, match="speed is nan"):
+    with pytest.raises(RobotError, match=r"the speed is \(nan, 0\.0\)"):
         vehicle.place((0, 0, 0), speed=math.nan)
     with pytest.raises(ArenaError, match="no free space"):
         vehicle.place((19.9, 0, 0))

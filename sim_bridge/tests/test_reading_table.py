@@ -191,7 +191,7 @@ def test_wrong_files_get_a_sentence(tmp_path: Path, text: str, what: str) -> Non
         ([0.2, 0.3], [0.0], [[[1]]], "samples has 1 entries; expected 2, one for each distance"),
         ([0.2], [0.0, 1.0], [[[1]]], r"samples\[0\] has 1 entries; expected 2, one for each angle"),
         ([0.2], [0.0], [[[]]], r"samples\[0\]\[0\] has 0 entries; expected readings"),
-        ([0.2], [0.0], [[1.0]], r"samples\[0\]\[0\] is 1; expected a list"),
+        ([0.2], [0.0], [[1.0]], r"samples\[0\]\[0\] is 1\.0; expected a list"),
         ([0.2], [0.0], [[[1.0, math.inf]]], r"samples\[0\]\[0\]\[1\] is inf; expected a finite number"),
         ([0.2], [0.0], [[["x"]]], r"samples\[0\]\[0\]\[0\] is 'x'; expected a finite number"),
     ],

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
-from sim_bridge.arena import load_arena
+from boebot.errors import ArenaError, BoebotError, RobotError
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.parameters import keys_of
 from sim_bridge.reading_table import ReadingTable
@@ -222,33 +221,6 @@ def test_motors_take_any_dictionary(kind: Any, data: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given_keys", "what"),
-    [
-        ({"pose": (0, 0)}, "vehicle: pose is (0, 0); expected 3 numbers, x (m), y (m), heading (rad)"),
-        ({"pose": "here"}, "vehicle: pose is 'here'; expected 3 numbers, x (m), y (m), heading (rad)"),
-        ({"pose": 3}, "vehicle: pose is 3; expected 3 numbers, x (m), y (m), heading (rad)"),
-        ({"pose": (0, "y", 0)}, "vehicle: pose: y (m) is 'y'; expected a finite number"),
-        ({"pose": (0, 0, 1e6)}, "vehicle: pose: heading (rad) is 1e+06; expected a number from -10000 to 10000"),
-        ({"seed": math.nan}, "vehicle: seed is nan; expected a whole number from -9223372036854775808"),
-        ({"seed": 1.5}, "vehicle: seed is 1.5; expected a whole number"),
-        ({"robot": 0}, "vehicle: robot is 0; expected a whole number from 1 to 2147483647"),
-        ({"state_bytes": -1}, "vehicle: state_bytes is -1; expected a whole number from 0 to 1073741824"),
-    ],
-)
-def test_wrong_starts_get_a_sentence(given_keys: dict[str, Any], what: str) -> None:
-    with pytest.raises(RobotError) as caught:
-        Vehicle(arsim(), load_arena("arsim"), **given_keys)
-    assert what in str(caught.value)
-
-
-def test_seeds_of_every_kind_are_whole_numbers() -> None:
-    sevens: list[Any] = [7, 7.0, np.int64(7), np.uint8(7)]
-    hashes = {Vehicle(arsim(), ROOM, seed=seed).hash() for seed in sevens}
-    assert len(hashes) == 1
-    assert Vehicle(arsim(), ROOM, seed=-1).hash() == Vehicle(arsim(), ROOM, seed=2**64 - 1).hash()
-
-
-@pytest.mark.parametrize(
     ("add", "what"),
     [
         (lambda m: m.sonar("a", beam=beam(), range=3.0), "'a': there is no key 'range'; expected beam, range_minimum"),
@@ -318,26 +290,3 @@ def test_a_model_that_steps_too_far_makes_no_worlds() -> None:
     for ask in (model.dc_motors, lambda: Vehicle(model, ROOM)):
         with pytest.raises(RobotError, match=r"dt = 0\.5 s; expected less than 0\.3255 s, the Euler limit"):
             ask()
-
-
-@pytest.mark.parametrize(
-    "signals", [None, 3, (1,), (1, 2, 3), "ab", ("a", 0.0), (0.0, None), (math.nan, 0), (0, 10**400)]
-)
-@pytest.mark.parametrize("stage", [None, lambda name, vehicle: None])
-def test_brains_that_give_no_signals_get_a_sentence(signals: Any, stage: Any) -> None:
-    vehicle = Vehicle(arsim(), ROOM)
-    before = vehicle.hash()
-    with pytest.raises(BrainError, match=r"motor signals are .*; expected two finite numbers, left and right"):
-        vehicle.run(lambda _: signals, 3, stage=stage)
-    assert vehicle.hash() == before
-    with pytest.raises(RobotError, match=r"steps is 1\.5; expected a whole number"):
-        vehicle.run(lambda _: (0, 0), 1.5)  # type: ignore[arg-type]
-
-
-def test_what_is_no_model_or_arena() -> None:
-    with pytest.raises(RobotError, match="expected a VehicleModel and an Arena"):
-        Vehicle(ARSIM_BODY, ROOM)  # type: ignore[arg-type]
-    with pytest.raises(RobotError, match="expected a VehicleModel and an Arena"):
-        Vehicle(arsim(), "arsim")  # type: ignore[arg-type]
-    with pytest.raises(RobotError, match="no saved state"):
-        Vehicle(arsim(), ROOM).restore("state")  # type: ignore[arg-type]

@@ -210,7 +210,7 @@ def test_saved_state_and_hash_carry_the_current() -> None:
     other = Vehicle(driven(0.01, SLOW | {"inductance_h": 0.06}), load_arena("arsim"), seed=3)
     other.step(0.001, 0.001)
     assert quiet.pose == other.pose and quiet.hash() not in (before, other.hash())
-    with pytest.raises(RobotError, match="no saved state"):
+    with pytest.raises(RobotError, match="saved by another model"):
         Vehicle(driven(0.01, SLOW, full=False), load_arena("arsim")).restore(state)
 
 

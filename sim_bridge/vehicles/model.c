@@ -19,10 +19,6 @@ vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
 
 void vehicle_model_destroy(vehicle_model *self) { free(self); }
 
-double vehicle_model_dt(const vehicle_model *self) { return self->dt; }
-
-size_t vehicle_model_readings(const vehicle_model *self) { return self->readings; }
-
 void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision) {
   self->noise = noise;
   self->ends_at_collision = ends_at_collision;
@@ -210,14 +206,4 @@ int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, 
   self->energy = *energy;
   self->has_battery = s != NULL && isfinite(sum) && sigma >= 0.0;
   return done(self, s, self->has_battery, 1);
-}
-
-uint64_t vehicle_model_print(const vehicle_model *self) {
-  uint64_t dt;
-  memcpy(&dt, &self->dt, sizeof dt);
-  uint64_t print = noise_mix(dt) ^ (uint64_t)(unsigned)self->drive ^ (uint64_t)(self->full != 0) << 8;
-  for (size_t i = 0; i < self->sensors_count; i++) {
-    print = noise_mix(print ^ self->sensors[i].device) ^ (uint64_t)self->sensors[i].first;
-  }
-  return noise_mix(print ^ (uint64_t)self->readings);
 }

@@ -36,8 +36,11 @@ enum {
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
   VEHICLE_TOO_MANY = -4,   /* sensors, or a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
-  VEHICLE_BAD_SNAPSHOT = -6, /* not made by this version, of another model, or damaged */
-  VEHICLE_NOT_PLACED = -7,   /* a world without an arena, or a model without a drive */
+  VEHICLE_BAD_SNAPSHOT = -6, /* not made by this version, or damaged */
+  VEHICLE_NOT_PLACED = -7,   /* a world that is not there or without an arena, or a model without a drive */
+  VEHICLE_OTHER_MODEL = -8,  /* a saved state is of another model */
+  VEHICLE_OTHER_ARENA = -9,
+  VEHICLE_OTHER_MEMORY = -10, /* its compiled brain's memory has another size */
 };
 
 typedef struct vehicle_model vehicle_model;
@@ -82,9 +85,6 @@ int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, co
 
 /* Whisker: a segment from (x0, y0) to (x1, y1) in the body's frame; reads 1 while it touches something. */
 int vehicle_model_add_whisker(vehicle_model *self, double x0, double y0, double x1, double y1);
-
-double vehicle_model_dt(const vehicle_model *self);
-size_t vehicle_model_readings(const vehicle_model *self);
 
 /* Above this step, s, Euler's method diverges for the drive and body: 2 / (the faster of their two linearised rates). */
 double vehicle_model_euler_limit(const vehicle_model *self);
@@ -158,7 +158,7 @@ struct vehicle_model {
   vehicle_sensor sensors[VEHICLE_SENSORS];
 };
 
-/* A number that two models share only if they hold the same sensors and drive and step alike. */
+/* A hash of all parameters: equal for two models only if their worlds go on alike from the same state. */
 uint64_t vehicle_model_print(const vehicle_model *self);
 
 #endif

@@ -8,11 +8,12 @@
 #include "sense.h"
 
 #define SERVO_PERIOD_S 0.020
-#define FIRST_MOVER 0x80000000u /* ids of the arena's moving shapes */
-#define SPEED_LIMIT 100.0       /* m/s: as body.c limits it */
-#define TURN_LIMIT 1000.0       /* rad/s */
+#define SPEED_LIMIT 100.0 /* m/s: as body.c limits it */
+#define TURN_LIMIT 1000.0 /* rad/s */
+#define HEADING_LIMIT 1e5 /* rad */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
+  if (state_size > SIZE_MAX - 15u) return NULL;
   const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
   vehicles *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
@@ -22,7 +23,7 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   self->worlds = calloc(count + 1, sizeof *self->worlds);
   self->slots = calloc(count * model->sensors_count + 1, sizeof *self->slots);
   self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
-  self->brains = calloc(count * block + 1, 1);
+  self->brains = calloc(count + 1, block + 1);
   if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
   vehicles_destroy(self);
   return NULL;
@@ -48,14 +49,16 @@ void vehicles_destroy(vehicles *self) {
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading) {
   const vehicle_model *m = self->model;
-  if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
+  if (m->drive == DRIVE_NONE || i >= self->count) return VEHICLE_NOT_PLACED;
   if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
-  if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0 || id >= FIRST_MOVER) return VEHICLE_BAD_NUMBER;
+  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) < HEADING_LIMIT))
+    return VEHICLE_BAD_NUMBER;
+  if (id == 0 || id >= SCENE_FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
   if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
-  scene_moving(where, 0.0, m->dt, FIRST_MOVER, movers);
+  scene_moving(where, 0.0, m->dt, SCENE_FIRST_MOVER, movers);
   body at;
   body_init(&at, &m->body, m->reach);
   const scene around = {.arena = where, .movers = movers, .movers_count = moving};
@@ -158,7 +161,7 @@ void vehicles_move(vehicles *self, size_t i) {
 void vehicles_update_arena(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   const double dt = self->model->dt;
-  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, FIRST_MOVER, w->movers);
+  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, SCENE_FIRST_MOVER, w->movers);
 }
 
 int vehicles_check(vehicles *self, size_t i) {
@@ -225,6 +228,7 @@ int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brai
       const int sent = vehicles_send(self, i, signals[0], signals[1]);
       if (sent != VEHICLE_OK) {
         status = sent;
+        self->worlds[i].state.flag = VEHICLE_BRAIN_FAILED;
         break;
       }
       finish_step(self, i);

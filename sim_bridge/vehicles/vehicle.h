@@ -13,7 +13,7 @@
 
 /* python: begin */
 /* Why a run ended. */
-enum { VEHICLE_RUNS = 0, VEHICLE_COLLIDED = 1, VEHICLE_EXHAUSTED = 2 };
+enum { VEHICLE_RUNS = 0, VEHICLE_COLLIDED = 1, VEHICLE_EXHAUSTED = 2, VEHICLE_BRAIN_FAILED = 3 };
 
 typedef struct vehicles vehicles;
 
@@ -42,8 +42,8 @@ int vehicles_step(vehicles *self, size_t first, size_t count, const double *sign
 /* One step of one world. Returns VEHICLE_RUNS or why the run has ended, or an error. */
 int vehicles_step_one(vehicles *self, size_t i, double left, double right);
 
-/* The same with a brain in compiled code that is asked in every step. A signal that is not a number stops that world and
- * is reported. */
+/* The same with a brain in compiled code that is asked in every step. A signal that is not a number ends that world's run
+ * and is reported. What the brain needs, memory and readings, is the caller's to see to. */
 int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps);
 
 /* The stages of one step of one world by themselves, for whoever looks on in between: sense, then (the brain), send, move,
@@ -74,10 +74,12 @@ double vehicles_energy(const vehicles *self, size_t i);
  * give; 0 with another drive. */
 void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
 
-/* Of everything that a world has come to; equal for runs that are equal bit for bit. */
+/* Of everything that a world has come to, which is what vehicles_save writes, in the same order; the same on every
+ * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
-/* One world as bytes, and back into a world of the same model that is placed in the same arena. */
+/* World i as bytes, the same on every machine, and back into a world of the same model that is placed in the same arena.
+ * Restoring checks model, arena, the brain's memory and every number; what it refuses changes nothing. */
 size_t vehicles_snapshot_size(const vehicles *self, size_t i);
 void vehicles_save(const vehicles *self, size_t i, void *bytes);
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);

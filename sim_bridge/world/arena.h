@@ -14,7 +14,10 @@
 
 #include "paths.h"
 
+#define ARENA_SHORTEST_M 1e-9 /* edges are at least as long */
+
 /* python: begin */
+enum { ARENA_FARTHEST_M = 1000000 }; /* from the origin: beyond it positions lose the precision that rays need */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
 /* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
  * many rays start, or wherever a ray starts. */
@@ -57,8 +60,8 @@ typedef struct {
 arena *arena_new(void);
 void arena_destroy(arena *self);
 
-/* These add something and return its number, or -1 without memory or where a number is not finite, an edge has no
- * length or a radius is not positive. `surface` NULL: infinitely high, reflectances 1. The caller's arrays are copied. */
+/* These add something and return its number, or -1 without memory or where a number is not finite or too far, an edge has no
+ * length, a radius or height is not positive or a reflectance not in [0, 1]. `surface` NULL: infinitely high, reflectances 1. The caller's arrays are copied. */
 int arena_add_polygon(arena *self, const double *xy, size_t count, int kind, const arena_surface *surface);
 int arena_add_wall(arena *self, const double *xy, size_t count, const arena_surface *surface);
 int arena_add_disc(arena *self, double x, double y, double radius, const arena_surface *surface);
@@ -76,8 +79,8 @@ void arena_build(arena *self);
 /* Which index answers. The answers are the same. */
 void arena_use_index(arena *self, int choice);
 
-/* Moves a polygon by (dx, dy) and builds anew: only while nobody else uses the arena. Returns 0, or -1. */
-int arena_move_polygon(arena *self, int shape, double dx, double dy);
+/* Equal for two arenas, once built, only if the same things stand in them, added in the same order; names do not count. */
+uint64_t arena_print(const arena *self);
 
 size_t arena_edge_count(const arena *self);
 size_t arena_disc_count(const arena *self);
@@ -110,6 +113,10 @@ int arena_is_free(const arena *self, double x, double y, double radius);
 
 /* Friction coefficient of the floor at (x, y): of the last patch there, `otherwise` where there is none. */
 double arena_grip(const arena *self, double x, double y, double otherwise);
+
+/* The first of a row's points that is the same as the next (nearer than ARENA_SHORTEST_M), -1 if there is none. `closed`:
+ * the last one's next is the first. */
+int64_t arena_repeated(const double *xy, size_t count, int closed);
 
 /* Two edges of a closed polygon that cross, touch or fold back on each other: 1 and the first such pair; 0 if there are
  * none; -1 without memory. */

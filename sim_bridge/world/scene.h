@@ -12,6 +12,8 @@
 
 #include "arena.h"
 
+#define SCENE_FIRST_MOVER 0x80000000u /* id of an arena's first moving shape; robots have those below, from 1 on */
+
 /* python: begin */
 typedef struct {
   double x, y, cosine, sine; /* pose: its origin and the direction of its x axis */
