@@ -91,18 +91,18 @@ static arena *room(input *in) {
 }
 
 static vehicle_model *model(void) {
-  const body_parameters body = {.mass = 3.0,
-                                .inertia = 0.2,
-                                .radius = 0.2,
-                                .half_track = 0.2,
-                                .wheel_radius = 0.1,
-                                .linear_damping = 1.0,
-                                .angular_damping = 0.1,
-                                .grip = 0.7};
+  const body_parameters chassis = {.mass = 3.0,
+                                   .inertia = 0.2,
+                                   .radius = 0.2,
+                                   .half_track = 0.2,
+                                   .wheel_radius = 0.1,
+                                   .linear_damping = 1.0,
+                                   .angular_damping = 0.1,
+                                   .grip = 0.7};
   const beam_parameters look = {.x = 0.2, .opening = 0.5, .height = 0.06, .rays = 3};
   const infrared_proximity_parameters eye = {.beam = look, .range = 1.0, .c1 = 0.03, .c2 = 0.1, .sigma = 0.01};
   const sharp_infrared_parameters sharp = {.beam = look, .reach = 1.5, .gain = 1.0, .period = 0.04, .sigma = 0.01};
-  const laser_parameters laser = {.first = 1.0, .step = 0.25, .rays = 9, .range = 4.0, .sigma = 0.01};
+  const laser_parameters finder = {.first = 1.0, .step = 0.25, .rays = 9, .range = 4.0, .sigma = 0.01};
   const phototransistor_parameters light = {.near_distance = 0.05, .gain = 1.0, .sigma = 0.01};
   const odometer_parameters wheels = {
       .half_track = 0.2, .wheel_radius = 0.1, .factor_left = 1.0, .factor_right = 1.0, .sigma_step = 1e-4};
@@ -110,11 +110,11 @@ static vehicle_model *model(void) {
   const energy_parameters energy = {0.002, 0.004, 0.1};
   motor_dc_parameters motor;
   motor_dc_default(&motor);
-  vehicle_model *made = vehicle_model_new(&body, 0.01);
+  vehicle_model *made = vehicle_model_new(&chassis, 0.01);
   int bad = vehicle_model_drive_dc(made, &motor, &motor, 1) != VEHICLE_OK;
   bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.0) < 0;
   bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.03) < 0;
-  bad |= vehicle_model_add_sharp_infrared(made, &sharp) < 0 || vehicle_model_add_laser(made, &laser, 0.1) < 0;
+  bad |= vehicle_model_add_sharp_infrared(made, &sharp) < 0 || vehicle_model_add_laser(made, &finder, 0.1) < 0;
   bad |= vehicle_model_add_phototransistor(made, &light, 0.0) < 0 || vehicle_model_add_odometer(made, &wheels) < 0;
   bad |= vehicle_model_add_accelerometer(made, &spring, 0.0) < 0 || vehicle_model_add_whisker(made, 0.2, 0, 0.3, 0) < 0;
   bad |= vehicle_model_battery(made, &energy, 5.0, 7.75, 0.005) < 0;

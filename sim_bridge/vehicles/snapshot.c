@@ -146,11 +146,11 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
 size_t vehicles_snapshot_size(const vehicles *self) {
   const vehicle_model *m = self->model;
   stream s = {.mode = COUNT};
-  body_state body = {0};
-  vehicle_state state = {0};
+  body_state no_body = {0};
+  vehicle_state no_state = {0};
   sensor_slot slot = {0};
-  walk_body(&s, &body);
-  walk_state(&s, &state);
+  walk_body(&s, &no_body);
+  walk_state(&s, &no_state);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(&s, &m->sensors[k], &slot);
   return 8 * (HEADING_WORDS + s.count + m->readings) + self->state_size;
 }
