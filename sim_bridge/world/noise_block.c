@@ -69,29 +69,32 @@ INLINE void edges_of(__m256i bits, __m256d *here, __m256d *next) {
 }
 
 /* Four draws; of those outside their layer's rectangle, which are wrong yet, the bits are set. */
-INLINE unsigned four(__m256i bits, double *draws) {
+INLINE uint64_t four(__m256i bits, double *draws) {
   __m256d here, next;
   edges_of(bits, &here, &next);
   const __m256d x = _mm256_mul_pd(place(bits), here);
   _mm256_storeu_pd(draws, x);
   const __m256d size = _mm256_andnot_pd(_mm256_set1_pd(-0.0), x);
-  return (unsigned)_mm256_movemask_pd(_mm256_cmp_pd(size, next, _CMP_NLT_UQ));
+  return (uint64_t)(unsigned)_mm256_movemask_pd(_mm256_cmp_pd(size, next, _CMP_NLT_UQ));
 }
 
-INLINE __m256i words(const source *s, size_t i) {
-  if (s->keys != NULL) return _mm256_loadu_si256((const __m256i *)(const void *)(s->keys + i));
-  const __m256i step = _mm256_add_epi64(_mm256_set1_epi64x((long long)(s->step + i)), _mm256_setr_epi64x(0, 1, 2, 3));
-  return _mm256_xor_si256(_mm256_set1_epi64x((long long)s->key), step);
-}
+INLINE __m256i load(const uint64_t *from) { return _mm256_loadu_si256((const __m256i *)(const void *)from); }
 
 /* As many draws as make whole registers; returns how many. */
 AVX2 static size_t by_avx2(const source *s, double *draws, size_t count) {
   const size_t end = count / 4 * 4;
+  const __m256i key = _mm256_set1_epi64x((long long)s->key);
+  __m256i step = _mm256_add_epi64(_mm256_set1_epi64x((long long)s->step), _mm256_setr_epi64x(0, 1, 2, 3));
   for (size_t block = 0; block < end; block += BLOCK) {
     const size_t some = end - block < BLOCK ? end - block : BLOCK;
     uint64_t outside = 0;
-    for (size_t i = 0; i < some; i += 4) {
-      outside |= (uint64_t)four(mix(words(s, block + i)), draws + block + i) << i;
+    if (s->keys != NULL) {
+      for (size_t i = 0; i < some; i += 4) outside |= four(mix(load(s->keys + block + i)), draws + block + i) << i;
+    } else {
+      for (size_t i = 0; i < some; i += 4) {
+        outside |= four(mix(_mm256_xor_si256(key, step)), draws + block + i) << i;
+        step = _mm256_add_epi64(step, _mm256_set1_epi64x(4));
+      }
     }
     for (; outside != 0; outside &= outside - 1) {
       const size_t i = block + (size_t)__builtin_ctzll(outside);
