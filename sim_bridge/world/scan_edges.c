@@ -46,16 +46,30 @@ static inline lanes bearing(lanes x, lanes y) {
   return lanes_with_sign(angle, y);
 }
 
+/* Beams between the bearings low and high: first and last of those that surely lie between, and of those that may. They
+ * stay between -1 and the number of beams, so that none is asked that is not there. */
+static inline void measure_beams(const scan_fan *self, lanes low, lanes high, size_t i, spans *to) {
+  const lanes zero = lanes_all(0.0);
+  const lanes before = lanes_all(-1.0);
+  const lanes most = lanes_all((double)(self->count - 1));
+  const lanes from = (low + self->half) * self->per_radian;
+  const lanes until = (high + self->half) * self->per_radian;
+  const lanes first = lanes_smaller(lanes_ceil(lanes_larger(from + self->margin, zero)), most + 1.0);
+  const lanes last = lanes_floor(lanes_smaller(lanes_larger(until - self->margin, before), most));
+  const lanes outer_first = lanes_smaller(lanes_ceil(lanes_larger(from - self->margin, zero)), most + 1.0);
+  const lanes outer_last = lanes_floor(lanes_smaller(lanes_larger(until + self->margin, before), most));
+  lanes_store_int(&to->first[i], lanes_whole(first));
+  lanes_store_int(&to->last[i], lanes_whole(last));
+  lanes_store_int(&to->outer_first[i], lanes_whole(outer_first));
+  lanes_store_int(&to->outer_last[i], lanes_whole(outer_last));
+}
+
 /* Spans of the edges `i` and on, one to a lane. */
 static inline void measure(const scan_fan *self, const scan_edges *edges, size_t i, spans *to) {
-  const lanes dx = lanes_load(&edges->ax[i]);
-  const lanes dy = lanes_load(&edges->ay[i]);
-  const lanes fx = lanes_load(&edges->bx[i]);
-  const lanes fy = lanes_load(&edges->by[i]);
-  const lanes ax = dx * edges->c + dy * edges->s;
-  const lanes ay = dy * edges->c - dx * edges->s;
-  const lanes bx = fx * edges->c + fy * edges->s;
-  const lanes by = fy * edges->c - fx * edges->s;
+  const lanes ax = lanes_load(&edges->ax[i]) * edges->c + lanes_load(&edges->ay[i]) * edges->s;
+  const lanes ay = lanes_load(&edges->ay[i]) * edges->c - lanes_load(&edges->ax[i]) * edges->s;
+  const lanes bx = lanes_load(&edges->bx[i]) * edges->c + lanes_load(&edges->by[i]) * edges->s;
+  const lanes by = lanes_load(&edges->by[i]) * edges->c - lanes_load(&edges->bx[i]) * edges->s;
   const lanes ex = bx - ax;
   const lanes ey = by - ay;
   const lanes k = ax * ey - ay * ex;
@@ -65,32 +79,18 @@ static inline void measure(const scan_fan *self, const scan_edges *edges, size_t
   const lanes high = lanes_larger(of_a, of_b);
   const lanes square = k * k;
   const lanes length_squared = ex * ex + ey * ey;
-  const lanes margin = lanes_all(self->margin);
-  const lanes most = lanes_all((double)(self->count - 1));
-  const lanes zero = lanes_all(0.0);
-  const lanes from = (low + self->half) * self->per_radian;
-  const lanes until = (high + self->half) * self->per_radian;
-  /* Between -1 and the number of beams, so that none is asked twice or is not there. */
-  const lanes first = lanes_smaller(lanes_ceil(lanes_larger(from + margin, zero)), most + 1.0);
-  const lanes last = lanes_floor(lanes_smaller(lanes_larger(until - margin, zero - 1.0), most));
-  const lanes outer_first = lanes_smaller(lanes_ceil(lanes_larger(from - margin, zero)), most + 1.0);
-  const lanes outer_last = lanes_floor(lanes_smaller(lanes_larger(until + margin, zero - 1.0), most));
-  const lanes swept = lanes_pick(outer_first <= outer_last, lanes_all(SWEPT), lanes_all(UNSEEN));
   const lanes_mask smooth = (high - low < NEARLY_PI) & (square > GRAZING * GRAZING * length_squared);
-  const lanes kind = lanes_pick(smooth, swept, lanes_all(AWKWARD));
   const lanes_mask far = square > edges->reach * edges->reach * length_squared;
+  const lanes kind = lanes_pick(smooth, lanes_all(SWEPT), lanes_all(AWKWARD));
+  measure_beams(self, low, high, i, to);
   lanes_store(&to->ax[i], ax);
   lanes_store(&to->ay[i], ay);
   lanes_store(&to->ex[i], ex);
   lanes_store(&to->ey[i], ey);
   lanes_store(&to->a[i], ey / k);
-  lanes_store(&to->b[i], zero - ex / k);
+  lanes_store(&to->b[i], lanes_all(0.0) - ex / k);
   lanes_store(&to->low[i], low);
   lanes_store(&to->high[i], high);
-  lanes_store_int(&to->first[i], lanes_whole(first));
-  lanes_store_int(&to->last[i], lanes_whole(last));
-  lanes_store_int(&to->outer_first[i], lanes_whole(outer_first));
-  lanes_store_int(&to->outer_last[i], lanes_whole(outer_last));
   lanes_store_int(&to->kind[i], lanes_whole(lanes_pick(far, lanes_all(UNSEEN), kind)));
 }
 
