@@ -1,10 +1,11 @@
 """Measures every figure, prints one table and writes build/bench.json: `make bench`.
 
-    python -m tools.bench [--only PATTERN ...] [--json] [--page FILE]
+    python -m tools.bench [--only PATTERN ...] [--json] [--page FILE] [--list]
 
 --only measures the figures whose names contain a PATTERN; --json prints what build/bench.json holds instead of the
-table; --page writes the table as a page of the documentation. Ctrl-C ends it with what was measured so far. The exit
-code is 1 when a target is missed or a measurement failed, 130 after Ctrl-C.
+table; --page writes the table as a page of the documentation; --list measures nothing and says which figures there are.
+Ctrl-C ends it with what was measured so far. The exit code is 1 when a target is missed or a measurement failed, 130
+after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -53,12 +54,17 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--only", action="append", default=[], metavar="PATTERN", help="figures whose names contain it")
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     parser.add_argument("--page", type=Path, metavar="FILE", help="write the table as a page of the documentation")
+    parser.add_argument("--list", action="store_true", help="which figures there are")
     chosen = parser.parse_args(arguments)
     wanted = figures(chosen.only)
     if not wanted:
         parser.error(
             f"no figure's name contains {' or '.join(map(repr, chosen.only))}; without --only all are measured"
         )
+    if chosen.list:
+        described = [report.description(figure) for figure in wanted]
+        print(json.dumps(described, indent=2) if chosen.json else "\n".join(figure.name for figure in wanted))
+        return 0
     started, before = time.monotonic(), report.load()
     rows: list[dict[str, Any]] = []
     stopped = False

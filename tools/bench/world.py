@@ -23,6 +23,7 @@ from tools.bench.scene import BEAMS
 STEPS = "robot-steps/s"
 RAYS = "rays/s"
 ROUNDS = 5
+PAIRS = 15  # of rates that are compared
 BUILDS: tuple[Build, Build] = ("portable", "native")
 
 
@@ -96,7 +97,7 @@ def rows_of_steps() -> None:
             asked(build, "compiled", edges=48, worlds=1000, threads=2)
         )
         name = f"world: 4,000 edges against 48, compiled brain, {build}"
-        figure(name, "× slower", at_most=2.5, rounds=ROUNDS, of="median")(
+        figure(name, "× slower", at_most=2.5, rounds=PAIRS, of="median")(
             ratio((build, {"edges": 48}), (build, {"edges": 4000}))
         )
 
@@ -119,7 +120,7 @@ def rows_of_equality() -> None:
         ("laser, 100 edges, noise", "scan", {"edges": 100, "noise": True}),
     ]
     for name, what, question in compared:
-        figure(f"cost of bit-equality: freed build / portable, {name}", "×", rounds=ROUNDS, of="median")(
+        figure(f"cost of bit-equality: freed build / portable, {name}", "×", rounds=PAIRS, of="median")(
             ratio(("free", question), ("portable", question), what)
         )
 

@@ -13,9 +13,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from tools.bench import __main__ as bench
 from tools.bench import report, scene
-from tools.bench.figures import FIGURES, Figure, Peer, figure
+from tools.bench.figures import Figure, Peer, figure
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -89,21 +88,22 @@ def test_the_table_shows_value_spread_bound_and_peers() -> None:
     assert "Failed: speed of a thing: RuntimeError: no such thing." in text
 
 
-def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
-    everything = bench.figures([])
-    assert len({one.name for one in everything}) == len(everything) == len(FIGURES)
-    assert {one.name for one in bench.figures(["laser of 683", "no such thing"])} == {
-        one.name for one in everything if "laser of 683" in one.name
-    }
-    assert [
-        one.target for one in everything if one.name.startswith("native board and world, wander at every 10 ms")
-    ] == [300]
-
-
 def run(*options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "tools.bench", *options], cwd=ROOT, capture_output=True, text=True, timeout=300
     )
+
+
+def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
+    names = run("--list").stdout.splitlines()
+    assert len(set(names)) == len(names) > 50
+    lasers = json.loads(run("--list", "--json", "--only", "laser of 683", "--only", "no such thing").stdout)
+    assert [row["name"] for row in lasers] == [name for name in names if "laser of 683" in name]
+    assert {(row["target"], row["unit"]) for row in lasers} == {
+        (target, "rays/s") for target in (100e6, 200e6, 20e6, 30e6)
+    }
+    (wandering,) = json.loads(run("--list", "--json", "--only", "native board and world, wander").stdout)
+    assert wandering["target"] == 300 and wandering["better"] == "more"
 
 
 def test_a_pattern_without_a_figure_is_one_sentence() -> None:
