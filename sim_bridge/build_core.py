@@ -17,6 +17,7 @@ from cffi import FFI
 HEADERS = [
     "world/numbers.h",
     "world/noise.h",
+    "world/noise_block.h",
     "world/paths.h",
     "world/arena.h",
     "world/scene.h",

@@ -1,13 +1,16 @@
 /* hash_runs.c: runs worlds of every sensor and both drives and prints a hash of each. The test compiles it with several
- * compilers and options: the hashes are the same. */
+ * compilers and options: the hashes are the same. Its arguments are the body of the notes' robot, as vehicle.py has it:
+ * mass, inertia, radius, half track, wheel radius, linear and angular damping, grip. */
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
 
 #define WORLDS 6
 #define STEPS 600
+#define BODY 8
 
 static arena *room(void) {
   static const double outline[] = {-1.8, -1.8, 1.8, -1.8, 1.8, 1.8, -1.8, 1.8};
@@ -63,7 +66,7 @@ static int add_sensors(vehicle_model *m) {
   return bad;
 }
 
-static vehicle_model *model(int servos) {
+static vehicle_model *model(int servos, const double notes[BODY]) {
   const body_parameters small = {.mass = 0.6,
                                  .inertia = 1.2e-3,
                                  .radius = 0.07,
@@ -75,14 +78,14 @@ static vehicle_model *model(int servos) {
                                  .angular_damping = 0.004,
                                  .grip = 0.7,
                                  .slip = servos};
-  const body_parameters large = {.mass = 3.0,
-                                 .inertia = 0.2,
-                                 .radius = 0.2,
-                                 .half_track = 0.2,
-                                 .wheel_radius = 0.1,
-                                 .linear_damping = 1.0,
-                                 .angular_damping = 0.1,
-                                 .grip = 0.7};
+  const body_parameters large = {.mass = notes[0],
+                                 .inertia = notes[1],
+                                 .radius = notes[2],
+                                 .half_track = notes[3],
+                                 .wheel_radius = notes[4],
+                                 .linear_damping = notes[5],
+                                 .angular_damping = notes[6],
+                                 .grip = notes[7]};
   servo_motor_parameters left = {
       .mount = 1.0,
       .wheel_radius = 0.0331,
@@ -107,10 +110,13 @@ static vehicle_model *model(int servos) {
   return m;
 }
 
-int main(void) {
+int main(int count, char **arguments) {
+  double notes[BODY];
+  if (count != BODY + 1) return 2;
+  for (int i = 0; i < BODY; i++) notes[i] = strtod(arguments[i + 1], NULL);
   arena *where = room();
   for (int servos = 0; servos < 2; servos++) {
-    vehicle_model *m = model(servos);
+    vehicle_model *m = model(servos, notes);
     vehicles *worlds = vehicles_new(m, WORLDS, sizeof(vehicle_wander_state));
     for (size_t i = 0; i < WORLDS; i++) {
       if (vehicles_place(worlds, i, where, 100 + i, (uint32_t)i + 1, -0.5 + 0.1 * (double)i, 0.0, (double)i))

@@ -16,7 +16,7 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.arena import load_arena
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
 from sim_bridge.tests.simulated import arena_of, square
-from sim_bridge.vehicle import Vehicle, VehicleModel, arsim, beam
+from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
 
 HERE = Path(__file__).resolve().parent
 STARTS = np.array([[0.1 * (k % 5) - 0.2, 0.1 * (k % 3), 0.7 * k] for k in range(12)])
@@ -170,7 +170,9 @@ def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:
         *map(str, sources),
     ]
     subprocess.run([*command, "-lm", "-o", str(program)], check=True)
-    return subprocess.run([str(program)], check=True, capture_output=True, text=True).stdout.split()
+    names = ("mass", "inertia", "radius", "half_track", "wheel_radius", "linear_damping", "angular_damping", "grip")
+    body = [repr(ARSIM_BODY[name]) for name in names]
+    return subprocess.run([str(program), *body], check=True, capture_output=True, text=True).stdout.split()
 
 
 def test_every_compiler_gives_the_same_bits(tmp_path: Path) -> None:

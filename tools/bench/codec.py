@@ -171,7 +171,7 @@ MAVLINK = "pymavlink, 37 B"
     "Python encodes telemetry of 37 B: payload to frame",
     "frames/s",
     at_least=300_000,
-    peer=Peer(COBS, lambda: cobs_encoding(TELEMETRY)),
+    peers=[Peer(COBS, lambda: cobs_encoding(TELEMETRY))],
 )
 def encode_telemetry() -> float:
     return encoding(TELEMETRY)
@@ -181,7 +181,7 @@ def encode_telemetry() -> float:
     "Python encodes set-points of 8 B: payload to frame",
     "frames/s",
     at_least=300_000,
-    peer=Peer(COBS, lambda: cobs_encoding(SETPOINT)),
+    peers=[Peer(COBS, lambda: cobs_encoding(SETPOINT))],
 )
 def encode_setpoints() -> float:
     return encoding(SETPOINT)
@@ -191,7 +191,7 @@ def encode_setpoints() -> float:
     "Python decodes telemetry of 37 B: 16 frames at a time to payloads",
     "frames/s",
     at_least=500_000,
-    peer=Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=16)),
+    peers=[Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=16))],
 )
 def decode_telemetry() -> float:
     return decoding(TELEMETRY, chunk=16)
@@ -201,7 +201,7 @@ def decode_telemetry() -> float:
     "Python decodes telemetry of 37 B: one frame at a time to its payload",
     "frames/s",
     at_least=500_000,
-    peer=Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=1)),
+    peers=[Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=1))],
 )
 def decode_single_telemetry() -> float:
     return decoding(TELEMETRY, chunk=1)
@@ -211,7 +211,7 @@ def decode_single_telemetry() -> float:
     "Python encodes telemetry of 37 B: fields to frame",
     "frames/s",
     at_least=200_000,
-    peer=Peer(MAVLINK, mavlink_encoding),
+    peers=[Peer(MAVLINK, mavlink_encoding)],
 )
 def encode_fields() -> float:
     return encoding(TELEMETRY, fields=True)
@@ -221,7 +221,7 @@ def encode_fields() -> float:
     "Python decodes telemetry of 37 B: 16 frames at a time to fields",
     "frames/s",
     at_least=200_000,
-    peer=Peer(MAVLINK, mavlink_decoding),
+    peers=[Peer(MAVLINK, mavlink_decoding)],
 )
 def decode_fields() -> float:
     return decoding(TELEMETRY, chunk=16, fields=True)
