@@ -52,6 +52,16 @@ class Solid:
         return self.infrared_reflectance < 1.0 or self.sound_reflectance < 1.0
 
     @property
+    def remarks(self) -> list[str]:
+        """What of it cannot be seen from above, in words: a low height, reflectances."""
+        said = [f"{self.height * 100:g} cm high"] if self.is_low else []
+        if self.infrared_reflectance < 1.0:
+            said.append(f"IR {self.infrared_reflectance:.0%}")
+        if self.sound_reflectance < 1.0:
+            said.append(f"sound {self.sound_reflectance:.0%}")
+        return said
+
+    @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower left and upper right corner."""
         return self.points.min(axis=0) - self.radius, self.points.max(axis=0) + self.radius

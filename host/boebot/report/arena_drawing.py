@@ -144,7 +144,7 @@ def _draw_labels(axes: Axes, plan: FloorPlan) -> None:
     if (charger := plan.charger) is not None:
         _label(axes, (charger.x, charger.y - charger.radius), "charger", "below")
     for solid in (*plan.obstacles, *(moving.at(float(moving.time[0])) for moving in plan.moving)):
-        if not (said := _said(solid)):
+        if not (said := solid.remarks):
             continue
         low, high = solid.box
         middle = (float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2)
@@ -154,18 +154,6 @@ def _draw_labels(axes: Axes, plan: FloorPlan) -> None:
             _label(axes, (middle[0], float(low[1])), ", ".join(said), "below")
         else:
             _label(axes, (middle[0], float(high[1])), ", ".join(said), "above")
-
-
-def _said(solid: Solid) -> list[str]:
-    """What cannot be seen of a solid from above."""
-    parts: list[str] = []
-    if solid.is_low:
-        parts.append(f"{solid.height * 100:g} cm high")
-    if solid.infrared_reflectance < 1.0:
-        parts.append(f"IR {solid.infrared_reflectance:.0%}")
-    if solid.sound_reflectance < 1.0:
-        parts.append(f"sound {solid.sound_reflectance:.0%}")
-    return parts
 
 
 def _middle(corners: Floats) -> tuple[float, float]:

@@ -78,7 +78,8 @@ def _solid(solid: Solid) -> dict[str, Any]:
         "radius": solid.radius,
         "low": solid.is_low,
         "dull": solid.is_dull,
-        "name": solid.name,
+        "remarks": ", ".join(solid.remarks),
+        "top": [float(value) for value in ((solid.box[0][0] + solid.box[1][0]) / 2, solid.box[1][1])],
     }
 
 
