@@ -38,12 +38,14 @@ def draw(arena: Arena, path: Path) -> Path:
     _draw_start(axes, arena)
     frame(axes, low, high)
     title = f"{plan.name}: {plan.title}" if plan.title else plan.name
-    axes.set_title(title, fontsize=12, color=style.INK)
+    axes.set_title(title, fontsize=12, color=style.INK, parse_math=False)
     # The same bytes each time: no date, no random names.
     with mpl.rc_context({"svg.hashsalt": arena.name}):
         try:
             figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise BoebotError(f"the picture cannot be written to {path}: {error.strerror}") from None
+        except ValueError as error:  # of matplotlib: a format that it does not know
             raise BoebotError(f"the picture cannot be written to {path}: {error}") from None
     return path
 

@@ -117,6 +117,8 @@ class View:
         """
         try:
             self.figure.savefig(path)
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise BoebotError(f"the picture cannot be written to {path}: {error.strerror}") from None
+        except ValueError as error:  # of matplotlib: a format that it does not know
             raise BoebotError(f"the picture cannot be written to {path}: {error}") from None
         return Path(path)

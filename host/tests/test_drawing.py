@@ -188,6 +188,13 @@ def test_picture_names_only_what_the_robot_has(
     assert any("odometry off" in text for text in texts) == estimate
 
 
+def test_names_are_no_formulas(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """matplotlib would set what stands between two $ as mathematics, or fail at it."""
+    result = run_of("shieldbot", monkeypatch)
+    result.brain = "my $brain_{ and my \\frac$"
+    assert picture.write(result, tmp_path / "run.png").stat().st_size > 10_000
+
+
 def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = load_robot("shieldbot-basic")
     fewer = {

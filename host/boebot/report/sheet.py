@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -60,8 +61,13 @@ class Sheet:
         )
         self.axes.set_facecolor(style.PAPER)
         frame(self.axes, low, high)
+        with rc_context({"text.parse_math": False}):  # a $ in a name is a $
+            self._write(tall, lines, legend, columns)
+
+    def _write(self, tall: float, lines: Sequence[str], legend: Sequence[Artist], columns: int) -> None:
+        """Title, caption and legend on a sheet so many inches tall."""
         left = 0.18 / style.WIDTH_IN
-        shown = textwrap.shorten(title, TITLE_COLUMNS, placeholder="…")
+        shown = textwrap.shorten(self.title, TITLE_COLUMNS, placeholder="…")
         self._figure.text(left, 1 - 0.32 / tall, shown, fontsize=15, weight="bold", color=style.INK, va="center")
         for number, line in enumerate(lines):
             y = 1 - (0.64 + LINE_IN * number) / tall
