@@ -138,6 +138,15 @@ def test_ghosts_of_a_shape_do_not_lie_on_each_other() -> None:
     assert len(places) == 5 and np.diff(places).min() >= 0.2
 
 
+def test_ghosts_of_a_gate_show_that_it_opens() -> None:
+    """It turns by a right angle about its end, and stays where it is otherwise."""
+    gate = Solid(kind="obstacle", points=np.array([(0, -0.02), (0.5, -0.02), (0.5, 0.02), (0, 0.02)]), height=0.05)
+    time = np.linspace(0, 3, 61)
+    still = np.zeros_like(time)
+    moving = Moving(solid=gate, time=time, x=still, y=still, heading=time / 3 * math.pi / 2)
+    assert len(ghost_times(moving)) == 1
+
+
 # ---- of a run --------------------------------------------------------------------------------------------------------
 
 

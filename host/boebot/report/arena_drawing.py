@@ -117,15 +117,15 @@ def _draw_moving(axes: Axes, moving: Moving) -> None:
     for time in ghost_times(moving):
         _draw_solid(axes, moving.at(time), **faint)
     start = moving.at(float(moving.time[0]))
-    look = {} if start.is_low else {"facecolor": style.MOVING}
-    _draw_solid(axes, start, zorder=4, **look)
+    _draw_solid(axes, start, zorder=4, facecolor=style.MOVING)
 
 
 def ghost_times(moving: Moving) -> list[float]:
     """Times (s) at which a moving shape stands where it covers little of what it has covered before."""
     low, high = moving.solid.box
     size = float((high - low).max())
-    way = np.column_stack((moving.x, moving.y, moving.heading * size / 2))
+    reach = float(np.hypot(*moving.solid.points.T).max())  # of its corners from the point that it turns about
+    way = np.column_stack((moving.x, moving.y, moving.heading * reach))
     shown = [0]
     for index in range(1, len(way)):
         if len(shown) > GHOSTS_MAXIMUM:
