@@ -10,7 +10,6 @@ import numpy as np
 
 from boebot.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
 from sim_bridge import arena_description
-from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena, Floats
 from sim_bridge.imperfections import TYRE_GRIP
 
@@ -84,10 +83,9 @@ def _moving(arena: Arena, begin: float, end: float) -> Iterator[Moving]:
 
 def _poses(arena: Arena, time: Floats, count: int) -> Floats:
     """x, y, cosine and sine of the heading of each moving shape at each time: shape (shapes, 4, times)."""
-    movers = ffi.new("mover[]", count)
     poses = np.empty((count, 4, len(time)))
     for k, moment in enumerate(time.tolist()):
-        lib.scene_moving(arena.handle, moment, 1, movers)
+        movers = arena._movers(moment)
         for i in range(count):
             mover = movers[i]
             poses[i, :, k] = mover.x, mover.y, mover.cosine, mover.sine

@@ -21,7 +21,6 @@ from sim_bridge.floor_plan import floor_plan
 from sim_bridge.vehicle import Vehicle
 
 BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"
-FIRST_MOVER = 1  # number of the arena's first moving shape
 
 
 class View:
@@ -84,10 +83,9 @@ class View:
     def _ray_lines(self) -> tuple[list[float], list[float]]:
         """Each ray from its sensor to what it meets at its height, one after another with gaps; beyond its reach there
         is nothing to meet."""
-        arena, moving = self.vehicle.arena, self.vehicle.arena.description.moving
-        movers = ffi.new("mover[]", len(moving))
-        lib.scene_moving(arena.handle, self.vehicle.time, FIRST_MOVER, movers)
-        scene = ffi.new("scene *", {"arena": arena.handle, "movers": movers, "movers_count": len(moving)})
+        arena = self.vehicle.arena
+        movers = arena._movers(self.vehicle.time)
+        scene = ffi.new("scene *", {"arena": arena.handle, "movers": movers, "movers_count": len(movers)})
         xs: list[float] = []
         ys: list[float] = []
         for x, y, angle, reach, height in self._each_ray():
