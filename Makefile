@@ -75,6 +75,7 @@ pictures:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run wander --on native --seconds 90 --out build/pictures
 	@cp build/pictures/run.png docs/images/wander.png
+	@$(PYTHON_VENV) -m sim_bridge.arena_reference --pictures
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 

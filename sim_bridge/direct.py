@@ -11,6 +11,7 @@ import numpy as np
 
 from boebot.boards import BoardRequest, Truth
 from sim_bridge.arena import load_arena
+from sim_bridge.floor_plan import floor_plan
 from sim_bridge.model_file import STEP_S, vehicle_model
 from sim_bridge.vehicle import Vehicle
 
@@ -54,16 +55,16 @@ class DirectSession:
         if self._rows is None:
             return None
         x, y, heading, left, right, touching = np.array(self._rows, dtype=np.float64).reshape(-1, 6).T
+        time = np.arange(len(x), dtype=np.float64) * self.tick_s
         return Truth(
-            time=np.arange(len(x), dtype=np.float64) * self.tick_s,
+            time=time,
             x=x,
             y=y,
             heading=heading,
             contact=touching > 0,
             left_speed=left,
             right_speed=right,
-            arena_name=self.arena.name,
-            outlines=self.arena.outlines,
+            plan=floor_plan(self.arena, 0.0, float(time[-1])),
         )
 
     def counters(self) -> Mapping[str, float]:

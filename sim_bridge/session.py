@@ -18,6 +18,7 @@ from boebot.errors import BoardError
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
+from sim_bridge.floor_plan import floor_plan
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Floats, Sim, SimRobot
 from sim_bridge.switches import SWITCHES
@@ -150,8 +151,7 @@ class SimSession:
             contact=columns["contact"] > 0,
             left_speed=columns["left"],
             right_speed=columns["right"],
-            arena_name=self.arena.name,
-            outlines=self.arena.outlines,
+            plan=floor_plan(self.arena, float(columns["time"][0]), float(columns["time"][-1])),
         )
 
     def looks(self) -> dict[str, Floats]:

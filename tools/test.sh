@@ -2,10 +2,12 @@
 # All tests, after `make` has built what they need. Beside each other, on two cores: the firmware's units on this
 # computer (plain and with sanitizers), and those of pytest's folders whose tests know only simulated time, followed by
 # the simulator's under sanitizers. Then, alone, the folders with tests that look at the wall clock. Arguments go to
-# pytest.
+# pytest. At the end, a table of what each folder took.
 set -eu
 cd "$(dirname "$0")/.."
 log=build/test-units.log
+export BOEBOT_TEST_TIMES="$PWD/build/test-times"
+rm -f "$BOEBOT_TEST_TIMES"
 
 pytest() { build/venv/bin/python -m pytest "$@"; }
 
@@ -25,5 +27,7 @@ if [ $units -ne 0 ]; then
 else
   grep "test cases: " "$log"
 fi
-pytest host hil_tests tools "$@"
-[ $simulated -eq 0 ] && [ $units -eq 0 ]
+alone=0
+pytest host hil_tests tools "$@" || alone=$?
+build/venv/bin/python -m tools.times_table "$BOEBOT_TEST_TIMES" "$log"
+[ $simulated -eq 0 ] && [ $units -eq 0 ] && [ $alone -eq 0 ]

@@ -15,6 +15,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from boebot.errors import BoardError
+from boebot.floor_plan import FloorPlan
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
 from boebot.link.ports.tcp import SocketTransport
@@ -64,9 +65,7 @@ class Truth:
     contact: NDArray[np.bool_]  # the body touches something
     left_speed: Floats | None = None  # m/s along the ground
     right_speed: Floats | None = None
-    arena_name: str = "arena"
-    outlines: Sequence[Floats] = ()  # closed polygons, one row per corner (m): walls and obstacles
-    charger: tuple[float, float, float] | None = None  # x, y, radius (m), where the arena has one
+    plan: FloorPlan = field(default_factory=FloorPlan)  # what stands and moves where it happened
 
 
 class BoardSession(Protocol):

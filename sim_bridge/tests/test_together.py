@@ -22,7 +22,7 @@ from boebot.boards import BoardRequest, SharedWorld, open_together
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
-from boebot.report import scene
+from boebot.report import style
 from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.robots import load_robot
@@ -318,9 +318,9 @@ def test_files_show_all_robots(tmp_path: Path) -> None:
     result = boebot.run_together([Member(), Member(brain=ahead)], "room", 3.0, out=tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"run.png", "replay.html", "robot-1", "robot-2"}
     assert {path.name for path in (tmp_path / "robot-2").iterdir()} >= {"run.csv", "run.png", "replay.html"}
-    page = re.search(r"const runs = (\[.*\]);\n", (tmp_path / "replay.html").read_text())
+    page = re.search(r"const page = (\{.*\});\n", (tmp_path / "replay.html").read_text())
     assert page
-    runs = json.loads(page[1].replace("<\\/", "</"))
+    runs = json.loads(page[1].replace("<\\/", "</"))["runs"]
     assert [run["brain"] for run in runs] == ["wander", "ahead"]
     assert [run["begin"] for run in runs] == [robot.clock_offset for robot in result.robots]
     import matplotlib.image
@@ -328,5 +328,5 @@ def test_files_show_all_robots(tmp_path: Path) -> None:
 
     picture = (matplotlib.image.imread(tmp_path / "run.png")[:, :, :3] * 255).round().astype(int)
     for number in (1, 2):
-        wanted = [int(scene.colour(number)[i : i + 2], 16) for i in (1, 3, 5)]
+        wanted = [int(style.colour(number)[i : i + 2], 16) for i in (1, 3, 5)]
         assert np.any(np.abs(picture - wanted).sum(axis=2) < 12), f"robot {number} is in the picture"
