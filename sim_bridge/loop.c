@@ -186,22 +186,16 @@ int sim_run_until(sim *self, uint64_t deadline) {
     const uint64_t target = next_target(self, deadline);
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];
-      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + r->number;
+      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) {
+        self->crashed = 1;
+        return 1 + r->number;
+      }
       take_bytes(r);
     }
     self->now = target;
     if (is_look(self) && somebody_speaks(self)) return 0;
   }
   return 0;
-}
-
-int sim_run(sim *self, int number, uint64_t max_cycles, uint64_t quiet_cycles) {
-  const uint64_t from = self->now + (quiet_cycles > 0 ? quiet_cycles : 1);
-  for (int i = 0; i < self->robot_count; i++) {
-    robot *r = self->robots[i];
-    r->listen_from = number == SIM_ANY || r->number == number ? from : SIM_NEVER;
-  }
-  return sim_run_until(self, self->now + max_cycles);
 }
 
 int sim_listen(sim *self, int number, uint64_t from) {
@@ -220,14 +214,20 @@ uint64_t sim_now(const sim *self) { return self->now; }
 
 /* ---- the lines ----------------------------------------------------------------------------------------------------- */
 
-void sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
+int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
   robot *r = sim_robot(self, number);
-  if (r != NULL && count > 0) r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+  if (r == NULL || count > UINT32_MAX) return SIM_BAD_ARGUMENT;
+  if (count == 0) return SIM_OK;
+  sim_note(self, number, INPUT_SEND, NULL, 0, bytes, count);
+  r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+  return SIM_OK;
 }
 
 int sim_line_rate(sim *self, int number, uint32_t baud) {
   robot *r = sim_robot(self, number);
   if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t word = baud;
+  sim_note(self, number, INPUT_LINE_RATE, &word, 1, NULL, 0);
   r->idle = line_idle_cycles(baud);
   r->board->op->line_rate(r->board, baud);
   return SIM_OK;

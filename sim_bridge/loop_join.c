@@ -46,6 +46,7 @@ void sim_destroy(sim *self) {
   if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
+  buffer_free(&self->inputs);
   free(self);
 }
 
@@ -88,6 +89,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   r->number = number;
   r->board = b;
   r->idle = line_idle_cycles(LINE_RATE);
+  r->listen_from = SIM_NEVER;
   body_init(&r->body, parameters, 0.0);
   r->body.id = robot_mover_id(number);
   body_place(&r->body, x, y, heading);

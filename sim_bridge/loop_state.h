@@ -1,5 +1,5 @@
 /* loop_state.h: what the files of the loop know of a simulation: loop.c runs it, loop_join.c builds it, loop_truth.c reads
- * it, loop_hands.c lays a test's hands on it.
+ * it, loop_hands.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again.
  */
 #ifndef LOOP_STATE_H
 #define LOOP_STATE_H
@@ -39,6 +39,7 @@ typedef struct {
   uint64_t last_byte;   /* cycle of the end of the last byte received */
   uint64_t listen_from; /* bytes end a run from this cycle on */
   uint64_t idle;        /* cycles without a byte after which the line is idle: two bytes' time */
+  uint64_t reset_at;    /* cycle of the last reset from outside */
   buffer truth;
   buffer looks;
   buffer tones;
@@ -65,8 +66,36 @@ struct sim {
   mover
       movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
   size_t obstacles;
-  scene seen; /* arena and all movers */
+  scene seen;    /* arena and all movers */
+  buffer inputs; /* from outside, as loop_inputs.c notes them */
+  int crashed;   /* 1: a board has */
 };
+
+/* What comes from outside, and what its words and bytes are in the notes; the numbers stand in saved simulations. */
+typedef enum {
+  INPUT_SEND = 1,      /* bytes */
+  INPUT_LINE_RATE = 2, /* bit/s */
+  INPUT_PLACE = 3,     /* x, y, heading */
+  INPUT_DRIVE = 4,     /* cycle, pin, level */
+  INPUT_WAVE = 5,      /* pin, half period, duration */
+  INPUT_WHISKER = 6,   /* pin, held */
+  INPUT_PING = 7,      /* cycles of the echo */
+  INPUT_SUPPLY = 8,    /* volts */
+  INPUT_BROWN_OUT = 9, /* the four parameters */
+  INPUT_RESET = 10,    /* cause */
+  INPUT_EEPROM = 11,   /* address; bytes */
+  INPUT_DAMAGE = 12,   /* damage, garbage */
+  INPUT_MEMORY = 13,   /* address; bytes */
+} input_kind;
+
+#define INPUT_WORDS 4 /* at most */
+
+/* Notes an input of now. */
+void sim_note(sim *self, int number, input_kind kind, const uint64_t *words, size_t count, const uint8_t *bytes,
+              size_t size);
+
+/* The bits of a double. */
+uint64_t input_of_double(double value);
 
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);

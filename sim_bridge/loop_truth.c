@@ -71,6 +71,11 @@ double sim_supply_voltage(const sim *self, int number) {
   return r == NULL ? 0.0 : r->chassis.supply * BOARD_NOMINAL_VOLTS;
 }
 
+uint64_t sim_reset_at(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->reset_at;
+}
+
 uint32_t sim_brown_outs(const sim *self, int number, uint32_t *upsets) {
   const robot *r = sim_robot(self, number);
   *upsets = r == NULL ? 0 : r->brown_out.upsets;

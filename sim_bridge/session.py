@@ -115,7 +115,8 @@ def alone(sim: Sim, paced: bool = False) -> Wait:
     pace = Pace(sim) if paced else None
 
     def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        sim.run(cycles, quiet, robot)
+        robot.listen(sim.cycle + max(quiet, 1))
+        sim.run_until(sim.cycle + cycles)
         if pace is not None:
             pace.wait()
 

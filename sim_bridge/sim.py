@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,7 @@ from numpy.typing import NDArray
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import imperfections, switches
+from sim_bridge import imperfections, saved, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
@@ -20,12 +23,27 @@ from sim_bridge.joining import done, join
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
+REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the clock
+PATIENCE_S = 2.0  # that replaying takes without a word
+REPORT_S = 0.1  # between two words of progress
 NEVER = 2**64 - 1
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
 TONE = ("time", "duration", "frequency")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 Floats = NDArray[np.float64]
+Pose = tuple[float, float, float]
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A robot as it was added."""
+
+    board: EmulatedBoard
+    description: robots.RobotDescription
+    pose: Pose
+    without: tuple[str, ...]
 
 
 class Sim:
@@ -59,10 +77,12 @@ class Sim:
                 f"{lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
         self.arena, self.seed, self.noise = arena, seed, noise
+        self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self._members: dict[int, tuple[EmulatedBoard, robots.RobotDescription]] = {}
+        self._members: dict[int, _Member] = {}
+        self._listening: dict[int, int] = {}
         # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
         # kept here leaves no cycle of references, in which the order would be anybody's guess.
         self.handle = ffi.gc(handle, lambda handle, keep=(arena, self._members): lib.sim_destroy(handle))
@@ -72,7 +92,7 @@ class Sim:
         board: EmulatedBoard,
         description: robots.RobotDescription,
         *,
-        pose: tuple[float, float, float] | None = None,
+        pose: Pose | None = None,
         number: int | None = None,
         without: Sequence[str] = (),
     ) -> SimRobot:
@@ -83,15 +103,18 @@ class Sim:
 
         Raises:
             ArenaError: that place is not free.
-            BoardError: the number is taken or negative, there are too many robots, or no such imperfection.
+            BoardError: the number is taken or negative, there are too many robots, no such imperfection, or the
+                simulation runs already.
         """
+        if self.cycle:
+            raise BoardError("the simulation runs already; expected all of its robots before")
         if number is None:
             number = max(self._members, default=-1) + 1
         if number < 0 or number in self._members:
             raise BoardError(f"robot number {number} is taken or negative")
         if len(self._members) == lib.BODY_MAXIMUM:
             raise BoardError(f"a simulation takes {len(self._members)} robots at most")
-        x, y, heading = self.arena.start if pose is None else pose
+        x, y, heading = pose = self.arena.start if pose is None else pose
         draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
         body = imperfections.body_parameters(description.body, draw)
         status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
@@ -100,7 +123,7 @@ class Sim:
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
         done(status, f"the {board.description}")
-        self._members[number] = board, description
+        self._members[number] = _Member(board, description, pose, tuple(without))
         join(self.handle, number, switches.idealised(description, without), draw)
         return self.robot(number)
 
@@ -112,7 +135,7 @@ class Sim:
         """
         if number not in self._members:
             raise BoardError(f"there is no robot number {number} in this simulation")
-        return SimRobot(self, number, *self._members[number])
+        return SimRobot(self, number)
 
     @property
     def robots(self) -> list[SimRobot]:
@@ -124,16 +147,15 @@ class Sim:
         """Up to where the simulation has run."""
         return int(lib.sim_now(self.handle))
 
-    def run(self, cycles: int, quiet: int = 0, hear: SimRobot | None = None) -> None:
-        """Runs for at most `cycles`; after `quiet` of them, until bytes have come and the line is idle.
-
-        `hear`: the robot whose bytes end the run; None: anybody's.
+    def run(self, cycles: int) -> None:
+        """Runs for so many cycles, whoever speaks.
 
         Raises:
             BoardError: a board's program crashed.
         """
-        number = lib.SIM_ANY if hear is None else hear.number
-        self._check(lib.sim_run(self.handle, number, cycles, quiet))
+        until = self.cycle + cycles
+        while self.cycle < until:
+            self.run_until(until)
 
     def run_until(self, cycle: int) -> None:
         """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`).
@@ -145,7 +167,7 @@ class Sim:
 
     def _check(self, crashed: int) -> None:
         if crashed:
-            board, _ = self._members[crashed - 1]
+            board = self._members[crashed - 1].board
             whose = f" of robot {crashed}" if len(self._members) > 1 else ""
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
@@ -155,22 +177,151 @@ class Sim:
         """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""
         return int(lib.sim_hash(self.handle))
 
+    # ---- save and restore --------------------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """The state of world and boards, to be gone on from by `restore`; what the host's end knows is not in it.
+
+        Raises:
+            SavedStateError: a board has crashed, or runs no firmware.
+        """
+        for number, member in self._members.items():
+            if not member.board.can_repeat:
+                raise saved.SavedStateError(
+                    f"robot {number} cannot be saved: its {member.board.description} runs a script"
+                )
+        count = ffi.new("size_t *")
+        inputs = lib.sim_inputs(self.handle, count)
+        if inputs == ffi.NULL:
+            raise saved.SavedStateError("this simulation cannot be saved: a board has crashed, or memory ran out")
+        return saved.encode(self._heading(), ffi.buffer(inputs, count[0])[:])
+
+    def restore(self, state: bytes, progress: Progress | None = None) -> None:
+        """Goes to a saved state, and on from there as the simulation went on that was saved, bit for bit.
+
+        This one has the same arena, seeds and robots with the same firmware; it may have run, and may stand before or
+        behind that state. All is replayed from the start, at the speed of the boards. Whoever holds a `SimRobot` or
+        `BoardPins` may keep it.
+
+        Args:
+            progress: called with the seconds that have been replayed, about ten times a second. None: where it takes
+                over two seconds, a line on standard error.
+
+        Raises:
+            SavedStateError: the bytes are damaged, of another simulation, or lead to another state; then nothing has
+                changed here.
+            BoardError: the firmware has changed on disk.
+        """
+        heading, inputs = saved.decode(state)
+        saved.check_alike(heading, self._heading())
+        fresh = Sim(self.arena, seed=self.seed, noise=self.noise, record=self._record, step_cycles=self._step_cycles)
+        try:
+            for number, member in self._members.items():
+                board = member.board.again()
+                try:
+                    fresh.add(board, member.description, pose=member.pose, number=number, without=member.without)
+                except Exception:
+                    board.close()
+                    raise
+            fresh._replay(heading, inputs, progress or _Patience(heading.cycle / CLOCK_HZ).report)
+        except BaseException:
+            fresh.close()
+            raise
+        self.close()
+        self.handle, self._members = fresh.handle, fresh._members
+        for number, cycle in self._listening.items():
+            lib.sim_listen(self.handle, number, cycle)
+
+    def _heading(self) -> saved.Heading:
+        return saved.Heading(
+            format=saved.FORMAT,
+            cycle=self.cycle,
+            state=f"{lib.sim_state_hash(self.handle):016x}",
+            seed=self.seed,
+            noise=self.noise,
+            record=self._record,
+            step_cycles=self._step_cycles,
+            arena=self.arena.name,
+            arena_print=saved.print_of(self.arena.description),
+            robots=[
+                saved.SavedRobot(
+                    number=number,
+                    name=member.description.name,
+                    built=saved.print_of(member.description, member.pose, member.without),
+                    firmware=member.board.firmware,
+                    waiting=lib.sim_waiting(self.handle, number),
+                )
+                for number, member in sorted(self._members.items())
+            ],
+        )
+
+    def _replay(self, heading: saved.Heading, inputs: bytes, progress: Progress) -> None:
+        """From the start to where `heading` says."""
+        at = ffi.new("size_t *")
+        shown = time.monotonic()
+        while at[0] < len(inputs) or self.cycle < heading.cycle:
+            is_last = self.cycle == heading.cycle
+            until = min(self.cycle + REPLAY_CYCLES, heading.cycle)
+            status = lib.sim_replay(self.handle, inputs, len(inputs), at, until)
+            if status < 0 or (is_last and at[0] < len(inputs)):
+                raise saved.SavedStateError(
+                    "the saved simulation has an input that does not fit; expected what save() gave"
+                )
+            self._check(status)
+            if time.monotonic() - shown > REPORT_S:
+                shown = time.monotonic()
+                progress(self.cycle / CLOCK_HZ)
+        for robot in heading.robots:
+            lib.sim_forget_received(self.handle, robot.number, robot.waiting)
+        if self._heading() != heading:
+            raise saved.SavedStateError(
+                f"replaying came to another state at {self.cycle / CLOCK_HZ:.3f} s: another version of the simulator "
+                "saved it"
+            )
+
     def close(self) -> None:
         """Frees the simulation, then the boards."""
         ffi.release(self.handle)
-        for board, _ in self._members.values():
-            board.close()
+        for member in self._members.values():
+            member.board.close()
+
+
+class _Patience:
+    """Says on standard error how far a replay has come, once it takes its time."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._next = time.monotonic() + PATIENCE_S
+
+    def report(self, passed: float) -> None:
+        """So many seconds have been replayed."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + PATIENCE_S
+            print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 class SimRobot:
     """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
 
-    def __init__(self, sim: Sim, number: int, board: EmulatedBoard, description: robots.RobotDescription) -> None:
-        self.sim, self.number, self.board, self.description = sim, number, board, description
-        self._handle = sim.handle
+    def __init__(self, sim: Sim, number: int) -> None:
+        self.sim, self.number = sim, number
         self._bytes = ffi.new("uint8_t[]", 65536)
         self._count = ffi.new("size_t *")
         self._body = ffi.new("body_state *")
+
+    @property
+    def board(self) -> EmulatedBoard:
+        """Its board; another one after `Sim.restore`."""
+        return self.sim._members[self.number].board
+
+    @property
+    def description(self) -> robots.RobotDescription:
+        """What it was built from."""
+        return self.sim._members[self.number].description
+
+    @property
+    def _handle(self) -> Any:
+        return self.sim.handle
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
@@ -186,6 +337,7 @@ class SimRobot:
 
     def listen(self, cycle: int) -> None:
         """From that cycle on its bytes end a run of `Sim.run_until`."""
+        self.sim._listening[self.number] = cycle
         lib.sim_listen(self._handle, self.number, cycle)
 
     @property

@@ -61,7 +61,7 @@ class Scripted:
 
     def run(self, seconds: float) -> None:
         cycles = round(seconds * CLOCK_HZ)
-        self.sim.run(cycles, cycles)
+        self.sim.run(cycles)
 
     def edge(self, cycle: int, pin: int, level: int) -> None:
         """The board will do `level` to `pin` at `cycle`; call in order of time."""

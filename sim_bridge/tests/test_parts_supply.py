@@ -50,7 +50,7 @@ def robot(request: pytest.FixtureRequest) -> Iterator[SimRobot]:
 
 def run(robot: SimRobot, seconds: float) -> None:
     cycles = round(seconds * CLOCK_HZ)
-    robot.sim.run(cycles, cycles)
+    robot.sim.run(cycles)
 
 
 def test_below_the_fuse_the_board_is_held_in_reset(robot: SimRobot) -> None:
