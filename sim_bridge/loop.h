@@ -1,10 +1,13 @@
-/* loop.h: one simulation: an arena, robots in it, a board on each, everything in lockstep.
+/* loop.h: one simulation: an arena, robots in it, on each a board or none, everything in lockstep.
  *
  * The world leads: a step takes world and parts from t to t + dt by what the pins did until t, and parts queue their edges
  * at exact cycles of that span; then each board runs through it, and its edges go to the parts as they happen. Everything
  * is counted in cycles of the boards' 16 MHz. The simulation knows bytes, not messages.
  *
- * Boards and arena belong to whoever made them and must outlive the simulation.
+ * A robot without a board is a vehicle (vehicles/vehicle.h): its sensors read at the end of the world's step, and its
+ * motor signals hold until it gets others.
+ *
+ * Boards, models and arena belong to whoever made them and must outlive the simulation.
  */
 #ifndef LOOP_H
 #define LOOP_H
@@ -25,6 +28,7 @@
 #include "parts/servo.h"
 #include "parts/turret.h"
 #include "parts/whisker.h"
+#include "vehicles/model.h"
 #include "world/arena.h"
 #include "world/body.h"
 
@@ -60,6 +64,15 @@ void sim_destroy(sim *self);
  * its noise: a run is the same in whatever order robots are added. Returns SIM_OK or an error. */
 int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *parameters, double x, double y,
                   double heading);
+
+/* The same for a robot without a board; its model steps as far as the world. */
+int sim_add_vehicle(sim *self, int robot, const vehicle_model *model, double x, double y, double heading);
+
+/* Motor signals of such a robot, from now on; its readings, which stay in place; and VEHICLE_RUNS, or why its motors do
+ * nothing any more. NULL and VEHICLE_RUNS for others. */
+int sim_signals(sim *self, int robot, double left, double right);
+const double *sim_readings(sim *self, int robot, size_t *count);
+int sim_vehicle_flag(const sim *self, int robot);
 
 /* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
 int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);

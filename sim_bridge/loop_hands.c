@@ -9,10 +9,10 @@ static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !isfinite(x + y + heading)) return SIM_BAD_ARGUMENT;
-  if (!scene_is_free(&self->seen, x, y, r->body.parameters.radius, r->chassis.self_id)) return SIM_NOT_FREE;
+  if (!scene_is_free(&self->seen, x, y, r->body->parameters.radius, r->chassis.self_id)) return SIM_NOT_FREE;
   const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
   sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
-  body_place(&r->body, x, y, heading);
+  body_place(r->body, x, y, heading);
   r->chassis.x = x;
   r->chassis.y = y;
   r->chassis.heading = heading;
@@ -35,7 +35,7 @@ static int take_pin(robot *r, uint8_t pin) {
 }
 
 int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
   const uint64_t words[] = {at, pin, level};
   sim_note(self, number, INPUT_DRIVE, words, 3, NULL, 0);
@@ -50,7 +50,7 @@ int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
 }
 
 int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || bad_pin(pin) || half_cycles == 0) return SIM_BAD_ARGUMENT;
   int i = 0; /* the place of this pin's wave, or of one that is over, or a new one */
   while (i < r->waves && r->wave[i].pin != pin) i++;
@@ -81,7 +81,7 @@ void robot_step_waves(robot *self, uint64_t until) {
 }
 
 int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || held < -1 || held > 1) return SIM_BAD_ARGUMENT;
   for (int i = 0; i < r->part_count; i++) {
     whisker *w = whisker_of(r->parts[i]);
@@ -95,7 +95,7 @@ int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
 }
 
 int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   int pings = 0;
   for (int i = 0; r != NULL && i < r->part_count; i++) {
     ping *p = ping_of(r->parts[i]);
@@ -110,7 +110,7 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
 }
 
 int sim_set_supply(sim *self, int number, double volts) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !(volts >= 0.0) || !isfinite(volts)) return SIM_BAD_ARGUMENT;
   const uint64_t word = input_of_double(volts);
   sim_note(self, number, INPUT_SUPPLY, &word, 1, NULL, 0);
@@ -120,7 +120,7 @@ int sim_set_supply(sim *self, int number, double volts) {
 }
 
 int sim_set_brown_out(sim *self, int number, const brown_out_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   const brown_out_parameters *p = parameters;
   if (r == NULL || !(p->reset_v >= 0.0 && p->reset_v < p->erratic_v && p->hysteresis_v >= 0.0)) return SIM_BAD_ARGUMENT;
   if (!(p->upsets_per_s >= 0.0)) return SIM_BAD_ARGUMENT;
@@ -132,7 +132,7 @@ int sim_set_brown_out(sim *self, int number, const brown_out_parameters *paramet
 }
 
 int sim_reset(sim *self, int number, int cause) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || cause < BOARD_RESET_POWER || cause > BOARD_RESET_WATCHDOG) return SIM_BAD_ARGUMENT;
   const uint64_t word = (uint64_t)cause;
   sim_note(self, number, INPUT_RESET, &word, 1, NULL, 0);
@@ -158,19 +158,19 @@ static board_eeprom *eeprom_of(const robot *r) {
 }
 
 int sim_write_eeprom(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
-  const board_eeprom *eeprom = eeprom_of(sim_robot(self, number));
+  const board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
   uint8_t *cells = eeprom == NULL ? NULL : eeprom->bytes;
   return write_cells(self, number, INPUT_EEPROM, cells, BOARD_EEPROM_SIZE, address, bytes, count);
 }
 
 int sim_write_memory(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
-  const robot *r = sim_robot(self, number);
+  const robot *r = sim_robot_with_board(self, number);
   uint8_t *cells = r == NULL ? NULL : r->board->op->extension(r->board, BOARD_DATA);
   return write_cells(self, number, INPUT_MEMORY, cells, BOARD_DATA_SIZE, address, bytes, count);
 }
 
 int sim_damage_eeprom(sim *self, int number, int damage, uint8_t garbage) {
-  board_eeprom *eeprom = eeprom_of(sim_robot(self, number));
+  board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
   if (eeprom == NULL || damage < BOARD_DAMAGE_ERASED || damage > BOARD_DAMAGE_GARBAGE) return SIM_BAD_ARGUMENT;
   const uint64_t words[] = {(uint64_t)damage, garbage};
   sim_note(self, number, INPUT_DAMAGE, words, 2, NULL, 0);

@@ -124,6 +124,8 @@ static int apply(sim *self, const input *in) {
       return sim_write_eeprom(self, n, (uint32_t)w[0], in->bytes, in->size);
     case INPUT_DAMAGE:
       return sim_damage_eeprom(self, n, (int)w[0], (uint8_t)w[1]);
+    case INPUT_SIGNALS:
+      return sim_signals(self, n, double_of_input(w[0]), double_of_input(w[1]));
     case INPUT_MEMORY:
       return sim_write_memory(self, n, (uint32_t)w[0], in->bytes, in->size);
     default:
@@ -196,7 +198,8 @@ uint64_t sim_state_hash(const sim *self) {
     const robot *r = self->robots[i];
     const double supply[] = {r->chassis.supply, r->battery == NULL ? 0.0 : r->battery->supply.pack_v};
     for (int k = 0; k < 2; k++) sum = noise_mix(sum ^ input_of_double(supply[k]));
-    sum = mixed_board(noise_mix(sum ^ r->contacts), r);
+    sum = noise_mix(sum ^ r->contacts);
+    sum = r->vehicle != NULL ? noise_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
   }
   return sum;
 }

@@ -1,11 +1,13 @@
 /* loop_state.h: what the files of the loop know of a simulation: loop.c runs it, loop_join.c builds it, loop_truth.c reads
- * it, loop_hands.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again.
+ * it, loop_hands.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again,
+ * loop_vehicle.c has the robots without boards.
  */
 #ifndef LOOP_STATE_H
 #define LOOP_STATE_H
 
 #include "loop.h"
 #include "parts/part.h"
+#include "vehicles/vehicle.h"
 
 #define WAVES_MAXIMUM 4
 #define SIM_NEVER UINT64_MAX
@@ -22,8 +24,11 @@ typedef struct {
 typedef struct {
   sim *sim;
   int number;
-  board *board;
-  body body;
+  board *board; /* NULL: it has none, and is a vehicle */
+  body *body;
+  vehicles *vehicle;   /* one world, which is this simulation's; NULL: it has a board */
+  double speed_before; /* of a vehicle, when the step under way begins */
+  body own;            /* of a robot with a board */
   chassis chassis;
   part **parts;
   int part_count;
@@ -86,6 +91,7 @@ typedef enum {
   INPUT_EEPROM = 11,   /* address; bytes */
   INPUT_DAMAGE = 12,   /* damage, garbage */
   INPUT_MEMORY = 13,   /* address; bytes */
+  INPUT_SIGNALS = 14,  /* left, right */
 } input_kind;
 
 #define INPUT_WORDS 4 /* at most */
@@ -100,8 +106,28 @@ uint64_t input_of_double(double value);
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);
 
+/* The same; NULL also for one without a board. */
+robot *sim_robot_with_board(const sim *self, int number);
+
 /* The turret on that pin, or NULL. */
 turret *robot_turret(const robot *self, uint8_t pin);
+
+/* A new robot with a board or without; the caller fills in its body. NULL without memory. */
+robot *sim_new_robot(sim *self, int number, board *b);
+
+/* It stands at that pose, and is among the others from now on. */
+void sim_insert(sim *self, robot *r, double x, double y, double heading);
+
+/* SIM_OK where there can be one more robot of that number and radius at a place. */
+int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
+
+/* loop_vehicle.c: sensors of robots without a board begin anew, when another robot has come: they may meet another thing
+ * now. */
+void sim_sense_anew(sim *self);
+
+/* loop_vehicle.c: before and after the world's step, of a robot without a board. */
+void vehicle_prepare(robot *r);
+void vehicle_follow(robot *r);
 
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);

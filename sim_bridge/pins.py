@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
-from sim_bridge.sim import SimRobot
+from sim_bridge.sim_robot import SimRobot
 
 EDGE = np.dtype(  # sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}

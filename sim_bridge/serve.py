@@ -20,7 +20,8 @@ from typing import Protocol
 
 from boebot.boards import BoardRequest
 from boebot.errors import BoardError
-from sim_bridge.session import Pace, SimSession, open_avr, open_native
+from sim_bridge.opening import Pace
+from sim_bridge.session import SimSession, open_avr, open_native
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
 BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late

@@ -6,10 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
@@ -19,6 +15,9 @@ from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.joining import done, join
+from sim_bridge.sim_robot import SimRobot
+from sim_bridge.vehicle import VehicleModel
+from sim_bridge.vehicle_joining import vehicle_model
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
@@ -27,23 +26,21 @@ REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the
 PATIENCE_S = 2.0  # that replaying takes without a word
 REPORT_S = 0.1  # between two words of progress
 NEVER = 2**64 - 1
-TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
-TONE = ("time", "duration", "frequency")
-LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
-Floats = NDArray[np.float64]
 Pose = tuple[float, float, float]
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class _Member:
+class Member:
     """A robot as it was added."""
 
-    board: EmulatedBoard
+    board: EmulatedBoard | None
     description: robots.RobotDescription
     pose: Pose
     without: tuple[str, ...]
+    model: VehicleModel | None
+    """of a robot without a board"""
 
 
 class Sim:
@@ -73,23 +70,22 @@ class Sim:
         moving = int(lib.arena_moving_count(arena.handle))
         if moving > lib.SIM_OBSTACLES_MAXIMUM:
             raise ArenaError(
-                f"arena {arena.name}: {moving} moving obstacles; a simulation with boards takes "
-                f"{lib.SIM_OBSTACLES_MAXIMUM} at most"
+                f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
         self.arena, self.seed, self.noise = arena, seed, noise
         self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self._members: dict[int, _Member] = {}
-        self._listening: dict[int, int] = {}
+        self.members: dict[int, Member] = {}
+        self.listening: dict[int, int] = {}
         # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
         # kept here leaves no cycle of references, in which the order would be anybody's guess.
-        self.handle = ffi.gc(handle, lambda handle, keep=(arena, self._members): lib.sim_destroy(handle))
+        self.handle = ffi.gc(handle, lambda handle, keep=(arena, self.members): lib.sim_destroy(handle))
 
     def add(
         self,
-        board: EmulatedBoard,
+        board: EmulatedBoard | None,
         description: robots.RobotDescription,
         *,
         pose: Pose | None = None,
@@ -99,33 +95,65 @@ class Sim:
         """Puts a robot at `pose` (x, y, heading; m, m, rad), or where the arena says.
 
         `number` is its name in the run and the key of its noise and its imperfections: the next one if None.
-        `without`: its imperfections that are switched off (switches.py).
+        `without`: its imperfections that are switched off (switches.py). `board` is None for a robot whose description
+        has none: it gets motor signals, and gives readings once every world step.
 
         Raises:
             ArenaError: that place is not free.
+            RobotError: a description that is none of a robot without a board.
             BoardError: the number is taken or negative, there are too many robots, no such imperfection, or the
                 simulation runs already.
         """
         if self.cycle:
             raise BoardError("the simulation runs already; expected all of its robots before")
         if number is None:
-            number = max(self._members, default=-1) + 1
-        if number < 0 or number in self._members:
+            number = max(self.members, default=-1) + 1
+        if number < 0 or number in self.members:
             raise BoardError(f"robot number {number} is taken or negative")
-        if len(self._members) == lib.BODY_MAXIMUM:
-            raise BoardError(f"a simulation takes {len(self._members)} robots at most")
-        x, y, heading = pose = self.arena.start if pose is None else pose
+        if len(self.members) == lib.BODY_MAXIMUM:
+            raise BoardError(f"a simulation takes {len(self.members)} robots at most")
+        if description.has_board != (board is not None):
+            has = "has a board" if description.has_board else "has no board"
+            raise BoardError(f"robot {description.name!r} {has}; expected one that fits what it is added with")
+        pose = self.arena.start if pose is None else pose
+        if board is None:
+            self._add_vehicle(number, description, pose, without)
+        else:
+            self._add_robot(number, board, description, pose, without)
+        return self.robot(number)
+
+    def _add_robot(
+        self,
+        number: int,
+        board: EmulatedBoard,
+        description: robots.RobotDescription,
+        pose: Pose,
+        without: Sequence[str],
+    ) -> None:
         draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
         body = imperfections.body_parameters(description.body, draw)
-        status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
+        status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
+        self._check_place(status, pose)
+        done(status, f"the {board.description}")
+        self.members[number] = Member(board, description, pose, tuple(without), None)
+        join(self.handle, number, switches.idealised(description, without), draw)
+
+    def _add_vehicle(
+        self, number: int, description: robots.RobotDescription, pose: Pose, without: Sequence[str]
+    ) -> None:
+        model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise, without=without)
+        status = lib.sim_add_vehicle(self.handle, number, model.handle, *pose)
+        self._check_place(status, pose)
+        done(status, f"robot {description.name!r}")
+        model.in_use = True
+        self.members[number] = Member(None, description, pose, tuple(without), model)
+
+    def _check_place(self, status: int, pose: Pose) -> None:
         if status == lib.SIM_NOT_FREE:
+            x, y, _ = pose
             raise ArenaError(
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
-        done(status, f"the {board.description}")
-        self._members[number] = _Member(board, description, pose, tuple(without))
-        join(self.handle, number, switches.idealised(description, without), draw)
-        return self.robot(number)
 
     def robot(self, number: int) -> SimRobot:
         """The robot of that number.
@@ -133,14 +161,14 @@ class Sim:
         Raises:
             BoardError: there is none.
         """
-        if number not in self._members:
+        if number not in self.members:
             raise BoardError(f"there is no robot number {number} in this simulation")
         return SimRobot(self, number)
 
     @property
     def robots(self) -> list[SimRobot]:
         """All of them, by increasing number."""
-        return [self.robot(number) for number in sorted(self._members)]
+        return [self.robot(number) for number in sorted(self.members)]
 
     @property
     def cycle(self) -> int:
@@ -167,8 +195,8 @@ class Sim:
 
     def _check(self, crashed: int) -> None:
         if crashed:
-            board = self._members[crashed - 1].board
-            whose = f" of robot {crashed}" if len(self._members) > 1 else ""
+            board = self.robot(crashed - 1).board
+            whose = f" of robot {crashed}" if len(self.members) > 1 else ""
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
             raise BoardError(f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
@@ -185,8 +213,8 @@ class Sim:
         Raises:
             SavedStateError: a board has crashed, or runs no firmware.
         """
-        for number, member in self._members.items():
-            if not member.board.can_repeat:
+        for number, member in self.members.items():
+            if member.board is not None and not member.board.can_repeat:
                 raise saved.SavedStateError(
                     f"robot {number} cannot be saved: its {member.board.description} runs a script"
                 )
@@ -216,20 +244,21 @@ class Sim:
         saved.check_alike(heading, self._heading())
         fresh = Sim(self.arena, seed=self.seed, noise=self.noise, record=self._record, step_cycles=self._step_cycles)
         try:
-            for number, member in self._members.items():
-                board = member.board.again()
+            for number, member in self.members.items():
+                board = None if member.board is None else member.board.again()
                 try:
                     fresh.add(board, member.description, pose=member.pose, number=number, without=member.without)
                 except Exception:
-                    board.close()
+                    if board is not None:
+                        board.close()
                     raise
             fresh._replay(heading, inputs, progress or _Patience(heading.cycle / CLOCK_HZ).report)
         except BaseException:
             fresh.close()
             raise
         self.close()
-        self.handle, self._members = fresh.handle, fresh._members
-        for number, cycle in self._listening.items():
+        self.handle, self.members = fresh.handle, fresh.members
+        for number, cycle in self.listening.items():
             lib.sim_listen(self.handle, number, cycle)
 
     def _heading(self) -> saved.Heading:
@@ -248,10 +277,10 @@ class Sim:
                     number=number,
                     name=member.description.name,
                     built=saved.print_of(member.description, member.pose, member.without),
-                    firmware=member.board.firmware,
+                    firmware="" if member.board is None else member.board.firmware,
                     waiting=lib.sim_waiting(self.handle, number),
                 )
-                for number, member in sorted(self._members.items())
+                for number, member in sorted(self.members.items())
             ],
         )
 
@@ -282,8 +311,9 @@ class Sim:
     def close(self) -> None:
         """Frees the simulation, then the boards."""
         ffi.release(self.handle)
-        for member in self._members.values():
-            member.board.close()
+        for member in self.members.values():
+            if member.board is not None:
+                member.board.close()
 
 
 class _Patience:
@@ -298,100 +328,3 @@ class _Patience:
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + PATIENCE_S
             print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)
-
-
-class SimRobot:
-    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
-
-    def __init__(self, sim: Sim, number: int) -> None:
-        self.sim, self.number = sim, number
-        self._bytes = ffi.new("uint8_t[]", 65536)
-        self._count = ffi.new("size_t *")
-        self._body = ffi.new("body_state *")
-
-    @property
-    def board(self) -> EmulatedBoard:
-        """Its board; another one after `Sim.restore`."""
-        return self.sim._members[self.number].board
-
-    @property
-    def description(self) -> robots.RobotDescription:
-        """What it was built from."""
-        return self.sim._members[self.number].description
-
-    @property
-    def _handle(self) -> Any:
-        return self.sim.handle
-
-    def receive(self) -> bytes:
-        """Bytes that left the board since the last call."""
-        count = lib.sim_receive(self._handle, self.number, self._bytes, 65536)
-        if not count:
-            return b""
-        data: bytes = ffi.buffer(self._bytes, count)[:]
-        return data if count < 65536 else data + self.receive()
-
-    def send(self, data: bytes) -> None:
-        """Bytes to the board, from now on."""
-        lib.sim_send(self._handle, self.number, data, len(data))
-
-    def listen(self, cycle: int) -> None:
-        """From that cycle on its bytes end a run of `Sim.run_until`."""
-        self.sim._listening[self.number] = cycle
-        lib.sim_listen(self._handle, self.number, cycle)
-
-    @property
-    def speaks(self) -> bool:
-        """Bytes have come since it is listened to, and the line has been idle since."""
-        return bool(lib.sim_speaks(self._handle, self.number))
-
-    def line_rate(self, baud: int) -> None:
-        """Bit rate of the outside's side of the serial line."""
-        lib.sim_line_rate(self._handle, self.number, baud)
-
-    @property
-    def last_byte_cycle(self) -> int:
-        """At which the last byte from the board had come."""
-        return int(lib.sim_last_byte(self._handle, self.number))
-
-    @property
-    def contacts(self) -> int:
-        """Touches begun so far; apart by 0.1 s at least."""
-        return int(lib.sim_contacts(self._handle, self.number))
-
-    @property
-    def pack_voltage(self) -> float:
-        """Of the battery, V."""
-        return float(lib.sim_pack_voltage(self._handle, self.number))
-
-    @property
-    def supply_voltage(self) -> float:
-        """Of the rail that the board runs on, V."""
-        return float(lib.sim_supply_voltage(self._handle, self.number))
-
-    def body(self) -> Any:
-        """The body's state (C struct body_state): pose, speeds, wheel angles, distance, contact."""
-        lib.sim_body(self._handle, self.number, self._body)
-        return self._body
-
-    def _rows(self, rows: Any, columns: tuple[str, ...]) -> dict[str, Floats]:
-        count = self._count[0]
-        size = count * len(columns) * 8
-        table = np.frombuffer(ffi.buffer(rows, size)[:] if count else b"", dtype=np.float64)
-        return dict(zip(columns, table.reshape(-1, len(columns)).T, strict=True))
-
-    def truth(self) -> dict[str, Floats]:
-        """Columns `TRUTH`, one row every 10 ms; empty without recording."""
-        return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
-
-    def tones(self) -> dict[str, Floats]:
-        """Columns `TONE`, one row per tone that a buzzer has sounded."""
-        return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
-
-    def turret_angle(self, pin: int) -> float:
-        """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
-        return float(lib.sim_turret_angle(self._handle, self.number, pin))
-
-    def looks(self) -> dict[str, Floats]:
-        """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
-        return self._rows(lib.sim_looks(self._handle, self.number, self._count), LOOK)

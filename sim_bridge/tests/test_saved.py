@@ -25,6 +25,7 @@ from boebot.link.session import Link
 from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.robots import load_robot
+from sim_bridge import opening
 from sim_bridge import session as sessions
 from sim_bridge.arena import Arena, load_arena
 from sim_bridge.boards.board import CLOCK_HZ, Damage
@@ -152,10 +153,9 @@ def digest(result: RunResult) -> str:
 def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The world is saved, driven astray and restored beneath a brain in mid-run, which does not notice."""
     opened: list[Sim] = []
-    new_sim = sessions.new_sim
 
-    def watched(request: BoardRequest) -> Sim:
-        opened.append(new_sim(request))
+    def watched(request: BoardRequest, step_s: float) -> Sim:
+        opened.append(opening.new_sim(request, step_s))
         return opened[-1]
 
     monkeypatch.setattr(sessions, "new_sim", watched)
