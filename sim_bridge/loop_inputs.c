@@ -196,8 +196,8 @@ uint64_t sim_state_hash(const sim *self) {
   uint64_t sum = noise_mix(self->now) ^ sim_hash(self);
   for (int i = 0; i < self->robot_count; i++) {
     const robot *r = self->robots[i];
-    const double supply[] = {r->chassis.supply, r->battery == NULL ? 0.0 : r->battery->supply.pack_v};
-    for (int k = 0; k < 2; k++) sum = noise_mix(sum ^ input_of_double(supply[k]));
+    const double volts[] = {r->chassis.supply, r->battery == NULL ? 0.0 : r->battery->supply.pack_v};
+    for (int k = 0; k < 2; k++) sum = noise_mix(sum ^ input_of_double(volts[k]));
     sum = noise_mix(sum ^ r->contacts);
     sum = r->vehicle != NULL ? noise_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
   }
