@@ -1,19 +1,22 @@
 """A robot without a board in a simulated world, as the host opens it: a vehicle built from the robot's description.
 
-`open_direct` is what the entry point of the group `boebot.vehicles` names.
+`open_direct` is what the entry point of the group `boebot.vehicles` names: called with one request it gives a session,
+its `together` puts several such robots into one world. Where there are robots with boards too, it is the boards' turn
+(sim_bridge.session).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from boebot.boards import BoardRequest, Truth
-from sim_bridge.arena import load_arena
-from sim_bridge.floor_plan import floor_plan
-from sim_bridge.model_file import STEP_S, vehicle_model
-from sim_bridge.vehicle import Vehicle
+from boebot.boards import BoardRequest, SharedWorld, Truth
+from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.opening import Wait, alone, new_sim, truth_of
+from sim_bridge.sim import Sim
+from sim_bridge.sim_robot import SimRobot
+from sim_bridge.together import SimWorld
+from sim_bridge.model_file import STEP_S
 
 DEFAULT_ARENA = "arsim"
 
@@ -23,66 +26,84 @@ class DirectSession:
 
     tick_s = STEP_S
 
-    def __init__(self, vehicle: Vehicle, record: bool = True) -> None:
-        self.vehicle = vehicle
-        self.arena = vehicle.arena
-        self.layout: Mapping[str, slice] = dict(vehicle.model.names)
-        self.description = f"robot without a board in arena {vehicle.arena.name}"
-        self._rows: list[tuple[float, ...]] | None = [] if record else None
-        self._note()
-
-    def _note(self) -> None:
-        if self._rows is not None:
-            body = self.vehicle.body
-            self._rows.append((body.x, body.y, body.heading, body.rim_left, body.rim_right, body.touching))
+    def __init__(self, robot: SimRobot, wait: Wait, *, shared: bool = False) -> None:
+        """`shared`: the world is not this robot's alone, and is closed by somebody else."""
+        self.robot = robot
+        self.sim = robot.sim
+        self.layout: Mapping[str, slice] = robot.layout
+        self.description = f"robot without a board in arena {robot.sim.arena.name}"
+        self._wait = wait
+        self._cycles = round(STEP_S * CLOCK_HZ)
+        self._shared = shared
 
     def readings(self) -> tuple[float, ...]:
         """All readings now."""
-        return tuple(self.vehicle.readings)
+        return self.robot.readings()
 
     def step(self, left: float, right: float) -> None:
         """One step under these motor signals."""
-        self.vehicle.step(left, right)
-        self._note()
+        self.robot.signals(left, right)
+        self._wait(self.robot, self._cycles, self._cycles)
+
+    def stop(self) -> None:
+        """No motor signals from now on."""
+        self.robot.signals(0.0, 0.0)
 
     @property
     def ended(self) -> str:
         """Why it can go no further, or ""."""
-        return self.vehicle.ended
+        return self.robot.ended
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""
-        if self._rows is None:
-            return None
-        x, y, heading, left, right, touching = np.array(self._rows, dtype=np.float64).reshape(-1, 6).T
-        time = np.arange(len(x), dtype=np.float64) * self.tick_s
-        return Truth(
-            time=time,
-            x=x,
-            y=y,
-            heading=heading,
-            contact=touching > 0,
-            left_speed=left,
-            right_speed=right,
-            plan=floor_plan(self.arena, 0.0, float(time[-1])),
-        )
+        return truth_of(self.robot)
 
     def counters(self) -> Mapping[str, float]:
-        """`distance` (m) and `time` (s)."""
-        return {"distance": float(self.vehicle.body.distance), "time": self.vehicle.time}
+        """`contacts`, `distance` (m) and `time` (s)."""
+        return {
+            "contacts": float(self.robot.contacts),
+            "distance": float(self.robot.body().distance),
+            "time": self.sim.cycle / CLOCK_HZ,
+        }
 
     def close(self) -> None:
-        """Nothing is held beyond the vehicle's memory."""
+        """Frees the world. May be called twice."""
+        if not self._shared:
+            self.sim.close()
 
 
-def open_direct(request: BoardRequest) -> DirectSession:
-    """Opens a robot without a board.
+def add_vehicle(sim: Sim, request: BoardRequest) -> SimRobot:
+    """Puts the request's robot, which has no board, into a world.
 
     Raises:
         RobotError: its description is none of such a robot.
-        ArenaError: no such arena, or its start is not free.
+        ArenaError: its place is not free.
         BoardError: no such imperfection.
     """
-    arena = load_arena(request.arena or DEFAULT_ARENA)
-    model = vehicle_model(request.robot, noise=request.noise, without=request.without)
-    return DirectSession(Vehicle(model, arena, pose=request.start_pose, seed=request.seed), request.record)
+    return sim.add(None, request.robot, pose=request.start_pose, without=request.without)
+
+
+class DirectKind:
+    """Robots without boards (VehicleFactory and TogetherFactory of boebot.boards)."""
+
+    def __call__(self, request: BoardRequest) -> DirectSession:
+        """Opens one in a world of its own. Raises as `add_vehicle`, and an ArenaError where there is no such arena."""
+        sim = new_sim(_in_arena(request), STEP_S)
+        try:
+            return DirectSession(add_vehicle(sim, request), alone(sim))
+        except Exception:
+            sim.close()
+            raise
+
+    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
+        """Opens several in one world."""
+        sim = new_sim(_in_arena(requests[0]), STEP_S)
+        return SimWorld(sim, requests, add_vehicle, lambda robot, wait: DirectSession(robot, wait, shared=True))
+
+
+def _in_arena(request: BoardRequest) -> BoardRequest:
+    return request if request.arena else replace(request, arena=DEFAULT_ARENA)
+
+
+open_direct = DirectKind()
+"""Robots that motor signals drive."""

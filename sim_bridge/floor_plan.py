@@ -44,7 +44,7 @@ def path_end(arena: Arena) -> float:
 
 
 def _solids(arena: Arena) -> Iterator[Solid]:
-    """Those that stay in place, where they are now: `Arena.move` may have moved them."""
+    """Those that stay in place."""
     said = arena.description
     now = iter(arena.outlines)
     for outline in said.outline:

@@ -5,7 +5,7 @@
 
 void sim_body(const sim *self, int number, body_state *out) {
   const robot *r = sim_robot(self, number);
-  if (r != NULL) *out = r->body.state;
+  if (r != NULL) *out = r->body->state;
 }
 
 const sim_truth *sim_record(const sim *self, int number, size_t *count) {
@@ -40,7 +40,7 @@ uint64_t sim_contacts(const sim *self, int number) {
 uint64_t sim_hash(const sim *self) {
   uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
   for (int i = 0; i < self->robot_count; i++) {
-    const body_state *s = &self->robots[i]->body.state;
+    const body_state *s = &self->robots[i]->body->state;
     const double state[] = {
         s->x,         s->y,          s->heading,     s->speed,    s->turn_rate,        s->lateral,         s->rim_left,
         s->rim_right, s->wheel_left, s->wheel_right, s->distance, (double)s->touching, (double)s->slipping};
@@ -69,6 +69,11 @@ double sim_pack_voltage(const sim *self, int number) {
 double sim_supply_voltage(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r == NULL ? 0.0 : r->chassis.supply * BOARD_NOMINAL_VOLTS;
+}
+
+uint64_t sim_reset_at(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->reset_at;
 }
 
 uint32_t sim_brown_outs(const sim *self, int number, uint32_t *upsets) {

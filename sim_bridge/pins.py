@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, BoardMemory, ResetCause
-from sim_bridge.sim import SimRobot
+from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
+from sim_bridge.sim_robot import SimRobot
 
 EDGE = np.dtype(  # sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
@@ -24,12 +25,23 @@ class BoardPins(BoardMemory):
     """
 
     def __init__(self, robot: SimRobot) -> None:
-        super().__init__(lib, ffi, ffi.cast("board *", robot.board.address))
+        super().__init__(lib, ffi)
         self._robot = robot
         self._sim = robot.sim
-        self._handle = robot.sim.handle
         self._number = robot.number
-        self.reset_cycle = 0  # when the program last started
+
+    @property
+    def _board(self) -> Any:
+        return ffi.cast("board *", self._robot.board.address)
+
+    @property
+    def _handle(self) -> Any:
+        return self._sim.handle
+
+    @property
+    def reset_cycle(self) -> int:
+        """At which the program was last started by `reset`; 0 before."""
+        return int(lib.sim_reset_at(self._handle, self._number))
 
     @property
     def cycle(self) -> int:
@@ -100,8 +112,24 @@ class BoardPins(BoardMemory):
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
-        self.reset_cycle = self._sim.cycle
-        lib.board_reset(self._robot.board.address, ResetCause[cause.upper()])
+        self._check(lib.sim_reset(self._handle, self._number, ResetCause[cause.upper()]), f"reset by {cause}")
+
+    def write_memory(self, address: int, data: bytes | Iterable[int]) -> None:
+        """See `BoardMemory`."""
+        data = bytes(data)
+        self._data(address, len(data))
+        self._check(lib.sim_write_memory(self._handle, self._number, address, data, len(data)), "memory")
+
+    def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
+        """See `BoardMemory`."""
+        data = bytes(data)
+        self._eeprom()
+        check_range("EEPROM", address, len(data), EEPROM_SIZE)
+        self._check(lib.sim_write_eeprom(self._handle, self._number, address, data, len(data)), "EEPROM")
+
+    def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
+        """See `BoardMemory`."""
+        self._check(lib.sim_damage_eeprom(self._handle, self._number, int(damage), garbage), "EEPROM")
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""

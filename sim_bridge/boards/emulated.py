@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,19 +15,48 @@ from sim_bridge._core import ffi, lib
 class EmulatedBoard:
     """A board by its address, and whatever must live as long as it does."""
 
-    def __init__(self, address: int, description: str, release: Callable[[], None], keep: Any = None) -> None:
-        """`release` frees the board.
+    def __init__(
+        self,
+        address: int,
+        description: str,
+        release: Callable[[], None],
+        keep: Any = None,
+        firmware: bytes = b"",
+        again: Callable[[], EmulatedBoard] | None = None,
+    ) -> None:
+        """`release` frees the board, `again` makes one more like it; `firmware` is the file that it runs.
 
         Raises:
             BoardError: the board was built for another version of this package.
         """
         self.address = address
         self.description = description
+        self.firmware = hashlib.sha256(firmware).hexdigest()
         self._release: Callable[[], None] | None = release
         self._keep = keep
+        self._again = again
         if lib.board_check(address) != lib.SIM_OK:
             self.close()
             raise BoardError(f"the {description} was built for another version of the simulator; build it again")
+
+    @property
+    def can_repeat(self) -> bool:
+        """Whether it runs firmware, so that there can be one more like it."""
+        return self._again is not None
+
+    def again(self) -> EmulatedBoard:
+        """One more of its kind with the same firmware, just powered on.
+
+        Raises:
+            BoardError: it runs no firmware, or the file is another one by now.
+        """
+        if self._again is None:
+            raise BoardError(f"the {self.description} runs no firmware; expected an emulated board that does")
+        board = self._again()
+        if board.firmware != self.firmware:
+            board.close()
+            raise BoardError(f"the firmware of the {self.description} has changed on disk since it was loaded")
+        return board
 
     def close(self) -> None:
         """Frees the board. May be called twice."""
@@ -60,7 +90,13 @@ def native_board(library: Path) -> EmulatedBoard:
     if board == ffi.NULL:
         raise BoardError(f"{library.name}: {ffi.string(error).decode(errors='replace')}")
     address = int(ffi.cast("uintptr_t", board))
-    return EmulatedBoard(address, "emulated native board", lambda: lib.board_destroy(address))
+    return EmulatedBoard(
+        address,
+        "emulated native board",
+        lambda: lib.board_destroy(address),
+        firmware=library.read_bytes(),
+        again=lambda: native_board(library),
+    )
 
 
 def avr_board(image: Path) -> EmulatedBoard:
@@ -72,7 +108,14 @@ def avr_board(image: Path) -> EmulatedBoard:
     from sim_bridge.boards import avr
 
     board = avr.create(image)
-    return EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board)
+    return EmulatedBoard(
+        board.pointer,
+        "emulated ATmega328P",
+        board.close,
+        keep=board,
+        firmware=image.read_bytes(),
+        again=lambda: avr_board(image),
+    )
 
 
 def avr_image(pin_map: str) -> Path:

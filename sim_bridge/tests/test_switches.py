@@ -228,7 +228,7 @@ def test_only_the_robot_that_switches_it_off_is_spared_cross_talk() -> None:
         hearer = add_scripted(sim, pose=(-dx, -dy, turn), without=without)
         sender = add_scripted(sim, pose=(1 + dx, dy, back))
         sender.burst(5 * MS, LED)
-        sim.run(40 * MS, 40 * MS)
+        sim.run(40 * MS)
         return len(hearer.inputs(RECEIVER)) > 1
 
     assert lit() and not lit("cross_talk")

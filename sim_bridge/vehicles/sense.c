@@ -115,7 +115,7 @@ void vehicle_sense(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
   const body_state *b = &w->body.state;
-  const scene around = vehicle_scene(w);
+  const scene around = vehicle_surroundings(w);
   const sensing s = {.all = self,
                      .world = w,
                      .from = {.around = &around,

@@ -147,6 +147,14 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
 }
 
+void vehicle_torques(vehicles *self, size_t i, double out[2]) { torques(self->model, &self->worlds[i], out); }
+
+void vehicle_moved(vehicles *self, size_t i, double speed) {
+  vehicle *w = &self->worlds[i];
+  w->state.acceleration = (w->body.state.speed - speed) / self->model->dt;
+  w->state.step++;
+}
+
 void vehicles_move(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   double torque[2];
@@ -154,8 +162,7 @@ void vehicles_move(vehicles *self, size_t i) {
   torques(self->model, w, torque);
   const scene around = vehicle_scene(w);
   body_advance(&w->body, &around, torque[0], torque[1], self->model->dt);
-  w->state.acceleration = (w->body.state.speed - before) / self->model->dt;
-  w->state.step++;
+  vehicle_moved(self, i, before);
 }
 
 void vehicles_update_arena(vehicles *self, size_t i) {

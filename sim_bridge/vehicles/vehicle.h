@@ -116,9 +116,10 @@ typedef struct {
 
 typedef struct {
   const arena *where;
-  laser *laser;  /* NULL: the model has none */
-  mover *movers; /* as many as the arena has moving shapes */
-  double hold;   /* of the DC motors' friction, see motor_dc.h */
+  laser *laser;        /* NULL: the model has none */
+  mover *movers;       /* as many as the arena has moving shapes */
+  double hold;         /* of the DC motors' friction, see motor_dc.h */
+  const scene *shared; /* what is around it in a world that is not its own alone; NULL: in its own */
   body body;
   vehicle_state state;
 } vehicle;
@@ -128,6 +129,16 @@ static inline scene vehicle_scene(const vehicle *self) {
                  .movers = self->movers,
                  .movers_count = self->movers == NULL ? 0 : arena_moving_count(self->where)};
 }
+
+/* What its sensors meet. */
+static inline scene vehicle_surroundings(const vehicle *self) {
+  return self->shared != NULL ? *self->shared : vehicle_scene(self);
+}
+
+/* For a world that somebody else moves: the wheels' torques for the next step, and what is to be done when the body, which
+ * went at `speed` before, has made it. */
+void vehicle_torques(vehicles *self, size_t i, double out[2]);
+void vehicle_moved(vehicles *self, size_t i, double speed);
 
 struct vehicles {
   const vehicle_model *model;

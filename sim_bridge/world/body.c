@@ -22,7 +22,7 @@ const char *body_parameters_wrong(const body_parameters *p) {
   } all[] = {
       {"mass", p->mass, 0},
       {"inertia", p->inertia, 0},
-      {"radius", p->outline != NULL ? p->outline->reach : p->radius, 0},
+      {"radius", body_reach_of(p), 0},
       {"half_track", p->half_track, 0},
       {"wheel_radius", p->wheel_radius, 0},
       {"wheel_mass", p->wheel_mass, 1},
@@ -54,7 +54,7 @@ void body_init(body *self, const body_parameters *parameters, double reach) {
   const body_parameters *p = parameters;
   memset(self, 0, sizeof *self);
   self->parameters = *p;
-  self->body_reach = p->outline != NULL ? p->outline->reach : p->radius;
+  self->body_reach = body_reach_of(p);
   self->reach = reach > self->body_reach + BODY_SKIN ? reach : self->body_reach + BODY_SKIN;
   self->force_gain = body_a(p) / p->mass;
   self->drag = p->linear_damping / p->mass;

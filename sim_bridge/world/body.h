@@ -95,6 +95,11 @@ typedef struct {
   body_surroundings near;
 } body;
 
+/* How far the body gets from the axle's middle, in m. */
+static inline double body_reach_of(const body_parameters *p) {
+  return p->outline != NULL ? p->outline->reach : p->radius;
+}
+
 /* A body at rest at a pose. `reach` is how far anything on it that touches gets from the axle's middle, in m. */
 void body_init(body *self, const body_parameters *parameters, double reach);
 

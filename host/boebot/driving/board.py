@@ -89,7 +89,7 @@ class BoardDriver:
             )
         self.description = request.robot
         self.equipment = Equipment(request.robot, self.tick_s)
-        self.robot = Robot(request.robot.name, self.period_s, task.chance)
+        self.robot = Robot(request.robot.name, self.period_s, task.brain_seed)
         self.record = Record()
         self.resets = 0
         self.late_steps = 0
@@ -328,7 +328,7 @@ class BoardDriver:
             board=self.task.on,
             description=self.session.description,
             arena=self.task.request.arena,
-            seed=self.task.chance,
+            seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.tick_s,
             error=error,
