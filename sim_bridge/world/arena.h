@@ -14,6 +14,9 @@
 
 #include "paths.h"
 
+#define RAY_FAN_MOST 32u /* rays */
+#define RAY_FAN_GROUP 4u /* of them that are asked at once */
+
 /* python: begin */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
 /* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
@@ -95,9 +98,27 @@ const arena_charger *arena_charger_of(const arena *self);
 double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t *item);
 
-/* The same distances, bit for bit, along `count` rays from one point: faster where they point much the same way. */
-void arena_fan(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, double *distances);
+/* Directions, of length 1, of up to RAY_FAN_MOST rays from one point, in the frame of what sends them. */
+typedef struct {
+  uint32_t rays;
+  uint32_t alike;              /* bit k: rays 4 k to 4 k + 3 point much the same way */
+  double cosine[32], sine[32]; /* the last ray's from there on */
+} ray_fan;
+
+/* 1 to 32 directions; fastest where each four follow each other counter-clockwise within 0.61 rad. */
+void ray_fan_set(ray_fan *self, const double *cosine, const double *sine, size_t count);
+
+/* Rays from (x, y) in a frame whose x axis points along (cosine, sine); `reach` and `height` as for arena_ray. */
+typedef struct {
+  const arena *where;
+  const ray_fan *rays;
+  double x, y, cosine, sine;
+  double reach, height;
+  double *distances; /* of each ray, to be written: room for a multiple of 4 */
+} fan_question;
+
+/* The distances of arena_ray, bit for bit. Many questions at once are faster than one after the other. */
+void arena_fans(const fan_question *questions, size_t count);
 
 /* Distance from (x, y) to the nearest edge or circle, at most `limit`. */
 double arena_clearance(const arena *self, double x, double y, double limit);
