@@ -12,11 +12,11 @@ from dataclasses import replace
 
 from boebot.boards import BoardRequest, SharedWorld, Truth
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.model_file import STEP_S
 from sim_bridge.opening import Wait, alone, new_sim, truth_of
 from sim_bridge.sim import Sim
 from sim_bridge.sim_robot import SimRobot
 from sim_bridge.together import SimWorld
-from sim_bridge.model_file import STEP_S
 
 DEFAULT_ARENA = "arsim"
 

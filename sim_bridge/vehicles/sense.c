@@ -63,10 +63,12 @@ static void read_odometer(const sensing *s, const odometer_parameters *p, odomet
   out[2] = state->heading;
 }
 
-static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *slot, noise_source *noise, double *out) {
+/* `asked`: its question to the arena, answered, where it has one. */
+static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *slot, const fan_question *asked,
+                 noise_source *noise, double *out) {
   switch (sensor->kind) {
     case SENSOR_INFRARED_PROXIMITY:
-      *out = infrared_proximity_read(&sensor->as.infrared_proximity, &s->from, noise);
+      *out = infrared_proximity_answer(&sensor->as.infrared_proximity, &s->from, asked, noise);
       break;
     case SENSOR_SHARP_INFRARED:
       *out = sharp_infrared_read(&sensor->as.sharp_infrared, &slot->as.sharp_infrared, &s->from, s->time, noise);
@@ -110,6 +112,35 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
   }
 }
 
+static int due(const vehicle_sensor *sensor, const sensor_slot *slot, double time) {
+  return !(sensor->period > 0.0) || sample_hold_due(&slot->hold, time);
+}
+
+static int has_fan(const vehicle_sensor *sensor) {
+  return sensor->kind == SENSOR_INFRARED_PROXIMITY && !sensor->as.infrared_proximity.reflectance;
+}
+
+/* The fans that the sensors need at one instant, in their order. */
+typedef struct {
+  fan_question asked[VEHICLE_SENSORS];
+  double distances[VEHICLE_SENSORS * BEAM_RAYS];
+} fans;
+
+/* Asks for all of them at once. */
+static void ask_fans(const sensing *s, const sensor_slot *slots, fans *out) {
+  const vehicle_model *m = s->all->model;
+  fan_question *next = out->asked;
+  double *room = out->distances;
+  for (size_t k = 0; k < m->sensors_count; k++) {
+    const vehicle_sensor *sensor = &m->sensors[k];
+    if (!has_fan(sensor) || !due(sensor, &slots[k], s->time)) continue;
+    const infrared_proximity *eye = &sensor->as.infrared_proximity;
+    *next++ = infrared_proximity_ask(eye, &s->from, room);
+    room += ((size_t)eye->beam.rays + RAY_FAN_GROUP - 1u) / RAY_FAN_GROUP * RAY_FAN_GROUP;
+  }
+  if (next > out->asked) arena_fans(out->asked, (size_t)(next - out->asked));
+}
+
 void vehicle_sense(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle *w = &self->worlds[i];
@@ -128,15 +159,19 @@ void vehicle_sense(vehicles *self, size_t i) {
                      .time = (double)w->state.step * m->dt};
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
+  fans all;
+  const fan_question *asked = all.asked;
+  ask_fans(&s, slots, &all);
   for (size_t k = 0; k < m->sensors_count; k++) {
     const vehicle_sensor *sensor = &m->sensors[k];
     sensor_slot *slot = &slots[k];
     if (sensor->kind == SENSOR_ACCELEROMETER && w->state.step > 0)
       accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, w->state.acceleration, m->dt);
-    if (sensor->period > 0.0 && !sample_hold_due(&slot->hold, s.time)) continue;
+    if (!due(sensor, slot, s.time)) continue;
     noise_source noise = {.key = slot->key, .keyed = 1, .on = m->noise != 0};
     noise_at(&noise, w->state.step);
-    read(&s, sensor, slot, &noise, &readings[sensor->first]);
+    read(&s, sensor, slot, asked, &noise, &readings[sensor->first]);
+    asked += has_fan(sensor);
     if (sensor->period > 0.0) sample_hold_take(&slot->hold, s.time, readings[sensor->first]);
   }
   w->state.sensed = w->state.step + 1;

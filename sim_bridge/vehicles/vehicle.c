@@ -108,7 +108,10 @@ int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate
 
 void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
 
-static double limited(double signal) { return signal > 1.0 ? 1.0 : (signal < -1.0 ? -1.0 : signal); }
+static double limited(double signal) {
+  const double below = signal < 1.0 ? signal : 1.0;
+  return below > -1.0 ? below : -1.0;
+}
 
 int vehicles_send(vehicles *self, size_t i, double left, double right) {
   if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;

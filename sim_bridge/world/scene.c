@@ -114,16 +114,16 @@ double scene_ray(const scene *self, double x, double y, double c, double s, doub
   return best;
 }
 
-void scene_fan(const scene *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, uint32_t self_id, double *distances) {
-  arena_fan(self->arena, x, y, cosine, sine, count, reach, height, distances);
+void scene_fan_movers(const scene *self, const fan_question *q, uint32_t self_id) {
   for (size_t k = 0; k < self->movers_count; k++) {
     const mover *m = &self->movers[k];
-    if ((self_id != 0 && m->id == self_id) || !(m->height >= height)) continue;
-    for (size_t i = 0; i < count; i++) {
-      const double best = distances[i];
-      const double d = mover_ray(m, x, y, cosine[i], sine[i], best < 0.0 ? reach : best, NULL);
-      if (d >= 0.0) distances[i] = d;
+    if ((self_id != 0 && m->id == self_id) || !(m->height >= q->height)) continue;
+    for (size_t i = 0; i < q->rays->rays; i++) {
+      const double best = q->distances[i];
+      const double c = q->cosine * q->rays->cosine[i] - q->sine * q->rays->sine[i];
+      const double s = q->sine * q->rays->cosine[i] + q->cosine * q->rays->sine[i];
+      const double d = mover_ray(m, q->x, q->y, c, s, best < 0.0 ? q->reach : best, NULL);
+      if (d >= 0.0) q->distances[i] = d;
     }
   }
 }

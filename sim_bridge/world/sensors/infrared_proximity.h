@@ -20,7 +20,8 @@ typedef struct {
 
 typedef struct {
   beam beam;
-  double range, c1, c2, sigma;
+  double range, c2, sigma;
+  double c1[32]; /* by ray */
   int reflectance;
 } infrared_proximity;
 
@@ -29,6 +30,12 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
 
 /* S in [0, 1]. */
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise);
+
+/* The same in two parts, for readings of many sensors at once: the question that arena_fans is to answer in between (but
+ * not with `reflectance`), and the reading. */
+fan_question infrared_proximity_ask(const infrared_proximity *self, const viewpoint *from, double *distances);
+double infrared_proximity_answer(const infrared_proximity *self, const viewpoint *from, const fan_question *asked,
+                                 noise_source *noise);
 
 /* Distance for which a centre ray alone reads `reading`: sqrt(c1 / (S - c2)), -1 unless c2 < S < 1. */
 double infrared_proximity_inverse(const infrared_proximity *self, double reading);
