@@ -69,7 +69,6 @@ void body_place(body *self, double x, double y, double heading);
 int body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
 void body_as_mover(const body *self, mover *out);
-double body_energy(const body *self);
 double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);
