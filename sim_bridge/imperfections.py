@@ -33,7 +33,7 @@ SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its g
 TYRE_SLIP = 1  # beyond that coefficient they slip; 0: wheels always roll
 TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
-WHISKER_HEIGHT_M = 0.03
+WHISKER_HEIGHT_M: float = lib.WHISKER_HEIGHT_M
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
 
 INFRARED_RAYS = 5

@@ -115,8 +115,16 @@ class Body:
 
     @property
     def energy(self) -> float:
-        """Kinetic, wheels included (J)."""
-        return float(lib.body_energy(self.body))
+        """Kinetic, wheels included (J): a wheel that may slip turns with the rotor behind its gear (body.h)."""
+        s, p = self.state, self.parameters
+        v, w, half = s.speed, s.turn_rate, p.half_track
+        rims = (s.rim_left, s.rim_right) if s.slipping else (v - half * w, v + half * w)
+        spin = p.wheel_inertia / p.wheel_radius**2
+        if p.slip:
+            spin = p.spin_inertia / p.wheel_radius**2 if p.spin_inertia > 0 else max(spin, 0.1 * p.mass)
+        mass, inertia = p.mass + 2 * p.wheel_mass, p.inertia + 2 * p.wheel_mass * half**2
+        turning = inertia * w**2 + spin * (rims[0] ** 2 + rims[1] ** 2)
+        return float(0.5 * (mass * (v**2 + s.lateral**2) + turning))
 
     def core(self) -> tuple[Any, float]:
         """What of it makes contact, by shapely: all within so many metres of a point or polygon."""

@@ -103,15 +103,6 @@ void body_as_mover(const body *self, mover *out) {
   };
 }
 
-double body_energy(const body *self) {
-  const body_state *s = &self->state;
-  const double spin = self->parameters.slip ? self->slip_spin : self->spin;
-  const double left = s->slipping ? s->rim_left : body_left_speed(self);
-  const double right = s->slipping ? s->rim_right : body_right_speed(self);
-  return 0.5 * (self->mass * (s->speed * s->speed + s->lateral * s->lateral) +
-                self->inertia * s->turn_rate * s->turn_rate + spin * (left * left + right * right));
-}
-
 double body_wheel_hold(const body *self, double dt) {
   const body_parameters *p = &self->parameters;
   const double straight = 0.5 * self->mass + self->spin; /* at the rim, one of two wheels */

@@ -120,9 +120,6 @@ int body_advance(body *self, const scene *around, double torque_left, double tor
 /* How others see it. Reflectances are 1. */
 void body_as_mover(const body *self, mover *out);
 
-/* Kinetic energy with the wheels' turning (as slipping wheels have it), J. */
-double body_energy(const body *self);
-
 /* Torque per rad/s that stops a wheel within `dt`: the least inertia felt at a wheel / dt. For motor_dc_torque. */
 double body_wheel_hold(const body *self, double dt);
 

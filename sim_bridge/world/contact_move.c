@@ -164,10 +164,10 @@ typedef struct {
   const scene *around;
 } group;
 
-/* What lies ahead of a group: the least distance of a core from anything, how fast two things near each other at most
- * come closer, and the time of the first meeting. */
+/* What lies ahead of a group: the least distance of a core from anything, the least gap, how fast two things near each
+ * other at most come closer, and the time of the first meeting. */
 typedef struct {
-  double nearest, rate, first;
+  double nearest, gap, rate, first;
   int sunk; /* 1: a core is nearer than that to something, by nobody's motion */
 } outlook;
 
@@ -177,6 +177,7 @@ static void consider(outlook *all, const body *self, const contacts *found) {
   const double nearest = fmax(found->nearest, CORE_SHARE * rounding);
   if (found->nearest < nearest) all->sunk = 1;
   if (nearest < all->nearest) all->nearest = nearest;
+  if (found->nearest - rounding < all->gap) all->gap = found->nearest - rounding;
   if (found->first < all->first) all->first = found->first;
 }
 
@@ -184,6 +185,7 @@ static void consider_pair(outlook *all, body *self, body *other) {
   contacts found;
   if (!are_near(self, other, CONTACT_FAR)) {
     if (all->nearest > CONTACT_FAR) all->nearest = CONTACT_FAR;
+    if (all->gap > CONTACT_FAR) all->gap = CONTACT_FAR;
     return;
   }
   contact_find_pair(self, other, BODY_SKIN, &found);
@@ -210,7 +212,7 @@ static double closer(size_t count, double way, double mover_way) { return (count
 /* Looks ahead, and notes who touches. */
 static outlook look(const group *g, double elapsed) {
   contacts found;
-  outlook all = {.nearest = 1e300, .first = 1e300};
+  outlook all = {.nearest = 1e300, .gap = 1e300, .first = 1e300};
   double fastest = 0.0;
   for (size_t i = 0; i < g->count; i++) {
     body *b = g->bodies[i];
@@ -233,6 +235,9 @@ static double part_of(const outlook *all, double remaining, int meetings) {
   if (meetings && all->first < part) part = all->first;
   return part < remaining ? part : remaining;
 }
+
+/* 1 if for certain nothing touches after a part. */
+static int stays_apart(const outlook *ahead, double part) { return ahead->rate * part < ahead->gap - 2.0 * BODY_SKIN; }
 
 /* Where a body would get to if nothing were in the way, and by how far a way. */
 typedef struct {
@@ -318,7 +323,8 @@ static int passed_nothing(const group *g, const body_state before[], const cours
   for (size_t i = 0; i < g->count; i++) {
     const body_state *s = &g->bodies[i]->state;
     if (is_on_course(s, &free[i])) continue;
-    const double angle = number_wrap(s->heading - before[i].heading);
+    const int turns = g->bodies[i]->parameters.outline != NULL;
+    const double angle = turns ? number_wrap(s->heading - before[i].heading) : 0.0;
     most = fmax(most, body_core_way(g->bodies[i], way_from(&before[i], s), angle));
   }
   if (most < 0.0) return ahead->rate * part <= ahead->nearest;
@@ -356,7 +362,7 @@ static double move_part(const group *g, const outlook *ahead, double elapsed, do
   for (size_t i = 0; i < g->count; i++) before[i] = g->bodies[i]->state;
   for (;;) {
     advance(g, now, free);
-    const int good = settle(g, elapsed + now);
+    const int good = stays_apart(ahead, now) || settle(g, elapsed + now);
     if (good && (ahead->sunk || passed_nothing(g, before, free, ahead, elapsed, now))) {
       count_way(g, before, free);
       return now;
@@ -375,13 +381,15 @@ static double move_part(const group *g, const outlook *ahead, double elapsed, do
 void contact_move(body *const bodies[], size_t count, const scene *around, double dt) {
   const group g = {bodies, count, around};
   double elapsed = 0.0;
+  int apart = 0;
   for (int parts = 0; elapsed < dt; parts++) {
     const double left = dt - elapsed;
     const outlook ahead = look(&g, elapsed);
     const double part = fmax(part_of(&ahead, left, parts < MEETINGS_MAXIMUM), fmin(PART_LEAST * dt, left));
     const double done = move_part(&g, &ahead, elapsed, part);
     elapsed = done >= left ? dt : elapsed + done;
+    apart = stays_apart(&ahead, done);
   }
   for (size_t i = 0; i < count; i++) bodies[i]->state.touching = 0;
-  look(&g, dt);
+  if (!apart) look(&g, dt);
 }
