@@ -11,6 +11,7 @@
 
 #define VERSION UINT64_C(0x32746f6f62656f62) /* "boeboot2": changes with the walk */
 #define LARGEST 1e12                         /* of a state's numbers */
+#define FASTEST 1e5                          /* m/s, rad/s: a step's time goes with the speed */
 #define HEADING_WORDS 5u
 
 enum { COUNT, HASH, WRITE, CHECK, READ };
@@ -75,8 +76,9 @@ static void number(stream *s, double *value, double most) {
 /* ---- the walk ----------------------------------------------------------------------------------------------------- */
 
 static void walk_body(stream *s, body_state *b) {
-  NUMBERS(s, LARGEST, &b->x, &b->y, &b->speed, &b->turn_rate, &b->lateral, &b->rim_left, &b->rim_right, &b->wheel_left,
-          &b->wheel_right, &b->distance, &b->touch_x, &b->touch_y);
+  NUMBERS(s, LARGEST, &b->x, &b->y);
+  NUMBERS(s, FASTEST, &b->speed, &b->turn_rate, &b->lateral, &b->rim_left, &b->rim_right);
+  NUMBERS(s, LARGEST, &b->wheel_left, &b->wheel_right, &b->distance, &b->touch_x, &b->touch_y);
   NUMBERS(s, 3.2, &b->heading);
   NUMBERS(s, 1.0 + 1e-9, &b->cosine, &b->sine);
   whole_int(s, &b->touching, 1);
@@ -144,11 +146,11 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
 size_t vehicles_snapshot_size(const vehicles *self) {
   const vehicle_model *m = self->model;
   stream s = {.mode = COUNT};
-  body_state body = {0};
-  vehicle_state state = {0};
+  body_state no_body = {0};
+  vehicle_state no_state = {0};
   sensor_slot slot = {0};
-  walk_body(&s, &body);
-  walk_state(&s, &state);
+  walk_body(&s, &no_body);
+  walk_state(&s, &no_state);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(&s, &m->sensors[k], &slot);
   return 8 * (HEADING_WORDS + s.count + m->readings) + self->state_size;
 }
