@@ -1,21 +1,25 @@
 """Vehicles without boards: motor signals in, readings out, as the notes' simulator ARSim drives its robot.
 
-A `VehicleModel` says what a vehicle is made of; a `Vehicle` is one of them in one world. `batch.py` steps many worlds
-at once. Models are sim_bridge/vehicles/model.h, the order of events in a step is Fig. 3.1 of the notes (vehicle.h).
-Lengths in m, angles in rad, SI units; motor signals in [-1, 1], left and right.
+A `VehicleModel` (model.py) says what a vehicle is made of; `arsim()`, or `vehicle_model(...)` of a robot's file, gives
+one that is ready (model_file.py); a `Vehicle` is one of them in one world. `batch.py` steps many worlds at once. The
+order of events in a step is Fig. 3.1 of the notes (vehicles/vehicle.h). Lengths in m, angles in rad, SI units; motor
+signals in [-1, 1], left and right.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from boebot.errors import BrainError, RobotError
 from sim_bridge import arguments, worlds
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
-from sim_bridge.motor import DCMotor
+from sim_bridge.model import VehicleModel as VehicleModel
+from sim_bridge.model import beam as beam
+from sim_bridge.model_file import ARSIM_BODY as ARSIM_BODY
+from sim_bridge.model_file import arsim as arsim
+from sim_bridge.model_file import vehicle_model as vehicle_model
 
 Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
@@ -27,191 +31,8 @@ ENDS: Final[dict[int, str]] = {
     lib.VEHICLE_EXHAUSTED: "battery empty",
     lib.VEHICLE_BRAIN_FAILED: "brain failed",
 }
-
-# The default robot of ARSim (THEORY section 1.2).
-ARSIM_BODY: Final = {
-    "mass": 3.0,
-    "inertia": 0.2,
-    "radius": 0.20,
-    "half_track": 0.20,
-    "wheel_radius": 0.10,
-    "wheel_mass": 0.0,
-    "wheel_inertia": 0.0,
-    "linear_damping": 1.0,
-    "angular_damping": 0.1,
-    "grip": 0.7,
-}
 SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
 TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
-ARSIM_INFRARED_RAD: Final = 0.7854  # left and right of straight ahead
-ARSIM_INFRARED: Final = {"range": 1.0, "c1": 0.03, "c2": 0.1, "sigma": 0.01}
-
-
-def beam(
-    x: float = 0.0, y: float = 0.0, heading: float = 0.0, opening: float = 0.0, rays: int = 1, height: float = 0.06
-) -> dict[str, float]:
-    """Where a sensor is on the body and what it sees (beam.h)."""
-    return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
-
-
-class VehicleModel:
-    """What a vehicle is made of; any number of worlds share one.
-
-    Parameters are those of the C structs of the same names in sim_bridge/world; a wrong one raises RobotError.
-    """
-
-    def __init__(
-        self, body: Mapping[str, float], *, dt: float = 0.01, noise: bool = True, ends_at_collision: bool = True
-    ) -> None:
-        self.dt = dt
-        self.names: dict[str, slice] = {}
-        """Readings by name: where they stand among all readings."""
-        self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
-        """Sensors with a beam by name: the beam, and how far it reaches (m)."""
-        self.body = dict(body)
-        self.in_use = False
-        self._keep: list[Any] = []
-        parameters = ffi.new("body_parameters *", self.body)
-        handle = lib.vehicle_model_new(parameters, dt)
-        if handle == ffi.NULL:
-            raise RobotError(
-                f"vehicle: body {dict(body)} with dt = {dt} s; expected dt > 0, positive mass, inertia, radius, "
-                "half_track and wheel_radius, and no negative number"
-            )
-        self.a: float = lib.body_a(parameters)  # 1/m, (2.26)
-        self.b: float = lib.body_b(parameters)  # (2.30)
-        self.handle = ffi.gc(handle, lib.vehicle_model_destroy)
-        lib.vehicle_model_switch(self.handle, noise, ends_at_collision)
-
-    @property
-    def euler_limit(self) -> float:
-        """The step, s, from which on Euler's method diverges."""
-        return float(lib.vehicle_model_euler_limit(self.handle))
-
-    @property
-    def _open(self) -> Any:
-        """The C model, while it may still grow: worlds have room for what it was when they were made."""
-        if self.in_use:
-            raise RobotError(
-                "vehicle: worlds of this model exist; expected all of its devices before the first of them"
-            )
-        return self.handle
-
-    def _done(self, status: int, what: str) -> int:
-        if status >= 0:
-            return status
-        if status == lib.VEHICLE_BAD_STEP:
-            limit = lib.vehicle_model_euler_limit(self.handle)
-            raise RobotError(
-                f"vehicle: dt = {self.dt:g} s; expected less than {limit:.4g} s, the Euler limit of its {what}"
-            )
-        if status == lib.VEHICLE_TOO_MANY:
-            raise RobotError(f"vehicle: no room for {what}; expected at most 24 sensors, one drive and one battery")
-        raise RobotError(f"vehicle: {what} has a number that is not finite or outside its range")
-
-    def _add(self, name: str, first: int, count: int = 1) -> None:
-        self._done(first, f"sensor {name!r}")
-        if name in self.names:
-            raise RobotError(f"vehicle: two sensors named {name!r}; expected different names")
-        self.names[name] = slice(first, first + count)
-
-    def dc_motors(self, left: Mapping[str, float] | None = None, right: Mapping[str, float] | None = None) -> None:
-        """Two DC motors (1.6)-(1.10); what is not said is as in the notes' default motor."""
-        motors = [DCMotor(**(changes or {})).parameters for changes in (left, right)]
-        self._done(lib.vehicle_model_drive_dc(self._open, *motors, 0), "DC motors")
-
-    def servos(self, left: Any, right: Any) -> None:
-        """Two continuous-rotation servos (C structs servo_motor_parameters) driven by signal: 1500 us +- 200 us s."""
-        self._done(lib.vehicle_model_drive_servo(self._open, left, right), "servos")
-
-    def battery(
-        self, name: str, *, empty: float = 5.0, full: float = 7.75, sigma: float = 0.0, **energy: float
-    ) -> None:
-        """The notes' battery, read as a voltage; `energy`: idle_per_s, signal_per_s, charger_per_s."""
-        parameters = ffi.new("energy_parameters *")
-        lib.energy_default(parameters)
-        for key, value in energy.items():
-            setattr(parameters, key, value)
-        self._add(name, lib.vehicle_model_battery(self._open, parameters, empty, full, sigma))
-
-    def _sensor(self, kind: str, name: str, parameters: Mapping[str, Any], *period: float, count: int = 1) -> None:
-        adder = getattr(lib, f"vehicle_model_add_{kind}")
-        self._add(name, adder(self._open, ffi.new(f"{kind}_parameters *", dict(parameters)), *period), count)
-        if "beam" in parameters:
-            reach = (parameters[key] for key in ("range", "range_maximum", "reach") if key in parameters)
-            self.looks[name] = (parameters["beam"], float(next(reach, 0.0)))
-
-    def infrared_proximity(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """The notes' IR sensor: beam, range, c1, c2, sigma, reflectance. One reading in [0, 1]."""
-        self._sensor("infrared_proximity", name, parameters, period)
-
-    def sharp_infrared(self, name: str, **parameters: Any) -> None:
-        """Sharp GP2D12: beam, reach, sigma, gain, period, late. One reading, V."""
-        self._sensor("sharp_infrared", name, parameters)
-
-    def sonar(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Sonar: beam, range_minimum, range_maximum, sigma, miss, ... One reading, m; D_max: nothing heard."""
-        self._sensor("sonar", name, parameters, period)
-
-    def laser(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Laser range finder: first, step, rays, range, sigma, height. A reading a ray, m; -1: beyond the range."""
-        self._sensor("laser", name, parameters, period, count=int(parameters.get("rays", 0)))
-
-    def compass(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Compass: sigma, bias, iron_x, iron_y, current_x, current_y. One reading, rad."""
-        self._sensor("compass", name, parameters, period)
-
-    def accelerometer(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Accelerometer along the heading: mass, stiffness, damping, range, sigma, bias. One reading, m/s^2."""
-        self._sensor("accelerometer", name, parameters, period)
-
-    def light(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Phototransistor: x, y, heading, height, near_distance, ambient, sigma, gain. One reading."""
-        self._sensor("phototransistor", name, parameters, period)
-
-    def odometer(self, name: str, **parameters: Any) -> None:
-        """Odometer: half_track, wheel_radius, sigma_step, factor_left, ... Three readings: x, y, heading."""
-        usual = {"factor_left": 1.0, "factor_right": 1.0}
-        self._sensor("odometer", name, usual | parameters, count=3)
-
-    def table(
-        self, name: str, look: Mapping[str, float], samples: Any, *, reach: float, none: float, period: float = 0.0
-    ) -> None:
-        """A sensor known by its table of samples (C handle table_noise): one ray of the beam `look`."""
-        self._keep.append(samples)
-        parameters = ffi.new("beam_parameters *", dict(look))
-        self._add(name, lib.vehicle_model_add_table(self._open, parameters, samples, reach, none, period))
-
-    def whisker(self, name: str, root: tuple[float, float], tip: tuple[float, float]) -> None:
-        """A whisker from `root` to `tip` on the body. One reading: 1 while it touches something."""
-        self._add(name, lib.vehicle_model_add_whisker(self._open, *root, *tip))
-
-
-def arsim(
-    *,
-    dt: float = 0.01,
-    noise: bool = True,
-    ends_at_collision: bool = True,
-    infrared_rad: Sequence[float] = (ARSIM_INFRARED_RAD, -ARSIM_INFRARED_RAD),
-    rays: int = 3,
-    odometer_sigma: float = 0.0,
-    compass_sigma: float = 0.05,
-) -> VehicleModel:
-    """The notes' default robot (THEORY 1.2, 1.5, 1.10, 3.6): 3 kg, two 12 V DC motors, IR sensors of three rays
-    on the body's circle at +-0.7854 rad, odometer, compass.
-
-    Readings: infrared_left, infrared_right (infrared_0 ... where there are not two), odometer (x, y, heading), compass.
-    """
-    model = VehicleModel(ARSIM_BODY, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
-    model.dc_motors()
-    names = ("left", "right") if len(infrared_rad) == 2 else tuple(map(str, range(len(infrared_rad))))
-    for name, angle in zip(names, infrared_rad, strict=True):
-        place = beam(ARSIM_BODY["radius"] * math.cos(angle), ARSIM_BODY["radius"] * math.sin(angle), angle, 0.5, rays)
-        model.infrared_proximity(f"infrared_{name}", beam=place, **ARSIM_INFRARED)
-    body = {"half_track": ARSIM_BODY["half_track"], "wheel_radius": ARSIM_BODY["wheel_radius"]}
-    model.odometer("odometer", sigma_step=odometer_sigma, **body)
-    model.compass("compass", sigma=compass_sigma)
-    return model
 
 
 class Vehicle:
@@ -248,6 +69,7 @@ class Vehicle:
         self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
         self._body = worlds.kept(lib.vehicles_body(self.handle, 0), self.handle)
         self._flag = ffi.new("int8_t *")
+        self._pair = ffi.new("double[2]")
 
     def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
         """Starts a new run at a pose (x, y, heading), at `speed` (m/s) and `turn_rate` (rad/s), wheels rolling.
@@ -265,8 +87,16 @@ class Vehicle:
         lib.vehicles_set_speeds(self.handle, 0, *speeds)
 
     def __getitem__(self, name: str) -> Any:
-        """A reading by the name of its sensor: a number, or a view where the sensor has several."""
-        where = self.model.names[name]
+        """A reading by the name of its sensor: a number, or a view where the sensor has several.
+
+        Raises:
+            RobotError: there is no sensor of that name.
+        """
+        try:
+            where = self.model.names[name]
+        except (KeyError, TypeError):
+            there = ", ".join(self.model.names) or "none: the model has no sensor"
+            raise RobotError(f"vehicle: there is no sensor {arguments.shown(name)}; expected {there}") from None
         return self.readings[where.start] if where.stop - where.start == 1 else self.readings[where]
 
     @property
@@ -294,6 +124,12 @@ class Vehicle:
     def collided(self) -> bool:
         """Whether it touches something."""
         return bool(self._body.touching)
+
+    @property
+    def currents(self) -> tuple[float, float]:
+        """Truth: of the DC motors, left and right, A; (0, 0) with another drive."""
+        lib.vehicles_currents(self.handle, 0, self._pair)
+        return self._pair[0], self._pair[1]
 
     @property
     def energy(self) -> float:

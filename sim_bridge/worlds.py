@@ -10,7 +10,7 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 
 if TYPE_CHECKING:
-    from sim_bridge.vehicle import VehicleModel
+    from sim_bridge.model import VehicleModel
 
 STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
 STATE_BYTES_MAXIMUM: Final = 2**24
@@ -67,7 +67,7 @@ def place(
             f"{who}: in arena {arena.name} the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
         )
     if status == lib.VEHICLE_NOT_PLACED:
-        raise RobotError(f"{who}: the model has no drive; expected dc_motors or servos")
+        raise RobotError(f"{who}: the model has no drive; expected dc_motors, regulated_motors or servos")
     if status == lib.VEHICLE_BAD_STEP:
         raise RobotError(
             f"{who}: the model's dt = {model.dt:g} s; expected less than {model.euler_limit:.4g} s, the Euler limit"

@@ -17,7 +17,7 @@ from boebot.device import Device as Device
 from boebot.device import pin_name as pin_name
 from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
-from boebot.vehicle_devices import AnyVehicleDevice, DcMotor, VehicleDevice
+from boebot.vehicle_devices import AnyVehicleDevice, Motor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -371,8 +371,13 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
             kind = device.__struct_config__.tag
             raise RobotError(f"{file}: device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}")
     for name in ("motor_left", "motor_right"):
-        if not (robot.has(name) and isinstance(robot.device[name], DcMotor)):
-            raise RobotError(f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor there")
+        if not (robot.has(name) and isinstance(robot.device[name], Motor)):
+            raise RobotError(
+                f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor or regulated_motor"
+            )
+    left, right = (robot.device[name].__struct_config__.tag for name in ("motor_left", "motor_right"))
+    if left != right:
+        raise RobotError(f"{file}: device.motor_right is {right}, device.motor_left {left}; expected the same type")
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without

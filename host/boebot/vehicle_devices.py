@@ -23,8 +23,12 @@ class VehicleDevice(Device, frozen=True, kw_only=True):
     """What every device of a vehicle has: no pins. `on = false` leaves it out."""
 
 
-class DcMotor(VehicleDevice, tag="dc_motor", frozen=True, kw_only=True):
-    """A DC motor with a gear, quasi-static: (1.8) to (1.10). Defaults are the notes' motor."""
+class Motor(VehicleDevice, frozen=True, kw_only=True):
+    """What drives a wheel by motor signals; both of a robot's are of one type."""
+
+
+class DcMotor(Motor, tag="dc_motor", frozen=True, kw_only=True):
+    """A DC motor with a gear, (1.1) to (1.10). Defaults are the notes' motor."""
 
     torque_constant_n_m_a: Positive = 0.0333  # c_t
     emf_constant_v_s: Positive = 0.0333  # c_e
@@ -36,6 +40,14 @@ class DcMotor(VehicleDevice, tag="dc_motor", frozen=True, kw_only=True):
     efficiency: Share = 1.0
     torque_maximum_n_m: Positive = 1.0
     voltage_maximum_v: Positive = 12.0  # at motor signal 1
+    full: bool = False  # the current is a state, with the inductance, (1.6); otherwise it follows at once, (1.8)
+
+
+class RegulatedMotor(Motor, tag="regulated_motor", frozen=True, kw_only=True):
+    """The velocity-regulated motor (3.15); its reference at motor signal 1 is the body's `wheel_speed_maximum_m_s`."""
+
+    gain_n_s: Positive = 10.0  # K
+    torque_maximum_n_m: Positive = 1.0
 
 
 class Sensor(VehicleDevice, frozen=True, kw_only=True):
@@ -140,6 +152,7 @@ class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
 
 AnyVehicleDevice = (
     DcMotor
+    | RegulatedMotor
     | InfraredProximity
     | Sonar
     | Laser

@@ -83,16 +83,17 @@ static vehicle_model *model(int servos) {
                                  .linear_damping = 1.0,
                                  .angular_damping = 0.1,
                                  .grip = 0.7};
-  servo_motor_parameters left = {.mount = 1.0,
-                                 .wheel_radius = 0.0331,
-                                 .centre_us = 1502.0,
-                                 .dead_band_us = 9.0,
-                                 .top_ccw_rad_s = 5.4,
-                                 .scale_ccw_us = 78.5,
-                                 .top_cw_rad_s = 5.2,
-                                 .scale_cw_us = 75.0,
-                                 .lag_s = 0.055,
-                                 .motor = {1.2, 0.268, 0.3, 0.05}};
+  servo_motor_parameters left = {
+      .mount = 1.0,
+      .wheel_radius = 0.0331,
+      .centre_us = 1502.0,
+      .dead_band_us = 9.0,
+      .top_ccw_rad_s = 5.4,
+      .scale_ccw_us = 78.5,
+      .top_cw_rad_s = 5.2,
+      .scale_cw_us = 75.0,
+      .lag_s = 0.055,
+      .motor = {.gain_n_s = 1.2, .torque_maximum_n_m = 0.268, .coast_n_s = 0.3, .coast_maximum_n_m = 0.05}};
   servo_motor_parameters right = left;
   right.mount = -1.0;
   vehicle_model *m = vehicle_model_new(servos ? &small : &large, servos ? 0.001 : 0.01);

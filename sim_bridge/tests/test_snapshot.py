@@ -13,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.errors import RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge._core import ffi
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
 from sim_bridge.arena_description import Charger, Disc, Light, Moving, Patch, Wall, Waypoint
 from sim_bridge.batch import WANDER, Batch
 from sim_bridge.motor import DCMotor
+from sim_bridge.reading_table import ReadingTable
 from sim_bridge.tests.simulated import square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
 
@@ -115,14 +116,10 @@ def test_a_brains_memory_is_in_the_hash() -> None:
 
 
 def test_servo_driven_worlds_go_on_identically() -> None:
-    servo = {"mount": 1.0, "wheel_radius": 0.0331, "centre_us": 1500.0, "dead_band_us": 9.0, "top_ccw_rad_s": 5.367,
-             "scale_ccw_us": 78.5, "top_cw_rad_s": 5.367, "scale_cw_us": 78.5, "lag_s": 0.055,
-             "motor": [1.2, 0.268, 0.3, 0.05]}  # fmt: skip
-    left, right = (ffi.new("servo_motor_parameters *", servo | {"mount": mount}) for mount in (1.0, -1.0))
     body = {"mass": 0.6, "inertia": 1.2e-3, "radius": 0.07, "half_track": 0.0525, "wheel_radius": 0.0331, "slip": 1,
             "wheel_mass": 0.03, "wheel_inertia": 1.7e-5, "angular_damping": 0.004, "grip": 0.7}  # fmt: skip
     built = VehicleModel(body, dt=0.003)
-    built.servos(left, right)
+    built.servos()
     whole, other = (Vehicle(built, load_arena("showcase"), seed=seed) for seed in (1, 2))
     whole.run(lambda _: (0.9, -0.2), 1111)
     other.restore(whole.save())
@@ -222,7 +219,7 @@ def changed(kind: str, values: dict[str, Any]) -> list[dict[str, Any]]:
         if field.type.kind == "struct":
             found += [values | {name: inner} for inner in changed(field.type.cname, values.get(name, {}))]
         elif field.type.kind == "primitive":
-            step = 1 if field.type.cname == "int" else 0.001
+            step = {"mount": -2, "efficiency": -0.001}.get(name, 1 if field.type.cname == "int" else 0.001)
             found.append(values | {name: values.get(name, 0) + step})
     return found
 
@@ -232,8 +229,7 @@ def driven_by(kind: str, values: dict[str, Any]) -> Callable[[VehicleModel], Non
         if kind == "dc":
             built.dc_motors(None, values)
         else:
-            structs = [ffi.new("servo_motor_parameters *", numbers) for numbers in (SERVO, values)]
-            built.servos(*structs)
+            getattr(built, f"{kind}s")(None, values)
 
     return build
 
@@ -274,6 +270,9 @@ def test_every_number_of_the_drive_is_the_models() -> None:
     for kind, name, values in (("dc", "motor_dc_parameters", motor), ("servo", "servo_motor_parameters", SERVO)):
         others = [built_from(driven_by(kind, other)) for other in changed(name, values)]
         assert refused(built_from(driven_by(kind, values)), others) >= 10
+    regulated = {"gain_n_s": 2.0, "torque_maximum_n_m": 0.5, "speed_maximum_m_s": 0.3}
+    others = [built_from(driven_by("regulated_motor", regulated | {name: 0.4})) for name in regulated]
+    assert refused(built_from(driven_by("regulated_motor", regulated)), others) == 3
 
 
 @pytest.mark.parametrize("kind", DEVICES)
@@ -285,9 +284,8 @@ def test_every_number_of_a_sensor_is_the_models(kind: str) -> None:
 
 def test_switches_battery_whisker_and_table_are_the_models() -> None:
     def table(sample: float) -> Callable[[VehicleModel], None]:
-        numbers = (ffi.new("double[]", [0.1, 1.1]), 2, ffi.new("double[]", [0.0]), 1, ffi.new("int[]", [1, 1]))
-        read = ffi.gc(lib.table_noise_new(*numbers, ffi.new("double[]", [5.0, sample])), lib.table_noise_destroy)
-        return with_sensor("table", {"look": BEAM, "samples": read, "reach": 1.1, "none": 0.0})
+        read = ReadingTable([0.1, 1.1], [0.0], [[[5.0]], [[sample]]])
+        return with_sensor("table", {"beam": BEAM, "table": read, "reach": 1.1, "none": 0.0})
 
     for build in (
         table,

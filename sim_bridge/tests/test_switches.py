@@ -24,8 +24,8 @@ from sim_bridge import imperfections as parts
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription
 from sim_bridge.arena_description import Patch
-from sim_bridge.direct import vehicle_model
 from sim_bridge.imperfections import Draw
+from sim_bridge.model_file import vehicle_model
 from sim_bridge.sim import Sim
 from sim_bridge.switches import SWITCHES
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square

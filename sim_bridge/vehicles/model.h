@@ -12,6 +12,7 @@
 
 #include "../world/body.h"
 #include "../world/motor_dc.h"
+#include "../world/motor_regulated.h"
 #include "../world/sensors/accelerometer.h"
 #include "../world/sensors/compass.h"
 #include "../world/sensors/infrared_proximity.h"
@@ -45,16 +46,19 @@ enum {
 typedef struct vehicle_model vehicle_model;
 
 /* A model that steps by `dt` seconds, without drive and sensors; NULL without memory or with a body whose mass, inertia,
- * radius, half track or wheel radius is not positive, or dt <= 0. */
+ * radius, half track or wheel radius is not positive (see body_parameters_wrong), or dt <= 0. */
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt);
 void vehicle_model_destroy(vehicle_model *self);
 
-/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the inductance if `full`. Servo: 1500 us
- * +- 200 us s, one pulse every 20 ms. */
+/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
+ * with inductance 0 is quasi-static nevertheless). Servo: 1500 us +- 200 us s, one pulse every 20 ms. Regulated: (3.15)
+ * with the reference s v_max. */
 int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
                            int full);
 int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
                               const servo_motor_parameters *right);
+int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
+                                  const motor_regulated_parameters *right);
 
 /* The notes' battery; its reading is the voltage empty + E (full - empty) with noise sigma, V. */
 int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, double empty, double full,
@@ -74,8 +78,8 @@ int vehicle_model_add_accelerometer(vehicle_model *self, const accelerometer_par
 int vehicle_model_add_phototransistor(vehicle_model *self, const phototransistor_parameters *p, double period);
 int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p);
 
-/* A sensor known by its table: distance along one ray, angle of incidence at what it meets; `none` beyond `range`. The
- * table stays the caller's. */
+/* A sensor known by its table: distance and angle of incidence at the nearest thing that its rays meet; `none` beyond
+ * `range`. The table stays the caller's. */
 int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
                             double none, double period);
 
@@ -100,7 +104,7 @@ enum {
   SENSOR_BATTERY,
 };
 
-enum { DRIVE_NONE = 0, DRIVE_DC, DRIVE_SERVO };
+enum { DRIVE_NONE = 0, DRIVE_DC, DRIVE_SERVO, DRIVE_REGULATED };
 
 typedef struct {
   beam beam;
@@ -145,6 +149,7 @@ struct vehicle_model {
   int drive, full;
   motor_dc_parameters dc[2];
   servo_motor_parameters servo[2];
+  motor_regulated_parameters regulated[2];
   int has_battery;
   const vehicle_sensor *laser; /* NULL: there is none */
   energy_parameters energy;

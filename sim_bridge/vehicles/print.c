@@ -14,11 +14,16 @@ static uint64_t print_dc(uint64_t sum, const motor_dc_parameters *m) {
                       m->viscous_n_m_s, m->gear, m->efficiency, m->torque_maximum_n_m, m->voltage_maximum);
 }
 
+static uint64_t print_regulated(uint64_t sum, const motor_regulated_parameters *m) {
+  return HASH_NUMBERS(sum, m->gain_n_s, m->torque_maximum_n_m, m->speed_maximum_m_s);
+}
+
 static uint64_t print_servo(uint64_t sum, const servo_motor_parameters *s) {
   const motor_regulated_parameters *m = &s->motor;
   sum = HASH_NUMBERS(sum, s->mount, s->wheel_radius, s->centre_us, s->dead_band_us, s->top_ccw_rad_s, s->scale_ccw_us,
                      s->top_cw_rad_s, s->scale_cw_us, s->lag_s);
-  return HASH_NUMBERS(sum, m->gain_n_s, m->torque_maximum_n_m, m->coast_n_s, m->coast_maximum_n_m);
+  return HASH_NUMBERS(sum, m->gain_n_s, m->torque_maximum_n_m, m->coast_n_s, m->coast_maximum_n_m,
+                      m->speed_maximum_m_s);
 }
 
 static uint64_t print_drive(uint64_t sum, const vehicle_model *m) {
@@ -26,6 +31,7 @@ static uint64_t print_drive(uint64_t sum, const vehicle_model *m) {
   for (int side = 0; side < 2; side++) {
     if (m->drive == DRIVE_DC) sum = print_dc(sum, &m->dc[side]);
     if (m->drive == DRIVE_SERVO) sum = print_servo(sum, &m->servo[side]);
+    if (m->drive == DRIVE_REGULATED) sum = print_regulated(sum, &m->regulated[side]);
   }
   return sum;
 }

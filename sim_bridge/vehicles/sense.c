@@ -31,28 +31,27 @@ void vehicle_sensors_start(vehicles *self, size_t i) {
 
 /* Current of both motors, A. */
 static double motor_current(const sensing *s) {
-  const vehicle_model *m = s->all->model;
-  if (m->drive != DRIVE_DC) return 0.0;
-  double sum = 0.0;
-  for (int side = 0; side < 2; side++) {
-    const double speed = side == 0 ? s->world->body.state.rim_left : s->world->body.state.rim_right;
-    const double volts = motor_dc_voltage(&m->dc[side], s->world->state.signals[side]);
-    const double current =
-        m->full ? s->world->state.currents[side] : motor_dc_current(&m->dc[side], volts, speed / m->body.wheel_radius);
-    sum += fabs(current);
-  }
-  return sum;
+  double currents[2];
+  vehicles_currents(s->all, (size_t)(s->world - s->all->worlds), currents);
+  return fabs(currents[0]) + fabs(currents[1]);
 }
 
 static double table_reading(const table_sensor *t, const viewpoint *from, noise_source *noise) {
-  ray_hit hit;
-  const double d = beam_ray(&t->beam, from, beam_from(&t->beam, from), 0, t->range, &hit);
-  if (d < 0.0) return t->none;
-  double cosine, sine;
-  beam_direction(&t->beam, from, 0, &cosine, &sine);
-  const double along = -(cosine * hit.normal_x + sine * hit.normal_y);
-  const double across = cosine * hit.normal_y - sine * hit.normal_x;
-  return table_noise_read(t->table, d, number_atan2(fabs(across), along), noise);
+  const beam_origin at = beam_from(&t->beam, from);
+  double nearest = -1.0;
+  double angle = 0.0;
+  for (int i = 0; i < t->beam.rays; i++) {
+    ray_hit hit;
+    const double d = beam_ray(&t->beam, from, at, i, nearest < 0.0 ? t->range : nearest, &hit);
+    if (d < 0.0) continue;
+    double cosine, sine;
+    beam_direction(&t->beam, from, i, &cosine, &sine);
+    const double along = -(cosine * hit.normal_x + sine * hit.normal_y);
+    const double across = cosine * hit.normal_y - sine * hit.normal_x;
+    nearest = d;
+    angle = number_atan2(fabs(across), along);
+  }
+  return nearest < 0.0 ? t->none : table_noise_read(t->table, nearest, angle, noise);
 }
 
 static void read_odometer(const sensing *s, const odometer_parameters *p, odometer_state *state, noise_source *noise,

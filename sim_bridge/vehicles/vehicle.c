@@ -131,6 +131,13 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
     }
     return;
   }
+  if (m->drive == DRIVE_REGULATED) {
+    for (int side = 0; side < 2; side++) {
+      const motor_regulated_parameters *motor = &m->regulated[side];
+      out[side] = motor_regulated(motor, motor_regulated_reference(motor, s->signals[side]), rims[side], 1.0);
+    }
+    return;
+  }
   const int pulse = s->step >= s->next_pulse;
   for (int side = 0; side < 2; side++) {
     const servo_motor_parameters *servo = &m->servo[side];
@@ -263,6 +270,20 @@ const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
 
 double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
+
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  for (int side = 0; side < 2; side++) {
+    currents[side] = 0.0;
+    if (m->drive != DRIVE_DC) continue;
+    const motor_dc_parameters *motor = &m->dc[side];
+    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
+    currents[side] =
+        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
+  }
+}
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;

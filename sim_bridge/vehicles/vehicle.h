@@ -70,6 +70,10 @@ const body_state *vehicles_body(const vehicles *self, size_t i);
 uint64_t vehicles_steps_done(const vehicles *self, size_t i);
 double vehicles_energy(const vehicles *self, size_t i);
 
+/* Currents of the DC motors, left and right, A: the state of the full motor, else what the last signals and the speed now
+ * give; 0 with another drive. */
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
+
 /* Of everything that a world has come to, which is what vehicles_save writes, in the same order; the same on every
  * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
