@@ -136,7 +136,7 @@ class Arena:
     def _movers(self, time: float) -> Any:
         """The C core's movers at a time."""
         movers = ffi.new("mover[]", len(self.description.moving))
-        lib.scene_moving(self.handle, time, 1, movers)
+        lib.scene_moving(self.handle, time, 1.0, 1, movers)
         return movers
 
     @property

@@ -62,6 +62,7 @@ BEFORE = """
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """
+static const double WHISKER_HEIGHT_M;
 typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);

@@ -50,19 +50,11 @@ void robot_update_supply(robot *self) {
 
 void sim_update_scene(sim *self) {
   if (self->obstacles > 0) {
-    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, SCENE_FIRST_MOVER, self->movers);
+    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, self->dt, SCENE_FIRST_MOVER, self->movers);
   }
   mover *robots = self->movers + self->obstacles;
   for (int i = 0; i < self->robot_count; i++) body_as_mover(&self->robots[i]->body, &robots[i]);
   self->seen = (scene){self->arena, self->movers, self->obstacles + (size_t)self->robot_count};
-}
-
-/* 1: the robot stands at the arena's charging station. */
-static int is_at_charger(const robot *r) {
-  const arena_charger *charger = arena_charger_of(r->sim->arena);
-  if (charger == NULL) return 0;
-  const double dx = r->body.state.x - charger->x, dy = r->body.state.y - charger->y;
-  return dx * dx + dy * dy <= charger->radius * charger->radius;
 }
 
 /* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
@@ -95,7 +87,7 @@ static void prepare(robot *r, uint64_t begin) {
   c->x = s->x;
   c->y = s->y;
   c->heading = s->heading;
-  c->at_charger = is_at_charger(r);
+  c->at_charger = arena_is_at_charger(r->sim->arena, s->x, s->y);
   c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
   c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
   for (int i = 0; i < r->part_count; i++) {

@@ -78,7 +78,8 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   board *b = (board *)address;
   if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
   if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
-  if (!scene_is_free(&self->seen, x, y, parameters->radius, 0)) return SIM_NOT_FREE;
+  const double reach = parameters->outline != NULL ? parameters->outline->reach : parameters->radius;
+  if (!scene_is_free(&self->seen, x, y, reach, 0)) return SIM_NOT_FREE;
   robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
   if (robots == NULL) return SIM_NO_MEMORY;
   self->robots = robots;

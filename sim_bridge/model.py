@@ -14,6 +14,7 @@ from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.arguments import shown
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
+from sim_bridge.outline import collision_outline
 from sim_bridge.parameters import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, struct
 from sim_bridge.reading_table import ReadingTable
 
@@ -36,6 +37,14 @@ def beam(
     return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
 
 
+def _body_and_outline(body: Any) -> tuple[Any, Any]:
+    """The body's struct as a mapping, with the outline in C that it says as `outline_m`."""
+    if not isinstance(body, Mapping) or "outline_m" not in body:
+        return body, None
+    outline = collision_outline("vehicle: body: outline_m", body["outline_m"])
+    return {key: value for key, value in body.items() if key != "outline_m"} | {"outline": outline}, outline
+
+
 class VehicleModel:
     """What a vehicle is made of; any number of worlds share one.
 
@@ -52,14 +61,18 @@ class VehicleModel:
     def __init__(
         self, body: Mapping[str, Any], *, dt: float = 0.01, noise: bool = True, ends_at_collision: bool = True
     ) -> None:
-        """A body (C struct body_parameters), which steps by `dt` seconds; drive and sensors are added to it."""
-        parameters = struct("body_parameters", "vehicle: body", body)
+        """A body (C struct body_parameters), which steps by `dt` seconds; drive and sensors are added to it.
+
+        `outline_m` in it, corners (x, y) in m around the axle's middle, is its collision outline instead of a circle.
+        """
+        given, outline = _body_and_outline(body)
+        parameters = struct("body_parameters", "vehicle: body", given)
         self.dt = number("vehicle", "dt", dt, POSITIVE)
         self.names: dict[str, slice] = {}
         self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
         self.body = dict(body)
         self.in_use = False
-        self._keep: list[Any] = [body]
+        self._keep: list[Any] = [given, outline]  # what the model in C points to
         handle = lib.vehicle_model_new(parameters, self.dt)
         if handle == ffi.NULL:
             raise RobotError("vehicle: there is no memory for a model")

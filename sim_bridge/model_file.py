@@ -45,7 +45,12 @@ def vehicle_model(
     if described.has_board:
         raise RobotError(f"robot {described.name!r} is driven by its board; expected one with board = 'none'")
     described = idealised(described, without)
-    body = _body(described.body) | {"grip": imperfections.Draw(0, noise, without=without)["TYRE_GRIP"]}
+    draw = imperfections.Draw(0, noise, without=without)
+    body = _body(described.body) | {"grip": draw.own("TYRE_GRIP", described.body.tyre_grip)}
+    if described.body.tyre_slip:
+        body["slip"] = int(draw["TYRE_SLIP"])
+    if described.body.outline_m:
+        body["outline_m"] = described.body.outline_m
     model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
     _drive(model, described)
     for name, device in described.device.items():
@@ -60,7 +65,7 @@ def _file(robot: Any) -> str | Path:
     return robot
 
 
-def _body(body: robots.Body) -> dict[str, float]:
+def _body(body: robots.Body) -> dict[str, Any]:
     return {
         "mass": body.mass_kg,
         "inertia": body.inertia_kg_m2,

@@ -16,6 +16,7 @@ from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.joining import done, join
+from sim_bridge.outline import collision_outline
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
@@ -63,6 +64,7 @@ class Sim:
         if handle == ffi.NULL:
             raise MemoryError("simulation")
         self._members: dict[int, tuple[EmulatedBoard, robots.RobotDescription]] = {}
+        self._outlines: list[Any] = []
         # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
         # kept here leaves no cycle of references, in which the order would be anybody's guess.
         self.handle = ffi.gc(handle, lambda handle, keep=(arena, self._members): lib.sim_destroy(handle))
@@ -93,7 +95,10 @@ class Sim:
             raise BoardError(f"a simulation takes {len(self._members)} robots at most")
         x, y, heading = self.arena.start if pose is None else pose
         draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
-        body = imperfections.body_parameters(description.body, draw)
+        corners = description.body.outline_m
+        outline = collision_outline(f"robot {description.name!r}: body.outline_m", corners) if corners else ffi.NULL
+        self._outlines.append(outline)  # bodies in C point to them
+        body = imperfections.body_parameters(description.body, draw, outline)
         status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
         if status == lib.SIM_NOT_FREE:
             raise ArenaError(

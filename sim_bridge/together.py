@@ -128,14 +128,14 @@ def places_of(arena: Arena, requests: Sequence[BoardRequest]) -> list[Pose]:
     taken: list[_Disc] = []
     for number, request in enumerate(requests, 1):
         if request.start_pose is not None:
-            taken.append(_given(arena, taken, number, request.start_pose, request.robot.body.radius_m))
+            taken.append(_given(arena, taken, number, request.start_pose, request.robot.body.reach_m))
     _, _, heading = arena.start
     places: list[Pose] = []
     for number, request in enumerate(requests, 1):
         if request.start_pose is not None:
             places.append(request.start_pose)
             continue
-        disc = _found(arena, taken, number, request.robot.body.radius_m)
+        disc = _found(arena, taken, number, request.robot.body.reach_m)
         taken.append(disc)
         places.append((disc.x, disc.y, heading))
     return places

@@ -80,7 +80,7 @@ def place(
 
 def save(handle: Any, index: int) -> bytes:
     """The state of one world."""
-    room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(handle))
+    room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(handle, index))
     lib.vehicles_save(handle, index, room)
     return bytes(ffi.buffer(room))
 

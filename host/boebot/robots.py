@@ -7,6 +7,7 @@ keys' names; lengths are in the robot's frame, x forward, y left, origin at the 
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -17,11 +18,13 @@ from boebot.device import Device as Device
 from boebot.device import pin_name as pin_name
 from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
+from boebot.geometry import Point, polygon_fault
 from boebot.vehicle_devices import AnyVehicleDevice, Motor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
-Point = tuple[float, float]
+
+OUTLINE_CORNERS_MAXIMUM = 32
 
 
 class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -37,6 +40,14 @@ class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     linear_damping_n_s_m: NotNegative
     angular_damping_n_m_s: NotNegative
     wheel_speed_maximum_m_s: Positive
+    outline_m: list[Point] = []  # collision outline around the axle's middle; none: the circle of radius_m
+    tyre_grip: NotNegative | None = None  # friction coefficient; none: as any rubber tyre's (imperfections)
+    tyre_slip: bool | None = None  # whether tyres slip beyond it; none: yes with a board, no without, as in the notes
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of the circle about the axle's middle that holds the body."""
+        return max((math.hypot(x, y) for x, y in self.outline_m), default=self.radius_m)
 
 
 class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -274,7 +285,11 @@ def load_robot(robot: str | Path) -> RobotDescription:
         RobotError: unknown robot, unreadable file, wrong key or value, or devices that cannot live on one board.
     """
     path = toml_files.find("robots", robot, RobotError)
-    description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
+    table = _read(path, seen=())
+    description = toml_files.convert(table, RobotDescription, path.name, RobotError)
+    if description.body.outline_m and (fault := polygon_fault(description.body.outline_m, OUTLINE_CORNERS_MAXIMUM)):
+        place = f"body.outline_m{fault.partition(' ')[0].rstrip(':')}"
+        raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
     if description.has_board:
         _check_supply(description, path.name)
         _check_pins(description, path.name)

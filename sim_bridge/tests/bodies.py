@@ -176,15 +176,16 @@ class World:
         return mover
 
     def step(self, torques: Sequence[tuple[float, float]], dt: float, order: Sequence[int] | None = None) -> int:
-        """One step; moving obstacles go on along their velocities."""
+        """One step; moving obstacles go on along their velocities unless they wait."""
         places = range(len(self.robots)) if order is None else order
         bodies = ffi.new("body *[]", [self.robots[i].body for i in places])
         status = int(lib.body_step(bodies, len(bodies), self.scene, [list(torques[i]) for i in places], dt))
         for i in range(self.scene.movers_count):
             mover = self._movers[i]
-            mover.x += mover.vx * dt
-            mover.y += mover.vy * dt
-            c, s = math.cos(mover.turn_rate * dt), math.sin(mover.turn_rate * dt)
+            gone = mover.stops  # it may have waited for the rest of the step
+            mover.x += mover.vx * gone
+            mover.y += mover.vy * gone
+            c, s = math.cos(mover.turn_rate * gone), math.sin(mover.turn_rate * gone)
             mover.cosine, mover.sine = mover.cosine * c - mover.sine * s, mover.sine * c + mover.cosine * s
         return status
 

@@ -18,7 +18,7 @@ static arena *room(void) {
   arena_add_polygon(where, pillar, 4, ARENA_OBSTACLE, NULL);
   arena_add_disc(where, 0.8, -0.8, 0.15, NULL);
   arena_add_light(where, 1.5, 1.5, 0.3, 2.0);
-  arena_add_moving(where, pillar, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);
+  arena_add_moving(where, NULL, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);
   arena_build(where);
   return where;
 }

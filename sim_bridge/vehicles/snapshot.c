@@ -105,6 +105,12 @@ static void walk_state(stream *s, vehicle_state *v) {
   v->flag = flag;
 }
 
+/* Where a moving shape is follows from the time and how long it has waited. */
+static void walk_mover(stream *s, mover *m) {
+  NUMBERS(s, LARGEST, &m->waited);
+  whole_int(s, &m->waits, 1);
+}
+
 static void walk_sensor(stream *s, const vehicle_sensor *sensor, sensor_slot *slot) {
   if (sensor->period > 0.0) NUMBERS(s, LARGEST, &slot->hold.next, &slot->hold.taken, &slot->hold.value);
   if (sensor->kind == SENSOR_SHARP_INFRARED) {
@@ -126,10 +132,13 @@ static void walk_brain(stream *s, unsigned char *memory, size_t size) {
   }
 }
 
+static size_t moving_count(const vehicle *w) { return vehicle_scene(w).movers_count; }
+
 static void walk(stream *s, vehicles *all, size_t i) {
   const vehicle_model *m = all->model;
   walk_body(s, &all->worlds[i].body.state);
   walk_state(s, &all->worlds[i].state);
+  for (size_t k = 0; k < moving_count(&all->worlds[i]); k++) walk_mover(s, &all->worlds[i].movers[k]);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(s, &m->sensors[k], &all->slots[i * m->sensors_count + k]);
   for (size_t k = 0; k < m->readings; k++) number(s, &all->readings[i * m->readings + k], DBL_MAX);
   walk_brain(s, all->brains + i * all->state_size, all->state_size);
@@ -143,14 +152,16 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
   return s.sum;
 }
 
-size_t vehicles_snapshot_size(const vehicles *self) {
+size_t vehicles_snapshot_size(const vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   stream s = {.mode = COUNT};
   body_state no_body = {0};
   vehicle_state no_state = {0};
   sensor_slot slot = {0};
+  mover still = {0};
   walk_body(&s, &no_body);
   walk_state(&s, &no_state);
+  for (size_t k = 0; k < moving_count(&self->worlds[i]); k++) walk_mover(&s, &still);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(&s, &m->sensors[k], &slot);
   return 8 * (HEADING_WORDS + s.count + m->readings) + self->state_size;
 }
@@ -181,7 +192,7 @@ static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t si
   if (get(bytes, 1) != vehicle_model_print(self->model)) return VEHICLE_OTHER_MODEL;
   if (get(bytes, 2) != arena_print(self->worlds[i].where)) return VEHICLE_OTHER_ARENA;
   if (get(bytes, 3) != self->state_size) return VEHICLE_OTHER_MEMORY;
-  if (size != vehicles_snapshot_size(self)) return VEHICLE_BAD_SNAPSHOT;
+  if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
   stream s = {.mode = CHECK, .good = 1, .in = rest};
   walk(&s, self, i);
   return s.good ? VEHICLE_OK : VEHICLE_BAD_SNAPSHOT;

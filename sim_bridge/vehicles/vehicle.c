@@ -58,7 +58,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
   if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
-  scene_moving(where, 0.0, SCENE_FIRST_MOVER, movers);
+  scene_moving(where, 0.0, m->dt, SCENE_FIRST_MOVER, movers);
   body at;
   body_init(&at, &m->body, m->reach);
   const scene around = {.arena = where, .movers = movers, .movers_count = moving};
@@ -160,23 +160,16 @@ void vehicles_move(vehicles *self, size_t i) {
 
 void vehicles_update_arena(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
-  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * self->model->dt, SCENE_FIRST_MOVER, w->movers);
-}
-
-/* 1 at a charging station. */
-static int charges(const vehicle *w) {
-  const arena_charger *charger = arena_charger_of(w->where);
-  if (charger == NULL) return 0;
-  const double dx = w->body.state.x - charger->x;
-  const double dy = w->body.state.y - charger->y;
-  return dx * dx + dy * dy < charger->radius * charger->radius;
+  const double dt = self->model->dt;
+  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, SCENE_FIRST_MOVER, w->movers);
 }
 
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
-  if (m->has_battery)
-    s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], charges(&self->worlds[i]), m->dt);
+  const body_state *b = &self->worlds[i].body.state;
+  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].where, b->x, b->y);
+  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
   if (m->ends_at_collision && self->worlds[i].body.state.touching) {
     s->flag = VEHICLE_COLLIDED;
   } else if (m->has_battery && s->energy <= 0.0) {

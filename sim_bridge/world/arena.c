@@ -251,6 +251,13 @@ const arena_disc *arena_discs(const arena *self) { return self->disc; }
 const arena_light *arena_lights(const arena *self) { return self->light; }
 const arena_moving *arena_movings(const arena *self) { return self->moving; }
 const arena_charger *arena_charger_of(const arena *self) { return self->has_charger ? &self->charger : NULL; }
+
+int arena_is_at_charger(const arena *self, double x, double y) {
+  const double dx = x - self->charger.x;
+  const double dy = y - self->charger.y;
+  return self->has_charger && dx * dx + dy * dy <= self->charger.radius * self->charger.radius;
+}
+
 uint32_t arena_version(const arena *self) { return self->version; }
 uint64_t arena_print(const arena *self) { return self->print; }
 

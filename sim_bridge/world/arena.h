@@ -93,6 +93,9 @@ const arena_moving *arena_movings(const arena *self);
 /* NULL if there is none. */
 const arena_charger *arena_charger_of(const arena *self);
 
+/* 1 if a robot whose axle's middle is at (x, y) stands at the charging station: on its disc, the rim included. */
+int arena_is_at_charger(const arena *self, double x, double y);
+
 /* Distance along the ray from (x, y) in direction (cosine, sine) to the nearest item that is at least `height` high, or
  * -1 if there is none nearer than `reach`. `item`, if not NULL, gets the item met: of equally near ones the first. */
 double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,

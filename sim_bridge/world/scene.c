@@ -128,17 +128,19 @@ void scene_fan(const scene *self, double x, double y, const double *cosine, cons
   }
 }
 
-void scene_moving(const arena *where, double time, uint32_t first_id, mover *out) {
+void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out) {
   const arena_moving *moving = arena_movings(where);
   for (size_t i = 0; i < arena_moving_count(where); i++) {
-    path_state at;
-    path_at(&moving[i].path, time, &at);
+    path_state at, next;
+    const double waited = out[i].waited;
+    path_at(&moving[i].path, time - waited, &at);
+    path_at(&moving[i].path, time - waited + dt, &next);
     out[i] = (mover){
         .x = at.x,
         .y = at.y,
-        .vx = at.vx,
-        .vy = at.vy,
-        .turn_rate = at.turn_rate,
+        .vx = (next.x - at.x) / dt, /* over waypoints as well: no jump at the step's end */
+        .vy = (next.y - at.y) / dt,
+        .turn_rate = number_wrap(next.heading - at.heading) / dt, /* a loop may begin again at another count of turns */
         .radius = moving[i].radius,
         .outline = moving[i].outline,
         .corners = moving[i].corners,
@@ -146,6 +148,8 @@ void scene_moving(const arena *where, double time, uint32_t first_id, mover *out
         .infrared_reflectance = moving[i].surface.infrared_reflectance,
         .sound_reflectance = moving[i].surface.sound_reflectance,
         .id = first_id + (uint32_t)i,
+        .waited = waited,
+        .waits = out[i].waits,
     };
     number_sincos(at.heading, &out[i].sine, &out[i].cosine);
   }

@@ -1,0 +1,57 @@
+"""What a collision outline may be: a simple polygon around the middle of the axle, section 3.2.5 of the notes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Point = tuple[float, float]
+
+EXTENT_M = 5.0  # a corner's coordinates, at most
+EDGE_M = 1e-4  # an edge's length, at least
+
+
+def polygon_fault(corners: Sequence[Point], most: int) -> str:
+    """What is wrong with these corners (m) as an outline, to stand behind their key; "" if nothing is."""
+    count = len(corners)
+    if not 3 <= count <= most:
+        return f" has {count} corners; expected 3 to {most}"
+    for i, (x, y) in enumerate(corners):
+        if not (abs(x) <= EXTENT_M and abs(y) <= EXTENT_M):
+            return f"[{i}] is [{x:g}, {y:g}]; expected numbers within ±{EXTENT_M:g} m"
+    edges = [(corners[i], corners[(i + 1) % count]) for i in range(count)]
+    for i, (a, b) in enumerate(edges):
+        if math.dist(a, b) < EDGE_M:
+            return f"[{i}] and the corner after it are the same; expected an edge"
+    for i in range(count):
+        for k in range(i + 1, count):
+            if _conflict(edges[i], edges[k], k == i + 1 or (i == 0 and k == count - 1)):
+                return f": edges {i} and {k} cross or touch; expected a polygon whose edges do not"
+    if not _is_inside(edges):
+        return ": the middle of the axle, [0, 0], lies outside; expected an outline around it"
+    return ""
+
+
+def _side(a: Point, b: Point, p: Point) -> float:
+    """Twice the area of a triangle: > 0 if p lies to the left of the way from a to b."""
+    return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+
+
+def _conflict(one: tuple[Point, Point], other: tuple[Point, Point], neighbours: bool) -> bool:
+    (a, b), (c, d) = one, other
+    if neighbours:  # they meet in a corner, and may not go back on each other
+        shared, p, q = (b, a, d) if b == c else (a, b, c)
+        back = (p[0] - shared[0]) * (q[0] - shared[0]) + (p[1] - shared[1]) * (q[1] - shared[1])
+        return back > 0 and abs(_side(shared, p, q)) <= 1e-9 * back
+    if any(max(a[i], b[i]) < min(c[i], d[i]) or max(c[i], d[i]) < min(a[i], b[i]) for i in (0, 1)):
+        return False
+    return _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0
+
+
+def _is_inside(edges: Sequence[tuple[Point, Point]]) -> bool:
+    """Whether the origin lies within the polygon, by the crossings of a ray along x."""
+    inside = False
+    for a, b in edges:
+        if (a[1] > 0) != (b[1] > 0) and a[0] - a[1] * (b[0] - a[0]) / (b[1] - a[1]) > 0:
+            inside = not inside
+    return inside
