@@ -140,7 +140,7 @@ static void check_world(vehicles *all, size_t i) {
 
 /* Saves world `from`, spoils the bytes, restores world `to` from them. */
 static void exchange(vehicles *all, size_t from, size_t to, input *in) {
-  const size_t size = vehicles_snapshot_size(all);
+  const size_t size = vehicles_snapshot_size(all, from);
   uint64_t *words = malloc(size);
   vehicles_save(all, from, words);
   const uint64_t before = vehicles_hash(all, to);

@@ -153,7 +153,7 @@ def test_an_empty_batch() -> None:
 # ---- the same bits from every compiler -------------------------------------------------------------------------------
 
 # Of hash_runs.c, as one number. It changes with every change of the world's behaviour, and then is to be renewed.
-RUNS_HASH = 0x31AE360E500A6972
+RUNS_HASH = 0xC29533E4C8BC163D
 
 
 def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:

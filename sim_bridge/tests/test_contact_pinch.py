@@ -292,7 +292,7 @@ def test_a_world_that_waits_is_saved_and_goes_on() -> None:
         assert there.hash() == here.hash()
     assert here.pose[1] > 0.3
     assert here.hash() != Vehicle(model, arena).hash()
-    with pytest.raises(RobotError, match="another arena"):
+    with pytest.raises(RobotError, match="saved in another arena"):
         Vehicle(model, shuttle(0.5), pose=(-3.0, 0.0, 0.0)).restore(Vehicle(model, arena_of()).save())
 
 

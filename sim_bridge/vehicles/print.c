@@ -39,7 +39,7 @@ static uint64_t print_drive(uint64_t sum, const vehicle_model *m) {
 static uint64_t print_beam(uint64_t sum, const beam *b) {
   const size_t rays = (size_t)b->rays;
   sum = HASH_NUMBERS(sum, b->x, b->y, b->height, b->middle_cosine, b->middle_sine);
-  return hash_numbers(hash_numbers(hash_numbers(sum, b->cosine, rays), b->sine, rays), b->inward, rays);
+  return hash_numbers(hash_numbers(hash_numbers(sum, b->fan.cosine, rays), b->fan.sine, rays), b->inward, rays);
 }
 
 static uint64_t print_laser(uint64_t sum, const laser_parameters *p) {
@@ -59,7 +59,8 @@ static uint64_t print_sensor(uint64_t sum, const vehicle_sensor *s) {
     case SENSOR_INFRARED_PROXIMITY: {
       const infrared_proximity *p = &s->as.infrared_proximity;
       sum = hash_word(print_beam(sum, &p->beam), p->reflectance != 0);
-      return HASH_NUMBERS(sum, p->range, p->c1, p->c2, p->sigma);
+      sum = hash_numbers(sum, p->c1, (size_t)p->beam.rays);
+      return HASH_NUMBERS(sum, p->range, p->c2, p->sigma);
     }
     case SENSOR_SHARP_INFRARED: {
       const sharp_infrared *p = &s->as.sharp_infrared;

@@ -105,6 +105,12 @@ static void walk_state(stream *s, vehicle_state *v) {
   v->flag = flag;
 }
 
+/* Where a moving shape is follows from the time and how long it has waited. */
+static void walk_mover(stream *s, mover *m) {
+  NUMBERS(s, LARGEST, &m->waited);
+  whole_int(s, &m->waits, 1);
+}
+
 static void walk_sensor(stream *s, const vehicle_sensor *sensor, sensor_slot *slot) {
   if (sensor->period > 0.0) NUMBERS(s, LARGEST, &slot->hold.next, &slot->hold.taken, &slot->hold.value);
   if (sensor->kind == SENSOR_SHARP_INFRARED) {
@@ -126,21 +132,15 @@ static void walk_brain(stream *s, unsigned char *memory, size_t size) {
   }
 }
 
-/* How long each moving shape has waited for robots that it pinches; where it is follows. */
-static void walk_movers(stream *s, vehicle *w) {
-  for (size_t k = 0; k < vehicle_scene(w).movers_count; k++) {
-    NUMBERS(s, LARGEST, &w->movers[k].waited);
-    whole_int(s, &w->movers[k].waits, 1);
-  }
-}
+static size_t moving_count(const vehicle *w) { return vehicle_scene(w).movers_count; }
 
 static void walk(stream *s, vehicles *all, size_t i) {
   const vehicle_model *m = all->model;
   walk_body(s, &all->worlds[i].body.state);
   walk_state(s, &all->worlds[i].state);
+  for (size_t k = 0; k < moving_count(&all->worlds[i]); k++) walk_mover(s, &all->worlds[i].movers[k]);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(s, &m->sensors[k], &all->slots[i * m->sensors_count + k]);
   for (size_t k = 0; k < m->readings; k++) number(s, &all->readings[i * m->readings + k], DBL_MAX);
-  walk_movers(s, &all->worlds[i]);
   walk_brain(s, all->brains + i * all->state_size, all->state_size);
 }
 
