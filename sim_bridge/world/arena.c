@@ -182,7 +182,7 @@ static int path_is_good(const path_waypoint *waypoints, size_t count, int repeat
   for (size_t i = 0; i < count; i++) {
     const path_waypoint *w = &waypoints[i];
     if (!all_finite((const double[]){w->time, w->x, w->y}, 3) || !(fabs(w->heading) < 1e5)) return 0;
-    if (i > 0 && !(w->time > waypoints[i - 1].time)) return 0;
+    if (i > 0 && !(w->time - waypoints[i - 1].time >= ARENA_WAYPOINTS_US * 1e-6)) return 0;
   }
   return 1;
 }

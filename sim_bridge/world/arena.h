@@ -17,6 +17,7 @@
 #define ARENA_SHORTEST_M 1e-9 /* edges are at least as long */
 
 /* python: begin */
+enum { ARENA_WAYPOINTS_US = 1 };     /* waypoints are at least so far apart in time, or rounds could not be counted */
 enum { ARENA_FARTHEST_M = 1000000 }; /* from the origin: beyond it positions lose the precision that rays need */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
 /* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
