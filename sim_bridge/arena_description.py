@@ -210,10 +210,15 @@ def _check_moving(moving: Moving, place: str) -> None:
     if times[0] != 0:
         raise DescriptionError(f"{place}.path[0].time_s", f" is {times[0]:g}; expected 0 for the first waypoint")
     for i in range(1, len(times)):
-        if not times[i - 1] < times[i]:
-            raise DescriptionError(
-                f"{place}.path[{i}].time_s", f" is {times[i]:g}; expected more than {times[i - 1]:g}"
-            )
+        if not times[i] - times[i - 1] >= lib.ARENA_WAYPOINTS_US * 1e-6:
+            what = f" is {times[i]:g}; expected more than {times[i - 1]:g}, by a microsecond or more"
+            raise DescriptionError(f"{place}.path[{i}].time_s", what)
+    radius = moving.radius_m or max(math.hypot(*corner) for corner in moving.corners_m or [])
+    path = [(point.time_s, point.x_m, point.y_m, point.heading_rad) for point in moving.path]
+    speed = lib.arena_path_speed(ffi.new("path_waypoint[]", path), len(path), radius)
+    if speed > lib.ARENA_FASTEST_M_S:
+        what = f": some of it moves at {speed:.4g} m/s; expected at most {lib.ARENA_FASTEST_M_S} m/s"
+        raise DescriptionError(f"{place}.path", what)
     first, last = moving.path[0], moving.path[-1]
     turns = (last.heading_rad - first.heading_rad) / (2 * math.pi)
     gap = math.dist((first.x_m, first.y_m), (last.x_m, last.y_m))

@@ -221,6 +221,18 @@ WAY = [Waypoint(0, 0, 0), Waypoint(1, 1, 0)]
             {"disc": [Disc(0, 0, 1, name="it")], "moving": [Moving(WAY, radius_m=1, name="it")]},
             "moving[0].name is 'it', as that of disc[0]; expected a name of its own, or none",
         ),
+        (
+            {"moving": [Moving([Waypoint(0, 0, 0), Waypoint(1e-118, 1, 0)], radius_m=1)]},
+            "moving[0].path[1].time_s is 1e-118; expected more than 0, by a microsecond or more",
+        ),
+        (
+            {"moving": [Moving([Waypoint(0, 0, 0), Waypoint(0.001, 1, 0)], radius_m=1)]},
+            "moving[0].path: some of it moves at 1000 m/s; expected at most 100 m/s",
+        ),
+        (
+            {"moving": [Moving([Waypoint(0, 0, 0), Waypoint(1, 0, 0, 300)], corners_m=square(0, 0, 1))]},
+            "moving[0].path: some of it moves at 212.1 m/s; expected at most 100 m/s",
+        ),
         ({"patch": [Patch(CORNERS, grip=math.inf)]}, "patch[0].grip: expected a finite number"),
         ({"light": [Light(0, 0, -1.0)]}, "light[0].power_w: expected float >= 0.0"),
         ({"charger": Charger(0, 0, 0)}, "charger.radius_m: expected float > 0.0"),

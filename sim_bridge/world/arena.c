@@ -182,9 +182,20 @@ static int path_is_good(const path_waypoint *waypoints, size_t count, int repeat
   for (size_t i = 0; i < count; i++) {
     const path_waypoint *w = &waypoints[i];
     if (!all_finite((const double[]){w->time, w->x, w->y}, 3) || !(fabs(w->heading) < 1e5)) return 0;
-    if (i > 0 && !(w->time > waypoints[i - 1].time)) return 0;
+    if (i > 0 && !(w->time - waypoints[i - 1].time >= ARENA_WAYPOINTS_US * 1e-6)) return 0;
   }
   return 1;
+}
+
+double arena_path_speed(const path_waypoint *waypoints, size_t count, double radius) {
+  double fastest = 0.0;
+  for (size_t i = 1; i < count; i++) {
+    const path_waypoint *a = &waypoints[i - 1];
+    const path_waypoint *b = &waypoints[i];
+    const double way = sqrt((b->x - a->x) * (b->x - a->x) + (b->y - a->y) * (b->y - a->y));
+    fastest = fmax(fastest, (way + radius * fabs(b->heading - a->heading)) / (b->time - a->time));
+  }
+  return fastest;
 }
 
 int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
@@ -201,6 +212,7 @@ int arena_add_moving(arena *self, const double *outline, size_t corners, double 
     added.radius *= 1.0 + 1e-12;
   }
   if (!all_finite(&added.radius, 1) || !(added.radius > 0.0)) return -1;
+  if (arena_path_speed(waypoints, waypoint_count, added.radius) > ARENA_FASTEST_M_S) return -1;
   arena_moving *movings = grown(self->moving, self->moving_count, 1, sizeof *movings);
   if (movings == NULL) return -1;
   self->moving = movings;

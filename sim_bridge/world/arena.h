@@ -19,6 +19,8 @@
 #define RAY_FAN_GROUP 4u      /* of them that are asked at once */
 
 /* python: begin */
+enum { ARENA_FASTEST_M_S = 100 };    /* of any point of a moving shape: a step of the world goes with its speed */
+enum { ARENA_WAYPOINTS_US = 1 };     /* waypoints are at least so far apart in time, or rounds could not be counted */
 enum { ARENA_FARTHEST_M = 1000000 }; /* from the origin: beyond it positions lose the precision that rays need */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
 /* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
@@ -69,9 +71,11 @@ int arena_add_wall(arena *self, const double *xy, size_t count, const arena_surf
 int arena_add_disc(arena *self, double x, double y, double radius, const arena_surface *surface);
 int arena_add_patch(arena *self, const double *xy, size_t count, double grip);
 int arena_add_light(arena *self, double x, double y, double height, double power);
-/* `outline` NULL: a disc of `radius`. */
+/* `outline` NULL: a disc of `radius`. Nothing of it is faster than ARENA_FASTEST_M_S. */
 int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
                      const path_waypoint *waypoints, size_t waypoint_count, int repeat);
+/* Speed of the fastest point within `radius` of a shape's origin on its path, m/s; times increase. */
+double arena_path_speed(const path_waypoint *waypoints, size_t count, double radius);
 /* Returns 0, or -1. */
 int arena_set_charger(arena *self, double x, double y, double radius);
 
