@@ -8,8 +8,8 @@ static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 
 int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
-  if (r == NULL || !isfinite(x + y + heading)) return SIM_BAD_ARGUMENT;
-  if (!scene_is_free(&self->seen, x, y, r->body->parameters.radius, r->chassis.self_id)) return SIM_NOT_FREE;
+  if (r == NULL || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
+  if (!scene_is_free(&self->seen, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
   const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
   sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
   body_place(r->body, x, y, heading);

@@ -84,7 +84,7 @@ static part_place place_of(robot *r, uint32_t device) {
 
 int sim_has_room(const sim *self, int number, double reach, double x, double y, double heading) {
   if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
-  if (self->now > 0 || !isfinite(x + y + heading)) return SIM_BAD_ARGUMENT;
+  if (self->now > 0 || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
   return scene_is_free(&self->seen, x, y, reach, 0) ? SIM_OK : SIM_NOT_FREE;
 }
 

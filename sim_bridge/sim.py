@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
 from sim_bridge import imperfections, saved, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
+from sim_bridge.arguments import point, shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.joining import done, join
@@ -26,10 +29,23 @@ RECORD_CYCLES = 160_000  # 10 ms
 REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the clock
 PATIENCE_S = 2.0  # that replaying takes without a word
 REPORT_S = 0.1  # between two words of progress
+PORTION_CYCLES = CLOCK_HZ  # of a long run, between two chances for Ctrl-C
+CYCLES_MAXIMUM = 2**62  # 9,000 years
+NUMBER_MAXIMUM = 2**30 - 1
+STEP_MINIMUM = 160  # cycles of a world step: 10 us
 NEVER = 2**64 - 1
 
 Pose = tuple[float, float, float]
 Progress = Callable[[float], None]
+
+
+def checked_pose(what: str, pose: object) -> Pose:
+    """A pose that is one (m, m, rad), else raises ArenaError; `what` names it."""
+    far = float(lib.ARENA_FARTHEST_M)
+    x, y, heading = point(
+        what, pose, ArenaError, "x (m), y (m) and heading (rad)", (far, far, float(lib.BODY_HEADING_LIMIT))
+    )
+    return x, y, heading
 
 
 @dataclass(frozen=True)
@@ -42,6 +58,17 @@ class Member:
     without: tuple[str, ...]
     model: VehicleModel | None
     """of a robot without a board"""
+
+
+_kept: dict[int, tuple[object, ...]] = {}
+"""What a simulation in C points to, by its address. Were it kept by the Sim, the collector of cycles, which takes things
+apart in any order, could free a board before the simulation that runs it."""
+
+
+def _destroy(handle: Any) -> None:
+    """Frees a simulation in C, and only then what it points to."""
+    lib.sim_destroy(handle)
+    _kept.pop(int(ffi.cast("uintptr_t", handle)), None)
 
 
 class Sim:
@@ -63,10 +90,16 @@ class Sim:
         """An arena without robots.
 
         Raises:
-            ArenaError: too many moving obstacles.
-            BoardError: a world step that does not divide the control tick.
+            ArenaError: it is no arena, or has too many moving obstacles.
+            BoardError: a seed that is none, or a world step that does not divide the control tick.
         """
-        if step_cycles <= 0 or TICK_CYCLES % step_cycles:
+        if not isinstance(arena, Arena):
+            raise ArenaError(f"simulation: got {shown(arena)}; expected an Arena, as load_arena gives it")
+        if not isinstance(noise, bool) or not isinstance(record, bool):
+            raise BoardError(f"simulation: noise is {shown(noise)}, record {shown(record)}; expected True or False")
+        seed = whole("simulation: the seed", seed, BoardError, least=-(2**63), most=2**64 - 1)
+        step_cycles = whole("simulation: step_cycles", step_cycles, BoardError, least=STEP_MINIMUM, most=TICK_CYCLES)
+        if TICK_CYCLES % step_cycles:
             raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
         moving = int(lib.arena_moving_count(arena.handle))
         if moving > lib.SIM_OBSTACLES_MAXIMUM:
@@ -81,9 +114,25 @@ class Sim:
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         self.listening: dict[int, int] = {}
-        # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
-        # kept here leaves no cycle of references, in which the order would be anybody's guess.
-        self.handle = ffi.gc(handle, lambda handle, keep=(arena, self.members, self._outlines): lib.sim_destroy(handle))
+        _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
+        self._handle: Any = ffi.gc(handle, _destroy)
+
+    @property
+    def handle(self) -> Any:
+        """The simulation in C.
+
+        Raises:
+            BoardError: it is closed.
+        """
+        if self._handle is None:
+            raise BoardError("this simulation is closed; expected one that is open")
+        return self._handle
+
+    def __copy__(self) -> Sim:
+        raise BoardError("a simulation cannot be copied; expected save() and restore()")
+
+    def __deepcopy__(self, memo: object) -> Sim:
+        return self.__copy__()
 
     def add(
         self,
@@ -108,16 +157,25 @@ class Sim:
         """
         if self.cycle:
             raise BoardError("the simulation runs already; expected all of its robots before")
+        if not isinstance(board, EmulatedBoard | None) or not isinstance(description, robots.RobotDescription):
+            raise BoardError(
+                f"got {shown(board)} and {shown(description)}; expected a board or None, and a description"
+            )
+        if isinstance(without, str) or not all(isinstance(name, str) for name in without):
+            raise BoardError(f"without is {shown(without)}; expected a list of names")
         if number is None:
             number = max(self.members, default=-1) + 1
-        if number < 0 or number in self.members:
-            raise BoardError(f"robot number {number} is taken or negative")
+        number = whole("robot number", number, BoardError, least=0, most=NUMBER_MAXIMUM)
+        if number in self.members:
+            raise BoardError(f"robot number {number} is taken")
+        if board is not None and board.is_in_use():
+            raise BoardError(f"the {board.description} is in a simulation already; expected one of its own")
         if len(self.members) == lib.BODY_MAXIMUM:
             raise BoardError(f"a simulation takes {len(self.members)} robots at most")
         if description.has_board != (board is not None):
             has = "has a board" if description.has_board else "has no board"
             raise BoardError(f"robot {description.name!r} {has}; expected one that fits what it is added with")
-        pose = self.arena.start if pose is None else pose
+        pose = self.arena.start if pose is None else checked_pose(f"arena {self.arena.name}: a robot's pose", pose)
         if board is None:
             self._add_vehicle(number, description, pose, without)
         else:
@@ -141,7 +199,13 @@ class Sim:
         self._check_place(status, pose)
         done(status, f"the {board.description}")
         self.members[number] = Member(board, description, pose, tuple(without), None)
+        self._take(board)
         join(self.handle, number, switches.idealised(description, without), draw)
+
+    def _take(self, board: EmulatedBoard) -> None:
+        """From now on this simulation runs it."""
+        me = weakref.ref(self)
+        board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
 
     def _add_vehicle(
         self, number: int, description: robots.RobotDescription, pose: Pose, without: Sequence[str]
@@ -186,7 +250,7 @@ class Sim:
         Raises:
             BoardError: a board's program crashed.
         """
-        until = self.cycle + cycles
+        until = self.cycle + whole("cycles", cycles, BoardError, least=0, most=CYCLES_MAXIMUM)
         while self.cycle < until:
             self.run_until(until)
 
@@ -196,7 +260,14 @@ class Sim:
         Raises:
             BoardError: a board's program crashed.
         """
-        self._check(lib.sim_run_until(self.handle, cycle))
+        while True:  # in portions, or Ctrl-C would not be heard
+            until = min(cycle, self.cycle + PORTION_CYCLES)
+            self._check(lib.sim_run_until(self.handle, until))
+            if until == cycle or self.cycle < until or self._anybody_speaks():
+                return
+
+    def _anybody_speaks(self) -> bool:
+        return any(lib.sim_speaks(self.handle, number) for number in self.listening)
 
     def _check(self, crashed: int) -> None:
         if crashed:
@@ -262,7 +333,10 @@ class Sim:
             fresh.close()
             raise
         self.close()
-        self.handle, self.members = fresh.handle, fresh.members
+        self._handle, self.members, self._outlines = fresh._handle, fresh.members, fresh._outlines
+        for member in self.members.values():
+            if member.board is not None:
+                self._take(member.board)
         for number, cycle in self.listening.items():
             lib.sim_listen(self.handle, number, cycle)
 
@@ -314,8 +388,11 @@ class Sim:
             )
 
     def close(self) -> None:
-        """Frees the simulation, then the boards."""
-        ffi.release(self.handle)
+        """Frees the simulation, then the boards. May be called twice."""
+        handle, self._handle = self._handle, None
+        if handle is None:
+            return
+        ffi.release(handle)
         for member in self.members.values():
             if member.board is not None:
                 member.board.close()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from boebot import robots
 from boebot.errors import BoardError, BrainError
 from sim_bridge._core import ffi, lib
+from sim_bridge.arguments import shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.vehicle import ENDS
@@ -22,6 +23,8 @@ TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "co
 TONE = ("time", "duration", "frequency")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
+BAUD_MAXIMUM = 4_000_000
+
 Floats = NDArray[np.float64]
 
 
@@ -31,7 +34,6 @@ class SimRobot:
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
         self._count = ffi.new("size_t *")
-        self._body = ffi.new("body_state *")
 
     @property
     def board(self) -> EmulatedBoard:
@@ -64,7 +66,15 @@ class SimRobot:
         return bytes(data)
 
     def send(self, data: bytes) -> None:
-        """Bytes to the board, from now on."""
+        """Bytes to the board, from now on.
+
+        Raises:
+            BoardError: they are none, or the robot has no board.
+        """
+        if not isinstance(data, bytes | bytearray | memoryview):
+            raise BoardError(f"send: got {shown(data)}; expected bytes")
+        data = bytes(data)
+        self._need_board("bytes")
         lib.sim_send(self._handle, self.number, data, len(data))
 
     # ---- without a board ---------------------------------------------------------------------------------------------
@@ -87,11 +97,14 @@ class SimRobot:
             BrainError: they are no finite numbers.
             BoardError: the robot is driven by its board.
         """
-        if lib.sim_signals(self._handle, self.number, left, right) == lib.SIM_OK:
-            return
         if self.description.has_board:
             raise BoardError(f"robot {self.description.name!r} is driven by its board; expected bytes for it")
-        raise BrainError(f"motor signals {left}, {right}; expected two finite numbers")
+        try:
+            status = lib.sim_signals(self._handle, self.number, left, right)
+        except (TypeError, OverflowError):
+            status = lib.SIM_BAD_ARGUMENT
+        if status != lib.SIM_OK:
+            raise BrainError(f"motor signals {shown(left)}, {shown(right)}; expected two finite numbers")
 
     @property
     def ended(self) -> str:
@@ -102,6 +115,7 @@ class SimRobot:
 
     def listen(self, cycle: int) -> None:
         """From that cycle on its bytes end a run of `Sim.run_until`."""
+        cycle = whole("listen: the cycle", cycle, BoardError, least=0, most=2**64 - 1)
         self.sim.listening[self.number] = cycle
         lib.sim_listen(self._handle, self.number, cycle)
 
@@ -111,7 +125,13 @@ class SimRobot:
         return bool(lib.sim_speaks(self._handle, self.number))
 
     def line_rate(self, baud: int) -> None:
-        """Bit rate of the outside's side of the serial line."""
+        """Bit rate of the outside's side of the serial line.
+
+        Raises:
+            BoardError: there is no such rate, or the robot has no board.
+        """
+        baud = whole("line_rate: the rate", baud, BoardError, least=1, most=BAUD_MAXIMUM)
+        self._need_board("a line")
         lib.sim_line_rate(self._handle, self.number, baud)
 
     @property
@@ -135,9 +155,14 @@ class SimRobot:
         return float(lib.sim_supply_voltage(self._handle, self.number))
 
     def body(self) -> Any:
-        """The body's state (C struct body_state): pose, speeds, wheel angles, distance, contact."""
-        lib.sim_body(self._handle, self.number, self._body)
-        return self._body
+        """The body's state now (a C struct body_state of its own): pose, speeds, wheel angles, distance, contact."""
+        body = ffi.new("body_state *")
+        lib.sim_body(self._handle, self.number, body)
+        return body
+
+    def _need_board(self, what: str) -> None:
+        if not self.description.has_board:
+            raise BoardError(f"robot {self.description.name!r} has no board, and so no {what}")
 
     def _rows(self, rows: Any, columns: tuple[str, ...]) -> dict[str, Floats]:
         count = self._count[0]

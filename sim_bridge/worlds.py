@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
 STATE_BYTES_MAXIMUM: Final = 2**24
-HEADING_MAXIMUM: Final = 1e5  # rad
 STEPS_MAXIMUM: Final = 2**52  # that a world counts
 
 
@@ -57,7 +56,7 @@ def place(
     """
     limit = float(lib.ARENA_FARTHEST_M)
     x, y, heading = arguments.point(
-        f"{who}: the pose", pose, RobotError, "x, y (m), heading (rad)", (limit, limit, HEADING_MAXIMUM)
+        f"{who}: the pose", pose, RobotError, "x, y (m), heading (rad)", (limit, limit, float(lib.BODY_HEADING_LIMIT))
     )
     number = arguments.whole(f"{who}: robot", robot, RobotError, least=1, most=2**31 - 1)
     key = arguments.whole(f"{who}: the seed", seed, RobotError, least=-(2**63), most=2**64 - 1) % 2**64

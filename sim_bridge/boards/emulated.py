@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,15 +30,30 @@ class EmulatedBoard:
         Raises:
             BoardError: the board was built for another version of this package.
         """
-        self.address = address
+        self._address = address
         self.description = description
         self.firmware = hashlib.sha256(firmware).hexdigest()
         self._release: Callable[[], None] | None = release
+        self._free = weakref.finalize(self, release)  # for one that is dropped; at the exit its world may still hold it
+        self._free.atexit = False
         self._keep = keep
         self._again = again
+        self.is_in_use: Callable[[], bool] = _in_no_simulation
+        """whether a simulation runs it"""
         if lib.board_check(address) != lib.SIM_OK:
             self.close()
             raise BoardError(f"the {description} was built for another version of the simulator; build it again")
+
+    @property
+    def address(self) -> int:
+        """Of the board in C.
+
+        Raises:
+            BoardError: it is closed.
+        """
+        if self._release is None:
+            raise BoardError(f"the {self.description} is closed; expected one that is open")
+        return self._address
 
     @property
     def can_repeat(self) -> bool:
@@ -59,10 +75,19 @@ class EmulatedBoard:
         return board
 
     def close(self) -> None:
-        """Frees the board. May be called twice."""
-        release, self._release = self._release, None
-        if release is not None:
-            release()
+        """Frees the board. May be called twice.
+
+        Raises:
+            BoardError: a simulation runs it.
+        """
+        if self.is_in_use():
+            raise BoardError(f"the {self.description} is in a simulation; expected Sim.close()")
+        self._release = None
+        self._free()
+
+
+def _in_no_simulation() -> bool:
+    return False
 
 
 def native_library(pin_map: str) -> Path:

@@ -192,7 +192,7 @@ def test_step_of_the_world_may_be_chosen(step_us: int) -> None:
 
 @pytest.mark.parametrize("step_cycles", [0, -16_000, 15_999, 48_000, 320_000])
 def test_step_that_does_not_divide_the_tick_is_refused(step_cycles: int) -> None:
-    with pytest.raises(BoardError, match="does not divide"):
+    with pytest.raises(BoardError, match=r"does not divide|step_cycles is .*; expected a whole number from 160 to"):
         scripted(step_cycles=step_cycles)
 
 

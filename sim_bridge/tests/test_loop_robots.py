@@ -166,7 +166,7 @@ def test_places_and_numbers_are_for_one() -> None:
         add_scripted(sim, pose=(0.1, 0.05, 0))
     with pytest.raises(BoardError, match="taken"):
         add_scripted(sim, pose=(1, 0, 0), number=2)
-    with pytest.raises(BoardError, match="negative"):
+    with pytest.raises(BoardError, match="expected a whole number from 0"):
         add_scripted(sim, pose=(1, 0, 0), number=-1)
     second = add_scripted(sim, pose=(1, 0, 0))
     assert second.robot.number == 3

@@ -10,7 +10,6 @@
 #define SERVO_PERIOD_S 0.020
 #define SPEED_LIMIT 100.0 /* m/s: as body.c limits it */
 #define TURN_LIMIT 1000.0 /* rad/s */
-#define HEADING_LIMIT 1e5 /* rad */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
   if (state_size > SIZE_MAX - 15u) return NULL;
@@ -51,7 +50,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   const vehicle_model *m = self->model;
   if (m->drive == DRIVE_NONE || i >= self->count) return VEHICLE_NOT_PLACED;
   if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
-  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) < HEADING_LIMIT))
+  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) <= BODY_HEADING_LIMIT))
     return VEHICLE_BAD_NUMBER;
   if (id == 0 || id >= SCENE_FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];

@@ -16,6 +16,8 @@
 #include "scene.h"
 
 /* python: begin */
+enum { BODY_HEADING_LIMIT = 100000 }; /* rad, that a body may be placed at: beyond it an angle loses its precision */
+
 typedef struct {
   double mass;                 /* M, kg, without wheels */
   double inertia;              /* I, kg m^2, about the vertical axis through the axle's middle, without wheels */
