@@ -17,7 +17,7 @@ from boebot.report import style
 from boebot.report.arena_drawing import draw_arena, frame
 from boebot.report.scene import plan_bounds
 from sim_bridge._core import ffi, lib
-from sim_bridge.floor_plan import floor_plan
+from sim_bridge.floor_plan import floor_plan, moving_solids, poses_of
 from sim_bridge.vehicle import Vehicle
 
 BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"
@@ -40,7 +40,8 @@ class View:
         draw_arena(self._axes, replace(plan, moving=()))
         x, y, _ = vehicle.pose
         frame(self._axes, *plan_bounds(plan, [(x, y)]))
-        self._moving = [self._add_moving(moving.solid.kind == "disc") for moving in plan.moving]
+        self._solids = moving_solids(vehicle.arena)
+        self._moving = [self._add_moving(solid.kind == "disc") for solid in self._solids]
         radius = vehicle.model.body["radius"]
         self._body = Circle((0, 0), radius, facecolor=BODY, alpha=0.85, zorder=8)
         self._ghost = Circle((0, 0), radius, fill=False, edgecolor=GHOST, ls="--", zorder=9)
@@ -71,9 +72,9 @@ class View:
         self._rays.set_data(*self._ray_lines())
         if self._ghost.get_visible():
             self._ghost.center = self.vehicle["odometer"][0], self.vehicle["odometer"][1]
-        now = self.vehicle.time
-        for patch, moving in zip(self._moving, floor_plan(self.vehicle.arena, now, now).moving, strict=True):
-            solid = moving.at(now)
+        movers = poses_of(self.vehicle.movers)
+        for patch, shape, (at_x, at_y, cosine, sine) in zip(self._moving, self._solids, movers.tolist(), strict=True):
+            solid = shape.placed(at_x, at_y, math.atan2(sine, cosine))
             if isinstance(patch, Circle):
                 patch.center, patch.radius = tuple(solid.points[0]), solid.radius
             elif isinstance(patch, Polygon):
@@ -84,7 +85,7 @@ class View:
         """Each ray from its sensor to what it meets at its height, one after another with gaps; beyond its reach there
         is nothing to meet."""
         arena = self.vehicle.arena
-        movers = arena._movers(self.vehicle.time)
+        movers = self.vehicle.movers
         scene = ffi.new("scene *", {"arena": arena.handle, "movers": movers, "movers_count": len(movers)})
         xs: list[float] = []
         ys: list[float] = []
