@@ -6,6 +6,7 @@ Lengths in m, angles in rad. A wrong file gets one sentence that names file, lin
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -119,7 +120,9 @@ class Arena:
         return [polygon.copy() for polygon in self._polygons]
 
     def moving_outlines(self, time: float) -> list[Floats]:
-        """The moving shapes where they are at `time` (s): closed polygons, arrays of shape (corners, 2) in m.
+        """The moving shapes where their paths are at `time` (s): closed polygons, arrays of shape (corners, 2) in m.
+
+        There they are in a world in which none has waited for a robot.
 
         Raises:
             ArenaError: `time` is no number of at most 1e9 s.
@@ -133,9 +136,11 @@ class Arena:
             polygons.append(shape @ rotation + np.array((mover.x, mover.y)))
         return polygons
 
-    def _movers(self, time: float) -> Any:
-        """The C core's movers at a time."""
+    def _movers(self, time: float, waited: Sequence[float] = ()) -> Any:
+        """The C core's movers at a time; `waited`: s by which the clock of each one's path is behind."""
         movers = ffi.new("mover[]", len(self.description.moving))
+        for mover, late in zip(movers, waited, strict=False):
+            mover.waited = late
         lib.scene_moving(self.handle, time, 1.0, 1, movers)
         return movers
 

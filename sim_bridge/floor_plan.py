@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,26 @@ SAMPLES_MAXIMUM = 20_000  # of one moving shape; longer times have them farther 
 Surface = arena_description.Polygon | arena_description.Wall | arena_description.Disc | arena_description.Moving
 
 
-def floor_plan(arena: Arena, begin: float, end: float) -> FloorPlan:
-    """The arena with its moving shapes from `begin` to `end` (s)."""
+@dataclass(frozen=True, kw_only=True)
+class Lateness:
+    """By how much the clock of a moving shape's path was behind the world's, for it had waited: even between rows."""
+
+    time: Floats  # s, increasing
+    waited: Floats  # s
+
+
+def floor_plan(arena: Arena, begin: float, end: float, late: Sequence[Lateness] = ()) -> FloorPlan:
+    """The arena with its moving shapes from `begin` to `end` (s); `late`: of each of them, unless none ever waited."""
+    time = _times(arena, begin, end, late)
+    return plan_of_poses(arena, time, _poses(arena, time, late))
+
+
+def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
+    """The arena with its moving shapes at these times (s).
+
+    Args:
+        poses: x, y (m), cosine and sine of the heading of each shape: shape (shapes, 4, times).
+    """
     said = arena.description
     charger = said.charger
     return FloorPlan(
@@ -33,9 +52,17 @@ def floor_plan(arena: Arena, begin: float, end: float) -> FloorPlan:
             for light in said.light
         ],
         charger=None if charger is None else Charger(x=charger.x_m, y=charger.y_m, radius=charger.radius_m),
-        moving=list(_moving(arena, begin, end)),
+        moving=[
+            Moving(solid=solid, time=time, x=x, y=y, heading=np.unwrap(np.arctan2(sine, cosine)))
+            for solid, (x, y, cosine, sine) in zip(moving_solids(arena), poses, strict=True)
+        ],
         grip=TYRE_GRIP,
     )
+
+
+def poses_of(movers: Any) -> Floats:
+    """x, y (m), cosine and sine of the heading of each of the C core's movers: shape (movers, 4)."""
+    return np.array([(m.x, m.y, m.cosine, m.sine) for m in movers], dtype=np.float64).reshape(-1, 4)
 
 
 def path_end(arena: Arena) -> float:
@@ -66,27 +93,53 @@ def _surface(shape: Surface) -> dict[str, Any]:
     }
 
 
-def _moving(arena: Arena, begin: float, end: float) -> Iterator[Moving]:
-    shapes = arena.description.moving
+def moving_solids(arena: Arena) -> list[Solid]:
+    """The shapes that move, in their own frames."""
+    return [
+        Solid(kind="disc", points=np.zeros((1, 2)), radius=moving.radius_m or 0.0, **_surface(moving))
+        if moving.corners_m is None
+        else Solid(kind="obstacle", points=np.array(moving.corners_m), **_surface(moving))
+        for moving in arena.description.moving
+    ]
+
+
+def _times(arena: Arena, begin: float, end: float, late: Sequence[Lateness]) -> Floats:
+    """When poses are taken: evenly, and wherever a shape begins or ends to wait or passes a waypoint, between which it
+    goes straight (paths.h)."""
+    bends = [row.time for row in late]
+    for k, moving in enumerate(arena.description.moving):
+        clock = late[k] if late else Lateness(time=np.array([begin, end]), waited=np.zeros(2))
+        bends.append(_waypoint_times(moving, begin, end, clock))
+    kept = np.unique(np.concatenate([np.empty(0), *bends]))
+    kept = kept[(kept > begin) & (kept < end)]
+    kept = kept[:: math.ceil(2 * len(kept) / SAMPLES_MAXIMUM) or 1]
+    count = max(2, min(SAMPLES_MAXIMUM - len(kept), math.ceil((end - begin) / SAMPLE_S) + 1))
+    return np.unique(np.concatenate((np.linspace(begin, end, count), kept))) if end > begin else np.full(2, begin)
+
+
+def _waypoint_times(moving: arena_description.Moving, begin: float, end: float, clock: Lateness) -> Floats:
+    """When the shape passes waypoints from `begin` to `end`, on the world's clock (s)."""
+    way = np.array([point.time_s for point in moving.path])
+    period = float(way[-1])
+    if period <= 0.0:
+        return np.empty(0)
+    own = np.concatenate(([begin], clock.time, [end]))
+    own.sort()
+    past = own - np.interp(own, clock.time, clock.waited)  # on the path's clock
+    first = 0 if moving.repeat == "once" else math.floor(past[0] / period)
+    last = 0 if moving.repeat == "once" else math.floor(past[-1] / period)
+    if (last - first + 1) * len(way) > SAMPLES_MAXIMUM:  # too many to be told
+        return np.empty(0)
+    back = moving.repeat == "back_and_forth"
+    turns = [n * period + (period - way if back and n % 2 else way) for n in range(first, last + 1)]
+    return np.interp(np.sort(np.concatenate(turns)), past, own)
+
+
+def _poses(arena: Arena, time: Floats, late: Sequence[Lateness]) -> Floats:
+    """Of each moving shape at each time, as `plan_of_poses` takes them."""
+    shapes = len(arena.description.moving)
     if not shapes:
-        return
-    count = max(2, min(SAMPLES_MAXIMUM, math.ceil((end - begin) / SAMPLE_S) + 1))
-    time = np.linspace(begin, end, count)
-    poses = _poses(arena, time, len(shapes))
-    for moving, (x, y, cosine, sine) in zip(shapes, poses, strict=True):
-        if moving.corners_m is None:
-            solid = Solid(kind="disc", points=np.zeros((1, 2)), radius=moving.radius_m or 0.0, **_surface(moving))
-        else:
-            solid = Solid(kind="obstacle", points=np.array(moving.corners_m), **_surface(moving))
-        yield Moving(solid=solid, time=time, x=x, y=y, heading=np.unwrap(np.arctan2(sine, cosine)))
-
-
-def _poses(arena: Arena, time: Floats, count: int) -> Floats:
-    """x, y, cosine and sine of the heading of each moving shape at each time: shape (shapes, 4, times)."""
-    poses = np.empty((count, 4, len(time)))
-    for k, moment in enumerate(time.tolist()):
-        movers = arena._movers(moment)
-        for i in range(count):
-            mover = movers[i]
-            poses[i, :, k] = mover.x, mover.y, mover.cosine, mover.sine
-    return poses
+        return np.empty((0, 4, len(time)))
+    waited = np.array([np.interp(time, row.time, row.waited) for row in late]).reshape(len(late), len(time)).T
+    rows = zip(time.tolist(), waited.tolist(), strict=True)
+    return np.array([poses_of(arena._movers(moment, clocks)) for moment, clocks in rows]).transpose(1, 2, 0)

@@ -130,6 +130,7 @@ static void step_world(sim *self) {
   }
   const scene obstacles = {self->arena, self->movers, self->obstacles};
   body_step(self->bodies, (size_t)self->robot_count, &obstacles, self->torques, self->dt);
+  if (self->record_cycles > 0) sim_record_waits(self, self->world);
   self->world += self->step_cycles;
   sim_update_scene(self);
   for (int i = 0; i < self->robot_count; i++) follow(self->robots[i], self->world);

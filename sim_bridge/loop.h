@@ -137,6 +137,9 @@ uint64_t sim_state_hash(const sim *self);
 void sim_body(const sim *self, int robot, body_state *out);
 const sim_truth *sim_record(const sim *self, int robot, size_t *count);
 const sim_look *sim_looks(const sim *self, int robot, size_t *count);
+const sim_wait *sim_waits(const sim *self, size_t *count); /* by time; none without a record */
+/* The arena's moving shapes as they stand, at `time`, s: up to a step ahead of sim_now. */
+const mover *sim_movers(const sim *self, size_t *count, double *time);
 uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
 uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
 

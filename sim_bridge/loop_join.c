@@ -50,6 +50,7 @@ void sim_destroy(sim *self) {
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
   buffer_free(&self->inputs);
+  buffer_free(&self->waits);
   free(self);
 }
 

@@ -21,6 +21,12 @@ typedef struct {
   uint64_t end;
 } wave;
 
+/* A moving shape's clock as the record of waits has it. */
+typedef struct {
+  double waited; /* s, after the last step */
+  double lost;   /* s, in that step */
+} mover_clock;
+
 typedef struct {
   sim *sim;
   int number;
@@ -71,6 +77,8 @@ struct sim {
   mover
       movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
   size_t obstacles;
+  mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
+  buffer waits;  /* rows of sim_wait */
   scene seen;    /* arena and all movers */
   buffer inputs; /* from outside, as loop_inputs.c notes them */
   int crashed;   /* 1: a board has */
@@ -138,6 +146,9 @@ uint64_t line_idle_cycles(uint32_t baud);
 
 /* The voltage of the rail as it is now goes to whoever runs on it. */
 void robot_update_supply(robot *self);
+
+/* loop_truth.c: how long movers waited in the world's step that began at `begin`, before the scene is updated. */
+void sim_record_waits(sim *self, uint64_t begin);
 
 /* Puts the robots into the scene as they stand now. */
 void sim_update_scene(sim *self);

@@ -26,6 +26,28 @@ const sim_tone *sim_tones(const sim *self, int number, size_t *count) {
   return r == NULL ? NULL : (const sim_tone *)(const void *)r->tones.data;
 }
 
+void sim_record_waits(sim *self, uint64_t begin) {
+  for (size_t k = 0; k < self->obstacles; k++) {
+    const mover *m = &self->movers[k];
+    mover_clock *clock = &self->clocks[k];
+    const double lost = m->waited > clock->waited ? self->dt - m->stops : 0.0;
+    const sim_wait row = {(double)begin / BOARD_CLOCK_HZ, (double)k, clock->waited};
+    if (lost != clock->lost) buffer_append(&self->waits, &row, sizeof row);
+    *clock = (mover_clock){.waited = m->waited, .lost = lost};
+  }
+}
+
+const sim_wait *sim_waits(const sim *self, size_t *count) {
+  *count = self->waits.count / sizeof(sim_wait);
+  return (const sim_wait *)(const void *)self->waits.data;
+}
+
+const mover *sim_movers(const sim *self, size_t *count, double *time) {
+  *count = self->obstacles;
+  *time = (double)self->world / BOARD_CLOCK_HZ;
+  return self->movers;
+}
+
 double sim_turret_angle(const sim *self, int number, uint8_t pin) {
   const robot *r = sim_robot(self, number);
   const turret *t = r == NULL ? NULL : robot_turret(r, pin);

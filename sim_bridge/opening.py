@@ -80,5 +80,5 @@ def truth_of(robot: SimRobot) -> Truth | None:
         contact=columns["contact"] > 0,
         left_speed=columns["left"],
         right_speed=columns["right"],
-        plan=floor_plan(robot.sim.arena, float(columns["time"][0]), float(columns["time"][-1])),
+        plan=floor_plan(robot.sim.arena, float(columns["time"][0]), float(columns["time"][-1]), robot.sim.lateness()),
     )

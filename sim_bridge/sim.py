@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
 from sim_bridge import imperfections, saved, switches
@@ -17,6 +19,7 @@ from sim_bridge.arena import Arena
 from sim_bridge.arguments import point, shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.floor_plan import Lateness
 from sim_bridge.joining import done, join
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.outline import collision_outline
@@ -276,6 +279,23 @@ class Sim:
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
             raise BoardError(f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+
+    def lateness(self) -> list[Lateness]:
+        """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
+        waited for robots; empty without recording."""
+        if not self._record:
+            return []
+        count, now = ffi.new("size_t *"), ffi.new("double *")
+        movers = lib.sim_movers(self.handle, count, now)
+        last = [movers[k].waited for k in range(count[0])]
+        rows = lib.sim_waits(self.handle, count)
+        size = count[0] * ffi.sizeof("sim_wait")
+        table = np.frombuffer(ffi.buffer(rows, size)[:] if size else b"", dtype=np.float64).reshape(-1, 3)
+        found = []
+        for shape, waited in enumerate(last):
+            time, _, late = table[table[:, 1] == shape].T
+            found.append(Lateness(time=np.append(time, now[0]), waited=np.append(late, waited)))
+        return found
 
     def hash(self) -> int:
         """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""

@@ -115,6 +115,15 @@ class Vehicle:
         return self._body
 
     @property
+    def movers(self) -> Any:
+        """Truth: C structs mover of the arena's moving shapes as they stand now, which may have waited; a copy."""
+        count = ffi.new("size_t *")
+        movers = lib.vehicles_movers(self.handle, 0, count)
+        copy = ffi.new("mover[]", count[0])
+        ffi.memmove(copy, movers, ffi.sizeof(copy))
+        return copy
+
+    @property
     def ended(self) -> str:
         """Why the run has ended, "" while it goes on: "collision" or "battery empty"."""
         lib.vehicles_flags(self.handle, 0, 1, self._flag)

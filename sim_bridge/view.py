@@ -11,13 +11,16 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.transforms import Affine2D
 
 from boebot.errors import BoebotError
+from boebot.geometry import way_out
 from boebot.report import style
 from boebot.report.arena_drawing import draw_arena, frame
+from boebot.report.robot_drawing import body_patch
 from boebot.report.scene import plan_bounds
 from sim_bridge._core import ffi, lib
-from sim_bridge.floor_plan import floor_plan
+from sim_bridge.floor_plan import floor_plan, moving_solids, poses_of
 from sim_bridge.vehicle import Vehicle
 
 BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"
@@ -40,10 +43,12 @@ class View:
         draw_arena(self._axes, replace(plan, moving=()))
         x, y, _ = vehicle.pose
         frame(self._axes, *plan_bounds(plan, [(x, y)]))
-        self._moving = [self._add_moving(moving.solid.kind == "disc") for moving in plan.moving]
-        radius = vehicle.model.body["radius"]
-        self._body = Circle((0, 0), radius, facecolor=BODY, alpha=0.85, zorder=8)
-        self._ghost = Circle((0, 0), radius, fill=False, edgecolor=GHOST, ls="--", zorder=9)
+        self._solids = moving_solids(vehicle.arena)
+        self._moving = [self._add_moving(solid.kind == "disc") for solid in self._solids]
+        radius, outline = vehicle.model.body["radius"], vehicle.model.body.get("outline_m", ())
+        self._front = way_out(outline) if len(outline) else radius
+        self._body = body_patch(radius, outline, facecolor=BODY, alpha=0.85, zorder=8)
+        self._ghost = body_patch(radius, outline, fill=False, edgecolor=GHOST, ls="--", zorder=9)
         self._axes.add_patch(self._body)
         self._axes.add_patch(self._ghost)
         self._ghost.set_visible(ghost and "odometer" in vehicle.model.names)
@@ -63,28 +68,31 @@ class View:
     def update(self) -> None:
         """Takes the vehicle, and what moves beside it, as they are now."""
         x, y, heading = self.vehicle.pose
-        radius = self._body.radius
         self._trail.append((x, y))
-        self._body.center = (x, y)
-        self._nose.set_data((x, x + radius * math.cos(heading)), (y, y + radius * math.sin(heading)))
+        self._put(self._body, x, y, heading)
+        tip = x + self._front * math.cos(heading), y + self._front * math.sin(heading)
+        self._nose.set_data((x, tip[0]), (y, tip[1]))
         self._path.set_data(*zip(*self._trail, strict=True))
         self._rays.set_data(*self._ray_lines())
         if self._ghost.get_visible():
-            self._ghost.center = self.vehicle["odometer"][0], self.vehicle["odometer"][1]
-        now = self.vehicle.time
-        for patch, moving in zip(self._moving, floor_plan(self.vehicle.arena, now, now).moving, strict=True):
-            solid = moving.at(now)
+            self._put(self._ghost, *self.vehicle["odometer"])
+        movers = poses_of(self.vehicle.movers)
+        for patch, shape, (at_x, at_y, cosine, sine) in zip(self._moving, self._solids, movers.tolist(), strict=True):
+            solid = shape.placed(at_x, at_y, math.atan2(sine, cosine))
             if isinstance(patch, Circle):
                 patch.center, patch.radius = tuple(solid.points[0]), solid.radius
             elif isinstance(patch, Polygon):
                 patch.set_xy(solid.points)
         self._axes.set_title(f"{self.vehicle.time:.2f} s", color=style.INK)
 
+    def _put(self, patch: Patch, x: float, y: float, heading: float) -> None:
+        patch.set_transform(Affine2D().rotate(heading).translate(x, y) + self._axes.transData)
+
     def _ray_lines(self) -> tuple[list[float], list[float]]:
         """Each ray from its sensor to what it meets at its height, one after another with gaps; beyond its reach there
         is nothing to meet."""
         arena = self.vehicle.arena
-        movers = arena._movers(self.vehicle.time)
+        movers = self.vehicle.movers
         scene = ffi.new("scene *", {"arena": arena.handle, "movers": movers, "movers_count": len(movers)})
         xs: list[float] = []
         ys: list[float] = []

@@ -61,6 +61,12 @@ class Solid:
             said.append(f"sound {self.sound_reflectance:.0%}")
         return said
 
+    def placed(self, x: float, y: float, heading: float) -> Solid:
+        """The solid with its frame at a pose."""
+        cosine, sine = math.cos(heading), math.sin(heading)
+        turned = self.points @ np.array([[cosine, sine], [-sine, cosine]])
+        return replace(self, points=turned + np.array((x, y)))
+
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower left and upper right corner."""
@@ -84,10 +90,7 @@ class Moving:
 
     def at(self, time: float) -> Solid:
         """The solid where it is then."""
-        x, y, heading = self.pose(time)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        turned = self.solid.points @ np.array([[cosine, sine], [-sine, cosine]])
-        return replace(self.solid, points=turned + np.array((x, y)))
+        return self.solid.placed(*self.pose(time))
 
 
 @dataclass(frozen=True, kw_only=True)

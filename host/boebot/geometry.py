@@ -55,3 +55,12 @@ def _is_inside(edges: Sequence[tuple[Point, Point]]) -> bool:
         if (a[1] > 0) != (b[1] > 0) and a[0] - a[1] * (b[0] - a[0]) / (b[1] - a[1]) > 0:
             inside = not inside
     return inside
+
+
+def way_out(corners: Sequence[Sequence[float]]) -> float:
+    """Distance from the origin, which lies in the polygon, along the x axis to the first edge."""
+    found = []
+    for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        if min(y0, y1) <= 0.0 <= max(y0, y1):
+            found += [x0, x1] if y0 == y1 else [x0 + (x1 - x0) * y0 / (y0 - y1)]
+    return min((x for x in found if x > 0.0), default=0.0)

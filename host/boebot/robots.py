@@ -18,7 +18,7 @@ from boebot.device import Device as Device
 from boebot.device import pin_name as pin_name
 from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
-from boebot.geometry import Point, polygon_fault
+from boebot.geometry import Point, polygon_fault, way_out
 from boebot.vehicle_devices import AnyVehicleDevice, Motor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -43,6 +43,11 @@ class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     outline_m: list[Point] = []  # collision outline around the axle's middle; none: the circle of radius_m
     tyre_grip: NotNegative | None = None  # friction coefficient; none: as any rubber tyre's (imperfections)
     tyre_slip: bool | None = None  # whether tyres slip beyond it; none: yes with a board, no without, as in the notes
+
+    @property
+    def front_m(self) -> float:
+        """From the axle's middle straight ahead to the body's edge."""
+        return way_out(self.outline_m) if self.outline_m else self.radius_m
 
     @property
     def reach_m(self) -> float:

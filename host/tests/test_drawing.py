@@ -14,16 +14,19 @@ import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import boebot
 from boebot import runner
 from boebot.boards import Truth
 from boebot.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
+from boebot.geometry import way_out
 from boebot.report import picture, scene, sensors, style
 from boebot.report.arena_drawing import draw_arena, frame, ghost_times, legend_entries
+from boebot.report.robot_drawing import draw_robot
 from boebot.result import RunResult
-from boebot.robots import load_robot
+from boebot.robots import RobotDescription, load_robot
 from peer import InProcess, Peer
 
 numbers = st.floats(-3, 3)
@@ -231,6 +234,58 @@ def test_pictures_show_the_sensors_that_are_on() -> None:
     assert kinds["arsim"] == pair and sensors.whiskers(load_robot("arsim")) == {}
     (ping,) = (look for look in sensors.looks(load_robot("boebot")) if look.device == "ping")
     assert ping.axis is not None, "it turns with the turret"
+
+
+OUTLINES = {"circle": [], "box": [(-0.08, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.08, 0.05)]}
+
+
+def shaped(robot: RobotDescription, outline: list[tuple[float, float]]) -> RobotDescription:
+    return msgspec.structs.replace(robot, body=msgspec.structs.replace(robot.body, outline_m=outline))
+
+
+@pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
+@pytest.mark.parametrize(("x", "y", "heading"), [(0.0, 0.0, 0.0), (1.2, -0.7, 2.5)])
+def test_the_body_is_drawn_as_what_meets_things(
+    outline: list[tuple[float, float]], x: float, y: float, heading: float
+) -> None:
+    """The filled patch, against shapely; its nose lies within."""
+    robot = shaped(load_robot("shieldbot"), outline)
+    axes = Figure().subplots()
+    axes.set(xlim=(x - 0.2, x + 0.2), ylim=(y - 0.2, y + 0.2))
+    draw_robot(axes, robot, (x, y, heading), style.END)
+    drawn = {}
+    for patch in axes.patches:
+        (pixels,) = patch.get_path().transformed(patch.get_transform()).to_polygons()
+        drawn[patch.get_facecolor()] = shapely.Polygon(axes.transData.inverted().transform(pixels))
+    body, nose = drawn[to_rgba(style.BODY)], drawn[to_rgba(style.END)]
+    shape = shapely.Polygon(outline) if outline else shapely.Point(0, 0).buffer(robot.body.radius_m, 64)
+    turned = shapely.affinity.rotate(shape, heading, origin=(0, 0), use_radians=True)
+    assert shapely.hausdorff_distance(body, shapely.affinity.translate(turned, x, y)) < (1e-9 if outline else 2e-4)
+    assert body.contains(nose)
+
+
+def test_the_ghost_is_drawn_as_the_body(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = run_of("shieldbot", monkeypatch)
+    axes = Figure().subplots()
+    picture._draw_ghost(axes, shaped(result.robot, OUTLINES["box"]).body, result.odometry)
+    (ghost,) = axes.patches
+    corners = (ghost.get_transform() - axes.transData).transform(ghost.get_path().vertices)
+    end = tuple(float(row[-1]) for row in (result.odometry.x, result.odometry.y, result.odometry.heading))
+    turned = shapely.affinity.rotate(shapely.Polygon(OUTLINES["box"]), end[2], origin=(0, 0), use_radians=True)
+    expected = shapely.affinity.translate(turned, *end[:2])
+    assert shapely.hausdorff_distance(shapely.Polygon(corners), expected) < 1e-9
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 1.0), st.floats(0.2, 1.0)), min_size=4, max_size=12))
+def test_the_way_out_is_the_nearest_edge_ahead(star: list[tuple[float, float]]) -> None:
+    """Of polygons around the origin, against shapely."""
+    steps = np.cumsum([step for _, step in star])
+    angles = 2 * math.pi * steps / steps[-1]
+    corners = [(r * math.cos(a), r * math.sin(a)) for (r, _), a in zip(star, angles.tolist(), strict=True)]
+    if not shapely.Polygon(corners).contains(shapely.Point(0, 0)):
+        return
+    ring = shapely.LinearRing(corners).intersection(shapely.LineString([(0, 0), (2, 0)]))
+    assert way_out(corners) == pytest.approx(ring.distance(shapely.Point(0, 0)), abs=1e-9)
 
 
 # ---- the result in a few words ---------------------------------------------------------------------------------------

@@ -110,3 +110,18 @@ def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path
     assert "pingRow" in moment["hidden"] and "estimateRow" not in moment["hidden"]
     assert [row[0] for row in moment["readings"]] == ["left IR", "right IR", "compass"]
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
+
+
+BODY = "rgba(229,233,240,.94)"
+
+
+@pytest.mark.parametrize("outline", [[], [[-0.08, -0.05], [0.06, -0.05], [0.06, 0.05], [-0.08, 0.05]]])
+def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tmp_path: Path) -> None:
+    """Each of two robots, in its own frame: the outline, or the circle."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text(f"extends = 'arsim'\nname = 'mine'\n[body]\noutline_m = {outline}\n")
+    members = [boebot.Member(brain=lambda robot: None, robot=mine, pose=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
+    run = boebot.run_together(members, arena="empty", seconds=0.2)
+    (moment,) = moments(run, tmp_path, 0.1)  # type: ignore[arg-type]
+    bodies = [row["path"] for row in moment["drawn"] if row.get("fill") == BODY]
+    assert bodies == [outline or [[0, 0, run.robots[0].robot.body.radius_m]]] * 2

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 
+import boebot
 from boebot.errors import ArenaError, RobotError
 from boebot.geometry import polygon_fault
 from boebot.robots import load_robot
@@ -20,6 +22,7 @@ from sim_bridge.model_file import vehicle_model
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, script_board, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
+from sim_bridge.view import View
 
 BOX = [[-0.15, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.15, 0.1]]
 
@@ -130,12 +133,72 @@ def test_a_narrow_outline_is_refused_and_an_array_taken() -> None:
     assert vehicle.pose[1] == pytest.approx(0.9, abs=5e-5)
 
 
-def test_the_example_of_the_reference_is_a_robot(tmp_path: Path) -> None:
-    """The chassis in docs/reference/robots.md: 136 mm by 80 mm, mirror-symmetric, within the published 90 to 119 mm."""
+def test_a_view_draws_the_outline_where_the_vehicle_is() -> None:
+    """Against shapely; the ghost is where the odometer has it."""
+    model = VehicleModel(ARSIM_BODY | {"outline_m": BOX}, noise=False)
+    model.dc_motors()
+    model.odometer("odometer")
+    view = View(vehicle := Vehicle(model, arena_of(), pose=(0.3, -0.2, 0.4)))
+    for _ in range(100):
+        vehicle.step(0.3, 0.5)
+    view.update()
+    x, y, heading = vehicle.pose
+    for patch, pose in ((view._body, vehicle.pose), (view._ghost, vehicle["odometer"])):
+        corners = (patch.get_transform() - view._axes.transData).transform(patch.get_path().vertices)
+        assert shapely.hausdorff_distance(shapely.Polygon(corners), placed(shapely.Polygon(BOX), *pose)) < 1e-9
+    front = max(corner for corner, _ in BOX)
+    tip = x + front * math.cos(heading), y + front * math.sin(heading)
+    assert [row[1] for row in view._nose.get_data()] == pytest.approx(tip, abs=1e-9)  # type: ignore[index]
+
+
+def placed(shape: Any, x: float, y: float, heading: float) -> Any:
+    turned = shapely.affinity.rotate(shape, heading, origin=(0, 0), use_radians=True)
+    return shapely.affinity.translate(turned, x, y)
+
+
+# ---- the reference's example -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def angular(tmp_path: Path) -> Path:
+    """The file in docs/reference/robots.md."""
     page = (Path(__file__).parents[2] / "docs/reference/robots.md").read_text("utf-8")
     text = next(block for block in page.split("```toml\n")[1:] if "outline_m = [" in block).partition("```")[0]
     (tmp_path / "angular.toml").write_text(text)
-    corners = load_robot(tmp_path / "angular.toml").body.outline_m
-    assert {(x, -y) for x, y in corners} == set(corners)
-    assert max(x for x, _ in corners) - min(x for x, _ in corners) == pytest.approx(0.136)
-    assert 0.090 <= load_robot(tmp_path / "angular.toml").body.reach_m <= 0.119
+    return tmp_path / "angular.toml"
+
+
+def test_the_example_of_the_reference_is_a_robot(angular: Path) -> None:
+    """A chassis of 136 mm by 80 mm, mirror-symmetric, within the published 90 to 119 mm, the wheels within it."""
+    body = load_robot(angular).body
+    assert {(x, -y) for x, y in body.outline_m} == set(body.outline_m)
+    assert max(x for x, _ in body.outline_m) - min(x for x, _ in body.outline_m) == pytest.approx(0.136)
+    assert 0.090 <= body.reach_m <= 0.119
+    wheel, middle = body.wheel_radius_m, body.track_width_m / 2
+    tyres = shapely.box(-wheel, middle - 0.004, wheel, middle + 0.004)  # of 8 mm, as the page says
+    assert tyres.difference(shapely.Polygon(body.outline_m)).area < 2e-6
+    assert shapely.Polygon(body.outline_m).contains(shapely.box(-0.086, -0.04, 0.05, 0.04).buffer(-1e-9))
+
+
+def blindly(robot: boebot.Robot) -> None:
+    """Into walls, along them and away, turning."""
+    robot.drive(*((1, 1), (0.3, 0.9), (1, 1), (-0.8, -0.7), (0.5, -0.4))[int(robot.time / 1.5) % 5])
+
+
+def ahead(robot: boebot.Robot) -> None:
+    robot.drive(1.0, 0.97)
+
+
+@pytest.mark.parametrize("arena", ["maze", "room"])
+@pytest.mark.parametrize("brain", ["wander", blindly, ahead])
+def test_the_example_drives_and_gets_into_nothing(angular: Path, brain: Any, arena: str) -> None:
+    """shapely's core of the polygon, 1 mm within it, stays 1 mm away from every wall."""
+    result = boebot.run(brain, robot=angular, arena=arena, on="native", seconds=40, seed=2)
+    truth = result.truth
+    assert truth is not None and not result.error and result.distance > 0.5
+    assert brain is not ahead or (result.contacts and truth.contact.sum() > 100)
+    core = shapely.Polygon(result.robot.body.outline_m).buffer(-1e-3, join_style="mitre")
+    rings = {"outline": shapely.LinearRing, "obstacle": shapely.LinearRing, "wall": shapely.LineString}
+    edges = shapely.union_all([rings[solid.kind](solid.points) for solid in truth.plan.solids])
+    poses = zip(truth.x.tolist(), truth.y.tolist(), truth.heading.tolist(), strict=True)
+    assert min(shapely.distance(placed(core, *pose), edges) for pose in poses) - 1e-3 > -1e-6

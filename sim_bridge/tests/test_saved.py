@@ -82,6 +82,8 @@ def all_of(sim: Sim) -> str:
             for column in table.values():
                 heap.update(column.tobytes())
         heap.update(robot.receive())
+    for late in sim.lateness():
+        heap.update(late.time.tobytes() + late.waited.tobytes())
     return heap.hexdigest()
 
 

@@ -269,6 +269,12 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 
 const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
 
+const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
+  const scene own = vehicle_scene(&self->worlds[i]);
+  *count = own.movers_count;
+  return own.movers;
+}
+
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
 
 double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }

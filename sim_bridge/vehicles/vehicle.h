@@ -68,6 +68,9 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 /* Truth of one world, for records and tests: never for a brain. */
 const body_state *vehicles_body(const vehicles *self, size_t i);
 uint64_t vehicles_steps_done(const vehicles *self, size_t i);
+
+/* The arena's moving shapes as they stand in that world; good until it is placed anew. */
+const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count);
 double vehicles_energy(const vehicles *self, size_t i);
 
 /* Currents of the DC motors, left and right, A: the state of the full motor, else what the last signals and the speed now

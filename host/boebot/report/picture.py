@@ -3,17 +3,16 @@ what its sensors look at. What the robot does not have is neither drawn nor name
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.transforms import Affine2D
 
 from boebot.report import scene, style
 from boebot.report.arena_drawing import draw_arena, legend_entries
-from boebot.report.robot_drawing import draw_robot
+from boebot.report.robot_drawing import body_patch, draw_robot
 from boebot.report.sheet import Sheet, counted
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from boebot.result import RunResult
+    from boebot.robots import Body
     from boebot.series import Floats, Pose
 
 SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
@@ -38,7 +38,7 @@ def write(result: RunResult, path: Path) -> Path:
     _draw_path(axes, view.path, result.series.time)
     if view.estimate is not None:
         axes.plot(view.estimate.x, view.estimate.y, color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
-        _draw_ghost(axes, result.robot.body.radius_m, view.estimate)
+        _draw_ghost(axes, result.robot.body, view.estimate)
     draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
@@ -60,13 +60,13 @@ def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
     axes.add_collection(lines)
 
 
-def _draw_ghost(axes: Axes, radius: float, estimate: Pose) -> None:
+def _draw_ghost(axes: Axes, body: Body, estimate: Pose) -> None:
     """The odometric ghost: the robot where it believes to be at the end."""
     x, y, heading = float(estimate.x[-1]), float(estimate.y[-1]), float(estimate.heading[-1])
+    on_axes = Affine2D().rotate(heading).translate(x, y) + axes.transData
     look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.1, "ls": (0, (3, 2)), "zorder": 8}
-    axes.add_patch(Circle((x, y), radius, **look))
-    nose = (x + radius * math.cos(heading), y + radius * math.sin(heading))
-    axes.plot((x, nose[0]), (y, nose[1]), color=style.ESTIMATE, lw=1.1, zorder=8)
+    axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=on_axes, **look))
+    axes.plot((0.0, body.front_m), (0.0, 0.0), color=style.ESTIMATE, lw=1.1, transform=on_axes, zorder=8)
 
 
 def draw_marks(axes: Axes, view: scene.View) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from boebot.result import RunResult
     from boebot.series import Floats, Pose, Readout
 
-FORMAT = 2
+FORMAT = 3
 FRAMES_AT_MOST = 20_000
 _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
@@ -138,6 +138,8 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
     """What the page needs to draw the robot (m, rad): its body, and what it has."""
     return {
         "radius": robot.body.radius_m,
+        "outline": _points(np.array(robot.body.outline_m).reshape(-1, 2)),  # none: the circle
+        "front": robot.body.front_m,
         "track": robot.body.track_width_m,
         "wheel": robot.body.wheel_radius_m,
         "whiskers": {name: {"root": root, "tip": tip} for name, (root, tip) in sensors.whiskers(robot).items()},

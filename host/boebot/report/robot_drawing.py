@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle, Wedge
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 
@@ -14,6 +14,8 @@ from boebot.report import style
 from boebot.report.sensors import Look, looks, whiskers
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
     from boebot.floor_plan import FloorPlan
@@ -39,8 +41,8 @@ def draw_robot(
     x, y, heading = pose
     place = Affine2D().rotate(heading).translate(x, y)
     seen = _inside(plan)
-    for look in looks(robot):
-        _draw_look(axes, look, colour, place, turret, seen)
+    for sensor in looks(robot):
+        _draw_look(axes, sensor, colour, place, turret, seen)
     on_axes = place + axes.transData
     for root, tip in whiskers(robot).values():
         axes.plot(*zip(root, tip, strict=True), color=style.INK, lw=1.1, transform=on_axes, zorder=11)
@@ -48,10 +50,15 @@ def draw_robot(
     for side in (-1, 1):
         corner = (-wheel, side * track / 2 - RIM_M / 2)
         axes.add_patch(Rectangle(corner, 2 * wheel, RIM_M, facecolor=style.INK, transform=on_axes, zorder=11))
-    body = {"facecolor": style.BODY, "edgecolor": colour, "lw": 1.8, "transform": on_axes, "zorder": 10}
-    axes.add_patch(Circle((0, 0), robot.body.radius_m, **body))
-    nose = np.array([(0.9, 0.0), (0.35, 0.32), (0.35, -0.32)]) * robot.body.radius_m
+    look = {"facecolor": style.BODY, "edgecolor": colour, "lw": 1.8, "zorder": 10}
+    axes.add_patch(body_patch(robot.body.radius_m, robot.body.outline_m, transform=on_axes, **look))
+    nose = np.array([(0.9, 0.0), (0.35, 0.32), (0.35, -0.32)]) * robot.body.front_m
     axes.add_patch(Polygon(nose, closed=True, facecolor=colour, edgecolor="none", transform=on_axes, zorder=12))
+
+
+def body_patch(radius: float, outline: Sequence[Sequence[float]], **look: Any) -> Patch:
+    """The body in its own frame (m): its outline, or a circle where it has none."""
+    return Polygon(outline, closed=True, **look) if len(outline) else Circle((0, 0), radius, **look)
 
 
 def _inside(plan: FloorPlan | None) -> Path | None:
