@@ -178,6 +178,7 @@ def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:
 def test_every_compiler_gives_the_same_bits(tmp_path: Path) -> None:
     builds: list[tuple[str, ...]] = [(c, o) for c in ("gcc", "clang") if shutil.which(c) for o in ("-O0", "-O2")]
     builds += [(c, o, "-DWORLD_PLAIN_LANES") for c, o in builds if o == "-O2"]  # without AVX2
+    builds += [("gcc", "-O2", "-flto")] if shutil.which("gcc") else []  # as it is installed
     assert builds, "expected gcc or clang"
     with ThreadPoolExecutor() as pool:
         results = list(pool.map(lambda build: hashes_by(tmp_path, build[0], *build[1:]), builds))

@@ -63,12 +63,10 @@ static void read_odometer(const sensing *s, const odometer_parameters *p, odomet
   out[2] = state->heading;
 }
 
-/* `asked`: its question to the arena, answered, where it has one. */
-static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *slot, const fan_question *asked,
-                 noise_source *noise, double *out) {
+static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *slot, noise_source *noise, double *out) {
   switch (sensor->kind) {
     case SENSOR_INFRARED_PROXIMITY:
-      *out = infrared_proximity_answer(&sensor->as.infrared_proximity, &s->from, asked, noise);
+      *out = infrared_proximity_read(&sensor->as.infrared_proximity, &s->from, noise);
       break;
     case SENSOR_SHARP_INFRARED:
       *out = sharp_infrared_read(&sensor->as.sharp_infrared, &slot->as.sharp_infrared, &s->from, s->time, noise);
@@ -116,29 +114,60 @@ static int due(const vehicle_sensor *sensor, const sensor_slot *slot, double tim
   return !(sensor->period > 0.0) || sample_hold_due(&slot->hold, time);
 }
 
-static int has_fan(const vehicle_sensor *sensor) {
-  return sensor->kind == SENSOR_INFRARED_PROXIMITY && !sensor->as.infrared_proximity.reflectance;
+/* From here on a sensor's draws are those of this step. */
+static void key_noise(noise_source *noise, const sensor_slot *slot, uint64_t step) {
+  noise->key = slot->key;
+  noise_at(noise, step);
 }
 
-/* The fans that the sensors need at one instant, in their order. */
-typedef struct {
+/* The IR proximity sensors that are due: first all questions, then all answers. */
+static void read_eyes(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
+  const vehicle_model *m = s->all->model;
+  const vehicle_sensor *sensors[VEHICLE_SENSORS];
+  const infrared_proximity *eyes[VEHICLE_SENSORS];
   fan_question asked[VEHICLE_SENSORS];
   double distances[VEHICLE_SENSORS * BEAM_RAYS];
-} fans;
-
-/* Asks for all of them at once. */
-static void ask_fans(const sensing *s, const sensor_slot *slots, fans *out) {
-  const vehicle_model *m = s->all->model;
-  fan_question *next = out->asked;
-  double *room = out->distances;
-  for (size_t k = 0; k < m->sensors_count; k++) {
-    const vehicle_sensor *sensor = &m->sensors[k];
-    if (!has_fan(sensor) || !due(sensor, &slots[k], s->time)) continue;
-    const infrared_proximity *eye = &sensor->as.infrared_proximity;
-    *next++ = infrared_proximity_ask(eye, &s->from, room);
-    room += ((size_t)eye->beam.rays + RAY_FAN_GROUP - 1u) / RAY_FAN_GROUP * RAY_FAN_GROUP;
+  double sums[VEHICLE_SENSORS];
+  double *room = distances;
+  size_t count = 0;
+  for (size_t k = 0; k < m->eyes.count; k++) {
+    const size_t number = m->eyes.number[k];
+    const vehicle_sensor *sensor = &m->sensors[number];
+    if (!due(sensor, &slots[number], s->time)) continue;
+    sensors[count] = sensor;
+    eyes[count] = &sensor->as.infrared_proximity;
+    asked[count] = infrared_proximity_ask(eyes[count], &s->from, room);
+    room += ((size_t)eyes[count]->beam.rays + RAY_FAN_GROUP - 1u) / RAY_FAN_GROUP * RAY_FAN_GROUP;
+    count++;
   }
-  if (next > out->asked) arena_fans(out->asked, (size_t)(next - out->asked));
+  if (count == 0) return;
+  arena_fans(asked, count);
+  if (s->from.around->movers_count > 0) {
+    for (size_t k = 0; k < count; k++) scene_fan_movers(s->from.around, &asked[k], s->from.id);
+  }
+  infrared_proximity_sums(eyes, asked, count, sums);
+  for (size_t k = 0; k < count; k++) {
+    sensor_slot *slot = &slots[sensors[k] - m->sensors];
+    double *out = &readings[sensors[k]->first];
+    key_noise(noise, slot, s->world->state.step);
+    *out = infrared_proximity_finish(eyes[k], sums[k], noise);
+    if (sensors[k]->period > 0.0) sample_hold_take(&slot->hold, s->time, *out);
+  }
+}
+
+static void read_others(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
+  const vehicle_model *m = s->all->model;
+  const vehicle_state *state = &s->world->state;
+  for (size_t k = 0; k < m->others.count; k++) {
+    const vehicle_sensor *sensor = &m->sensors[m->others.number[k]];
+    sensor_slot *slot = &slots[m->others.number[k]];
+    if (sensor->kind == SENSOR_ACCELEROMETER && state->step > 0)
+      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, state->acceleration, m->dt);
+    if (!due(sensor, slot, s->time)) continue;
+    key_noise(noise, slot, state->step);
+    read(s, sensor, slot, noise, &readings[sensor->first]);
+    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, readings[sensor->first]);
+  }
 }
 
 void vehicle_sense(vehicles *self, size_t i) {
@@ -159,20 +188,8 @@ void vehicle_sense(vehicles *self, size_t i) {
                      .time = (double)w->state.step * m->dt};
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
-  fans all;
-  const fan_question *asked = all.asked;
-  ask_fans(&s, slots, &all);
-  for (size_t k = 0; k < m->sensors_count; k++) {
-    const vehicle_sensor *sensor = &m->sensors[k];
-    sensor_slot *slot = &slots[k];
-    if (sensor->kind == SENSOR_ACCELEROMETER && w->state.step > 0)
-      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, w->state.acceleration, m->dt);
-    if (!due(sensor, slot, s.time)) continue;
-    noise_source noise = {.key = slot->key, .keyed = 1, .on = m->noise != 0};
-    noise_at(&noise, w->state.step);
-    read(&s, sensor, slot, asked, &noise, &readings[sensor->first]);
-    asked += has_fan(sensor);
-    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s.time, readings[sensor->first]);
-  }
+  noise_source noise = {.keyed = 1, .on = m->noise != 0};
+  read_eyes(&s, slots, &noise, readings);
+  read_others(&s, slots, &noise, readings);
   w->state.sensed = w->state.step + 1;
 }

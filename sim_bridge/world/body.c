@@ -117,12 +117,12 @@ static double limited(double value, double limit) { return value > limit ? limit
 /* Tyres that slip, and what the body leans on meanwhile, answer each other until they agree. */
 static void slide(body *self, const scene *around, const double limits[2], const double torque[2], double dt) {
   ground floor;
-  contacts at = {.count = 0};
-  if (self->state.touching) contact_find(self, around, 0.0, BODY_SKIN, &at);
+  contact_holds at;
+  contact_lean(self, around, dt, &at);
   ground_begin(&floor, self, limits, torque[0], torque[1], dt);
   for (int round = 0; round < SLIP_ROUNDS; round++) {
     double change = ground_round(&floor, self);
-    if (at.count > 0) change += contact_stop(self, &at, dt);
+    if (at.count > 0) change += contact_stop(self, &at);
     if (change < SLIP_SETTLED) break;
   }
   ground_end(&floor, self, dt);
@@ -131,8 +131,8 @@ static void slide(body *self, const scene *around, const double limits[2], const
 /* Rolling for certain (slip switched off), held across the heading by friction that something may have overcome. */
 static void hold_across(body *self, const scene *around, const double limits[2], double dt) {
   body_state *s = &self->state;
-  contacts at = {.count = 0};
-  if (s->touching) contact_find(self, around, 0.0, BODY_SKIN, &at);
+  contact_holds at;
+  contact_lean(self, around, dt, &at);
   const double most = (limits[0] + limits[1]) * dt / self->mass;
   double held = 0.0;
   for (int round = 0; round < SLIP_ROUNDS; round++) {
@@ -140,7 +140,7 @@ static void hold_across(body *self, const scene *around, const double limits[2],
     double change = fabs(wanted - held);
     s->lateral += wanted - held;
     held = wanted;
-    if (at.count > 0) change += contact_stop(self, &at, dt);
+    if (at.count > 0) change += contact_stop(self, &at);
     if (change < SLIP_SETTLED) return;
   }
 }

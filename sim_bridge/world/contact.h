@@ -44,9 +44,32 @@ void contact_find(body *self, const scene *around, double elapsed, double margin
 /* Contacts of one robot with another. */
 void contact_find_pair(body *self, body *other, double margin, contacts *out);
 
-/* Takes away the velocities into the contacts, but for what closes a gap within `within` seconds. Returns the largest
- * change, m/s. */
-double contact_stop(body *self, const contacts *at, double within);
+/* What a unit impulse along a contact's normal does to a body. */
+typedef struct {
+  double speed, lateral, turn_rate; /* changes */
+  double along, across, moment;     /* components of the impulse */
+  double gain;                      /* change of the velocity along the impulse: 1 / the mass felt there */
+} contact_answer;
+
+/* A contact at poses that stay as they are: what depends on them is known once for many rounds. */
+typedef struct {
+  body *other;
+  contact_answer own, its; /* of the body and of the other */
+  double met;              /* velocity along the normal of what does not give way, m/s */
+  double allowed;          /* m/s into the contact that stay */
+} contact_hold;
+
+typedef struct {
+  contact_hold list[CONTACTS_CAPACITY];
+  int count;
+} contact_holds;
+
+/* What of movers and arena a body that touches leans on, none otherwise: what closes a gap within `within` seconds is
+ * allowed. */
+void contact_lean(body *self, const scene *around, double within, contact_holds *out);
+
+/* Takes away the velocities into the contacts beyond what is allowed. Returns the largest change, m/s. */
+double contact_stop(body *self, const contact_holds *at);
 
 /* Moves the bodies of one group for `dt` seconds by the speeds that they have. */
 void contact_move(body *const bodies[], size_t count, const scene *around, double dt);

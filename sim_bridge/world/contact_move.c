@@ -13,18 +13,12 @@
 
 /* ---- impulses and places ------------------------------------------------------------------------------------------ */
 
-/* What a unit impulse along (nx, ny) at (rx, ry) from the middle does to a body. */
-typedef struct {
-  double speed, lateral, turn_rate; /* changes */
-  double along, across, moment;     /* components of the impulse */
-  double gain;                      /* change of the velocity along the impulse: 1 / the mass felt there */
-} answer;
-
-static answer answer_of(const body *self, double nx, double ny, double rx, double ry) {
+/* Of a unit impulse along (nx, ny) at (rx, ry) from the middle. */
+static contact_answer answer_of(const body *self, double nx, double ny, double rx, double ry) {
   const body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   const double spin = p->slip ? 0.0 : self->spin; /* a blow is too short for tyres to pass it on to the wheels */
-  answer a = {.along = nx * s->cosine + ny * s->sine, .across = ny * s->cosine - nx * s->sine};
+  contact_answer a = {.along = nx * s->cosine + ny * s->sine, .across = ny * s->cosine - nx * s->sine};
   a.moment = rx * ny - ry * nx;
   a.speed = a.along / (self->mass + 2.0 * spin);
   a.lateral = a.across / self->mass;
@@ -33,12 +27,12 @@ static answer answer_of(const body *self, double nx, double ny, double rx, doubl
   return a;
 }
 
-static double velocity_along(const body *self, const answer *a) {
+static double velocity_along(const body *self, const contact_answer *a) {
   const body_state *s = &self->state;
   return s->speed * a->along + s->lateral * a->across + s->turn_rate * a->moment;
 }
 
-static void push(body *self, const answer *a, double impulse) {
+static void push(body *self, const contact_answer *a, double impulse) {
   body_state *s = &self->state;
   if (self->parameters.slip && !s->slipping) {
     s->rim_left = body_left_speed(self);
@@ -87,27 +81,40 @@ static situation situation_of(const body *self, const contact *k) {
   return now;
 }
 
-/* Takes away the velocity into one contact beyond `allowed`. The impulse acts where the bodies touch: on the surface. */
-static double stop(body *self, const contact *k, const situation *now, double allowed) {
-  const answer a = answer_of(self, k->nx, k->ny, now->rx, now->ry);
-  answer b = {0};
-  double into = velocity_along(self, &a) - (k->vx * k->nx + k->vy * k->ny);
-  if (k->other != NULL) {
-    b = answer_of(k->other, k->nx, k->ny, now->ox, now->oy);
-    into -= velocity_along(k->other, &b);
-  }
-  if (into >= -allowed) return 0.0;
-  const double impulse = -(into + allowed) / (a.gain + b.gain);
-  push(self, &a, impulse);
-  if (k->other != NULL) push(k->other, &b, -impulse);
-  return -(into + allowed);
+static contact_hold hold_of(const body *self, const contact *k, const situation *now, double allowed) {
+  contact_hold h = {.other = k->other, .met = k->vx * k->nx + k->vy * k->ny, .allowed = allowed};
+  h.own = answer_of(self, k->nx, k->ny, now->rx, now->ry);
+  if (k->other != NULL) h.its = answer_of(k->other, k->nx, k->ny, now->ox, now->oy);
+  return h;
 }
 
-double contact_stop(body *self, const contacts *at, double within) {
+/* Takes away the velocity into one contact beyond what is allowed. The impulse acts where the bodies touch: on the
+ * surface. */
+static double stop(body *self, const contact_hold *h) {
+  double into = velocity_along(self, &h->own) - h->met;
+  if (h->other != NULL) into -= velocity_along(h->other, &h->its);
+  if (into >= -h->allowed) return 0.0;
+  const double impulse = -(into + h->allowed) / (h->own.gain + h->its.gain);
+  push(self, &h->own, impulse);
+  if (h->other != NULL) push(h->other, &h->its, -impulse);
+  return -(into + h->allowed);
+}
+
+void contact_lean(body *self, const scene *around, double within, contact_holds *out) {
+  contacts at;
+  out->count = 0;
+  if (!self->state.touching) return;
+  contact_find(self, around, 0.0, BODY_SKIN, &at);
+  for (int i = 0; i < at.count; i++) {
+    const situation now = situation_of(self, &at.list[i]);
+    out->list[out->count++] = hold_of(self, &at.list[i], &now, now.gap > 0.0 ? now.gap / within : 0.0);
+  }
+}
+
+double contact_stop(body *self, const contact_holds *at) {
   double most = 0.0;
   for (int i = 0; i < at->count; i++) {
-    const situation now = situation_of(self, &at->list[i]);
-    const double change = stop(self, &at->list[i], &now, now.gap > 0.0 ? now.gap / within : 0.0);
+    const double change = stop(self, &at->list[i]);
     if (change > most) most = change;
   }
   return most;
@@ -122,7 +129,8 @@ static double put_out(body *self, const contacts *at) {
     const double depth = -now.gap;
     if (depth > deepest) deepest = depth;
     if (depth < -CONTACT_DEPTH) continue;
-    stop(self, k, &now, 0.0);
+    const contact_hold h = hold_of(self, k, &now, 0.0);
+    stop(self, &h);
     if (depth < CONTACT_DEPTH) continue;
     const double lever = now.rx * k->ny - now.ry * k->nx;
     const double other_lever = now.ox * k->ny - now.oy * k->nx;

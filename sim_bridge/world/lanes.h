@@ -16,7 +16,8 @@
 #define LANES_INLINE static inline __attribute__((always_inline))
 #define LANES_NOT_INLINE __attribute__((noinline))
 
-#if defined(__x86_64__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
+/* What is built for AVX2 anyway need not ask. The macro: for tests. */
+#if defined(__x86_64__) && !defined(__AVX2__) && !defined(WORLD_PLAIN_LANES)
 #define LANES_AVX2 LANES_NOT_INLINE __attribute__((target("avx2")))
 #define LANES_HAVE_AVX2() __builtin_cpu_supports("avx2")
 #endif

@@ -63,5 +63,6 @@ def core(build: Build) -> Path | None:
     objects = dict(_objects())
     del objects[CORE / "world/numbers.c" if build == "free" else LIBM]
     made = ROOT / "build" / "bench_core" / f"_core_{build}.so"
-    subprocess.run(["cc", "-shared", *map(str, objects.values()), "-lm", *build_core.LINK, "-o", str(made)], check=True)
+    how = [*build_core.COMPILE_NATIVE, "-fPIC", "-shared"]
+    subprocess.run(["cc", *how, *map(str, objects.values()), "-lm", *build_core.LIBRARIES, "-o", str(made)], check=True)
     return made

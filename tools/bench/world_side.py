@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from sim_bridge.batch import Batch
+    from sim_bridge.batch import Batch, CompiledBrain
     from sim_bridge.vehicle import Vehicle
 
 TAKES = 0.2  # s that a measurement takes, about
@@ -69,12 +69,20 @@ def placed(worlds: int, threads: int, edges: int, laser: str | None) -> Batch:
 
 
 @functools.cache
+def wander() -> CompiledBrain:
+    """The compiled brain, for whatever the first two readings of the scene's robots are."""
+    from sim_bridge import batch
+    from sim_bridge._core import ffi, lib
+
+    size = ffi.sizeof("vehicle_wander_state")
+    return batch.CompiledBrain(ffi.addressof(lib, "vehicle_wander"), readings=(), state_bytes=size, name="wander")
+
+
+@functools.cache
 def runner(worlds: int, threads: int, edges: int, laser: str | None) -> tuple[Callable[[int], Any], int]:
     """Runs so many steps of all worlds with the compiled brain; and the steps that take long enough."""
-    from sim_bridge.batch import WANDER
-
     batch = placed(worlds, threads, edges, laser)
-    run = functools.partial(batch.run, WANDER)
+    run = functools.partial(batch.run, wander())
     steps = 1
     while True:  # caches and lists are made on the way
         started = time.perf_counter()
@@ -121,26 +129,23 @@ def python(edges: int, steps: int = 100_000) -> float:
 
 def memory(laser: bool = False, worlds: int = 200) -> float:
     """Bytes that the C heap gives to a world and all that is its own, movers, fan, readings, brain; not the arena."""
-    from sim_bridge.batch import WANDER
-
     kind = "noise" if laser else None
-    placed(16, 1, 48, kind).run(WANDER, 1000)  # what all share is there
+    placed(16, 1, 48, kind).run(wander(), 1000)  # what all share is there
     before = allocated()
     batch = placed(worlds, 1, 48, kind)
-    batch.run(WANDER, 10)
+    batch.run(wander(), 10)
     return (allocated() - before) / worlds
 
 
 def memory_of_edges(edges: int, steps: int) -> float:
     """Bytes per edge of an arena with its index, and with the lists that so many steps of 16 robots make."""
-    from sim_bridge.batch import WANDER
     from tools.bench import scene
 
     of_a_world = memory()
     scene.room.cache_clear()
     before = allocated()
     batch = placed(16, 1, edges, None)
-    batch.run(WANDER, steps)
+    batch.run(wander(), steps)
     return (allocated() - before - 16 * of_a_world) / edges
 
 

@@ -46,21 +46,32 @@ LANES_INLINE double sum_of(const infrared_proximity *self, const double *c1, con
   return sum;
 }
 
-LANES_NOT_INLINE static double sum_anywhere(const infrared_proximity *self, const double *c1, const double *distances) {
-  return sum_of(self, c1, distances);
+LANES_INLINE void sum_each(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
+                           double sums[]) {
+  for (size_t i = 0; i < count; i++) sums[i] = sum_of(sensors[i], sensors[i]->c1, answered[i].distances);
+}
+
+LANES_NOT_INLINE static void sums_anywhere(const infrared_proximity *const sensors[], const fan_question answered[],
+                                           size_t count, double sums[]) {
+  sum_each(sensors, answered, count, sums);
 }
 
 #ifdef LANES_AVX2
-LANES_AVX2 static double sum_by_avx2(const infrared_proximity *self, const double *c1, const double *distances) {
-  return sum_of(self, c1, distances);
+LANES_AVX2 static void sums_by_avx2(const infrared_proximity *const sensors[], const fan_question answered[],
+                                    size_t count, double sums[]) {
+  sum_each(sensors, answered, count, sums);
 }
 #endif
 
-static double sum_of_all(const infrared_proximity *self, const double *c1, const double *distances) {
+void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
+                             double sums[]) {
 #ifdef LANES_AVX2
-  if (LANES_HAVE_AVX2()) return sum_by_avx2(self, c1, distances);
+  if (LANES_HAVE_AVX2()) {
+    sums_by_avx2(sensors, answered, count, sums);
+    return;
+  }
 #endif
-  return sum_anywhere(self, c1, distances);
+  sums_anywhere(sensors, answered, count, sums);
 }
 
 /* Where each surface reflects in its own way. */
@@ -73,33 +84,21 @@ LANES_NOT_INLINE static double sum_by_reflectance(const infrared_proximity *self
     distances[i] = beam_ray(&self->beam, from, at, i, self->range, &hit);
     c1[i] = self->c1[i] * hit.infrared;
   }
-  return sum_of_all(self, c1, distances);
+  return sum_of(self, c1, distances);
 }
 
-fan_question infrared_proximity_ask(const infrared_proximity *self, const viewpoint *from, double *distances) {
-  return beam_question(&self->beam, from, self->range, distances);
-}
-
-double infrared_proximity_answer(const infrared_proximity *self, const viewpoint *from, const fan_question *asked,
-                                 noise_source *noise) {
+double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise) {
   double sum;
   if (self->reflectance) {
     sum = sum_by_reflectance(self, from);
   } else {
-    if (from->around->movers_count > 0) scene_fan_movers(from->around, asked, from->id);
-    sum = sum_of_all(self, self->c1, asked->distances);
+    double distances[BEAM_RAYS];
+    const fan_question question = infrared_proximity_ask(self, from, distances);
+    arena_fans(&question, 1);
+    scene_fan_movers(from->around, &question, from->id);
+    infrared_proximity_sums(&self, &question, 1, &sum);
   }
-  double s = sum / (double)self->beam.rays;                                 /* (3.12) */
-  if (self->sigma > 0.0) s *= 1.0 + self->sigma * noise_next_normal(noise); /* (3.1) */
-  s = s > 0.0 ? s : 0.0;                                                    /* each a single operation, no branch */
-  return s < 1.0 ? s : 1.0;
-}
-
-double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise) {
-  double distances[BEAM_RAYS];
-  const fan_question question = infrared_proximity_ask(self, from, distances);
-  if (!self->reflectance) arena_fans(&question, 1);
-  return infrared_proximity_answer(self, from, &question, noise);
+  return infrared_proximity_finish(self, sum, noise);
 }
 
 double infrared_proximity_inverse(const infrared_proximity *self, double reading) {
