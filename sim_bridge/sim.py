@@ -64,8 +64,8 @@ class Member:
 
 
 _kept: dict[int, tuple[object, ...]] = {}
-"""What a simulation in C points to, by its address. Were it kept by the Sim, the collector of cycles, which takes things
-apart in any order, could free a board before the simulation that runs it."""
+"""What a simulation in C points to, by its address. Were it kept by the Sim, the collector of cycles, which takes
+things apart in any order, could free a board before the simulation that runs it."""
 
 
 def _destroy(handle: Any) -> None:

@@ -65,7 +65,7 @@ class SimRobot:
         lib.sim_receive(self._handle, self.number, ffi.from_buffer("uint8_t[]", data, require_writable=True), waiting)
         return bytes(data)
 
-    def send(self, data: bytes) -> None:
+    def send(self, data: bytes | bytearray | memoryview) -> None:
         """Bytes to the board, from now on.
 
         Raises:

@@ -127,7 +127,7 @@ def test_an_upset_resets_the_board() -> None:
 def test_bad_borders_are_refused() -> None:
     robot = scripted()
     for changes in ({"reset_v": 4.0}, {"upsets_per_s": -1.0}, {"hysteresis_v": float("nan")}):
-        with pytest.raises(BoardError, match="brown.out"):
+        with pytest.raises(BoardError, match=r"brown.out"):
             robot.pins.brown_out(**changes)
 
 
