@@ -254,7 +254,11 @@ class VehicleModel:
         self._sensor("sharp_infrared", name, parameters, {"gain": 1.0}, reach="reach")
 
     def laser(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Laser range finder: first, step, rays, range, sigma, height. A reading a ray, m; -1: beyond the range."""
+        """Laser range finder: first, step, rays, range, sigma, height, ... A reading a ray, m; -1: beyond the range.
+
+        Ray i looks along heading + first + i step, counter-clockwise as all angles (3.10): a fan about the heading has
+        first = -step (rays - 1) / 2, and its readings go from right to left.
+        """
         self._sensor("laser", name, parameters, None, period)
 
     def compass(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
