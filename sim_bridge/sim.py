@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import imperfections, saved, switches
+from sim_bridge import arguments, imperfections, saved, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
@@ -73,7 +73,7 @@ class Sim:
             raise ArenaError(
                 f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
-        self.arena, self.seed, self.noise = arena, seed, noise
+        self.arena, self.seed, self.noise = arena, seed, arguments.switch("sim: noise", noise, BoardError)
         self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:

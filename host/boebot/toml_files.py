@@ -6,6 +6,7 @@ What is wrong is said in one sentence with the file, the line, the full key and 
 from __future__ import annotations
 
 import re
+import reprlib
 import sys
 import tomllib
 import types
@@ -56,7 +57,10 @@ def bundled_names(kind: str) -> list[str]:
 
 def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
     """The file of a bundled name, or the .toml file that `name` is. Raises `error` if there is none."""
-    path, thing = Path(name), kind.removesuffix("s")
+    thing = kind.removesuffix("s")
+    if not isinstance(name, (str, Path)):
+        raise error(f"{thing} is {reprlib.repr(name)}; expected a name or a .toml file")
+    path = Path(name)
     if path.suffix == ".toml":
         if path.is_file():
             return path

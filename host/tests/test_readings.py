@@ -76,7 +76,10 @@ def variant(folder: Path, text: str) -> Path:
         ("[device.laser]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\nrays = 0", "device.laser.rays: expected"),
         ("[device.infrared_left]\nthreshold = 1.5", "device.infrared_left.threshold: expected"),
         ("[device.infrared_left]\nrays = 33", r"variant\.toml:3: device\.infrared_left\.rays: expected int <= 32"),
-        ("[device.infrared_left]\nbeam_rad = 3.2", r"variant\.toml:3: device\.infrared_left\.beam_rad: expected float <="),
+        (
+            "[device.infrared_left]\nbeam_rad = 3.2",
+            r"variant\.toml:3: device\.infrared_left\.beam_rad: expected float <=",
+        ),
         ("[device.infrared_left]\nheading_rad = 2e4", r"variant\.toml:3: device\.infrared_left\.heading_rad: expected"),
         ("[device.infrared_left]\nrange_m = 2e12", r"variant\.toml:3: device\.infrared_left\.range_m: expected"),
         ("[device.compass]\nbias_rad = 7", r"variant\.toml:3: device\.compass\.bias_rad: expected"),
