@@ -35,7 +35,9 @@ class CompiledBrain:
         Raises:
             BrainError: that is no function, or its needs are none.
         """
-        sensors = list(readings) if isinstance(readings, Iterable) and not isinstance(readings, str) else [None]
+        sensors: list[Any] = (
+            list(readings) if isinstance(readings, Iterable) and not isinstance(readings, str) else [None]
+        )
         if not all(isinstance(sensor, str) for sensor in sensors):
             raise BrainError(f"{name}: readings are {arguments.shown(readings)}; expected a list of sensors' names")
         self.name, self.readings = name, tuple(sensors)
