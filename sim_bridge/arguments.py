@@ -7,6 +7,8 @@ import reprlib
 from numbers import Integral, Real
 from typing import Any
 
+import numpy as np
+
 from boebot.errors import BoebotError
 
 
@@ -26,6 +28,13 @@ def number(
     if math.isfinite(taken) and least <= taken <= most:
         return taken
     raise error(f"{what} is {shown(value)}; expected a finite number{_range(least, most)}")
+
+
+def switch(what: str, value: Any, error: type[BoebotError]) -> bool:
+    """True or False, also numpy's, else raises `error`; `what` names it."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise error(f"{what} is {shown(value)}; expected True or False")
 
 
 def whole(what: str, value: Any, error: type[BoebotError], *, least: int, most: int) -> int:

@@ -3,7 +3,7 @@ both are checked before they run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from boebot.errors import BrainError
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sim_bridge.vehicle import VehicleModel
 
 FIRST_PAGE: Final = 4096  # no function has an address in it
+BRAIN: Final = ffi.typeof("vehicle_brain *")
 
 
 class CompiledBrain:
@@ -34,9 +35,12 @@ class CompiledBrain:
         Raises:
             BrainError: that is no function, or its needs are none.
         """
-        if isinstance(readings, str) or not all(isinstance(sensor, str) for sensor in readings):
+        sensors: list[Any] = (
+            list(readings) if isinstance(readings, Iterable) and not isinstance(readings, str) else [None]
+        )
+        if not all(isinstance(sensor, str) for sensor in sensors):
             raise BrainError(f"{name}: readings are {arguments.shown(readings)}; expected a list of sensors' names")
-        self.name, self.readings = name, tuple(readings)
+        self.name, self.readings = name, tuple(sensors)
         self.state_bytes = arguments.whole(
             f"{name}: state_bytes", state_bytes, BrainError, least=0, most=STATE_BYTES_MAXIMUM
         )
@@ -66,10 +70,13 @@ def _pointer(name: str, function: Any) -> Any:
     """The function as C has it."""
     if isinstance(function, int) and FIRST_PAGE <= function < 2**64:
         return ffi.cast("vehicle_brain *", function)
-    if isinstance(function, ffi.CData) and ffi.typeof(function).kind in ("function", "pointer"):
-        if function != ffi.NULL:
-            return ffi.cast("vehicle_brain *", function)
-        raise BrainError(f"{name}: the function is a null pointer; expected a C function or its address")
+    if isinstance(function, ffi.CData):
+        kind = ffi.typeof(function)
+        if kind.cname != BRAIN.cname:  # by name: it may be of another cffi module
+            raise BrainError(f"{name}: it is a C '{kind.cname}'; expected a C function or its address, '{BRAIN.cname}'")
+        if function == ffi.NULL:
+            raise BrainError(f"{name}: the function is a null pointer; expected a C function or its address")
+        return ffi.cast("vehicle_brain *", function)
     raise BrainError(f"{name}: {arguments.shown(function)} is no function; expected a C function or its address")
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import shown
+from sim_bridge.arguments import shown, switch
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.outline import collision_outline
 from sim_bridge.parameters import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, struct
@@ -68,6 +68,10 @@ class VehicleModel:
         given, outline = _body_and_outline(body)
         parameters = struct("body_parameters", "vehicle: body", given)
         self.dt = number("vehicle", "dt", dt, POSITIVE)
+        switches = (
+            switch("vehicle: noise", noise, RobotError),
+            switch("vehicle: ends_at_collision", ends_at_collision, RobotError),
+        )
         self.names: dict[str, slice] = {}
         self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
         self.body = dict(body)
@@ -79,7 +83,7 @@ class VehicleModel:
         self.a: float = lib.body_a(parameters)
         self.b: float = lib.body_b(parameters)
         self.handle = ffi.gc(handle, lib.vehicle_model_destroy)
-        lib.vehicle_model_switch(self.handle, bool(noise), bool(ends_at_collision))
+        lib.vehicle_model_switch(self.handle, *switches)
 
     @property
     def euler_limit(self) -> float:
@@ -113,7 +117,7 @@ class VehicleModel:
         motor is stable at every step at which the quasi-static one is, whatever its inductance (world/motor_dc.h).
         """
         motors = [dc_parameters(f"vehicle: {side} motor", changes) for side, changes in _sides(left, right)]
-        self._driven(lib.vehicle_model_drive_dc(self._open, *motors, bool(full)))
+        self._driven(lib.vehicle_model_drive_dc(self._open, *motors, switch("vehicle: full", full, RobotError)))
 
     def regulated_motors(self, left: Mapping[str, Any] | None = None, right: Mapping[str, Any] | None = None) -> None:
         """Two velocity-regulated motors (3.15): torque K (v_ref - v), limited, with v_ref = s speed_maximum_m_s.
@@ -155,8 +159,12 @@ class VehicleModel:
         usual = ffi.new("energy_parameters *")
         lib.energy_default(usual)
         values = {key: getattr(usual, key) for key in keys_of("energy_parameters")}
-        volts = number(where, "empty", empty), number(where, "full", full), number(where, "sigma", sigma, NOT_NEGATIVE)
-        first = lib.vehicle_model_battery(self._open, struct("energy_parameters", where, energy, values), *volts)
+        low, high = number(where, "empty", empty), number(where, "full", full)
+        if not low < high:
+            raise RobotError(f"{where}: full is {shown(full)}; expected more than empty, {low:g}")
+        spread = number(where, "sigma", sigma, NOT_NEGATIVE)
+        rates = struct("energy_parameters", where, energy, values)
+        first = lib.vehicle_model_battery(self._open, rates, low, high, spread)
         if first == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a battery already; expected one")
         self._add(name, where, first)
@@ -254,7 +262,11 @@ class VehicleModel:
         self._sensor("sharp_infrared", name, parameters, {"gain": 1.0}, reach="reach")
 
     def laser(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Laser range finder: first, step, rays, range, sigma, height. A reading a ray, m; -1: beyond the range."""
+        """Laser range finder: first, step, rays, range, sigma, height, ... A reading a ray, m; -1: beyond the range.
+
+        Ray i looks along heading + first + i step, counter-clockwise as all angles (3.10): a fan about the heading has
+        first = -step (rays - 1) / 2, and its readings go from right to left.
+        """
         self._sensor("laser", name, parameters, None, period)
 
     def compass(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
@@ -278,4 +290,6 @@ class VehicleModel:
         """A whisker from `root` to `tip` on the body. One reading: 1 while it touches something."""
         where = self._named(name)
         ends = (*several(where, "root", root, ("x", "y")), *several(where, "tip", tip, ("x", "y")))
+        if ends[:2] == ends[2:]:
+            raise RobotError(f"{where}: tip is where root is; expected a whisker that has a length")
         self._add(name, where, lib.vehicle_model_add_whisker(self._open, *ends))

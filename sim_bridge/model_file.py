@@ -151,7 +151,7 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 y=y,
                 heading=device.heading_rad,
                 height=device.height_m,
-                first=device.step_rad * (device.rays - 1) / 2,
+                first=-device.step_rad * (device.rays - 1) / 2,
                 step=device.step_rad,
                 rays=device.rays,
                 range=device.range_m,

@@ -70,7 +70,7 @@ RANGES: Final[Mapping[str, Mapping[str, Range]]] = {
     "motor_position_parameters": {"mount": SIDE, "centre_us": PULSE_US}
     | dict.fromkeys(("us_per_rad", "gain_per_s", "range_rad"), POSITIVE)
     | dict.fromkeys(("top_speed_rad_s", "dead_band_us"), NOT_NEGATIVE),
-    "energy_parameters": {},
+    "energy_parameters": dict.fromkeys(("idle_per_s", "signal_per_s", "charger_per_s"), NOT_NEGATIVE),
     "beam_parameters": {"heading": HEADING, "opening": Range(0.0, math.pi), "rays": Range(1, 32)},
     "infrared_proximity_parameters": {"range": POSITIVE, "reflectance": SWITCH}
     | dict.fromkeys(("c1", "c2", "sigma"), NOT_NEGATIVE),

@@ -64,6 +64,8 @@ class ReadingTable:
         Raises:
             RobotError: it cannot be read, a cell is no number, or a distance was not measured at all angles.
         """
+        if not isinstance(path, (str, Path)):
+            raise RobotError(f"table is {shown(path)}; expected the path of a CSV file")
         name = Path(path).name
         try:
             with Path(path).open(newline="", encoding="utf-8") as file:

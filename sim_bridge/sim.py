@@ -13,7 +13,7 @@ import numpy as np
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import imperfections, saved, switches
+from sim_bridge import arguments, imperfections, saved, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
 from sim_bridge.arguments import point, shown, whole
@@ -109,7 +109,7 @@ class Sim:
             raise ArenaError(
                 f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
-        self.arena, self.seed, self.noise = arena, seed, noise
+        self.arena, self.seed, self.noise = arena, seed, arguments.switch("sim: noise", noise, BoardError)
         self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:

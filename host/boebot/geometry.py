@@ -9,6 +9,7 @@ Point = tuple[float, float]
 
 EXTENT_M = 5.0  # a corner's coordinates, at most
 EDGE_M = 1e-4  # an edge's length, at least
+CORNER_DEG = 15.0  # an outward corner's angle, at least: a sharper one would be rounded by more than 0.1 mm
 
 
 def polygon_fault(corners: Sequence[Point], most: int) -> str:
@@ -29,7 +30,23 @@ def polygon_fault(corners: Sequence[Point], most: int) -> str:
                 return f": edges {i} and {k} cross or touch; expected a polygon whose edges do not"
     if not _is_inside(edges):
         return ": the middle of the axle, [0, 0], lies outside; expected an outline around it"
+    for i, angle in enumerate(_corner_angles(corners)):
+        if angle < CORNER_DEG:
+            return (
+                f"[{i}] is a corner of {angle:.3g}°; expected at least {CORNER_DEG:g}°, or a short edge across its tip"
+            )
     return ""
+
+
+def _corner_angles(corners: Sequence[Point]) -> list[float]:
+    """The angle within each corner, degrees, in [0, 360)."""
+    count = len(corners)
+    twice = sum(_side((0.0, 0.0), corners[i - 1], corners[i]) for i in range(count))
+    turns = [(corners[i - 1], corners[i], corners[(i + 1) % count]) for i in range(count)]
+    ways = [
+        (math.atan2(a[1] - b[1], a[0] - b[0]), math.atan2(c[1] - b[1], c[0] - b[0])) for a, b, c in turns
+    ]  # from each corner to the one before and the one after it
+    return [math.degrees((back - on if twice > 0 else on - back) % math.tau) for back, on in ways]
 
 
 def _side(a: Point, b: Point, p: Point) -> float:

@@ -19,12 +19,13 @@ from boebot.device import pin_name as pin_name
 from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
 from boebot.geometry import Point, polygon_fault, way_out
-from boebot.vehicle_devices import AnyVehicleDevice, Motor, VehicleDevice
+from boebot.vehicle_devices import AnyVehicleDevice, Energy, Laser, Motor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 OUTLINE_CORNERS_MAXIMUM = 32
+VEHICLE_SENSORS_MAXIMUM = 24
 
 
 class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -301,6 +302,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
         _check_image(description, path)
     else:
         _check_vehicle(description, path.name)
+        _check_vehicle_devices(description, table, path.name)
     return description
 
 
@@ -398,6 +400,25 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
     left, right = (robot.device[name].__struct_config__.tag for name in ("motor_left", "motor_right"))
     if left != right:
         raise RobotError(f"{file}: device.motor_right is {right}, device.motor_left {left}; expected the same type")
+
+
+def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
+    """Refuses what no model of a vehicle takes: keys that do not fit each other, too many sensors."""
+    sensors: list[VehicleDevice] = []
+    for name, device in robot.device.items():
+        if not isinstance(device, VehicleDevice) or not device.on:
+            continue
+        if fault := device.fault():
+            key = f"device.{name}.{fault[0]}"
+            raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
+        if isinstance(device, Motor):
+            continue
+        at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
+        if isinstance(device, (Laser, Energy)) and any(type(other) is type(device) for other in sensors):
+            raise RobotError(f"{at} is a second {device.__struct_config__.tag}; expected one")
+        sensors.append(device)
+        if len(sensors) > VEHICLE_SENSORS_MAXIMUM:
+            raise RobotError(f"{at} is one sensor too many; expected at most {VEHICLE_SENSORS_MAXIMUM}")
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without

@@ -5,6 +5,8 @@ What is wrong is said in one sentence with the file, the line, the full key and 
 
 from __future__ import annotations
 
+import re
+import reprlib
 import sys
 import tomllib
 import types
@@ -55,7 +57,10 @@ def bundled_names(kind: str) -> list[str]:
 
 def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
     """The file of a bundled name, or the .toml file that `name` is. Raises `error` if there is none."""
-    path, thing = Path(name), kind.removesuffix("s")
+    thing = kind.removesuffix("s")
+    if not isinstance(name, (str, Path)):
+        raise error(f"{thing} is {reprlib.repr(name)}; expected a name or a .toml file")
+    path = Path(name)
     if path.suffix == ".toml":
         if path.is_file():
             return path
@@ -74,16 +79,35 @@ def read(path: Path, error: type[BoebotError]) -> Table:
             raise error(f"{path.name} has {size:,} bytes; expected at most {SIZE_MAXIMUM:,}")
         if size > SLOW:
             print(f"reading {path.name}, {size / 1e6:.1f} MB ...", file=sys.stderr)
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin with a byte order mark
         table = Table(toml_numbers.loads(text) if size > LARGE else tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
     except RecursionError:
         raise error(f"{path.name} is nested too deeply; expected a flat description") from None
     except ValueError as cause:  # also a number of thousands of digits, which tomllib passes on
-        raise error(f"{path.name} is no valid TOML: {' '.join(str(cause).split())}") from None
+        raise error(_no_toml(path.name, text, cause)) from None
     table.sources = ((path.name, text),)
     return table
+
+
+def _no_toml(name: str, text: str, cause: ValueError) -> str:
+    """The sentence about a text that tomllib refuses; in our words where its own say nothing to most people."""
+    what = " ".join(str(cause).split())
+    if not isinstance(cause, tomllib.TOMLDecodeError):
+        digits = re.search(rf"[0-9_]{{{sys.get_int_max_str_digits()},}}", text)
+        line = text.count("\n", 0, digits.start()) + 1 if digits else 1
+        return (
+            f"{name}:{line}: a number has {len(digits[0]) if digits else 'too many'} digits; expected a finite number"
+        )
+    at = re.search(r"\(at line (\d+), ", what)
+    line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
+    if what.startswith(("Cannot overwrite a value", "Duplicate inline table key", "Cannot declare")):
+        said = re.search(r"key '(.*)' \(at ", what) or re.match(
+            r"[\s\[]*([^\s=\[\]]+)\s*[=\]]", text.split("\n")[line - 1]
+        )
+        return f"{name}:{line}: {repr(said[1]) if said else 'a key'} is given twice; expected each key and table once"
+    return f"{name} is no valid TOML: {what}"
 
 
 def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) -> Table:

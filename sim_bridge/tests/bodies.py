@@ -133,8 +133,8 @@ class Body:
             return shapely.Point(x, y), float(self.parameters.radius)
         c, s = math.cos(heading), math.sin(heading)
         polygon = shapely.Polygon(np.array(self.corners) @ np.array([[c, s], [-s, c]]) + (x, y))
-        # its outward corners are rounded by 1 mm
-        return polygon.buffer(-1e-3, join_style="mitre", mitre_limit=100), 1e-3
+        rounding = float(self.outline.rounding)  # of its outward corners
+        return polygon.buffer(-rounding, join_style="mitre", mitre_limit=100), rounding
 
     def depth_in(self, other: Any, rounding: float = 0.0) -> float:
         """How deep it is in another thing: positive if the surfaces have passed each other (m)."""

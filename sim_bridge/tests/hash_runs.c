@@ -48,7 +48,7 @@ static int add_sensors(vehicle_model *m) {
              m, &(sharp_infrared_parameters){
                     .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076}) < 0;
   bad |= vehicle_model_add_laser(
-             m, &(laser_parameters){.first = 2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
+             m, &(laser_parameters){.first = -2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
   bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01}, 0.0) < 0;
   bad |= vehicle_model_add_accelerometer(m, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1}, 0.0) < 0;
   bad |=

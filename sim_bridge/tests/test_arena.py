@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from boebot.errors import ArenaError
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
+from sim_bridge.arena_description import Moving, Waypoint
 from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))
@@ -108,6 +110,16 @@ def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) ->
         return
     edges_apart = distance_to_segments(arena, x, y) >= 0.07
     assert arena.is_free(x, y, 0.07) == (not solid.contains(point) and edges_apart)
+
+
+@pytest.mark.parametrize("radius", [0.0, 1e-6, 0.05])
+@pytest.mark.parametrize("shape", [{"radius_m": 0.1}, {"corners_m": square(0, 0, 0.2)}], ids=["disc", "polygon"])
+def test_within_what_moves_nothing_is_free(shape: dict[str, Any], radius: float) -> None:
+    arena = Arena(ArenaDescription(name="one", moving=[Moving(path=[Waypoint(0, 0.5, 0)], **shape)]))
+    for x in (0.5, 0.45, 0.599, 0.401):
+        assert not arena.is_free(x, 0, radius)
+    assert arena.is_free(0.601 + radius, 0, radius)
+    assert arena.is_free(0.5, -0.101 - radius, radius)
 
 
 @pytest.mark.parametrize("name", arena_names())

@@ -205,6 +205,13 @@ def test_no_brain_is_one_sentence() -> None:
         batch.run(ffi.addressof(lib, "vehicle_wander"), 5)
     with pytest.raises(BrainError, match="null pointer"):
         CompiledBrain(ffi.cast("vehicle_brain *", 0), readings=())
+    others = ffi.new("int *"), ffi.addressof(lib, "body_a"), ffi.cast("void *", 5), ffi.cast("void *", 10**6)
+    for other in others:
+        with pytest.raises(BrainError, match=r"^brain: it is a C '.*'; expected a C function or its address, 'void"):
+            CompiledBrain(other, readings=())
+    for readings in (None, 5, "infrared", [5]):
+        with pytest.raises(BrainError, match=r"^brain: readings are .*; expected a list of sensors' names$"):
+            CompiledBrain(counting_brain, readings=readings)  # type: ignore[arg-type]
     for nothing in (0, 1, -1, 2**64, 1.5, None, "wander", ffi.cast("double", 3.0), lambda *_: None):
         with pytest.raises(BrainError, match="expected a C function or its address"):
             CompiledBrain(nothing, readings=())

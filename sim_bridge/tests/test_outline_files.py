@@ -58,6 +58,11 @@ def file_of(folder: Path, base: str, *lines: str) -> Path:
             "[[1, -1], [2, -1], [2, 1]]",
             "mine.toml:4: body.outline_m: the middle of the axle, [0, 0], lies outside; expected an outline around it",
         ),
+        (
+            "[[-0.1, -0.02], [0.3, 0], [-0.1, 0.02]]",
+            "mine.toml:4: body.outline_m[1] is a corner of 5.72°; "
+            "expected at least 15°, or a short edge across its tip",
+        ),
     ],
 )
 @pytest.mark.parametrize("base", ["shieldbot", "arsim"])
@@ -65,6 +70,12 @@ def test_a_wrong_outline_is_one_sentence(tmp_path: Path, base: str, outline: str
     with pytest.raises(RobotError) as error:
         load_robot(file_of(tmp_path, base, f"outline_m = {outline}"))
     assert str(error.value) == expected
+
+
+def sharpest(corners: list[tuple[int, int]]) -> float:
+    """The least angle within a counter-clockwise polygon, degrees, by complex numbers."""
+    z = np.array([complex(*corner) for corner in corners])
+    return float(min(np.degrees(np.angle((np.roll(z, 1) - z) / (np.roll(z, -1) - z))) % 360))
 
 
 @given(st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=3, max_size=7))
@@ -76,7 +87,9 @@ def test_what_is_a_polygon_shapely_says(corners: list[tuple[int, int]]) -> None:
     if same or not ring.is_simple:
         assert fault
     elif not shapely.Polygon(corners).contains(shapely.Point(0, 0)):
-        assert fault == "" or "outside" in fault  # the middle may lie on the edge
+        assert fault == "" or "outside" in fault or "is a corner" in fault  # the middle may lie on the edge
+    elif sharpest(corners if ring.is_ccw else corners[::-1]) < 15:
+        assert "is a corner of" in fault
     else:
         assert fault == ""
 

@@ -201,7 +201,7 @@ DEVICES: dict[str, tuple[str, dict[str, Any]]] = {
     "infrared_proximity": ("infrared_proximity_parameters", {"beam": BEAM, "range": 1.0, "c1": 0.03, "c2": 0.1}),
     "sharp_infrared": ("sharp_infrared_parameters", {"beam": BEAM, "reach": 1.5, "gain": 1.0, "period": 0.05}),
     "sonar": ("sonar_parameters", {"beam": BEAM, "range_maximum": 3.0}),
-    "laser": ("laser_parameters", {"first": 1.0, "step": 0.1, "rays": 9, "range": 4.0}),
+    "laser": ("laser_parameters", {"first": -1.0, "step": 0.1, "rays": 9, "range": 4.0}),
     "compass": ("compass_parameters", {}),
     "accelerometer": ("accelerometer_parameters", {"mass": 1e-3, "stiffness": 10.0, "range": 20.0}),
     "light": ("phototransistor_parameters", {"near_distance": 0.05, "gain": 1.0}),

@@ -110,6 +110,19 @@ def test_accelerometer_feels_the_start() -> None:
         assert vehicle["a"] == pytest.approx((speeds[-1] - speeds[-2]) / 0.01, rel=0.05, abs=1e-3)
 
 
+def test_a_lasers_rays_go_counter_clockwise_from_the_first() -> None:
+    """A wall on the left alone: ray i looks along heading + first + i step."""
+    model = VehicleModel(ARSIM_BODY, noise=False)
+    model.dc_motors()
+    model.laser("laser", heading=0.2, first=0.5, step=0.3, rays=4, range=9.0, height=0.1)
+    vehicle = Vehicle(model, arena_of([(-50, 1), (50, 1), (50, 2), (-50, 2)]))
+    assert list(vehicle["laser"]) == pytest.approx([1 / math.sin(0.2 + 0.5 + 0.3 * i) for i in range(4)])
+    one = VehicleModel(ARSIM_BODY, noise=False)
+    one.dc_motors()
+    one.laser("laser", first=0.5, rays=1, range=9.0, height=0.1)
+    assert list(np.atleast_1d(Vehicle(one, vehicle.arena)["laser"])) == pytest.approx([1 / math.sin(0.5)])
+
+
 def test_whiskers_table_battery_laser_and_light_in_one_model() -> None:
     table = ReadingTable([0.1, 1.1], [0.0], [[[5.0]], [[1.0]]])
     model = VehicleModel(ARSIM_BODY, noise=False, ends_at_collision=False)
@@ -117,7 +130,7 @@ def test_whiskers_table_battery_laser_and_light_in_one_model() -> None:
     model.whisker("whisker", (0.2, 0.0), (0.3, 0.0))
     model.table("table", table, beam=beam(x=0.2), reach=1.1, none=-7.0)
     model.battery("battery", empty=5.0, full=8.0, idle_per_s=0.1, signal_per_s=0.0, charger_per_s=0.0)
-    model.laser("laser", first=1.0, step=1.0, rays=3, range=5.0, height=0.1)
+    model.laser("laser", first=-1.0, step=1.0, rays=3, range=5.0, height=0.1)
     wall = arena_of([(1.0, -5), (2.0, -5), (2.0, 5), (1.0, 5)])
     vehicle = Vehicle(model, wall)
     assert vehicle["whisker"] == 0.0 and vehicle["battery"] == 8.0
@@ -154,14 +167,14 @@ def test_a_moving_shape_is_seen_and_bumps_and_the_charger_charges() -> None:
     model = VehicleModel(ARSIM_BODY, noise=False)
     model.dc_motors()
     model.sonar("sonar", beam=beam(x=0.2), range_minimum=0.0, range_maximum=3.0)
-    model.battery("battery", empty=5.0, full=8.0, idle_per_s=0.0, signal_per_s=0.0, charger_per_s=-0.1)
+    model.battery("battery", empty=5.0, full=8.0, idle_per_s=0.05, signal_per_s=0.0, charger_per_s=0.1)
     vehicle, distances = Vehicle(model, arena), []
     while not vehicle.ended:
         distances.append(vehicle["sonar"])
         vehicle.step(0, 0)
     assert distances == pytest.approx([2.5 - 0.01 * step for step in range(len(distances))], abs=1e-9)
     assert vehicle.ended == "collision" and vehicle.time == pytest.approx(2.5, abs=0.011)
-    assert vehicle.energy < 1.0, "the charger acts (here it drains)"
+    assert vehicle.energy > 0.99, "the charger acts: without it 0.05 x 2.5 would be gone"
 
 
 def lively(seed: int = 3) -> Vehicle:

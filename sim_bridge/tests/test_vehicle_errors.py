@@ -11,10 +11,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from boebot.errors import ArenaError, BoebotError, RobotError
+from boebot.errors import ArenaError, BoardError, BoebotError, RobotError
+from boebot.robots import load_robot
+from sim_bridge.arena import load_arena
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.parameters import keys_of
 from sim_bridge.reading_table import ReadingTable
+from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
 
@@ -255,6 +258,15 @@ def test_motors_take_any_dictionary(kind: Any, data: Any) -> None:
             lambda m: m.battery("a", idle=1),
             "'a': there is no key 'idle'; expected idle_per_s, signal_per_s, charger_per_s",
         ),
+        (lambda m: m.battery("a", empty=7, full=5), "'a': full is 5; expected more than empty, 7"),
+        (lambda m: m.battery("a", idle_per_s=-1), "'a': idle_per_s is -1; expected a number of at least 0"),
+        (lambda m: m.battery("a", signal_per_s=-1), "'a': signal_per_s is -1; expected a number of at least 0"),
+        (lambda m: m.battery("a", charger_per_s=-1), "'a': charger_per_s is -1; expected a number of at least 0"),
+        (
+            lambda m: m.whisker("a", (0.1, 0), (0.1, 0.0)),
+            "'a': tip is where root is; expected a whisker that has a length",
+        ),
+        (lambda m: m.dc_motors(full="no"), "vehicle: full is 'no'; expected True or False"),
         (lambda m: m.servos(7), "left servo is 7; expected a mapping with keys of mount"),
         (lambda m: m.servos(None, {"lag": 1}), "right servo: there is no key 'lag'; expected mount"),
         (lambda m: m.dc_motors(right={"gears": 2}), "right motor: there is no key 'gears'; expected torque_constant"),
@@ -269,6 +281,27 @@ def test_wrong_keys_get_a_sentence_and_add_nothing(add: Any, what: str) -> None:
     assert not model.names and not model.looks
     model.dc_motors()
     assert len(Vehicle(model, ROOM).readings) == 0
+
+
+@pytest.mark.parametrize("key", ["noise", "ends_at_collision"])
+def test_a_switch_is_true_or_false(key: str) -> None:
+    wrong: Any
+    right: dict[str, Any] = {key: np.bool_(False)}
+    for wrong in ("off", None, 2):
+        with pytest.raises(RobotError, match=f"^vehicle: {key} is .*; expected True or False$"):
+            VehicleModel(ARSIM_BODY, **{key: wrong})
+    VehicleModel(ARSIM_BODY, **right)
+
+
+def test_what_is_no_path_is_one_sentence() -> None:
+    with pytest.raises(ArenaError, match=r"^arena is 5; expected a name or a \.toml file$"):
+        load_arena(5)  # type: ignore[arg-type]
+    with pytest.raises(RobotError, match=r"^robot is None; expected a name or a \.toml file$"):
+        load_robot(None)  # type: ignore[arg-type]
+    with pytest.raises(RobotError, match=r"^table is 5; expected the path of a CSV file$"):
+        ReadingTable.load(5)  # type: ignore[arg-type]
+    with pytest.raises(BoardError, match=r"^sim: noise is 'off'; expected True or False$"):
+        Sim(ROOM, noise="off")  # type: ignore[arg-type]
 
 
 def test_one_of_each() -> None:

@@ -182,7 +182,9 @@ int scene_is_free(const scene *self, double x, double y, double radius, uint32_t
   if (!arena_is_free(self->arena, x, y, radius)) return 0;
   for (size_t i = 0; i < self->movers_count; i++) {
     const mover *m = &self->movers[i];
-    if (!(self_id != 0 && m->id == self_id) && !(mover_distance(m, x, y) >= radius)) return 0;
+    if (self_id != 0 && m->id == self_id) continue;
+    const double apart = mover_distance(m, x, y);
+    if (!(apart > 0.0 && apart >= radius)) return 0; /* inside of it is not free for a point either */
   }
   return 1;
 }

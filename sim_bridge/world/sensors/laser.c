@@ -25,10 +25,10 @@ int laser_check(const laser_parameters *p) {
 laser *laser_new(const laser_parameters *p) {
   laser *self = laser_check(p) == 0 ? calloc(1, sizeof *self) : NULL;
   if (self == NULL) return NULL;
-  const double heading = p->rays > 1 ? p->heading : p->heading - p->first;
+  const double heading = p->rays > 1 ? p->heading : p->heading + p->first;
   const beam_parameters mount = {.x = p->x, .y = p->y, .heading = heading, .height = p->height, .rays = 1};
   self->parameters = *p;
-  if (p->rays > 1) self->fan = scan_fan_new(-p->first, (p->rays - 1) * p->step - p->first, (size_t)p->rays);
+  if (p->rays > 1) self->fan = scan_fan_new(p->first, p->first + (p->rays - 1) * p->step, (size_t)p->rays);
   if ((p->rays > 1 && self->fan == NULL) || beam_init(&self->mount, &mount)) {
     laser_destroy(self);
     return NULL;
