@@ -98,8 +98,8 @@ class Sim:
         """
         if not isinstance(arena, Arena):
             raise ArenaError(f"simulation: got {shown(arena)}; expected an Arena, as load_arena gives it")
-        if not isinstance(noise, bool) or not isinstance(record, bool):
-            raise BoardError(f"simulation: noise is {shown(noise)}, record {shown(record)}; expected True or False")
+        noise = arguments.switch("simulation: noise", noise, BoardError)
+        record = arguments.switch("simulation: record", record, BoardError)
         seed = whole("simulation: the seed", seed, BoardError, least=-(2**63), most=2**64 - 1)
         step_cycles = whole("simulation: step_cycles", step_cycles, BoardError, least=STEP_MINIMUM, most=TICK_CYCLES)
         if TICK_CYCLES % step_cycles:
@@ -109,7 +109,7 @@ class Sim:
             raise ArenaError(
                 f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
-        self.arena, self.seed, self.noise = arena, seed, arguments.switch("sim: noise", noise, BoardError)
+        self.arena, self.seed, self.noise = arena, seed, noise
         self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:

@@ -300,7 +300,7 @@ def test_what_is_no_path_is_one_sentence() -> None:
         load_robot(None)  # type: ignore[arg-type]
     with pytest.raises(RobotError, match=r"^table is 5; expected the path of a CSV file$"):
         ReadingTable.load(5)  # type: ignore[arg-type]
-    with pytest.raises(BoardError, match=r"^sim: noise is 'off'; expected True or False$"):
+    with pytest.raises(BoardError, match=r"^simulation: noise is 'off'; expected True or False$"):
         Sim(ROOM, noise="off")  # type: ignore[arg-type]
 
 
