@@ -12,7 +12,6 @@ from pymavlink.dialects.v20 import common as mavlink
 from boebot.link import messages
 from tools.bench.codec import COUNT, per_second, sequences
 
-
 # ---- MAVLink 2: SERVO_OUTPUT_RAW has 37 bytes, as our telemetry -----------------------------------------------------
 
 
