@@ -26,7 +26,7 @@ help:
 	@echo "make run       build everything, let the wander brain drive the emulated robot, write build/run"
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
-	@echo "make bench     the figures, as a table and in build/bench.json"
+	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
 	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
@@ -55,7 +55,7 @@ check:
 
 bench:
 	@$(SIDE_BY_SIDE) ready-bench
-	@$(PYTHON_VENV) -m tools.bench
+	@$(PYTHON_VENV) -m tools.bench $(if $(ONLY),--only "$(ONLY)") $(if $(PAGE),--page $(PAGE))
 
 SECONDS ?= 3600
 soak:
@@ -75,6 +75,7 @@ pictures:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run wander --on native --seconds 90 --out build/pictures
 	@cp build/pictures/run.png docs/images/wander.png
+	@$(PYTHON_VENV) -m sim_bridge.arena_reference --pictures
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 

@@ -177,7 +177,10 @@ setup(
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],
-            exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "world", "vehicles", "parts", "arenas", "images")],
+            exclude=[
+                f"sim_bridge.{folder}*"
+                for folder in ("tests", "fuzz", "world", "vehicles", "parts", "arenas", "images")
+            ],
         ),
     ],
     package_data={"": ["py.typed", "*.html"]},

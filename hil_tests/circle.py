@@ -16,8 +16,10 @@ from hil_tests.rig import Rig
 from sim_bridge.arena import Arena, ArenaDescription
 from sim_bridge.arena_description import Disc, Light, Patch, Polygon
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
-from sim_bridge.session import SimSession, alone
-from sim_bridge.sim import Sim, SimRobot
+from sim_bridge.opening import alone
+from sim_bridge.session import SimSession
+from sim_bridge.sim import Sim
+from sim_bridge.sim_robot import SimRobot
 
 WALL_THICKNESS_M = 0.05
 
@@ -87,7 +89,7 @@ def circle(
     board = (
         avr_board(avr_image(description.pin_map)) if url == "avr" else native_board(native_library(description.pin_map))
     )
-    rig = CircleRig(SimSession(sim.add(board, description, pose=pose), url, alone(sim, False)))
+    rig = CircleRig(SimSession(sim.add(board, description, pose=pose), url, alone(sim)))
     with rig:
         rig.start()
         yield rig

@@ -14,7 +14,8 @@ def cells_visited(truth: Truth, cell: float = 0.20) -> tuple[int, int]:
     """
     from matplotlib.path import Path
 
-    outer, *obstacles = (Path(outline) for outline in sorted(truth.outlines, key=lambda o: -np.ptp(o[:, 0])))
+    (outer,) = (Path(solid.points) for solid in truth.plan.outlines)
+    obstacles = [Path(solid.points) for solid in truth.plan.obstacles if solid.kind == "obstacle"]
     corners = np.asarray(outer.vertices)
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = (np.floor((high - low) / cell + 1e-9)).astype(int)

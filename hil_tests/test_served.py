@@ -37,12 +37,12 @@ def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]
         yield json.loads(announced)["url"], server
     finally:
         server.send_signal(signal.SIGINT)
-        assert server.wait(timeout=5) in (0, 130, -signal.SIGKILL)
+        assert server.wait(timeout=20) in (0, 130, -signal.SIGKILL)
         server.stdout.close()
 
 
 def boebot(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, timeout=30)
+    return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, timeout=60)
 
 
 def test_served_board_answers_no_sooner_than_it_was_asked() -> None:

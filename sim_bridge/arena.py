@@ -6,15 +6,17 @@ Lengths in m, angles in rad. A wrong file gets one sentence that names file, lin
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from boebot import toml_files
 from boebot.errors import ArenaError
+from sim_bridge import arguments
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena_description import (
     ArenaDescription,
@@ -33,6 +35,8 @@ __all__ = ["Arena", "ArenaDescription", "Floats", "Point", "Polygon", "Start", "
 Floats = NDArray[np.float64]
 REPEATS = {"loop": lib.PATH_LOOP, "back_and_forth": lib.PATH_BACK_AND_FORTH, "once": lib.PATH_ONCE}
 DISC_CORNERS = 48  # of a disc as it is drawn
+REACH_MAXIMUM_M = 1e7  # that may be asked for
+TIME_MAXIMUM_S = 1e9
 
 
 class Arena:
@@ -44,44 +48,45 @@ class Arena:
         handle: the C core's `arena *`.
     """
 
-    def __init__(self, description: ArenaDescription, where: Callable[[str], str] = lambda place: "arena") -> None:
-        """`where`: the file, and the line of a place in it.
+    def __init__(self, description: ArenaDescription | toml_files.Table, file: str = "arena") -> None:
+        """From a description made in Python, which may hold numpy's arrays, or from a file's table; both are checked
+        alike. `file`: its name, for errors.
 
         Raises:
-            ArenaError: a polygon is none, a number is not finite, a path goes back in time.
+            ArenaError: a key, type or value that the description's types do not allow, a polygon that is none, a path
+                that goes back in time, two shapes of the same name.
         """
+        table = description if isinstance(description, toml_files.Table) else _table_of(description)
+        self.description = toml_files.convert(table, ArenaDescription, file, ArenaError)
         try:
-            check(description)
+            check(self.description)
         except DescriptionError as error:
-            raise ArenaError(f"{where(error.place)}: {error}") from None
-        self.description = description
-        self.name = description.name
+            raise ArenaError(f"{toml_files.where(table, file, error.place)}: {error}") from None
+        self.name = self.description.name
         self._polygons: list[Floats] = []
-        self._numbers: dict[str, int] = {}
         self.handle = ffi.gc(lib.arena_new(), lib.arena_destroy)
-        for outline in description.outline:
+        for outline in self.description.outline:
             self._add_polygon(outline, lib.ARENA_OUTLINE)
-        for obstacle in description.obstacle:
+        for obstacle in self.description.obstacle:
             self._add_polygon(obstacle, lib.ARENA_OBSTACLE)
-        for wall in description.wall:
+        for wall in self.description.wall:
             self._add_wall(wall)
-        for disc in description.disc:
-            self._added(lib.arena_add_disc(self.handle, disc.x_m, disc.y_m, disc.radius_m, _surface(disc)), disc)
+        for disc in self.description.disc:
+            self._added(lib.arena_add_disc(self.handle, disc.x_m, disc.y_m, disc.radius_m, _surface(disc)))
             self._polygons.append(_ring(disc.radius_m) + np.array((disc.x_m, disc.y_m)))
         self._add_floor()
-        for moving in description.moving:
+        for moving in self.description.moving:
             self._add_moving(moving)
         lib.arena_build(self.handle)
 
     def _add_polygon(self, polygon: Polygon, kind: int) -> None:
         corners = np.array(polygon.corners_m, dtype=np.float64)
-        added = lib.arena_add_polygon(self.handle, _doubles(corners), len(corners), kind, _surface(polygon))
-        self._added(added, polygon)
+        self._added(lib.arena_add_polygon(self.handle, _doubles(corners), len(corners), kind, _surface(polygon)))
         self._polygons.append(corners)
 
     def _add_wall(self, wall: Wall) -> None:
         points = np.array(wall.points_m, dtype=np.float64)
-        self._added(lib.arena_add_wall(self.handle, _doubles(points), len(points), _surface(wall)), wall)
+        self._added(lib.arena_add_wall(self.handle, _doubles(points), len(points), _surface(wall)))
         self._polygons.append(np.vstack((points, points[-2:0:-1])))  # there and back
 
     def _add_floor(self) -> None:
@@ -102,11 +107,9 @@ class Arena:
         radius = moving.radius_m or 0.0
         self._added(lib.arena_add_moving(self.handle, *shape, radius, _surface(moving), *path))
 
-    def _added(self, number: int, shape: Polygon | Wall | Disc | None = None) -> None:
-        if number < 0:
-            raise ArenaError(f"arena {self.name}: no room in memory, or a number is not finite")
-        if shape is not None and shape.name:
-            self._numbers[shape.name] = number
+    def _added(self, number: int) -> None:
+        if number < 0:  # what is wrong in itself was refused before
+            raise MemoryError(f"arena {self.name}")
 
     @property
     def outlines(self) -> list[Floats]:
@@ -117,7 +120,14 @@ class Arena:
         return [polygon.copy() for polygon in self._polygons]
 
     def moving_outlines(self, time: float) -> list[Floats]:
-        """The moving shapes where they are at `time` (s): closed polygons, arrays of shape (corners, 2) in m."""
+        """The moving shapes where their paths are at `time` (s): closed polygons, arrays of shape (corners, 2) in m.
+
+        There they are in a world in which none has waited for a robot.
+
+        Raises:
+            ArenaError: `time` is no number of at most 1e9 s.
+        """
+        time = arguments.number("arena: time", time, ArenaError, least=-TIME_MAXIMUM_S, most=TIME_MAXIMUM_S)
         polygons = []
         movers = self._movers(time)
         for mover, moving in zip(movers, self.description.moving, strict=True):
@@ -126,10 +136,12 @@ class Arena:
             polygons.append(shape @ rotation + np.array((mover.x, mover.y)))
         return polygons
 
-    def _movers(self, time: float) -> Any:
-        """The C core's movers at a time."""
+    def _movers(self, time: float, waited: Sequence[float] = ()) -> Any:
+        """The C core's movers at a time; `waited`: s by which the clock of each one's path is behind."""
         movers = ffi.new("mover[]", len(self.description.moving))
-        lib.scene_moving(self.handle, time, 1, movers)
+        for mover, late in zip(movers, waited, strict=False):
+            mover.waited = late
+        lib.scene_moving(self.handle, time, 1.0, 1, movers)
         return movers
 
     @property
@@ -139,55 +151,50 @@ class Arena:
         return start.x_m, start.y_m, start.heading_rad
 
     def ray(self, x: float, y: float, angle: float, reach: float) -> float | None:
-        """Distance (m) from (x, y) to the nearest thing in direction `angle` (rad), None beyond `reach` (m)."""
+        """Distance (m) from (x, y) to the nearest thing in direction `angle` (rad), None beyond `reach` (m).
+
+        Raises:
+            ArenaError: a number is not finite or too large.
+        """
+        x, y = _position(x, y)
+        angle = arguments.number("arena: angle", angle, ArenaError)
+        reach = arguments.number("arena: reach", reach, ArenaError, least=0.0, most=REACH_MAXIMUM_M)
         distance: float = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)
         return None if distance < 0 else distance
 
     def clearance(self, x: float, y: float, limit: float = 10.0) -> float:
-        """Distance (m) from (x, y) to the nearest edge or circle, at most `limit`."""
+        """Distance (m) from (x, y) to the nearest edge or circle, at most `limit`.
+
+        Raises:
+            ArenaError: a number is not finite, negative or too large.
+        """
+        x, y = _position(x, y)
+        limit = arguments.number("arena: limit", limit, ArenaError, least=0.0, most=REACH_MAXIMUM_M)
         distance: float = lib.arena_clearance(self.handle, x, y, limit)
         return distance
 
     def is_free(self, x: float, y: float, radius: float) -> bool:
-        """Whether a disc of `radius` (m) at (x, y) lies in free space, also of what moves, at the start."""
+        """Whether a disc of `radius` (m) at (x, y) lies in free space, also of what moves, at the start.
+
+        Raises:
+            ArenaError: a number is not finite, negative or too large.
+        """
+        x, y = _position(x, y)
+        radius = arguments.number("arena: radius", radius, ArenaError, least=0.0, most=REACH_MAXIMUM_M)
         movers = self._movers(0.0)
         scene = ffi.new("scene *", {"arena": self.handle, "movers": movers, "movers_count": len(movers)})
         return bool(lib.scene_is_free(scene, x, y, radius, 0))
 
     def grip(self, x: float, y: float, otherwise: float) -> float:
-        """Friction coefficient of the floor at (x, y); `otherwise` outside of all patches."""
-        coefficient: float = lib.arena_grip(self.handle, x, y, otherwise)
-        return coefficient
-
-    def move(self, polygon: int | str, dx: float, dy: float) -> None:
-        """Moves a polygon or wall, by number or name, by (dx, dy) m: only while nobody else uses the arena.
+        """Friction coefficient of the floor at (x, y); `otherwise` outside of all patches.
 
         Raises:
-            ArenaError: there is no such polygon.
+            ArenaError: a number is not finite, negative or too large.
         """
-        number = self._numbers.get(polygon, -1) if isinstance(polygon, str) else polygon
-        if not math.isfinite(dx + dy) or lib.arena_move_polygon(self.handle, number, dx, dy) != 0:
-            raise ArenaError(f"arena {self.name}: there is no polygon {polygon!r} to move")
-        self._polygons[number] += (dx, dy)
-
-    def free_cells(self, size: float, radius: float) -> Floats:
-        """Centres of the square cells of side `size` (m) in which a robot of `radius` (m) can stand: shape (n, 2).
-
-        Cells lie on a lattice through the origin. A field without outline has none.
-        """
-        if not self.description.outline:
-            return np.empty((0, 2))
-        corners = np.concatenate(self._polygons)
-        low = np.floor(corners.min(axis=0) / size).astype(int)
-        high = np.ceil(corners.max(axis=0) / size).astype(int)
-        return np.array(list(self._free_centres(low, high, size, radius))).reshape(-1, 2)
-
-    def _free_centres(self, low: Any, high: Any, size: float, radius: float) -> Iterator[Point]:
-        for column in range(low[0], high[0]):
-            for row in range(low[1], high[1]):
-                x, y = (column + 0.5) * size, (row + 0.5) * size
-                if self.is_free(x, y, radius):
-                    yield x, y
+        x, y = _position(x, y)
+        otherwise = arguments.number("arena: otherwise", otherwise, ArenaError, least=0.0)
+        coefficient: float = lib.arena_grip(self.handle, x, y, otherwise)
+        return coefficient
 
 
 def arena_names() -> list[str]:
@@ -203,13 +210,30 @@ def load_arena(arena: str | Path | None) -> Arena:
     """
     path = toml_files.find("arenas", "room" if arena is None else arena, ArenaError)
     table = toml_files.read(path, ArenaError)
-    description = toml_files.convert(table, ArenaDescription, path.name, ArenaError)
-    loaded = Arena(description, lambda place: toml_files.where(table, path.name, place))
+    loaded = Arena(table, path.name)
     x, y, _ = loaded.start
     if not loaded.is_free(x, y, 0.0):
         place = toml_files.where(table, path.name, "start")
         raise ArenaError(f"{place}: start: x_m = {x:g}, y_m = {y:g} is in or behind something; expected free space")
     return loaded
+
+
+def _table_of(description: Any) -> dict[str, Any]:
+    """A description made in Python as a file would say it."""
+    try:
+        return cast("dict[str, Any]", msgspec.to_builtins(description, enc_hook=_plain))
+    except RecursionError:
+        raise ArenaError("arena: the description holds itself; expected an ArenaDescription") from None
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's arrays and numbers as Python's; anything else as a text, which no number is."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else arguments.shown(value)
+
+
+def _position(x: float, y: float) -> tuple[float, ...]:
+    limit = float(lib.ARENA_FARTHEST_M)
+    return arguments.point("arena: the position", (x, y), ArenaError, "x, y (m)", (limit, limit))
 
 
 def _doubles(values: Floats) -> Any:

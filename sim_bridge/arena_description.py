@@ -13,16 +13,13 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from sim_bridge._core import ffi, lib
 
-Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 EXTENT_M = 1000.0  # nothing lies farther from the origin
 EDGES_MAXIMUM = 200_000  # of all shapes together
-DISTINCT_M = 1e-9  # corners nearer than that are the same
 
 Position = Annotated[float, Meta(ge=-EXTENT_M, le=EXTENT_M)]
 Length = Annotated[float, Meta(gt=0, le=EXTENT_M)]
@@ -34,6 +31,7 @@ Height = Annotated[
 Infrared = Annotated[float, Meta(ge=0, le=1, description="share of infrared light thrown back; 1: a white wall")]
 Sound = Annotated[float, Meta(ge=0, le=1, description="share of sound thrown back; 1: a hard wall, less: cloth")]
 Name = Annotated[str, Meta(description="for people")]
+ShapeName = Annotated[str, Meta(description="for people; no two shapes have the same")]
 Corners = Annotated[
     list[tuple[Position, Position]], Meta(min_length=3, description="x, y of each corner; the last one joins the first")
 ]
@@ -51,7 +49,7 @@ class Polygon(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A closed polygon: as an outline, the robot is inside it; as an obstacle, outside."""
 
     corners_m: Corners
-    name: Name = ""
+    name: ShapeName = ""
     height_m: Height | None = None
     infrared_reflectance: Infrared = 1.0
     sound_reflectance: Sound = 1.0
@@ -64,7 +62,7 @@ class Wall(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         list[tuple[Position, Position]],
         Meta(min_length=2, description="x, y of its ends and of the bends between them"),
     ]
-    name: Name = ""
+    name: ShapeName = ""
     height_m: Height | None = None
     infrared_reflectance: Infrared = 1.0
     sound_reflectance: Sound = 1.0
@@ -76,7 +74,7 @@ class Disc(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     x_m: Annotated[Position, Meta(description="centre")]
     y_m: Annotated[Position, Meta(description="centre")]
     radius_m: Length
-    name: Name = ""
+    name: ShapeName = ""
     height_m: Height | None = None
     infrared_reflectance: Infrared = 1.0
     sound_reflectance: Sound = 1.0
@@ -127,7 +125,7 @@ class Moving(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         Literal["loop", "back_and_forth", "once"],
         Meta(description="after the last waypoint: again from the first (which it has to equal), back, or stay"),
     ] = "back_and_forth"
-    name: Name = ""
+    name: ShapeName = ""
     height_m: Height | None = None
     infrared_reflectance: Infrared = 1.0
     sound_reflectance: Sound = 1.0
@@ -163,68 +161,40 @@ class DescriptionError(Exception):
 
 
 def check(description: ArenaDescription) -> None:
-    """Raises DescriptionError at the first thing beyond types: simple polygons, order in time, number of edges."""
-    rows = [*_closed(description), *((f"wall[{i}].points_m", wall.points_m) for i, wall in enumerate(description.wall))]
-    edges = sum(len(points) for _, points in rows)
+    """Raises DescriptionError at the first thing beyond types: number of edges, simple polygons, time, names."""
+    rows = list(_rows(description))
+    edges = sum(len(points) for _, points, _ in rows)
     if edges > EDGES_MAXIMUM:
         largest = max(rows, key=lambda row: len(row[1]))[0]
         raise DescriptionError(largest, f": the arena has {edges:,} edges; expected at most {EDGES_MAXIMUM:,}")
-    for place, corners in _closed(description):
-        _check_polygon(corners, place)
-    for i, wall in enumerate(description.wall):
-        _check_points(wall.points_m, f"wall[{i}].points_m", 2)
-        _check_distinct(np.array(wall.points_m), f"wall[{i}].points_m")
-    for i, disc in enumerate(description.disc):
-        _check_finite((disc.x_m, disc.y_m), f"disc[{i}]")
-        _check_radius(disc.radius_m, f"disc[{i}].radius_m")
+    for place, points, closed in rows:
+        _check_row(points, place, closed)
     for i, moving in enumerate(description.moving):
         _check_moving(moving, f"moving[{i}]")
+    _check_names(description)
 
 
-def _closed(description: ArenaDescription) -> Iterator[tuple[str, list[Point]]]:
-    """All closed polygons, with their places."""
+def _rows(description: ArenaDescription) -> Iterator[tuple[str, list[Point], bool]]:
+    """All polygons and walls: their places, points, and whether they are closed."""
     for key, shapes in (("outline", description.outline), ("obstacle", description.obstacle)):
-        yield from ((f"{key}[{i}].corners_m", shape.corners_m) for i, shape in enumerate(shapes))
-    for i, patch in enumerate(description.patch):
-        yield f"patch[{i}].corners_m", patch.corners_m
+        yield from ((f"{key}[{i}].corners_m", shape.corners_m, True) for i, shape in enumerate(shapes))
+    yield from ((f"patch[{i}].corners_m", patch.corners_m, True) for i, patch in enumerate(description.patch))
+    yield from ((f"wall[{i}].points_m", wall.points_m, False) for i, wall in enumerate(description.wall))
     for i, moving in enumerate(description.moving):
         if moving.corners_m is not None:
-            yield f"moving[{i}].corners_m", moving.corners_m
+            yield f"moving[{i}].corners_m", moving.corners_m, True
 
 
-def _check_finite(point: Point, place: str) -> None:
-    if not all(math.isfinite(value) and abs(value) <= EXTENT_M for value in point):
-        raise DescriptionError(place, f" is {list(point)}; expected numbers within ±{EXTENT_M:g} m")
-
-
-def _check_radius(radius: float, place: str) -> None:
-    if not 0 < radius <= EXTENT_M:
-        raise DescriptionError(place, f" is {radius}; expected more than 0 and at most {EXTENT_M:g} m")
-
-
-def _check_points(points: list[Point], place: str, least: int) -> None:
-    if len(points) < least:
-        raise DescriptionError(
-            place, f" has {len(points)} {'corners' if least > 2 else 'points'}; expected at least {least}"
-        )
-    for index, point in enumerate(points):
-        _check_finite(point, f"{place}[{index}]")
-
-
-def _check_distinct(points: Floats, place: str) -> None:
-    """Neighbours in the row may not coincide."""
-    same = np.flatnonzero(np.hypot(*(points[1:] - points[:-1]).T) < DISTINCT_M)
-    if same.size:
-        raise DescriptionError(f"{place}[{same[0]}]", " and the point after it are the same; expected an edge")
-
-
-def _check_polygon(corners: list[Point], place: str) -> None:
-    """Refuses what is no simple polygon of finite size."""
-    _check_points(corners, place, 3)
-    xy = np.array(corners, dtype=np.float64)
-    _check_distinct(np.vstack((xy, xy[:1])), place)
+def _check_row(points: list[Point], place: str, closed: bool) -> None:
+    """Refuses neighbours that coincide, and what is closed and no simple polygon."""
+    xy = ffi.from_buffer("double[]", np.array(points, dtype=np.float64))
+    same = lib.arena_repeated(xy, len(points), closed)
+    if same >= 0:
+        raise DescriptionError(f"{place}[{same}]", " and the point after it are the same; expected an edge")
+    if not closed:
+        return
     one, other = ffi.new("uint32_t *"), ffi.new("uint32_t *")
-    crossing = lib.arena_crossing(ffi.from_buffer("double[]", xy), len(xy), one, other)
+    crossing = lib.arena_crossing(xy, len(points), one, other)
     if crossing < 0:
         raise MemoryError("arena")
     if crossing > 0:
@@ -236,20 +206,19 @@ def _check_polygon(corners: list[Point], place: str) -> None:
 def _check_moving(moving: Moving, place: str) -> None:
     if (moving.corners_m is None) == (moving.radius_m is None):
         raise DescriptionError(place, ": expected either corners_m or radius_m")
-    if moving.radius_m is not None:
-        _check_radius(moving.radius_m, f"{place}.radius_m")
-    if not moving.path:
-        raise DescriptionError(f"{place}.path", " is empty; expected a waypoint")
-    for i, point in enumerate(moving.path):
-        _check_finite((point.x_m, point.y_m), f"{place}.path[{i}]")
     times = [point.time_s for point in moving.path]
     if times[0] != 0:
         raise DescriptionError(f"{place}.path[0].time_s", f" is {times[0]:g}; expected 0 for the first waypoint")
     for i in range(1, len(times)):
-        if not times[i - 1] < times[i] <= 1e6:
-            raise DescriptionError(
-                f"{place}.path[{i}].time_s", f" is {times[i]:g}; expected more than {times[i - 1]:g}"
-            )
+        if not times[i] - times[i - 1] >= lib.ARENA_WAYPOINTS_US * 1e-6:
+            what = f" is {times[i]:g}; expected more than {times[i - 1]:g}, by a microsecond or more"
+            raise DescriptionError(f"{place}.path[{i}].time_s", what)
+    radius = moving.radius_m or max(math.hypot(*corner) for corner in moving.corners_m or [])
+    path = [(point.time_s, point.x_m, point.y_m, point.heading_rad) for point in moving.path]
+    speed = lib.arena_path_speed(ffi.new("path_waypoint[]", path), len(path), radius)
+    if speed > lib.ARENA_FASTEST_M_S:
+        what = f": some of it moves at {speed:.4g} m/s; expected at most {lib.ARENA_FASTEST_M_S} m/s"
+        raise DescriptionError(f"{place}.path", what)
     first, last = moving.path[0], moving.path[-1]
     turns = (last.heading_rad - first.heading_rad) / (2 * math.pi)
     gap = math.dist((first.x_m, first.y_m), (last.x_m, last.y_m))
@@ -257,3 +226,15 @@ def _check_moving(moving: Moving, place: str) -> None:
         raise DescriptionError(
             f"{place}.path[{len(times) - 1}]", ": expected the first waypoint again, as the path is a loop"
         )
+
+
+def _check_names(description: ArenaDescription) -> None:
+    """Shapes that have a name have each their own."""
+    owners: dict[str, str] = {}
+    for key in ("outline", "obstacle", "wall", "disc", "moving"):
+        for i, shape in enumerate(getattr(description, key)):
+            place = f"{key}[{i}]"
+            if shape.name and (owner := owners.setdefault(shape.name, place)) != place:
+                raise DescriptionError(
+                    f"{place}.name", f" is {shape.name!r}, as that of {owner}; expected a name of its own, or none"
+                )

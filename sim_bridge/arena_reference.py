@@ -20,14 +20,26 @@ from sim_bridge.arena_description import ArenaDescription
 from sim_bridge.arena_picture import draw
 
 SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
+LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 BEGIN, END = "<!-- keys: begin -->", "<!-- keys: end -->"
 UNITS = {"m": "m", "rad": "rad", "s": "s", "w": "W"}  # by a key's last part
 
 
 def schema() -> str:
     """The JSON schema of an arena file."""
-    made = msgspec.json.schema(ArenaDescription)
+    made = _whole(msgspec.json.schema(ArenaDescription))
     return json.dumps({"$schema": SCHEMA_URI, "title": "arena file", **made}, indent=2, ensure_ascii=False) + "\n"
+
+
+def _whole(value: Any) -> Any:
+    """The schema with limits such as 1000.0 as 1000: which of the two msgspec gives depends on who was imported first,
+    for `typing` keeps one of annotations that are equal."""
+    if isinstance(value, dict):
+        return {
+            key: int(item) if key in LIMITS and isinstance(item, float) and item.is_integer() else _whole(item)
+            for key, item in value.items()
+        }
+    return [_whole(item) for item in value] if isinstance(value, list) else value
 
 
 def page(text: str) -> str:

@@ -6,26 +6,36 @@ size of the batch, nor on its place in it, nor on how many threads step it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+import weakref
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from boebot.errors import BrainError, RobotError
+from sim_bridge import arguments, worlds
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
-from sim_bridge.vehicle import STATE_BYTES, VehicleModel, place, worlds
+from sim_bridge.compiled_brain import WANDER, CompiledBrain
+from sim_bridge.vehicle import VehicleModel
+
+__all__ = ["WANDER", "Batch", "CompiledBrain"]
 
 Floats = NDArray[np.float64]
-WANDER: Final = ffi.addressof(lib, "vehicle_wander")
-"""A compiled brain: the notes' wandering for two IR sensors (vehicles/wander.h), with a `vehicle_wander_state *`."""
+THREADS_MAXIMUM: Final = 256
+# Long calls are made in portions, between which Ctrl-C is heard. Worlds know nothing of them.
+PORTION_FIRST: Final = 4096  # steps of all worlds together
+PORTION_SHORT_S: Final = 0.02  # such portions are doubled ...
+PORTION_LONG_S: Final = 0.1  # ... and such halved
 
 
 class Batch:
-    """N worlds of one model.
+    """N worlds of one model. With several threads, `close` it or use it by `with`; what was read stays.
 
     Attributes:
         readings: shape (N, M), a view that changes with each step; `model.names` says which column is what.
@@ -39,89 +49,181 @@ class Batch:
         seeds: ArrayLike,
         *,
         threads: int = 1,
-        state_bytes: int = STATE_BYTES,
+        state_bytes: int = worlds.STATE_BYTES,
     ) -> None:
         """N worlds at `poses`, shape (N, 3): x, y (m), heading (rad), with `seeds`, shape (N,); one arena or N of them.
 
         Raises:
             ArenaError: a start is not free space.
-            RobotError: shapes do not fit, or a number is not finite.
+            RobotError: shapes do not fit, or something is no number, seed, model or arena.
         """
-        starts = np.asarray(poses, dtype=np.float64)
-        keys = np.asarray(seeds)
+        starts = _floats("batch: poses", poses, RobotError, "(N, 3)")
+        keys = _array("batch: seeds", seeds, RobotError, "(N,)")
         if starts.ndim != 2 or starts.shape[1] != 3 or keys.shape != starts.shape[:1]:
             raise RobotError(f"batch: poses {starts.shape}, seeds {keys.shape}; expected shapes (N, 3) and (N,)")
-        self.model, self.count, self.threads = model, len(starts), max(1, threads)
-        around = [arenas] * self.count if isinstance(arenas, Arena) else list(arenas)
-        if len(around) != self.count:
-            raise RobotError(f"batch: {len(around)} arenas for {self.count} poses; expected one, or as many")
-        self.arenas = around
-        self.handle = worlds(model, self.count, state_bytes)
-        for index, (arena, pose, seed) in enumerate(zip(around, starts, keys.tolist(), strict=True)):
-            place(self.handle, index, arena, int(seed), 1, pose)
+        self.model, self.count = model, len(starts)
+        self.threads = arguments.whole("batch: threads", threads, RobotError, least=1, most=THREADS_MAXIMUM)
+        self.arenas = self._arenas(arenas)
+        self.handle = worlds.make_worlds("batch", model, self.count, state_bytes)
+        self.state_bytes = int(state_bytes)
+        for index, (arena, pose, seed) in enumerate(zip(self.arenas, starts.tolist(), keys.tolist(), strict=True)):
+            worlds.place(f"batch, world {index}", self.handle, index, model, arena, seed, 1, pose)
         columns = lib.vehicles_reading_count(self.handle)
         size = 8 * self.count * columns
-        room = ffi.buffer(lib.vehicles_readings(self.handle), size) if size else b""
+        pointer = worlds.kept(lib.vehicles_readings(self.handle), self.handle)
+        room = ffi.buffer(pointer, size) if size else b""
         self.readings: Floats = np.frombuffer(room, dtype=np.float64).reshape(self.count, columns)
         self.readings.flags.writeable = False
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self._closed = False
+        self._pool: ThreadPoolExecutor | None = None
+        self._open_pool()
+
+    def _arenas(self, arenas: Any) -> list[Arena]:
+        """One for each world."""
+        try:
+            around = [arenas] * self.count if isinstance(arenas, Arena) else list(arenas)
+        except TypeError:
+            around = [arenas]
+        for arena in around:
+            worlds.check_arena("batch", arena)
+        if len(around) != self.count:
+            raise RobotError(f"batch: {len(around)} arenas for {self.count} poses; expected one, or as many")
+        return around
+
+    # ---- threads -----------------------------------------------------------------------------------------------------
+
+    def _open_pool(self) -> None:
+        if self.threads > 1:
+            self._pool = ThreadPoolExecutor(self.threads)
+            weakref.finalize(self, self._pool.shutdown, wait=False)
+        self._closed = False
+
+    def close(self) -> None:
+        """Ends its threads. Readings, poses and states can still be read; there are no more steps."""
+        pool, self._pool, self._closed = self._pool, None, True
+        if pool is not None:
+            pool.shutdown(wait=True)
+
+    def __enter__(self) -> Batch:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
     def _shares(self) -> list[tuple[int, int]]:
         """First world and number of worlds of each thread."""
         borders = np.linspace(0, self.count, self.threads + 1).astype(int).tolist()
         return [(a, b - a) for a, b in pairwise(borders) if b > a]
 
-    def _each(self, work: Any) -> None:
-        """Calls work(first, count), which leaves the interpreter, for all shares."""
+    def _portion(self, work: Callable[[int, int, int], int], steps: int) -> bool:
+        """Calls work(first, count, steps), which leaves the interpreter, for all shares. Whether all went well."""
         if self._pool is None:
-            statuses = [work(0, self.count)]
-        else:
-            statuses = [task.result() for task in [self._pool.submit(work, *share) for share in self._shares()]]
-        if any(statuses):
-            raise BrainError("batch: a motor signal is not a finite number; expected numbers in [-1, 1]")
+            return not work(0, self.count, steps)
+        try:
+            tasks = [self._pool.submit(work, *share, steps) for share in self._shares()]
+            statuses = [task.result() for task in tasks]  # of all, before anything else is asked of the worlds
+        except BaseException:  # Ctrl-C: wait for the threads, a portion at most; should it come again, closed it stays
+            self.close()
+            self._open_pool()
+            raise
+        return not any(statuses)
+
+    def _advance(self, work: Callable[[int, int, int], int], steps: int) -> bool:
+        """`steps` steps of all worlds, in portions. Whether all went well."""
+        left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
+        if self._closed:
+            raise RobotError("batch: it is closed; expected no steps after close()")
+        portion, well = max(1, PORTION_FIRST // max(1, self.count)), True
+        while left > 0:
+            portion = min(portion, left)
+            started = time.perf_counter()
+            well = self._portion(work, portion) and well
+            left -= portion
+            took = time.perf_counter() - started
+            if took < PORTION_SHORT_S:
+                portion *= 2
+            elif took > PORTION_LONG_S:
+                portion = max(1, portion // 2)
+        return well
+
+    # ---- steps -------------------------------------------------------------------------------------------------------
 
     def step(self, signals: ArrayLike, steps: int = 1) -> Floats:
         """`steps` steps under motor signals of shape (N, 2), left and right. Returns the readings.
 
+        Ctrl-C ends it soon, after some of the steps; the batch goes on from there.
+
         Raises:
             BrainError: a signal is not finite, and then no world has moved.
-            RobotError: the shape does not fit.
+            RobotError: the shape does not fit, or it is closed.
         """
-        given = np.ascontiguousarray(signals, dtype=np.float64)
+        given = np.ascontiguousarray(_floats("batch: signals", signals, BrainError, f"({self.count}, 2)"))
         if given.shape != (self.count, 2):
             raise RobotError(f"batch: signals {given.shape}; expected shape ({self.count}, 2)")
-        if self._pool is not None and not np.isfinite(given).all():
+        if not np.isfinite(given).all():
             raise BrainError("batch: a motor signal is not a finite number; expected numbers in [-1, 1]")
         pointer = ffi.from_buffer("double[]", given)
-        self._each(lambda first, count: lib.vehicles_step(self.handle, first, count, pointer + 2 * first, steps))
+        self._advance(
+            lambda first, count, some: int(lib.vehicles_step(self.handle, first, count, pointer + 2 * first, some)),
+            steps,
+        )
         return self.readings
 
-    def run(self, brain: Any, steps: int) -> Floats:
+    def run(self, brain: CompiledBrain, steps: int) -> Floats:
         """`steps` steps with a brain in compiled code that is asked in each of them. Returns the readings.
 
-        Args:
-            brain: C function `void brain(void *state, const double *readings, double *signals)` (vehicle.h): a cffi
-                function, or the address of one, such as `numba.cfunc("void(voidptr, CPointer(float64),
-                CPointer(float64))")(f).address`. `state` is its memory in that world, see `states`.
-            steps: how many.
+        Its memory in each world is at `state`. Ctrl-C ends it soon, after some of the steps.
 
         Raises:
-            BrainError: it gave a signal that is not finite.
+            BrainError: the model or the memory is not what the brain needs, and then no world has moved; or the brain
+                gave a signal that is not finite, and then that world's run has ended and the others' went on.
+            RobotError: it is closed.
         """
-        function = ffi.cast("vehicle_brain *", brain)
-        if function == ffi.NULL:
-            raise BrainError("batch: brain is a null pointer; expected a C function or its address")
-        self._each(lambda first, count: lib.vehicles_run(self.handle, first, count, function, steps))
+        if not isinstance(brain, CompiledBrain):
+            raise BrainError(f"batch: brain is {arguments.shown(brain)}; expected a CompiledBrain")
+        brain.check("batch", self.model, self.state_bytes)
+        well = self._advance(
+            lambda first, count, some: int(lib.vehicles_run(self.handle, first, count, brain.function, some)), steps
+        )
+        if not well:
+            worlds_failed = np.flatnonzero(self.flags == lib.VEHICLE_BRAIN_FAILED)
+            raise BrainError(
+                f"batch: {brain.name} gave a motor signal that is not a finite number in {len(worlds_failed)} of "
+                f"{self.count} worlds, first in world {worlds_failed[0]}; expected numbers in [-1, 1]"
+            )
         return self.readings
 
     def state(self, index: int, kind: str = "unsigned char *") -> Any:
-        """The compiled brain's memory in a world, as a pointer of that C type."""
-        return ffi.cast(kind, lib.vehicles_brain_state(self.handle, self._index(index)))
+        """The compiled brain's memory in a world, as a pointer of that C type.
+
+        Raises:
+            RobotError: there is no such world or type, or it is larger than the memory.
+        """
+        memory = lib.vehicles_brain_state(self.handle, self._index(index))
+        try:
+            pointer = ffi.cast(kind, memory)
+            size = ffi.sizeof(ffi.typeof(pointer).item)
+        except (TypeError, AttributeError, ValueError, ffi.error):
+            raise RobotError(
+                f"batch: {arguments.shown(kind)} is no C type here; expected a pointer, such as double *"
+            ) from None
+        if size > self.state_bytes:
+            raise RobotError(
+                f"batch: a brain's memory has {self.state_bytes} bytes, {kind} points to {size}; "
+                f"expected state_bytes={size} or more where the worlds are made"
+            )
+        return worlds.kept(pointer, self.handle)
 
     def _index(self, index: int) -> int:
-        if not 0 <= index < self.count:
-            raise RobotError(f"batch: there is no world {index}; expected 0 to {self.count - 1}")
-        return index
+        try:
+            return arguments.whole("", index, RobotError, least=0, most=self.count - 1)
+        except RobotError:
+            shown = arguments.shown(index)
+            raise RobotError(f"batch: there is no world {shown}; expected 0 to {self.count - 1}") from None
+
+    # ---- what can be read --------------------------------------------------------------------------------------------
 
     @property
     def poses(self) -> Floats:
@@ -132,7 +234,8 @@ class Batch:
 
     @property
     def flags(self) -> NDArray[np.int8]:
-        """Shape (N,): 0 while a run goes on, 1 ended by a collision, 2 by an empty battery."""
+        """Shape (N,): 0 while a run goes on, 1 ended by a collision, 2 by an empty battery, 3 by a compiled brain that
+        gave a signal that is no finite number."""
         flags = np.empty(self.count, dtype=np.int8)
         lib.vehicles_flags(self.handle, 0, self.count, ffi.from_buffer("int8_t[]", flags))
         return flags
@@ -144,21 +247,33 @@ class Batch:
         return np.fromiter(done, dtype=np.uint64, count=self.count)
 
     def save(self, index: int) -> bytes:
-        """The state of one world; `restore` takes it into any world of the same model and arena."""
-        room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(self.handle))
-        lib.vehicles_save(self.handle, self._index(index), room)
-        return bytes(ffi.buffer(room))
+        """The state of one world; `restore` takes it into any world of the same model and arena, on any machine."""
+        return worlds.save(self.handle, self._index(index))
 
     def restore(self, index: int, state: bytes) -> None:
-        """Raises RobotError: it is of another model or version, or damaged."""
-        if lib.vehicles_restore(self.handle, self._index(index), state, len(state)):
-            raise RobotError("batch: this is no saved state of this model and version; expected what save() gave")
+        """Raises RobotError: it is of another model, arena, size of memory or version, or damaged; nothing changes."""
+        world = self._index(index)
+        worlds.restore(f"batch, world {world}", self.handle, world, self.arenas[world], state)
 
     def hashes(self) -> NDArray[np.uint64]:
-        """Shape (N,): of each world's body, drive, battery and readings."""
+        """Shape (N,): of all that `save` writes of each world, in the same order; the same on every machine."""
         return np.array([lib.vehicles_hash(self.handle, i) for i in range(self.count)], dtype=np.uint64)
 
     @property
     def bytes_per_world(self) -> float:
         """Memory of one world, without the arena."""
         return float(lib.vehicles_memory(self.handle) / self.count) if self.count else 0.0
+
+
+def _array(what: str, values: Any, error: type[RobotError] | type[BrainError], shape: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError):  # rows of different lengths
+        raise error(f"{what} are {arguments.shown(values)}; expected numbers of shape {shape}") from None
+
+
+def _floats(what: str, values: Any, error: type[RobotError] | type[BrainError], shape: str) -> Floats:
+    array = _array(what, values, error, shape)
+    if array.dtype.kind in "fiu":
+        return array.astype(np.float64, copy=False)
+    raise error(f"{what} are {arguments.shown(values)}; expected numbers of shape {shape}")

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
+import subprocess
 import sys
+import sysconfig
+import tempfile
 from pathlib import Path
 
 from cffi import FFI
@@ -17,6 +21,7 @@ from cffi import FFI
 HEADERS = [
     "world/numbers.h",
     "world/noise.h",
+    "world/noise_block.h",
     "world/paths.h",
     "world/arena.h",
     "world/scene.h",
@@ -62,13 +67,13 @@ BEFORE = """
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """
+static const double WHISKER_HEIGHT_M;
 typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
 int body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
 void body_as_mover(const body *self, mover *out);
-double body_energy(const body *self);
 double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);
@@ -87,10 +92,31 @@ SOURCES = [
 # No fused multiply-add: the same bits on every machine. BOEBOT_NATIVE=1 builds for the machine at hand instead: faster,
 # and runs are equal only on machines of its kind.
 WINDOWS = sys.platform == "win32"
-COMPILE_PORTABLE = ["/O2", "/fp:precise"] if WINDOWS else ["-std=gnu11", "-O2", "-ffp-contract=off"]
-COMPILE_NATIVE = ["/O2"] if WINDOWS else ["-std=gnu11", "-O3", "-march=native", "-ffp-contract=fast"]
+WHOLE_PROGRAM = "-flto=auto"
+
+
+def links_whole_program() -> bool:
+    """Whether the compiler optimises across files when it links; the sanitizers' build goes without."""
+    if WINDOWS or os.environ.get("BOEBOT_SANITIZE") == "1":
+        return False
+    compiler = shlex.split(os.environ.get("CC") or str(sysconfig.get_config_var("CC") or "cc"))
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "probe.c")
+        source.write_text("int probe(void) { return 0; }\n", encoding="utf-8")
+        command = [*compiler, WHOLE_PROGRAM, "-shared", "-fPIC", str(source), "-o", str(source.with_suffix(".so"))]
+        try:
+            return subprocess.run(command, capture_output=True, check=False).returncode == 0
+        except OSError:
+            return False
+
+
+# Nothing but the module's entry is seen from outside: what is called within the library may be inlined there.
+INSIDE = ["-std=gnu11", "-fvisibility=hidden", *([WHOLE_PROGRAM] if links_whole_program() else [])]
+COMPILE_PORTABLE = ["/O2", "/fp:precise"] if WINDOWS else [*INSIDE, "-O2", "-ffp-contract=off"]
+COMPILE_NATIVE = ["/O2"] if WINDOWS else [*INSIDE, "-O3", "-march=native", "-ffp-contract=fast"]
 COMPILE = COMPILE_NATIVE if os.environ.get("BOEBOT_NATIVE") == "1" else COMPILE_PORTABLE
-LINK = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
+LIBRARIES = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
+LINK = [*([] if WINDOWS else COMPILE), *LIBRARIES]  # code is made when linking, and by the same rules
 
 
 def declarations(header: Path) -> str:

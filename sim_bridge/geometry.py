@@ -13,7 +13,7 @@ from boebot.errors import ArenaError
 from sim_bridge._core import ffi, lib
 
 Point = tuple[float, float]
-REACH_M = 1e6  # of a ray unless one is said
+REACH_M = float(lib.ARENA_FARTHEST_M)  # of a ray unless one is said
 
 
 def ray_segment(x: float, y: float, angle: float, p1: Point, p2: Point, reach: float = REACH_M) -> float | None:
@@ -24,11 +24,15 @@ def ray_segment(x: float, y: float, angle: float, p1: Point, p2: Point, reach: f
     Raises:
         ArenaError: the segment has no length, or a number is not finite.
     """
-    if not all(map(math.isfinite, (x, y, angle, reach, *p1, *p2))) or p1 == p2:
-        raise ArenaError(f"segment {p1} to {p2}, ray from {(x, y)} at {angle}: expected finite numbers and two points")
+    numbers = (x, y, angle, reach, *p1, *p2)
+    if not all(map(math.isfinite, numbers)) or max(map(abs, numbers)) > REACH_M:
+        raise ArenaError(
+            f"segment {p1} to {p2}, ray from {(x, y)} at {angle}: expected finite numbers within ±{REACH_M:,.0f}"
+        )
     wall = ffi.gc(lib.arena_new(), lib.arena_destroy)
     ends = np.array((p1, p2), dtype=np.float64)
-    lib.arena_add_wall(wall, ffi.from_buffer("double[]", ends), 2, ffi.NULL)
+    if lib.arena_add_wall(wall, ffi.from_buffer("double[]", ends), 2, ffi.NULL) < 0:
+        raise ArenaError(f"segment {p1} to {p2}: expected two points apart")
     lib.arena_use_index(wall, lib.ARENA_INDEX_NONE)
     lib.arena_build(wall)
     distance: float = lib.arena_ray(wall, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)

@@ -33,7 +33,7 @@ SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its g
 TYRE_SLIP = 1  # beyond that coefficient they slip; 0: wheels always roll
 TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
 
-WHISKER_HEIGHT_M = 0.03
+WHISKER_HEIGHT_M: float = lib.WHISKER_HEIGHT_M
 WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
 
 INFRARED_RAYS = 5
@@ -118,6 +118,10 @@ class Draw:
         value: float = lib.noise_normal(self._seed, self._robot, _DRAW + device, what)
         return value
 
+    def own(self, name: str, given: float | None) -> float:
+        """The same, `given` by a robot itself unless that is None."""
+        return self[name] if given is None or name in self._neutral else given
+
     def __getitem__(self, name: str) -> float:
         """A parameter of this module, or its neutral value if what it belongs to is switched off."""
         value: float = self._neutral.get(name, globals()[name])
@@ -128,8 +132,8 @@ AS_BUILT = Draw(0, noise=False)
 """Nothing is drawn, and nothing switched off."""
 
 
-def body_parameters(body: robots.Body, draw: Draw = AS_BUILT) -> Any:
-    """The body in C."""
+def body_parameters(body: robots.Body, draw: Draw = AS_BUILT, outline: Any = ffi.NULL) -> Any:
+    """The body in C. `outline`: its collision outline in C, which must outlive what is made of it; NULL: a circle."""
     return ffi.new(
         "body_parameters *",
         {
@@ -142,9 +146,10 @@ def body_parameters(body: robots.Body, draw: Draw = AS_BUILT) -> Any:
             "wheel_inertia": body.wheel_inertia_kg_m2,
             "linear_damping": body.linear_damping_n_s_m,
             "angular_damping": body.angular_damping_n_m_s,
-            "grip": draw["TYRE_GRIP"],
+            "outline": outline,
+            "grip": draw.own("TYRE_GRIP", body.tyre_grip),
             "spin_inertia": SPIN_INERTIA_KG_M2,
-            "slip": int(draw["TYRE_SLIP"]),
+            "slip": int(draw.own("TYRE_SLIP", body.tyre_slip)),
         },
     )
 

@@ -33,6 +33,13 @@ typedef struct {
   double duration;  /* s */
   double frequency; /* Hz */
 } sim_tone;
+/* The clock of a moving shape's path runs at another rate from `time` on: slower than the world's while it waits. Between
+ * two rows of a shape, and from the last one to now, `waited` goes evenly. */
+typedef struct {
+  double time;   /* s */
+  double shape;  /* its number among the arena's moving shapes */
+  double waited; /* s by which it is behind then */
+} sim_wait;
 /* python: end */
 
 #define SIM_EDGES_KEPT (1u << 20)

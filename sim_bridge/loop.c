@@ -2,7 +2,6 @@
 #include "loop_state.h"
 
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
-#define FIRST_OBSTACLE_ID 0x80000000u      /* among the movers; robots have those below */
 #define SLICE_CYCLES 4000u                 /* how often lines are looked at while somebody listens */
 
 /* ---- what boards do and ask ---------------------------------------------------------------------------------------- */
@@ -25,7 +24,7 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
 /* ---- the world's step ---------------------------------------------------------------------------------------------- */
 
 static void record(robot *r, uint64_t cycle) {
-  const body_state *s = &r->body.state;
+  const body_state *s = &r->body->state;
   const sim_truth row = {
       .time = (double)cycle / BOARD_CLOCK_HZ,
       .x = s->x,
@@ -33,8 +32,8 @@ static void record(robot *r, uint64_t cycle) {
       .heading = s->heading,
       .speed = s->speed,
       .turn_rate = s->turn_rate,
-      .left = body_left_speed(&r->body),
-      .right = body_right_speed(&r->body),
+      .left = body_left_speed(r->body),
+      .right = body_right_speed(r->body),
       .contact = r->touched,
   };
   r->touched = s->touching;
@@ -51,19 +50,11 @@ void robot_update_supply(robot *self) {
 
 void sim_update_scene(sim *self) {
   if (self->obstacles > 0) {
-    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, FIRST_OBSTACLE_ID, self->movers);
+    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, self->dt, SCENE_FIRST_MOVER, self->movers);
   }
   mover *robots = self->movers + self->obstacles;
-  for (int i = 0; i < self->robot_count; i++) body_as_mover(&self->robots[i]->body, &robots[i]);
+  for (int i = 0; i < self->robot_count; i++) body_as_mover(self->robots[i]->body, &robots[i]);
   self->seen = (scene){self->arena, self->movers, self->obstacles + (size_t)self->robot_count};
-}
-
-/* 1: the robot stands at the arena's charging station. */
-static int is_at_charger(const robot *r) {
-  const arena_charger *charger = arena_charger_of(r->sim->arena);
-  if (charger == NULL) return 0;
-  const double dx = r->body.state.x - charger->x, dy = r->body.state.y - charger->y;
-  return dx * dx + dy * dy <= charger->radius * charger->radius;
 }
 
 /* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
@@ -91,14 +82,15 @@ static void exchange_light(sim *self) {
 /* Motors say their torque for the step that begins at `begin`. */
 static void prepare(robot *r, uint64_t begin) {
   chassis *c = &r->chassis;
-  const body_state *s = &r->body.state;
+  const body_state *s = &r->body->state;
   c->since = begin;
   c->x = s->x;
   c->y = s->y;
   c->heading = s->heading;
-  c->at_charger = is_at_charger(r);
+  c->at_charger = arena_is_at_charger(r->sim->arena, s->x, s->y);
   c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
   c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
+  if (r->vehicle != NULL) vehicle_prepare(r);
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     if (p->op->before_step != NULL) p->op->before_step(p);
@@ -111,10 +103,14 @@ static void follow(robot *r, uint64_t end) {
     part *p = r->parts[i];
     if (p->op->step != NULL) p->op->step(p);
   }
-  robot_update_supply(r);
-  brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->dt);
-  robot_step_waves(r, end + PART_GUARD);
-  if (!r->body.state.touching) return;
+  if (r->vehicle != NULL) {
+    vehicle_follow(r);
+  } else {
+    robot_update_supply(r);
+    brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->dt);
+    robot_step_waves(r, end + PART_GUARD);
+  }
+  if (!r->body->state.touching) return;
   if (r->contacts == 0 || end - r->last_touch > CONTACT_GAP) r->contacts++;
   r->last_touch = end;
   r->touched = 1;
@@ -134,6 +130,7 @@ static void step_world(sim *self) {
   }
   const scene obstacles = {self->arena, self->movers, self->obstacles};
   body_step(self->bodies, (size_t)self->robot_count, &obstacles, self->torques, self->dt);
+  if (self->record_cycles > 0) sim_record_waits(self, self->world);
   self->world += self->step_cycles;
   sim_update_scene(self);
   for (int i = 0; i < self->robot_count; i++) follow(self->robots[i], self->world);
@@ -186,22 +183,17 @@ int sim_run_until(sim *self, uint64_t deadline) {
     const uint64_t target = next_target(self, deadline);
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];
-      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + r->number;
+      if (r->board == NULL) continue;
+      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) {
+        self->crashed = 1;
+        return 1 + r->number;
+      }
       take_bytes(r);
     }
     self->now = target;
     if (is_look(self) && somebody_speaks(self)) return 0;
   }
   return 0;
-}
-
-int sim_run(sim *self, int number, uint64_t max_cycles, uint64_t quiet_cycles) {
-  const uint64_t from = self->now + (quiet_cycles > 0 ? quiet_cycles : 1);
-  for (int i = 0; i < self->robot_count; i++) {
-    robot *r = self->robots[i];
-    r->listen_from = number == SIM_ANY || r->number == number ? from : SIM_NEVER;
-  }
-  return sim_run_until(self, self->now + max_cycles);
 }
 
 int sim_listen(sim *self, int number, uint64_t from) {
@@ -220,14 +212,20 @@ uint64_t sim_now(const sim *self) { return self->now; }
 
 /* ---- the lines ----------------------------------------------------------------------------------------------------- */
 
-void sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
-  robot *r = sim_robot(self, number);
-  if (r != NULL && count > 0) r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || count > UINT32_MAX) return SIM_BAD_ARGUMENT;
+  if (count == 0) return SIM_OK;
+  sim_note(self, number, INPUT_SEND, NULL, 0, bytes, count);
+  r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+  return SIM_OK;
 }
 
 int sim_line_rate(sim *self, int number, uint32_t baud) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t word = baud;
+  sim_note(self, number, INPUT_LINE_RATE, &word, 1, NULL, 0);
   r->idle = line_idle_cycles(baud);
   r->board->op->line_rate(r->board, baud);
   return SIM_OK;

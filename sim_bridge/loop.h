@@ -1,10 +1,13 @@
-/* loop.h: one simulation: an arena, robots in it, a board on each, everything in lockstep.
+/* loop.h: one simulation: an arena, robots in it, on each a board or none, everything in lockstep.
  *
  * The world leads: a step takes world and parts from t to t + dt by what the pins did until t, and parts queue their edges
  * at exact cycles of that span; then each board runs through it, and its edges go to the parts as they happen. Everything
  * is counted in cycles of the boards' 16 MHz. The simulation knows bytes, not messages.
  *
- * Boards and arena belong to whoever made them and must outlive the simulation.
+ * A robot without a board is a vehicle (vehicles/vehicle.h): its sensors read at the end of the world's step, and its
+ * motor signals hold until it gets others.
+ *
+ * Boards, models and arena belong to whoever made them and must outlive the simulation.
  */
 #ifndef LOOP_H
 #define LOOP_H
@@ -25,12 +28,12 @@
 #include "parts/servo.h"
 #include "parts/turret.h"
 #include "parts/whisker.h"
+#include "vehicles/model.h"
 #include "world/arena.h"
 #include "world/body.h"
 
 /* python: begin */
 enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
-enum { SIM_ANY = -1 };
 enum { SIM_OBSTACLES_MAXIMUM = 64 }; /* that move; robots: BODY_MAXIMUM */
 enum {
   SIM_OK = 0,
@@ -62,6 +65,15 @@ void sim_destroy(sim *self);
 int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *parameters, double x, double y,
                   double heading);
 
+/* The same for a robot without a board; its model steps as far as the world. */
+int sim_add_vehicle(sim *self, int robot, const vehicle_model *model, double x, double y, double heading);
+
+/* Motor signals of such a robot, from now on; its readings, which stay in place; and VEHICLE_RUNS, or why its motors do
+ * nothing any more. NULL and VEHICLE_RUNS for others. */
+int sim_signals(sim *self, int robot, double left, double right);
+const double *sim_readings(sim *self, int robot, size_t *count);
+int sim_vehicle_flag(const sim *self, int robot);
+
 /* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
 int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
 int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters);
@@ -81,17 +93,13 @@ int sim_add_turret(sim *self, int robot, uint8_t pin, double x, double y, const 
 int sim_mount(sim *self, int robot, uint8_t turret_pin, uint8_t pin);
 int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
 
-/* Runs for at most `max_cycles`. After `quiet_cycles` it returns as soon as bytes have come from the board of that robot
- * (SIM_ANY: of any) and its line has been idle for two byte times. Returns 0, or 1 + the number of a robot whose board
- * crashed. */
-int sim_run(sim *self, int robot, uint64_t max_cycles, uint64_t quiet_cycles);
-
-/* The same for several listeners: from that cycle on bytes from the robot end a run (2^64 - 1: never). `sim_run_until` runs
- * until a cycle, or until they have come from a robot that is listened to and its line has been idle for two byte times;
- * `sim_speaks` says whether that is so for a robot now. When a robot is heard does not depend on the other listeners.
- * `sim_run` sets all of that anew. */
-int sim_listen(sim *self, int robot, uint64_t from);
+/* Runs until a cycle, or until bytes have come from a robot that is listened to and its line has been idle for two byte
+ * times. Returns 0, or 1 + the number of a robot whose board crashed. */
 int sim_run_until(sim *self, uint64_t deadline);
+
+/* From that cycle on bytes from the robot end a run (2^64 - 1, as at first: never). `sim_speaks` says whether they have
+ * come, and its line has been idle since. When a robot is heard does not depend on the other listeners. */
+int sim_listen(sim *self, int robot, uint64_t from);
 int sim_speaks(const sim *self, int robot);
 
 /* The cycle up to which the simulation has run. */
@@ -104,14 +112,34 @@ int sim_line_rate(sim *self, int robot, uint32_t baud);
 uint64_t sim_last_byte(const sim *self, int robot);
 
 /* Bytes to and from a robot's board. */
-void sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
-size_t sim_waiting(const sim *self, int robot);
+int sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
 size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
+
+/* All that has come from outside since power-on (bytes sent and whatever below changes something), with its cycles; NULL
+ * where some of it found no memory, or a board has crashed. Good until the next input. */
+const uint8_t *sim_inputs(const sim *self, size_t *count);
+
+/* Plays such inputs again, from byte `at` of them on, which goes on with them, and runs until that cycle; the simulation
+ * has the same arena, robots, boards and firmware, and has heard nothing else. Returns 0, 1 + the number of a robot whose
+ * board crashed, or SIM_BAD_ARGUMENT where they are no inputs of such a simulation. */
+int sim_replay(sim *self, const uint8_t *inputs, size_t size, size_t *at, uint64_t until);
+
+/* Forgets what was received of that robot but for the newest bytes. */
+void sim_forget_received(sim *self, int robot, size_t keep);
+
+/* Bytes that were received and not yet taken. */
+size_t sim_waiting(const sim *self, int robot);
+
+/* Of all that can be had of the state: bodies, supplies, what boards did, counted and hold. */
+uint64_t sim_state_hash(const sim *self);
 
 /* Truth. The pointers stay good until the next run. */
 void sim_body(const sim *self, int robot, body_state *out);
 const sim_truth *sim_record(const sim *self, int robot, size_t *count);
 const sim_look *sim_looks(const sim *self, int robot, size_t *count);
+const sim_wait *sim_waits(const sim *self, size_t *count); /* by time; none without a record */
+/* The arena's moving shapes as they stand, at `time`, s: up to a step ahead of sim_now. */
+const mover *sim_movers(const sim *self, size_t *count, double *time);
 uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
 uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
 
@@ -123,16 +151,24 @@ double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 wher
 size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
 uint64_t sim_edges_seen(const sim *self, int robot);
 
+/* A reset from outside (a board_reset_cause); `sim_reset_at`: the cycle of the last one. */
+int sim_reset(sim *self, int robot, int cause);
+uint64_t sim_reset_at(const sim *self, int robot);
+
 /* For tests: a robot put elsewhere, at rest (or SIM_NOT_FREE); a pin taken from its part
  * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
  * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; voltage of the rail that board and servos run
- * on, 0: what the regulator gives. */
+ * on, 0: what the regulator gives; bytes put into the EEPROM, or into the data space of a board that has one; what
+ * becomes of a cell whose write is cut short. Return SIM_OK or an error. */
 int sim_place(sim *self, int robot, double x, double y, double heading);
 int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
 int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
 int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
 int sim_set_supply(sim *self, int robot, double volts);
+int sim_write_eeprom(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
+int sim_write_memory(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
+int sim_damage_eeprom(sim *self, int robot, int damage, uint8_t garbage);
 
 /* What a weak supply does to a robot's board; by default it is as the data sheet has it, with 2 upsets per second at the
  * worst. Returns SIM_OK or an error. `sim_brown_outs`: resets by the detector, and upsets above it. */
@@ -145,11 +181,8 @@ double sim_supply_voltage(const sim *self, int robot);
 
 /* Operations of a board by its address, for Python. */
 int board_check(uintptr_t board); /* 0, or SIM_WRONG_BOARD where it was built for another interface */
-const char *board_kind(uintptr_t board);
 uint8_t board_output(uintptr_t board, uint8_t pin);
 void board_destroy(uintptr_t board);
-const char *board_pin_map(uintptr_t board); /* that its firmware was built for, or NULL where the board does not know */
-void board_reset(uintptr_t board, int cause);
 const char *board_fault(uintptr_t board);
 /* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
 void board_read_counters(uintptr_t board, uint64_t counters[8]);

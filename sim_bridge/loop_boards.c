@@ -8,8 +8,6 @@ int board_check(uintptr_t address) {
   return b != NULL && b->op != NULL && b->op->version == BOARD_INTERFACE_VERSION ? SIM_OK : SIM_WRONG_BOARD;
 }
 
-const char *board_kind(uintptr_t address) { return ((const board *)address)->op->kind; }
-
 uint8_t board_output(uintptr_t address, uint8_t pin) {
   const board *b = (const board *)address;
   return pin < BOARD_PIN_COUNT ? b->op->output(b, pin) : (uint8_t)BOARD_RELEASED;
@@ -18,16 +16,6 @@ uint8_t board_output(uintptr_t address, uint8_t pin) {
 void board_destroy(uintptr_t address) {
   board *b = (board *)address;
   b->op->destroy(b);
-}
-
-const char *board_pin_map(uintptr_t address) {
-  board *b = (board *)address;
-  return b->op->extension(b, "pin_map");
-}
-
-void board_reset(uintptr_t address, int cause) {
-  board *b = (board *)address;
-  b->op->reset(b, (board_reset_cause)cause);
 }
 
 const char *board_fault(uintptr_t address) {

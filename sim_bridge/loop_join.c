@@ -30,8 +30,11 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
 }
 
 static void destroy_robot(robot *r) {
-  r->board->sink = NULL;
-  r->board->op->analog(r->board, NULL, NULL);
+  if (r->board != NULL) {
+    r->board->sink = NULL;
+    r->board->op->analog(r->board, NULL, NULL);
+  }
+  vehicles_destroy(r->vehicle);
   for (int i = 0; i < r->part_count; i++) free(r->parts[i]);
   free(r->parts);
   buffer_free(&r->received);
@@ -46,6 +49,8 @@ void sim_destroy(sim *self) {
   if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
+  buffer_free(&self->inputs);
+  buffer_free(&self->waits);
   free(self);
 }
 
@@ -58,12 +63,17 @@ robot *sim_robot(const sim *self, int number) {
   return NULL;
 }
 
+robot *sim_robot_with_board(const sim *self, int number) {
+  robot *r = sim_robot(self, number);
+  return r == NULL || r->board == NULL ? NULL : r;
+}
+
 /* Its place in the order of numbers. */
 static void insert(sim *self, robot *r) {
   int i = self->robot_count++;
   for (; i > 0 && self->robots[i - 1]->number > r->number; i--) self->robots[i] = self->robots[i - 1];
   self->robots[i] = r;
-  for (i = 0; i < self->robot_count; i++) self->bodies[i] = &self->robots[i]->body;
+  for (i = 0; i < self->robot_count; i++) self->bodies[i] = self->robots[i]->body;
 }
 
 static part_place place_of(robot *r, uint32_t device) {
@@ -73,29 +83,35 @@ static part_place place_of(robot *r, uint32_t device) {
   };
 }
 
-int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
-                  double heading) {
-  board *b = (board *)address;
-  if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
+int sim_has_room(const sim *self, int number, double reach, double x, double y, double heading) {
   if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
-  if (!scene_is_free(&self->seen, x, y, parameters->radius, 0)) return SIM_NOT_FREE;
+  if (self->now > 0 || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
+  return scene_is_free(&self->seen, x, y, reach, 0) ? SIM_OK : SIM_NOT_FREE;
+}
+
+robot *sim_new_robot(sim *self, int number, board *b) {
   robot **robots = realloc(self->robots, (size_t)(self->robot_count + 1) * sizeof *robots);
-  if (robots == NULL) return SIM_NO_MEMORY;
+  if (robots == NULL) return NULL;
   self->robots = robots;
   robot *r = calloc(1, sizeof *r);
-  if (r == NULL) return SIM_NO_MEMORY;
+  if (r == NULL) return NULL;
   r->sim = self;
   r->number = number;
   r->board = b;
+  r->body = &r->own;
   r->idle = line_idle_cycles(LINE_RATE);
-  body_init(&r->body, parameters, 0.0);
-  r->body.id = robot_mover_id(number);
-  body_place(&r->body, x, y, heading);
+  r->listen_from = SIM_NEVER;
+  return r;
+}
+
+void sim_insert(sim *self, robot *r, double x, double y, double heading) {
+  r->body->id = robot_mover_id(r->number);
+  body_place(r->body, x, y, heading);
   r->chassis = (chassis){
-      .board = b,
-      .body = &r->body,
+      .board = r->board,
+      .body = r->body,
       .around = &self->seen,
-      .self_id = robot_mover_id(number),
+      .self_id = r->body->id,
       .since = self->world,
       .step_cycles = self->step_cycles,
       .x = x,
@@ -107,15 +123,28 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
       .looks = &r->looks,
       .tones = &r->tones,
   };
+  memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
+  insert(self, r);
+  sim_update_scene(self);
+  sim_sense_anew(self);
+}
+
+int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
+                  double heading) {
+  if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
+  const int room = sim_has_room(self, number, body_reach_of(parameters), x, y, heading);
+  if (room != SIM_OK) return room;
+  board *b = (board *)address;
+  robot *r = sim_new_robot(self, number, b);
+  if (r == NULL) return SIM_NO_MEMORY;
+  body_init(r->body, parameters, 0.0);
   r->brown_out.noise = place_of(r, PART_BROWN_OUT).noise;
   r->brown_out.parameters = (brown_out_parameters){
       .reset_v = SUPPLY_RESET_V, .hysteresis_v = 0.05, .erratic_v = SUPPLY_ERRATIC_V, .upsets_per_s = 2.0};
-  memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
   b->sink = robot_on_edge;
   b->sink_context = r;
   b->op->analog(b, robot_on_analog, r);
-  insert(self, r);
-  sim_update_scene(self);
+  sim_insert(self, r, x, y, heading);
   return SIM_OK;
 }
 
@@ -170,7 +199,7 @@ static int join_if(robot *r, part *p, int status) {
 }
 
 int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin) || !is_side(side)) return SIM_BAD_ARGUMENT;
   servo *s = new_part(r, sizeof *s);
   if (s == NULL) return SIM_NO_MEMORY;
@@ -181,7 +210,7 @@ int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_moto
 
 int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b,
                     const encoder_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin_a) || !is_side(side) || parameters->edges_per_turn == 0) return SIM_BAD_ARGUMENT;
   encoder *e = new_part(r, sizeof *e);
   if (e == NULL) return SIM_NO_MEMORY;
@@ -198,20 +227,20 @@ static void widen_reach(body *b, double x, double y) {
 }
 
 int sim_add_whisker(sim *self, int number, uint8_t pin, const whisker_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
   whisker *w = new_part(r, sizeof *w);
   if (w == NULL) return SIM_NO_MEMORY;
   const part_place place = next_place(r, PART_WHISKER);
   whisker_init(w, &place, pin, parameters);
-  widen_reach(&r->body, parameters->root_x, parameters->root_y);
-  widen_reach(&r->body, parameters->tip_x, parameters->tip_y);
+  widen_reach(r->body, parameters->root_x, parameters->root_y);
+  widen_reach(r->body, parameters->tip_x, parameters->tip_y);
   return join(r, &w->part);
 }
 
 int sim_add_infrared(sim *self, int number, uint8_t led_pin, uint8_t receiver_pin,
                      const infrared_pair_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(led_pin) || !is_pin(receiver_pin)) return SIM_BAD_ARGUMENT;
   infrared *i = new_part(r, sizeof *i);
   if (i == NULL) return SIM_NO_MEMORY;
@@ -220,7 +249,7 @@ int sim_add_infrared(sim *self, int number, uint8_t led_pin, uint8_t receiver_pi
 }
 
 int sim_add_ping(sim *self, int number, uint8_t pin, const sonar_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
   ping *p = new_part(r, sizeof *p);
   if (p == NULL) return SIM_NO_MEMORY;
@@ -229,7 +258,7 @@ int sim_add_ping(sim *self, int number, uint8_t pin, const sonar_parameters *par
 }
 
 int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || (channel != PART_NO_PIN && channel >= BOARD_ANALOG_COUNT)) return SIM_BAD_ARGUMENT;
   if (r->battery != NULL) { /* a fresh one */
     const part_place place = place_of(r, PART_BATTERY);
@@ -265,7 +294,7 @@ static two_wire *bus_of(robot *r, uint8_t sda_pin, uint8_t scl_pin) {
 }
 
 int sim_add_compass(sim *self, int number, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(sda_pin) || !is_pin(scl_pin) || sda_pin == scl_pin) return SIM_BAD_ARGUMENT;
   if (bus_at(r, sda_pin, scl_pin) == NULL && (r->hears[sda_pin] != NULL || r->hears[scl_pin] != NULL)) {
     return SIM_PIN_TAKEN;
@@ -283,7 +312,7 @@ int sim_add_compass(sim *self, int number, uint8_t sda_pin, uint8_t scl_pin, con
 }
 
 int sim_add_analog_infrared(sim *self, int number, uint8_t channel, const sharp_infrared_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || channel >= BOARD_ANALOG_COUNT) return SIM_BAD_ARGUMENT;
   analog_infrared *a = new_part(r, sizeof *a);
   if (a == NULL) return SIM_NO_MEMORY;
@@ -292,7 +321,7 @@ int sim_add_analog_infrared(sim *self, int number, uint8_t channel, const sharp_
 }
 
 int sim_add_light_sensor(sim *self, int number, uint8_t pin, const light_sensor_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
   light_sensor *l = new_part(r, sizeof *l);
   if (l == NULL) return SIM_NO_MEMORY;
@@ -301,7 +330,7 @@ int sim_add_light_sensor(sim *self, int number, uint8_t pin, const light_sensor_
 }
 
 int sim_add_buzzer(sim *self, int number, uint8_t pin) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
   buzzer *b = new_part(r, sizeof *b);
   if (b == NULL) return SIM_NO_MEMORY;
@@ -312,7 +341,7 @@ int sim_add_buzzer(sim *self, int number, uint8_t pin) {
 
 int sim_add_turret(sim *self, int number, uint8_t pin, double x, double y,
                    const motor_position_parameters *parameters) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !is_pin(pin) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
   turret *t = new_part(r, sizeof *t);
   if (t == NULL) return SIM_NO_MEMORY;
@@ -330,7 +359,7 @@ turret *robot_turret(const robot *self, uint8_t pin) {
 }
 
 int sim_mount(sim *self, int number, uint8_t turret_pin, uint8_t pin) {
-  robot *r = sim_robot(self, number);
+  robot *r = sim_robot_with_board(self, number);
   turret *t = r == NULL ? NULL : robot_turret(r, turret_pin);
   int mounted = 0;
   for (int i = 0; t != NULL && i < r->part_count; i++) {

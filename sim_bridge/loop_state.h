@@ -1,11 +1,13 @@
 /* loop_state.h: what the files of the loop know of a simulation: loop.c runs it, loop_join.c builds it, loop_truth.c reads
- * it, loop_hands.c lays a test's hands on it.
+ * it, loop_hands.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again,
+ * loop_vehicle.c has the robots without boards.
  */
 #ifndef LOOP_STATE_H
 #define LOOP_STATE_H
 
 #include "loop.h"
 #include "parts/part.h"
+#include "vehicles/vehicle.h"
 
 #define WAVES_MAXIMUM 4
 #define SIM_NEVER UINT64_MAX
@@ -19,11 +21,20 @@ typedef struct {
   uint64_t end;
 } wave;
 
+/* A moving shape's clock as the record of waits has it. */
+typedef struct {
+  double waited; /* s, after the last step */
+  double lost;   /* s, in that step */
+} mover_clock;
+
 typedef struct {
   sim *sim;
   int number;
-  board *board;
-  body body;
+  board *board; /* NULL: it has none, and is a vehicle */
+  body *body;
+  vehicles *vehicle;   /* one world, which is this simulation's; NULL: it has a board */
+  double speed_before; /* of a vehicle, when the step under way begins */
+  body own;            /* of a robot with a board */
   chassis chassis;
   part **parts;
   int part_count;
@@ -39,6 +50,7 @@ typedef struct {
   uint64_t last_byte;   /* cycle of the end of the last byte received */
   uint64_t listen_from; /* bytes end a run from this cycle on */
   uint64_t idle;        /* cycles without a byte after which the line is idle: two bytes' time */
+  uint64_t reset_at;    /* cycle of the last reset from outside */
   buffer truth;
   buffer looks;
   buffer tones;
@@ -65,14 +77,65 @@ struct sim {
   mover
       movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
   size_t obstacles;
-  scene seen; /* arena and all movers */
+  mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
+  buffer waits;  /* rows of sim_wait */
+  scene seen;    /* arena and all movers */
+  buffer inputs; /* from outside, as loop_inputs.c notes them */
+  int crashed;   /* 1: a board has */
 };
+
+/* What comes from outside, and what its words and bytes are in the notes; the numbers stand in saved simulations. */
+typedef enum {
+  INPUT_SEND = 1,      /* bytes */
+  INPUT_LINE_RATE = 2, /* bit/s */
+  INPUT_PLACE = 3,     /* x, y, heading */
+  INPUT_DRIVE = 4,     /* cycle, pin, level */
+  INPUT_WAVE = 5,      /* pin, half period, duration */
+  INPUT_WHISKER = 6,   /* pin, held */
+  INPUT_PING = 7,      /* cycles of the echo */
+  INPUT_SUPPLY = 8,    /* volts */
+  INPUT_BROWN_OUT = 9, /* the four parameters */
+  INPUT_RESET = 10,    /* cause */
+  INPUT_EEPROM = 11,   /* address; bytes */
+  INPUT_DAMAGE = 12,   /* damage, garbage */
+  INPUT_MEMORY = 13,   /* address; bytes */
+  INPUT_SIGNALS = 14,  /* left, right */
+} input_kind;
+
+#define INPUT_WORDS 4 /* at most */
+
+/* Notes an input of now. */
+void sim_note(sim *self, int number, input_kind kind, const uint64_t *words, size_t count, const uint8_t *bytes,
+              size_t size);
+
+/* The bits of a double. */
+uint64_t input_of_double(double value);
 
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);
 
+/* The same; NULL also for one without a board. */
+robot *sim_robot_with_board(const sim *self, int number);
+
 /* The turret on that pin, or NULL. */
 turret *robot_turret(const robot *self, uint8_t pin);
+
+/* A new robot with a board or without; the caller fills in its body. NULL without memory. */
+robot *sim_new_robot(sim *self, int number, board *b);
+
+/* It stands at that pose, and is among the others from now on. */
+void sim_insert(sim *self, robot *r, double x, double y, double heading);
+
+/* SIM_OK where there can be one more robot of that number and radius at a place. */
+int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
+
+/* loop_vehicle.c: sensors of robots without a board begin anew, when another robot has come: they may meet another thing
+ * now. */
+void sim_sense_anew(sim *self);
+
+/* loop_vehicle.c: before and after the world's step, of a robot without a board. */
+void vehicle_prepare(robot *r);
+void vehicle_follow(robot *r);
 
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
@@ -83,6 +146,9 @@ uint64_t line_idle_cycles(uint32_t baud);
 
 /* The voltage of the rail as it is now goes to whoever runs on it. */
 void robot_update_supply(robot *self);
+
+/* loop_truth.c: how long movers waited in the world's step that began at `begin`, before the scene is updated. */
+void sim_record_waits(sim *self, uint64_t begin);
 
 /* Puts the robots into the scene as they stand now. */
 void sim_update_scene(sim *self);

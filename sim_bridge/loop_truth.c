@@ -5,7 +5,7 @@
 
 void sim_body(const sim *self, int number, body_state *out) {
   const robot *r = sim_robot(self, number);
-  if (r != NULL) *out = r->body.state;
+  if (r != NULL) *out = r->body->state;
 }
 
 const sim_truth *sim_record(const sim *self, int number, size_t *count) {
@@ -26,6 +26,28 @@ const sim_tone *sim_tones(const sim *self, int number, size_t *count) {
   return r == NULL ? NULL : (const sim_tone *)(const void *)r->tones.data;
 }
 
+void sim_record_waits(sim *self, uint64_t begin) {
+  for (size_t k = 0; k < self->obstacles; k++) {
+    const mover *m = &self->movers[k];
+    mover_clock *clock = &self->clocks[k];
+    const double lost = m->waited > clock->waited ? self->dt - m->stops : 0.0;
+    const sim_wait row = {(double)begin / BOARD_CLOCK_HZ, (double)k, clock->waited};
+    if (lost != clock->lost) buffer_append(&self->waits, &row, sizeof row);
+    *clock = (mover_clock){.waited = m->waited, .lost = lost};
+  }
+}
+
+const sim_wait *sim_waits(const sim *self, size_t *count) {
+  *count = self->waits.count / sizeof(sim_wait);
+  return (const sim_wait *)(const void *)self->waits.data;
+}
+
+const mover *sim_movers(const sim *self, size_t *count, double *time) {
+  *count = self->obstacles;
+  *time = (double)self->world / BOARD_CLOCK_HZ;
+  return self->movers;
+}
+
 double sim_turret_angle(const sim *self, int number, uint8_t pin) {
   const robot *r = sim_robot(self, number);
   const turret *t = r == NULL ? NULL : robot_turret(r, pin);
@@ -40,7 +62,7 @@ uint64_t sim_contacts(const sim *self, int number) {
 uint64_t sim_hash(const sim *self) {
   uint64_t hash = 0xcbf29ce484222325u; /* FNV-1a */
   for (int i = 0; i < self->robot_count; i++) {
-    const body_state *s = &self->robots[i]->body.state;
+    const body_state *s = &self->robots[i]->body->state;
     const double state[] = {
         s->x,         s->y,          s->heading,     s->speed,    s->turn_rate,        s->lateral,         s->rim_left,
         s->rim_right, s->wheel_left, s->wheel_right, s->distance, (double)s->touching, (double)s->slipping};
@@ -69,6 +91,11 @@ double sim_pack_voltage(const sim *self, int number) {
 double sim_supply_voltage(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r == NULL ? 0.0 : r->chassis.supply * BOARD_NOMINAL_VOLTS;
+}
+
+uint64_t sim_reset_at(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->reset_at;
 }
 
 uint32_t sim_brown_outs(const sim *self, int number, uint32_t *upsets) {

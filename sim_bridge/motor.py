@@ -1,18 +1,32 @@
-"""The DC motor of section 1.2 of the notes by itself, (1.1)-(1.10): for plots and exercises, and for vehicles."""
+"""Motors of the notes by themselves, sections 1.2 and 1.10 to 1.12 of THEORY: for plots, exercises and vehicles.
+
+`DCMotor` (1.1)-(1.10), `RegulatedMotor` (3.15) and `ServoMotor`, a servo modified for continuous rotation, drive a
+`VehicleModel`; a `PositionServo` turns to an angle. Each has its parameters as a C struct of sim_bridge/world, SI units
+except for pulses, which are in us; a wrong one raises RobotError.
+"""
 
 from __future__ import annotations
 
-import math
+from typing import Any
 
 from boebot.errors import RobotError
+from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
+from sim_bridge.parameters import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
+
+
+def _defaults(kind: str) -> dict[str, float]:
+    """What `NAME_default` of a C struct `NAME_parameters` gives."""
+    pointer = ffi.new(f"{kind}_parameters *")
+    getattr(lib, f"{kind}_default")(pointer)
+    return {key: getattr(pointer, key) for key in keys_of(f"{kind}_parameters")}
 
 
 class DCMotor:
-    """A DC motor with its gear (C struct motor_dc_parameters, world/motor_dc.h), quasi-static.
+    """A DC motor with its gear (world/motor_dc.h): quasi-static by `torque`, with the inductance by `step`.
 
     Attributes:
-        parameters: the C struct, SI units; what was not said is as in the notes' default motor.
+        parameters: the C struct motor_dc_parameters; what was not said is as in the notes' default motor.
     """
 
     def __init__(self, **parameters: float) -> None:
@@ -20,20 +34,168 @@ class DCMotor:
         efficiency, torque_maximum_n_m, voltage_maximum.
 
         Raises:
-            RobotError: there is no parameter of that name, or it is no finite number.
+            RobotError: there is no parameter of that name, or it is outside its range.
         """
-        self.parameters = ffi.new("motor_dc_parameters *")
-        lib.motor_dc_default(self.parameters)
-        names = dir(self.parameters)
-        for name, value in parameters.items():
-            if name not in names or not math.isfinite(value):
-                raise RobotError(f"motor: {name} = {value}; expected a finite number for one of {', '.join(names)}")
-            setattr(self.parameters, name, value)
+        self.parameters = dc_parameters("motor", parameters)
 
     def voltage(self, signal: float) -> float:
         """Volts for a motor signal in [-1, 1], beyond it limited: V = s V_max."""
-        return float(lib.motor_dc_voltage(self.parameters, signal))
+        return float(lib.motor_dc_voltage(self.parameters, number("motor", "signal", signal)))
+
+    def current(self, voltage: float, axis_speed: float) -> float:
+        """Current (A) once it has settled, while the wheel turns at `axis_speed` (rad/s): (1.1) with di/dt = 0."""
+        return float(lib.motor_dc_current(self.parameters, *_question(voltage, axis_speed)))
 
     def torque(self, voltage: float, axis_speed: float) -> float:
         """Torque (N m) on the wheel while that turns at `axis_speed` (rad/s): (1.8), friction (1.9), gear (1.10)."""
-        return float(lib.motor_dc_torque(self.parameters, voltage, axis_speed, 0.0))
+        return float(lib.motor_dc_torque(self.parameters, *_question(voltage, axis_speed), 0.0))
+
+    def step(self, voltage: float, axis_speed: float, current: float, dt: float) -> tuple[float, float]:
+        """The full motor (1.6), (1.7) for the next `dt` seconds, from a `current` (A) at their beginning.
+
+        Returns the mean torque (N m) on the wheel meanwhile, and the current at their end; exact for any `dt` as long
+        as voltage and speed hold still.
+        """
+        now = ffi.new("double *", number("motor", "current", current))
+        seconds = number("motor", "dt", dt, POSITIVE)
+        torque = lib.motor_dc_step(self.parameters, now, *_question(voltage, axis_speed), 0.0, seconds)
+        return float(torque), float(now[0])
+
+
+def _question(voltage: float, axis_speed: float) -> tuple[float, float]:
+    return number("motor", "voltage", voltage), number("motor", "axis_speed", axis_speed)
+
+
+def dc_parameters(where: str, changes: Any) -> Any:
+    """C struct of the notes' default DC motor with `changes`."""
+    return struct("motor_dc_parameters", where, changes, _defaults("motor_dc"))
+
+
+REGULATED_KEYS = ("gain_n_s", "torque_maximum_n_m", "speed_maximum_m_s")
+
+
+class RegulatedMotor:
+    """The velocity-regulated motor (3.15), world/motor_regulated.h.
+
+    Attributes:
+        parameters: the C struct motor_regulated_parameters; K 10 N s, 1 N m and 0.3 m/s unless said otherwise.
+    """
+
+    def __init__(self, **parameters: float) -> None:
+        """`parameters`: gain_n_s (K, N m per m/s at the rim), torque_maximum_n_m, speed_maximum_m_s (at signal 1).
+
+        Raises:
+            RobotError: there is no parameter of that name, or it is outside its range.
+        """
+        self.parameters = regulated_parameters("motor", parameters)
+
+    def reference(self, signal: float) -> float:
+        """v_ref (m/s) of a motor signal in [-1, 1], beyond it limited."""
+        return float(lib.motor_regulated_reference(self.parameters, number("motor", "signal", signal)))
+
+    def torque(self, reference: float, speed: float) -> float:
+        """Torque (N m) on the wheel whose rim moves at `speed` (m/s): K (v_ref - v), limited."""
+        wanted, now = number("motor", "reference", reference), number("motor", "speed", speed)
+        return float(lib.motor_regulated(self.parameters, wanted, now, 1.0))
+
+
+def regulated_parameters(where: str, changes: Any) -> Any:
+    """C struct of the default regulated motor with `changes`; it never coasts, so what says how is no key of it."""
+    usual = _defaults("motor_regulated")
+    return struct("motor_regulated_parameters", where, known(where, changes, REGULATED_KEYS), usual)
+
+
+class ServoMotor:
+    """A servo modified for continuous rotation (world/servo_motor.h): pulses set its speed. Nominal Parallax servo.
+
+    Attributes:
+        parameters: the C struct servo_motor_parameters.
+    """
+
+    def __init__(self, **parameters: Any) -> None:
+        """`parameters`: mount (1 left, -1 right), wheel_radius, centre_us, dead_band_us, top_ccw_rad_s, scale_ccw_us,
+        top_cw_rad_s, scale_cw_us, lag_s, motor (gain_n_s, torque_maximum_n_m, coast_n_s, coast_maximum_n_m).
+
+        Raises:
+            RobotError: there is no parameter of that name, or it is outside its range.
+        """
+        self.parameters = servo_parameters("servo", parameters)
+
+    def pulse(self, signal: float) -> float:
+        """Width (us) for a motor signal in [-1, 1], beyond it limited: 1500 us +- 200 us s, mirrored on the right."""
+        return float(lib.servo_motor_pulse_of(self.parameters, number("servo", "signal", signal)))
+
+    def speed(self, pulse_us: float) -> float:
+        """Steady speed of the rim (m/s, forward) under pulses of that width."""
+        return float(lib.servo_motor_curve(self.parameters, number("servo", "pulse_us", pulse_us)))
+
+
+def servo_parameters(where: str, changes: Any, mount: int = 1, wheel_radius: float = 0.0331) -> Any:
+    """C struct of the nominal servo with `changes`; values and sources are those of imperfections.py."""
+    top = imperfections.SERVO_TOP_RPM * imperfections.RPM
+    usual = {
+        "mount": mount,
+        "wheel_radius": wheel_radius,
+        "centre_us": 1500.0,
+        "dead_band_us": imperfections.SERVO_DEAD_BAND_US,
+        "top_ccw_rad_s": top,
+        "scale_ccw_us": imperfections.SERVO_SCALE_US,
+        "top_cw_rad_s": top,
+        "scale_cw_us": imperfections.SERVO_SCALE_US,
+        "lag_s": imperfections.SERVO_LAG_S,
+        "motor": {
+            "gain_n_s": imperfections.SERVO_GAIN_N_S,
+            "torque_maximum_n_m": imperfections.SERVO_TORQUE_N_M,
+            "coast_n_s": imperfections.SERVO_COAST_N_S,
+            "coast_maximum_n_m": imperfections.SERVO_COAST_N_M,
+        },
+    }
+    return struct("servo_motor_parameters", where, changes, usual)
+
+
+class PositionServo:
+    """A servo that turns to the angle of its pulses (world/motor_position.h); a turret sits on one.
+
+    Attributes:
+        parameters: the C struct motor_position_parameters; the notes' standard servo unless said otherwise.
+    """
+
+    def __init__(self, angle: float = 0.0, **parameters: float) -> None:
+        """At rest at `angle` (rad, counter-clockwise from straight ahead).
+
+        Args:
+            angle: where it begins.
+            parameters: mount, centre_us, us_per_rad, range_rad, gain_per_s, top_speed_rad_s, dead_band_us.
+
+        Raises:
+            RobotError: there is no parameter of that name, or it is outside its range.
+        """
+        usual = _defaults("motor_position")
+        self.parameters = struct("motor_position_parameters", "servo", parameters, usual)
+        self._state = ffi.new("motor_position *")
+        lib.motor_position_init(self._state, number("servo", "angle", angle))
+
+    @property
+    def angle(self) -> float:
+        """Where its shaft is, rad."""
+        return float(self._state.angle)
+
+    def pulse_of(self, angle: float) -> float:
+        """Width (us) of the pulse that asks for an angle (rad)."""
+        return float(lib.motor_position_pulse_of(self.parameters, number("servo", "angle", angle)))
+
+    def pulse(self, pulse_us: float) -> None:
+        """A pulse ends now. After 50 ms without another one the controller rests, and the gear holds.
+
+        Raises:
+            RobotError: no servo takes a pulse of that width.
+        """
+        width = number("servo", "pulse_us", pulse_us)
+        if not lib.motor_position_pulse(self.parameters, self._state, width):
+            raise RobotError(f"servo: pulse_us is {width:g}; expected a number from 500 to 2500")
+
+    def step(self, dt: float, supply: float = 1.0) -> float:
+        """Moves for `dt` seconds; `supply` is the share of its nominal voltage. Returns the angle (rad)."""
+        seconds, share = number("servo", "dt", dt, POSITIVE), number("servo", "supply", supply, NOT_NEGATIVE)
+        lib.motor_position_step(self.parameters, self._state, share, seconds)
+        return self.angle

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,13 @@ from numpy.typing import NDArray
 
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, BoardMemory, ResetCause
-from sim_bridge.sim import SimRobot
+from sim_bridge.arguments import number, shown
+from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
+from sim_bridge.sim import checked_pose
+from sim_bridge.sim_robot import SimRobot
+
+ECHO_MAXIMUM_US = 1e6
+SUPPLY_MAXIMUM_V = 30.0
 
 EDGE = np.dtype(  # sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
@@ -24,12 +30,23 @@ class BoardPins(BoardMemory):
     """
 
     def __init__(self, robot: SimRobot) -> None:
-        super().__init__(lib, ffi, ffi.cast("board *", robot.board.address))
+        super().__init__(lib, ffi)
         self._robot = robot
         self._sim = robot.sim
-        self._handle = robot.sim.handle
         self._number = robot.number
-        self.reset_cycle = 0  # when the program last started
+
+    @property
+    def _board(self) -> Any:
+        return ffi.cast("board *", self._robot.board.address)
+
+    @property
+    def _handle(self) -> Any:
+        return self._sim.handle
+
+    @property
+    def reset_cycle(self) -> int:
+        """At which the program was last started by `reset`; 0 before."""
+        return int(lib.sim_reset_at(self._handle, self._number))
 
     @property
     def cycle(self) -> int:
@@ -64,7 +81,11 @@ class BoardPins(BoardMemory):
 
     def answer_ping(self, echo_us: float | None) -> None:
         """Every trigger is answered by a pulse of that length (us), or by none at all; see `ask_world`."""
-        echo = -2 if echo_us is None else round(echo_us * CLOCK_HZ / 1e6)
+        echo = -2
+        if echo_us is not None:
+            echo = round(
+                number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US) * CLOCK_HZ / 1e6
+            )
         self._check(lib.sim_answer_ping(self._handle, self._number, echo), "Ping")
 
     def ask_world(self) -> None:
@@ -73,14 +94,21 @@ class BoardPins(BoardMemory):
 
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
-        self._check(lib.sim_set_supply(self._handle, self._number, 0.0 if volts is None else volts), "supply")
+        held = (
+            0.0 if volts is None else number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V)
+        )
+        self._check(lib.sim_set_supply(self._handle, self._number, held), "supply")
 
     def brown_out(self, **changes: float) -> None:
         """What a weak supply does to the board: reset_v, hysteresis_v, erratic_v, upsets_per_s (parts/brown_out.h).
 
         What is not named is as the data sheet has it; upsets 2 per second at the worst.
         """
-        values = {"reset_v": 2.7, "hysteresis_v": 0.05, "erratic_v": 3.78, "upsets_per_s": 2.0, **changes}
+        values = {"reset_v": 2.7, "hysteresis_v": 0.05, "erratic_v": 3.78, "upsets_per_s": 2.0}
+        for name, value in changes.items():
+            if name not in values:
+                raise BoardError(f"brown_out: there is no {name!r}; expected one of {', '.join(values)}")
+            values[name] = number(f"brown_out: {name}", value, BoardError, least=0)
         parameters = ffi.new("brown_out_parameters *", values)
         self._check(lib.sim_set_brown_out(self._handle, self._number, parameters), f"brown-out with {changes}")
 
@@ -95,17 +123,37 @@ class BoardPins(BoardMemory):
         Raises:
             ArenaError: that place is not free.
         """
+        x, y, heading = checked_pose("place: the pose", (x, y, heading))
         if lib.sim_place(self._handle, self._number, x, y, heading) != lib.SIM_OK:
             raise ArenaError(f"the robot cannot be put at x = {x:g} m, y = {y:g} m: no free space")
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
-        self.reset_cycle = self._sim.cycle
-        lib.board_reset(self._robot.board.address, ResetCause[cause.upper()])
+        causes = {one.name.lower(): one for one in ResetCause}
+        if cause not in causes:
+            raise BoardError(f"reset: there is no cause {shown(cause)}; expected one of {', '.join(causes)}")
+        self._check(lib.sim_reset(self._handle, self._number, causes[cause]), f"reset by {cause}")
+
+    def write_memory(self, address: int, data: bytes | Iterable[int]) -> None:
+        """See `BoardMemory`."""
+        data = bytes(data)
+        self._data(address, len(data))
+        self._check(lib.sim_write_memory(self._handle, self._number, address, data, len(data)), "memory")
+
+    def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
+        """See `BoardMemory`."""
+        data = bytes(data)
+        self._eeprom()
+        check_range("EEPROM", address, len(data), EEPROM_SIZE)
+        self._check(lib.sim_write_eeprom(self._handle, self._number, address, data, len(data)), "EEPROM")
+
+    def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
+        """See `BoardMemory`."""
+        self._check(lib.sim_damage_eeprom(self._handle, self._number, int(damage), garbage), "EEPROM")
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""
-        lib.sim_line_rate(self._handle, self._number, baud)
+        self._robot.line_rate(baud)
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""

@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.errors import RobotError
+from boebot.floor_plan import FloorPlan
+from sim_bridge.floor_plan import plan_of_poses, poses_of
 from sim_bridge.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
@@ -28,12 +31,14 @@ class Recorder:
             count = where.stop - where.start
             self.names += [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]
         self._rows: list[tuple[float, ...]] = []
+        self._movers: list[Floats] = []
 
     def append(self) -> None:
         """A row of how things are now. Lengths in m, times in s, angles in rad."""
         v, body = self.vehicle, self.vehicle.body
         truth = (v.time, body.x, body.y, body.heading, body.speed, body.turn_rate, body.distance, body.touching)
         self._rows.append((*truth, *v.readings))
+        self._movers.append(poses_of(v.movers))
 
     def __call__(self, stage: str, vehicle: Vehicle) -> None:
         """A row at the end of each step: as ARSim, with the readings that the step's brain got."""
@@ -51,6 +56,20 @@ class Recorder:
     def table(self) -> Floats:
         """All, shape (rows, columns)."""
         return np.array(self._rows, dtype=np.float64).reshape(-1, len(self.names))
+
+    def floor_plan(self) -> FloorPlan:
+        """The arena with its moving shapes where they really were, at the rows' times, for pictures of the run.
+
+        After another `Vehicle.place` it is that of the newest run.
+
+        Raises:
+            RobotError: there is no row.
+        """
+        if not self._rows:
+            raise RobotError("recorder: it has no row; expected append() after some steps before a floor plan is made")
+        time = self["time"]
+        newest = 1 + max(np.flatnonzero(np.diff(time) < 0), default=-1)
+        return plan_of_poses(self.vehicle.arena, time[newest:], np.array(self._movers[newest:]).transpose(1, 2, 0))
 
     def save(self, path: str | Path) -> None:
         """Writes a CSV file with the columns' names in its first line."""

@@ -20,7 +20,8 @@ from typing import Protocol
 
 from boebot.boards import BoardRequest
 from boebot.errors import BoardError
-from sim_bridge.session import Pace, SimSession, open_avr, open_native
+from sim_bridge.opening import Pace
+from sim_bridge.session import SimSession, open_avr, open_native
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
 BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late
@@ -240,7 +241,7 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
         while data := port.read():
             heard += data
         cycles = pace.due()
-        sim.run(cycles, cycles)  # first: the board must not hear, let alone answer, before it was told
+        sim.run(cycles)  # first: the board must not hear, let alone answer, before it was told
         if heard:
             session.robot.send(heard)
             brisk_until = time.monotonic() + BRISK_FOR_S

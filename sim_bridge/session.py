@@ -1,32 +1,31 @@
 """A robot in a simulated world as the host opens it: bytes, pins, truth.
 
 `open_native` and `open_avr` are what the entry points of the group `boebot.boards` name: called with one request they
-give a session, their `together` puts several robots into one world (sim_bridge.together). A session joins one emulated
-board to a body in an arena, by the robot's description; the loop that advances both is C (loop.h), and Python is called
-only where somebody reads or writes bytes.
+give a session, their `together` puts several robots into one world (sim_bridge.together), also such without boards. A
+session joins one emulated board to a body in an arena, by the robot's description; the loop that advances both is C
+(loop.h), and Python is called only where somebody reads or writes bytes.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from boebot import robots
-from boebot.boards import BoardRequest, SharedWorld, Truth
+from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession
 from boebot.errors import BoardError
-from sim_bridge.arena import load_arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
+from sim_bridge.direct import DirectSession, add_vehicle
+from sim_bridge.opening import Wait, alone, new_sim, truth_of
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Floats, Sim, SimRobot
+from sim_bridge.sim import Sim
+from sim_bridge.sim_robot import Floats, SimRobot
 from sim_bridge.switches import SWITCHES
+from sim_bridge.together import SimWorld
 
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
-
-
-Wait = Callable[[SimRobot, int, int], None]
-"""Lets time pass for a robot: at most so many cycles; after so many quiet ones, until its bytes have come."""
+STEP_S = 0.001  # of a world with boards
 
 
 class SimTransport:
@@ -84,44 +83,6 @@ class SimTransport:
         self._closed = True
 
 
-class Pace:
-    """Holds simulated time to the wall clock."""
-
-    LAG_S = 0.5  # what cannot be caught up is forgotten
-
-    def __init__(self, sim: Sim) -> None:
-        self._sim = sim
-        self._start = time.monotonic() - sim.cycle / CLOCK_HZ
-
-    def due(self) -> int:
-        """Cycles that the wall clock is ahead of the simulation."""
-        ahead = time.monotonic() - self._start - self._sim.cycle / CLOCK_HZ
-        if ahead > self.LAG_S:
-            self._start += ahead
-            ahead = 0.0
-        return max(0, int(ahead * CLOCK_HZ))
-
-    def wait(self) -> None:
-        """Sleeps until the wall clock has caught up."""
-        behind = self._sim.cycle / CLOCK_HZ + self._start - time.monotonic()
-        if behind > 0:
-            time.sleep(behind)
-        elif behind < -self.LAG_S:
-            self._start -= behind
-
-
-def alone(sim: Sim, paced: bool = False) -> Wait:
-    """Time passes for one robot only. `paced`: at most as fast as on the wall."""
-    pace = Pace(sim) if paced else None
-
-    def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        sim.run(cycles, quiet, robot)
-        if pace is not None:
-            pace.wait()
-
-    return wait
-
-
 class SimSession:
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
@@ -139,20 +100,7 @@ class SimSession:
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""
-        columns = self.robot.truth()
-        if not len(columns["time"]):
-            return None
-        return Truth(
-            time=columns["time"],
-            x=columns["x"],
-            y=columns["y"],
-            heading=columns["heading"],
-            contact=columns["contact"] > 0,
-            left_speed=columns["left"],
-            right_speed=columns["right"],
-            arena_name=self.arena.name,
-            outlines=self.arena.outlines,
-        )
+        return truth_of(self.robot)
 
     def looks(self) -> dict[str, Floats]:
         """Where the range sensors looked from and what they saw: columns `LOOK`."""
@@ -192,22 +140,27 @@ class BoardKind:
 
     def __call__(self, request: BoardRequest) -> SimSession:
         """Opens one robot in a world of its own."""
-        sim = new_sim(request)
+        sim = new_sim(request, STEP_S)
         try:
             robot = self.add(sim, request)
         except Exception:
             sim.close()
             raise
-        return SimSession(robot, self.name, alone(sim, request.realtime))
+        return SimSession(robot, self.name, alone(sim, paced=request.realtime))
 
     def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
-        """Opens several robots in one world."""
-        from sim_bridge.together import SimWorld
+        """Opens several robots in one world; those whose description has no board get none."""
+        return SimWorld(new_sim(requests[0], STEP_S), requests, self.add, self._open_shared)
 
-        return SimWorld(self, requests)
+    def _open_shared(self, robot: SimRobot, wait: Wait) -> BoardSession | VehicleSession:
+        if robot.description.has_board:
+            return SimSession(robot, self.name, wait, shared=True)
+        return DirectSession(robot, wait, shared=True)
 
     def add(self, sim: Sim, request: BoardRequest) -> SimRobot:
-        """Puts the request's robot with its board into a world."""
+        """Puts the request's robot into a world, with its board if it has one."""
+        if not request.robot.has_board:
+            return add_vehicle(sim, request)
         find = self._find
         board = self._make(find(request.robot.pin_map) if request.image is None else image_file(request.image))
         try:
@@ -222,18 +175,6 @@ open_native = BoardKind("native", native_library, native_board)
 
 open_avr = BoardKind("avr", avr_image, avr_board)
 """The emulated ATmega328P with the image that would be flashed."""
-
-
-def new_sim(request: BoardRequest) -> Sim:
-    """The world that a request wants, without robots."""
-    step_cycles = round(float(request.options.get("world_step_s", 0.001)) * CLOCK_HZ)
-    return Sim(
-        load_arena(request.arena),
-        seed=request.seed,
-        noise=request.noise,
-        record=request.record,
-        step_cycles=step_cycles,
-    )
 
 
 def _baud(robot: robots.RobotDescription) -> int:

@@ -2,30 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+import time
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from boebot import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import imperfections, switches
+from sim_bridge import arguments, imperfections, saved, switches
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
+from sim_bridge.arguments import point, shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.floor_plan import Lateness
 from sim_bridge.joining import done, join
+from sim_bridge.model_file import vehicle_model
+from sim_bridge.outline import collision_outline
+from sim_bridge.sim_robot import SimRobot
+from sim_bridge.vehicle import VehicleModel
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
+REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the clock
+PATIENCE_S = 2.0  # that replaying takes without a word
+REPORT_S = 0.1  # between two words of progress
+PORTION_CYCLES = CLOCK_HZ  # of a long run, between two chances for Ctrl-C
+CYCLES_MAXIMUM = 2**62  # 9,000 years
+NUMBER_MAXIMUM = 2**30 - 1
+STEP_MINIMUM = 160  # cycles of a world step: 10 us
 NEVER = 2**64 - 1
-TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
-TONE = ("time", "duration", "frequency")
-LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
-Floats = NDArray[np.float64]
+Pose = tuple[float, float, float]
+Progress = Callable[[float], None]
+
+
+def checked_pose(what: str, pose: object) -> Pose:
+    """A pose that is one (m, m, rad), else raises ArenaError; `what` names it."""
+    far = float(lib.ARENA_FARTHEST_M)
+    x, y, heading = point(
+        what, pose, ArenaError, "x (m), y (m) and heading (rad)", (far, far, float(lib.BODY_HEADING_LIMIT))
+    )
+    return x, y, heading
+
+
+@dataclass(frozen=True)
+class Member:
+    """A robot as it was added."""
+
+    board: EmulatedBoard | None
+    description: robots.RobotDescription
+    pose: Pose
+    without: tuple[str, ...]
+    model: VehicleModel | None
+    """of a robot without a board"""
+
+
+_kept: dict[int, tuple[object, ...]] = {}
+"""What a simulation in C points to, by its address. Were it kept by the Sim, the collector of cycles, which takes
+things apart in any order, could free a board before the simulation that runs it."""
+
+
+def _destroy(handle: Any) -> None:
+    """Frees a simulation in C, and only then what it points to."""
+    lib.sim_destroy(handle)
+    _kept.pop(int(ffi.cast("uintptr_t", handle)), None)
 
 
 class Sim:
@@ -47,62 +93,139 @@ class Sim:
         """An arena without robots.
 
         Raises:
-            ArenaError: too many moving obstacles.
-            BoardError: a world step that does not divide the control tick.
+            ArenaError: it is no arena, or has too many moving obstacles.
+            BoardError: a seed that is none, or a world step that does not divide the control tick.
         """
-        if step_cycles <= 0 or TICK_CYCLES % step_cycles:
+        if not isinstance(arena, Arena):
+            raise ArenaError(f"simulation: got {shown(arena)}; expected an Arena, as load_arena gives it")
+        noise = arguments.switch("simulation: noise", noise, BoardError)
+        record = arguments.switch("simulation: record", record, BoardError)
+        seed = whole("simulation: the seed", seed, BoardError, least=-(2**63), most=2**64 - 1)
+        step_cycles = whole("simulation: step_cycles", step_cycles, BoardError, least=STEP_MINIMUM, most=TICK_CYCLES)
+        if TICK_CYCLES % step_cycles:
             raise BoardError(f"a world step of {step_cycles} cycles does not divide the control tick of {TICK_CYCLES}")
         moving = int(lib.arena_moving_count(arena.handle))
         if moving > lib.SIM_OBSTACLES_MAXIMUM:
             raise ArenaError(
-                f"arena {arena.name}: {moving} moving obstacles; a simulation with boards takes "
-                f"{lib.SIM_OBSTACLES_MAXIMUM} at most"
+                f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
         self.arena, self.seed, self.noise = arena, seed, noise
+        self._record, self._step_cycles = record, step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self._members: dict[int, tuple[EmulatedBoard, robots.RobotDescription]] = {}
-        # Arena and boards outlive the simulation, whichever of them Python lets go of first. That a SimRobot is never
-        # kept here leaves no cycle of references, in which the order would be anybody's guess.
-        self.handle = ffi.gc(handle, lambda handle, keep=(arena, self._members): lib.sim_destroy(handle))
+        self._outlines: list[object] = []
+        self.members: dict[int, Member] = {}
+        self.listening: dict[int, int] = {}
+        _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
+        self._handle: Any = ffi.gc(handle, _destroy)
+
+    @property
+    def handle(self) -> Any:
+        """The simulation in C.
+
+        Raises:
+            BoardError: it is closed.
+        """
+        if self._handle is None:
+            raise BoardError("this simulation is closed; expected one that is open")
+        return self._handle
+
+    def __copy__(self) -> Sim:
+        raise BoardError("a simulation cannot be copied; expected save() and restore()")
+
+    def __deepcopy__(self, memo: object) -> Sim:
+        return self.__copy__()
 
     def add(
         self,
-        board: EmulatedBoard,
+        board: EmulatedBoard | None,
         description: robots.RobotDescription,
         *,
-        pose: tuple[float, float, float] | None = None,
+        pose: Pose | None = None,
         number: int | None = None,
         without: Sequence[str] = (),
     ) -> SimRobot:
         """Puts a robot at `pose` (x, y, heading; m, m, rad), or where the arena says.
 
         `number` is its name in the run and the key of its noise and its imperfections: the next one if None.
-        `without`: its imperfections that are switched off (switches.py).
+        `without`: its imperfections that are switched off (switches.py). `board` is None for a robot whose description
+        has none: it gets motor signals, and gives readings once every world step.
 
         Raises:
             ArenaError: that place is not free.
-            BoardError: the number is taken or negative, there are too many robots, or no such imperfection.
+            RobotError: a description that is none of a robot without a board.
+            BoardError: the number is taken or negative, there are too many robots, no such imperfection, or the
+                simulation runs already.
         """
+        if self.cycle:
+            raise BoardError("the simulation runs already; expected all of its robots before")
+        if not isinstance(board, EmulatedBoard | None) or not isinstance(description, robots.RobotDescription):
+            raise BoardError(
+                f"got {shown(board)} and {shown(description)}; expected a board or None, and a description"
+            )
+        if isinstance(without, str) or not all(isinstance(name, str) for name in without):
+            raise BoardError(f"without is {shown(without)}; expected a list of names")
         if number is None:
-            number = max(self._members, default=-1) + 1
-        if number < 0 or number in self._members:
-            raise BoardError(f"robot number {number} is taken or negative")
-        if len(self._members) == lib.BODY_MAXIMUM:
-            raise BoardError(f"a simulation takes {len(self._members)} robots at most")
-        x, y, heading = self.arena.start if pose is None else pose
+            number = max(self.members, default=-1) + 1
+        number = whole("robot number", number, BoardError, least=0, most=NUMBER_MAXIMUM)
+        if number in self.members:
+            raise BoardError(f"robot number {number} is taken")
+        if board is not None and board.is_in_use():
+            raise BoardError(f"the {board.description} is in a simulation already; expected one of its own")
+        if len(self.members) == lib.BODY_MAXIMUM:
+            raise BoardError(f"a simulation takes {len(self.members)} robots at most")
+        if description.has_board != (board is not None):
+            has = "has a board" if description.has_board else "has no board"
+            raise BoardError(f"robot {description.name!r} {has}; expected one that fits what it is added with")
+        pose = self.arena.start if pose is None else checked_pose(f"arena {self.arena.name}: a robot's pose", pose)
+        if board is None:
+            self._add_vehicle(number, description, pose, without)
+        else:
+            self._add_robot(number, board, description, pose, without)
+        return self.robot(number)
+
+    def _add_robot(
+        self,
+        number: int,
+        board: EmulatedBoard,
+        description: robots.RobotDescription,
+        pose: Pose,
+        without: Sequence[str],
+    ) -> None:
         draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
-        body = imperfections.body_parameters(description.body, draw)
-        status = lib.sim_add_robot(self.handle, number, board.address, body, x, y, heading)
+        corners = description.body.outline_m
+        outline = collision_outline(f"robot {description.name!r}: body.outline_m", corners) if corners else ffi.NULL
+        self._outlines.append(outline)  # bodies in C point to them
+        body = imperfections.body_parameters(description.body, draw, outline)
+        status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
+        self._check_place(status, pose)
+        done(status, f"the {board.description}")
+        self.members[number] = Member(board, description, pose, tuple(without), None)
+        self._take(board)
+        join(self.handle, number, switches.idealised(description, without), draw)
+
+    def _take(self, board: EmulatedBoard) -> None:
+        """From now on this simulation runs it."""
+        me = weakref.ref(self)
+        board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
+
+    def _add_vehicle(
+        self, number: int, description: robots.RobotDescription, pose: Pose, without: Sequence[str]
+    ) -> None:
+        model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise, without=without)
+        status = lib.sim_add_vehicle(self.handle, number, model.handle, *pose)
+        self._check_place(status, pose)
+        done(status, f"robot {description.name!r}")
+        model.in_use = True
+        self.members[number] = Member(None, description, pose, tuple(without), model)
+
+    def _check_place(self, status: int, pose: Pose) -> None:
         if status == lib.SIM_NOT_FREE:
+            x, y, _ = pose
             raise ArenaError(
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
-        done(status, f"the {board.description}")
-        self._members[number] = board, description
-        join(self.handle, number, switches.idealised(description, without), draw)
-        return self.robot(number)
 
     def robot(self, number: int) -> SimRobot:
         """The robot of that number.
@@ -110,30 +233,29 @@ class Sim:
         Raises:
             BoardError: there is none.
         """
-        if number not in self._members:
+        if number not in self.members:
             raise BoardError(f"there is no robot number {number} in this simulation")
-        return SimRobot(self, number, *self._members[number])
+        return SimRobot(self, number)
 
     @property
     def robots(self) -> list[SimRobot]:
         """All of them, by increasing number."""
-        return [self.robot(number) for number in sorted(self._members)]
+        return [self.robot(number) for number in sorted(self.members)]
 
     @property
     def cycle(self) -> int:
         """Up to where the simulation has run."""
         return int(lib.sim_now(self.handle))
 
-    def run(self, cycles: int, quiet: int = 0, hear: SimRobot | None = None) -> None:
-        """Runs for at most `cycles`; after `quiet` of them, until bytes have come and the line is idle.
-
-        `hear`: the robot whose bytes end the run; None: anybody's.
+    def run(self, cycles: int) -> None:
+        """Runs for so many cycles, whoever speaks.
 
         Raises:
             BoardError: a board's program crashed.
         """
-        number = lib.SIM_ANY if hear is None else hear.number
-        self._check(lib.sim_run(self.handle, number, cycles, quiet))
+        until = self.cycle + whole("cycles", cycles, BoardError, least=0, most=CYCLES_MAXIMUM)
+        while self.cycle < until:
+            self.run_until(until)
 
     def run_until(self, cycle: int) -> None:
         """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`).
@@ -141,105 +263,170 @@ class Sim:
         Raises:
             BoardError: a board's program crashed.
         """
-        self._check(lib.sim_run_until(self.handle, cycle))
+        while True:  # in portions, or Ctrl-C would not be heard
+            until = min(cycle, self.cycle + PORTION_CYCLES)
+            self._check(lib.sim_run_until(self.handle, until))
+            if until == cycle or self.cycle < until or self._anybody_speaks():
+                return
+
+    def _anybody_speaks(self) -> bool:
+        return any(lib.sim_speaks(self.handle, number) for number in self.listening)
 
     def _check(self, crashed: int) -> None:
         if crashed:
-            board, _ = self._members[crashed - 1]
-            whose = f" of robot {crashed}" if len(self._members) > 1 else ""
+            board = self.robot(crashed - 1).board
+            whose = f" of robot {crashed}" if len(self.members) > 1 else ""
             fault = lib.board_fault(board.address)
             why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
             raise BoardError(f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+
+    def lateness(self) -> list[Lateness]:
+        """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
+        waited for robots; empty without recording."""
+        if not self._record:
+            return []
+        count, now = ffi.new("size_t *"), ffi.new("double *")
+        movers = lib.sim_movers(self.handle, count, now)
+        last = [movers[k].waited for k in range(count[0])]
+        rows = lib.sim_waits(self.handle, count)
+        size = count[0] * ffi.sizeof("sim_wait")
+        table = np.frombuffer(ffi.buffer(rows, size)[:] if size else b"", dtype=np.float64).reshape(-1, 3)
+        found = []
+        for shape, waited in enumerate(last):
+            time, _, late = table[table[:, 1] == shape].T
+            found.append(Lateness(time=np.append(time, now[0]), waited=np.append(late, waited)))
+        return found
 
     def hash(self) -> int:
         """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""
         return int(lib.sim_hash(self.handle))
 
+    # ---- save and restore --------------------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """The state of world and boards, to be gone on from by `restore`; what the host's end knows is not in it.
+
+        Raises:
+            SavedStateError: a board has crashed, or runs no firmware.
+        """
+        for number, member in self.members.items():
+            if member.board is not None and not member.board.can_repeat:
+                raise saved.SavedStateError(
+                    f"robot {number} cannot be saved: its {member.board.description} runs a script"
+                )
+        count = ffi.new("size_t *")
+        inputs = lib.sim_inputs(self.handle, count)
+        if inputs == ffi.NULL:
+            raise saved.SavedStateError("this simulation cannot be saved: a board has crashed, or memory ran out")
+        return saved.encode(self._heading(), ffi.buffer(inputs, count[0])[:])
+
+    def restore(self, state: bytes, progress: Progress | None = None) -> None:
+        """Goes to a saved state, and on from there as the simulation went on that was saved, bit for bit.
+
+        This one has the same arena, seeds and robots with the same firmware; it may have run, and may stand before or
+        behind that state. All is replayed from the start, at the speed of the boards. Whoever holds a `SimRobot` or
+        `BoardPins` may keep it.
+
+        Args:
+            progress: called with the seconds that have been replayed, about ten times a second. None: where it takes
+                over two seconds, a line on standard error.
+
+        Raises:
+            SavedStateError: the bytes are damaged, of another simulation, or lead to another state; then nothing has
+                changed here.
+            BoardError: the firmware has changed on disk.
+        """
+        heading, inputs = saved.decode(state)
+        saved.check_alike(heading, self._heading())
+        fresh = Sim(self.arena, seed=self.seed, noise=self.noise, record=self._record, step_cycles=self._step_cycles)
+        try:
+            for number, member in self.members.items():
+                board = None if member.board is None else member.board.again()
+                try:
+                    fresh.add(board, member.description, pose=member.pose, number=number, without=member.without)
+                except Exception:
+                    if board is not None:
+                        board.close()
+                    raise
+            fresh._replay(heading, inputs, progress or _Patience(heading.cycle / CLOCK_HZ).report)
+        except BaseException:
+            fresh.close()
+            raise
+        self.close()
+        self._handle, self.members, self._outlines = fresh._handle, fresh.members, fresh._outlines
+        for member in self.members.values():
+            if member.board is not None:
+                self._take(member.board)
+        for number, cycle in self.listening.items():
+            lib.sim_listen(self.handle, number, cycle)
+
+    def _heading(self) -> saved.Heading:
+        return saved.Heading(
+            format=saved.FORMAT,
+            cycle=self.cycle,
+            state=f"{lib.sim_state_hash(self.handle):016x}",
+            seed=self.seed,
+            noise=self.noise,
+            record=self._record,
+            step_cycles=self._step_cycles,
+            arena=self.arena.name,
+            arena_print=saved.print_of(self.arena.description),
+            robots=[
+                saved.SavedRobot(
+                    number=number,
+                    name=member.description.name,
+                    built=saved.print_of(member.description, member.pose, member.without),
+                    firmware="" if member.board is None else member.board.firmware,
+                    waiting=lib.sim_waiting(self.handle, number),
+                )
+                for number, member in sorted(self.members.items())
+            ],
+        )
+
+    def _replay(self, heading: saved.Heading, inputs: bytes, progress: Progress) -> None:
+        """From the start to where `heading` says."""
+        at = ffi.new("size_t *")
+        shown = time.monotonic()
+        while at[0] < len(inputs) or self.cycle < heading.cycle:
+            is_last = self.cycle == heading.cycle
+            until = min(self.cycle + REPLAY_CYCLES, heading.cycle)
+            status = lib.sim_replay(self.handle, inputs, len(inputs), at, until)
+            if status < 0 or (is_last and at[0] < len(inputs)):
+                raise saved.SavedStateError(
+                    "the saved simulation has an input that does not fit; expected what save() gave"
+                )
+            self._check(status)
+            if time.monotonic() - shown > REPORT_S:
+                shown = time.monotonic()
+                progress(self.cycle / CLOCK_HZ)
+        for robot in heading.robots:
+            lib.sim_forget_received(self.handle, robot.number, robot.waiting)
+        if self._heading() != heading:
+            raise saved.SavedStateError(
+                f"replaying came to another state at {self.cycle / CLOCK_HZ:.3f} s: another version of the simulator "
+                "saved it"
+            )
+
     def close(self) -> None:
-        """Frees the simulation, then the boards."""
-        ffi.release(self.handle)
-        for board, _ in self._members.values():
-            board.close()
+        """Frees the simulation, then the boards. May be called twice."""
+        handle, self._handle = self._handle, None
+        if handle is None:
+            return
+        ffi.release(handle)
+        for member in self.members.values():
+            if member.board is not None:
+                member.board.close()
 
 
-class SimRobot:
-    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
+class _Patience:
+    """Says on standard error how far a replay has come, once it takes its time."""
 
-    def __init__(self, sim: Sim, number: int, board: EmulatedBoard, description: robots.RobotDescription) -> None:
-        self.sim, self.number, self.board, self.description = sim, number, board, description
-        self._handle = sim.handle
-        self._bytes = ffi.new("uint8_t[]", 65536)
-        self._count = ffi.new("size_t *")
-        self._body = ffi.new("body_state *")
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._next = time.monotonic() + PATIENCE_S
 
-    def receive(self) -> bytes:
-        """Bytes that left the board since the last call."""
-        count = lib.sim_receive(self._handle, self.number, self._bytes, 65536)
-        if not count:
-            return b""
-        data: bytes = ffi.buffer(self._bytes, count)[:]
-        return data if count < 65536 else data + self.receive()
-
-    def send(self, data: bytes) -> None:
-        """Bytes to the board, from now on."""
-        lib.sim_send(self._handle, self.number, data, len(data))
-
-    def listen(self, cycle: int) -> None:
-        """From that cycle on its bytes end a run of `Sim.run_until`."""
-        lib.sim_listen(self._handle, self.number, cycle)
-
-    @property
-    def speaks(self) -> bool:
-        """Bytes have come since it is listened to, and the line has been idle since."""
-        return bool(lib.sim_speaks(self._handle, self.number))
-
-    def line_rate(self, baud: int) -> None:
-        """Bit rate of the outside's side of the serial line."""
-        lib.sim_line_rate(self._handle, self.number, baud)
-
-    @property
-    def last_byte_cycle(self) -> int:
-        """At which the last byte from the board had come."""
-        return int(lib.sim_last_byte(self._handle, self.number))
-
-    @property
-    def contacts(self) -> int:
-        """Touches begun so far; apart by 0.1 s at least."""
-        return int(lib.sim_contacts(self._handle, self.number))
-
-    @property
-    def pack_voltage(self) -> float:
-        """Of the battery, V."""
-        return float(lib.sim_pack_voltage(self._handle, self.number))
-
-    @property
-    def supply_voltage(self) -> float:
-        """Of the rail that the board runs on, V."""
-        return float(lib.sim_supply_voltage(self._handle, self.number))
-
-    def body(self) -> Any:
-        """The body's state (C struct body_state): pose, speeds, wheel angles, distance, contact."""
-        lib.sim_body(self._handle, self.number, self._body)
-        return self._body
-
-    def _rows(self, rows: Any, columns: tuple[str, ...]) -> dict[str, Floats]:
-        count = self._count[0]
-        size = count * len(columns) * 8
-        table = np.frombuffer(ffi.buffer(rows, size)[:] if count else b"", dtype=np.float64)
-        return dict(zip(columns, table.reshape(-1, len(columns)).T, strict=True))
-
-    def truth(self) -> dict[str, Floats]:
-        """Columns `TRUTH`, one row every 10 ms; empty without recording."""
-        return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
-
-    def tones(self) -> dict[str, Floats]:
-        """Columns `TONE`, one row per tone that a buzzer has sounded."""
-        return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
-
-    def turret_angle(self, pin: int) -> float:
-        """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
-        return float(lib.sim_turret_angle(self._handle, self.number, pin))
-
-    def looks(self) -> dict[str, Floats]:
-        """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
-        return self._rows(lib.sim_looks(self._handle, self.number, self._count), LOOK)
+    def report(self, passed: float) -> None:
+        """So many seconds have been replayed."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + PATIENCE_S
+            print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)

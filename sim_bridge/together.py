@@ -1,4 +1,4 @@
-"""Several robots in one simulated world, each with its own board, line and program at the host's end.
+"""Several robots in one simulated world, each with its own program at the host's end, and with a board or without.
 
 Time is everybody's: it passes only while all robots wait, and then up to the earliest wake-up of any. A robot's wake-up
 depends on its own line and its own waiting only (sim_listen of loop.h), so that a robot that nobody senses changes no
@@ -7,60 +7,49 @@ bit of another's run.
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-from boebot.boards import BoardRequest
-from boebot.errors import ArenaError, BoardError
+from boebot.boards import BoardRequest, BoardSession, VehicleSession
+from boebot.errors import BoardError
 from sim_bridge._core import lib
-from sim_bridge.arena import Arena
-from sim_bridge.sim import NEVER, SimRobot
+from sim_bridge.opening import Pace, Wait
+from sim_bridge.places import places_of
+from sim_bridge.sim import NEVER, Sim
+from sim_bridge.sim_robot import SimRobot
 
-if TYPE_CHECKING:
-    from sim_bridge.session import BoardKind
-
-GAPS_M = (0.3, 0.1, 0.02)  # between robots, and to what is around, that places are looked for with, in this order
-WALL_GAP_M = 0.1  # at most
-CELL_M = 0.1
-FAR_M = 15.0  # from the start that places are looked for, in a field without outline
-
-Pose = tuple[float, float, float]
+Add = Callable[[Sim, BoardRequest], SimRobot]
+Open = Callable[[SimRobot, Wait], BoardSession | VehicleSession]
 
 
 class SimWorld:
     """The world of several robots (SharedWorld of boebot.boards)."""
 
-    def __init__(self, kind: BoardKind, requests: Sequence[BoardRequest]) -> None:
-        """Puts the robots into the first request's arena, in the order of the requests.
+    def __init__(self, sim: Sim, requests: Sequence[BoardRequest], add: Add, open_session: Open) -> None:
+        """Puts the robots into `sim`, in the order of the requests; it is freed where that fails.
+
+        `add` puts one robot there, `open_session` gives the host's end of one in a world that is shared.
 
         Raises:
-            ArenaError: no such arena, two robots overlap, or there is no free place.
+            ArenaError: two robots overlap, or there is no free place.
             BoardError: too many robots.
         """
-        from sim_bridge.session import Pace, SimSession, new_sim
-
-        if len(requests) > lib.BODY_MAXIMUM:
-            raise BoardError(f"{len(requests)} robots are too many; expected at most {lib.BODY_MAXIMUM} in one run")
-        self._sim = new_sim(requests[0])
-        self._pace = Pace(self._sim) if requests[0].realtime else None
+        self._sim = sim
+        self._pace = Pace(sim) if requests[0].realtime else None
         self._waits: dict[int, int] = {}  # robot -> cycle until which it waits
         self._pause: Callable[[int], None] | None = None
         self._closed = False
         try:
-            places = places_of(self._sim.arena, requests)
-            robots = [
-                kind.add(self._sim, replace(request, start_pose=place))
-                for request, place in zip(requests, places, strict=True)
+            if len(requests) > lib.BODY_MAXIMUM:
+                raise BoardError(f"{len(requests)} robots are too many; expected at most {lib.BODY_MAXIMUM} in one run")
+            places = places_of(sim.arena, requests)
+            self._robots = [
+                add(sim, replace(request, start_pose=place)) for request, place in zip(requests, places, strict=True)
             ]
         except Exception:
-            self._sim.close()
+            sim.close()
             raise
-        for robot in robots:
-            robot.listen(NEVER)
-        self.sessions = [SimSession(robot, kind.name, self._wait, shared=True) for robot in robots]
+        self.sessions = [open_session(robot, self._wait) for robot in self._robots]
 
     def on_wait(self, pause: Callable[[int], None]) -> None:
         """Who is called with a robot's index when it waits, and returns once it has woken."""
@@ -90,7 +79,8 @@ class SimWorld:
         sim.run_until(min(self._waits.values()))
         if self._pace is not None:
             self._pace.wait()
-        return sorted(n for n, end in self._waits.items() if sim.cycle >= end or sim.robot(n).speaks)
+        now = sim.cycle
+        return sorted(n for n, end in self._waits.items() if now >= end or self._robots[n].speaks)
 
     def close(self) -> None:
         """Frees boards and world. May be called twice."""
@@ -100,91 +90,3 @@ class SimWorld:
         for session in self.sessions:
             session.close()
         self._sim.close()
-
-
-# ---- places ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Disc:
-    """The room that a robot takes up."""
-
-    number: int  # as people count
-    x: float
-    y: float
-    radius: float
-
-    def gap(self, x: float, y: float, radius: float) -> float:
-        """To another disc (m)."""
-        return math.hypot(x - self.x, y - self.y) - radius - self.radius
-
-
-def places_of(arena: Arena, requests: Sequence[BoardRequest]) -> list[Pose]:
-    """Where each robot starts: where its request says; else at the arena's start, if it is free, or at a place near it.
-
-    Raises:
-        ArenaError: a place is not free, two robots overlap, or there is no place.
-    """
-    taken: list[_Disc] = []
-    for number, request in enumerate(requests, 1):
-        if request.start_pose is not None:
-            taken.append(_given(arena, taken, number, request.start_pose, request.robot.body.radius_m))
-    _, _, heading = arena.start
-    places: list[Pose] = []
-    for number, request in enumerate(requests, 1):
-        if request.start_pose is not None:
-            places.append(request.start_pose)
-            continue
-        disc = _found(arena, taken, number, request.robot.body.radius_m)
-        taken.append(disc)
-        places.append((disc.x, disc.y, heading))
-    return places
-
-
-def _given(arena: Arena, taken: Iterable[_Disc], number: int, pose: Pose, radius: float) -> _Disc:
-    x, y, _ = pose
-    if not all(map(math.isfinite, pose)):
-        raise ArenaError(f"robot {number} cannot start at {x:g}, {y:g}; expected numbers in m, m, rad")
-    where = f"x = {x:g} m, y = {y:g} m"
-    if not arena.is_free(x, y, radius):
-        raise ArenaError(f"arena {arena.name}: robot {number} cannot start at {where}: no free space")
-    for other in taken:
-        if (gap := other.gap(x, y, radius)) < 0:
-            raise ArenaError(
-                f"robots {other.number} and {number} overlap at {where} by {-gap:.3f} m; "
-                f"expected at least {radius + other.radius:.3f} m from centre to centre"
-            )
-    return _Disc(number, x, y, radius)
-
-
-def _found(arena: Arena, taken: Sequence[_Disc], number: int, radius: float) -> _Disc:
-    """A free place: the arena's start, or one on a lattice about it, near ones first and roomy ones before."""
-    x, y, _ = arena.start
-    if arena.is_free(x, y, radius) and all(other.gap(x, y, radius) >= 0 for other in taken):
-        return _Disc(number, x, y, radius)
-    reach = _reach(arena)
-    for gap in GAPS_M:
-        room = radius + min(gap, WALL_GAP_M)
-        for dx, dy in _around(reach):
-            place = x + dx, y + dy
-            if all(other.gap(*place, radius) >= gap for other in taken) and arena.is_free(*place, room):
-                return _Disc(number, *place, radius)
-    raise ArenaError(f"arena {arena.name} has no free place for robot {number}; expected fewer robots, or poses")
-
-
-def _reach(arena: Arena) -> float:
-    """How far from its start the arena goes (m)."""
-    if not arena.description.outline:
-        return FAR_M
-    x, y, _ = arena.start
-    return max(float(abs(value)) for outline in arena.outlines for corner in outline - (x, y) for value in corner)
-
-
-def _around(reach: float) -> Iterator[tuple[float, float]]:
-    """Steps to the points of a lattice, in square rings about the middle, near ones first in each."""
-    for ring in range(1, math.ceil(reach / CELL_M) + 1):
-        edge = range(-ring, ring + 1)
-        sides = itertools.product((-ring, ring), edge)
-        cells = {cell for i, j in sides for cell in ((i, j), (j, i))}
-        for i, j in sorted(cells, key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell)):
-            yield i * CELL_M, j * CELL_M

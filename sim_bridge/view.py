@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.transforms import Affine2D
 
-from sim_bridge.arena_picture import draw_arena
+from boebot.errors import BoebotError
+from boebot.geometry import way_out
+from boebot.report import style
+from boebot.report.arena_drawing import draw_arena, frame
+from boebot.report.robot_drawing import body_patch
+from boebot.report.scene import plan_bounds
+from sim_bridge._core import ffi, lib
+from sim_bridge.floor_plan import floor_plan, moving_solids, poses_of
 from sim_bridge.vehicle import Vehicle
 
-BODY, GHOST, RAY = "#4c6fb1", "#d08770", "#b48ead"
+BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"
 
 
 class View:
@@ -28,54 +39,92 @@ class View:
         self.figure = Figure(figsize=(5.0, 5.0), dpi=110, layout="constrained")
         FigureCanvasAgg(self.figure)
         self._axes = self.figure.subplots()
-        draw_arena(self._axes, vehicle.arena)
-        self._axes.set_aspect("equal")
-        self._axes.autoscale_view()
-        self._axes.set(xlabel="x (m)", ylabel="y (m)")
-        radius = vehicle.model.body["radius"]
-        self._body = Circle((0, 0), radius, facecolor=BODY, alpha=0.85, zorder=6)
-        self._ghost = Circle((0, 0), radius, fill=False, edgecolor=GHOST, ls="--", zorder=7)
+        plan = floor_plan(vehicle.arena, 0.0, 0.0)
+        draw_arena(self._axes, replace(plan, moving=()))
+        x, y, _ = vehicle.pose
+        frame(self._axes, *plan_bounds(plan, [(x, y)]))
+        self._solids = moving_solids(vehicle.arena)
+        self._moving = [self._add_moving(solid.kind == "disc") for solid in self._solids]
+        radius, outline = vehicle.model.body["radius"], vehicle.model.body.get("outline_m", ())
+        self._front = way_out(outline) if len(outline) else radius
+        self._body = body_patch(radius, outline, facecolor=BODY, alpha=0.85, zorder=8)
+        self._ghost = body_patch(radius, outline, fill=False, edgecolor=GHOST, ls="--", zorder=9)
         self._axes.add_patch(self._body)
         self._axes.add_patch(self._ghost)
         self._ghost.set_visible(ghost and "odometer" in vehicle.model.names)
-        self._nose = self._axes.plot([], [], color="white", lw=2.0, zorder=7)[0]
-        self._path = self._axes.plot([], [], color=BODY, lw=1.2, zorder=5)[0]
-        self._rays = self._axes.plot([], [], color=RAY, lw=0.8, zorder=4)[0]
+        self._nose = self._axes.plot([], [], color="white", lw=2.0, zorder=9)[0]
+        self._path = self._axes.plot([], [], color=BODY, lw=1.2, zorder=7)[0]
+        self._rays = self._axes.plot([], [], color=RAY, lw=0.8, zorder=6)[0]
         self._rays.set_visible(rays)
         self._trail: list[tuple[float, float]] = []
         self.update()
 
+    def _add_moving(self, is_disc: bool) -> Patch:
+        look: dict[str, Any] = {"facecolor": style.MOVING, "edgecolor": style.EDGE, "lw": 1.2, "zorder": 4}
+        patch: Patch = Circle((0, 0), 1.0, **look) if is_disc else Polygon([(0, 0), (1, 0), (0, 1)], **look)
+        self._axes.add_patch(patch)
+        return patch
+
     def update(self) -> None:
-        """Takes the vehicle as it is now."""
+        """Takes the vehicle, and what moves beside it, as they are now."""
         x, y, heading = self.vehicle.pose
-        radius = self._body.radius
         self._trail.append((x, y))
-        self._body.center = (x, y)
-        self._nose.set_data((x, x + radius * math.cos(heading)), (y, y + radius * math.sin(heading)))
+        self._put(self._body, x, y, heading)
+        tip = x + self._front * math.cos(heading), y + self._front * math.sin(heading)
+        self._nose.set_data((x, tip[0]), (y, tip[1]))
         self._path.set_data(*zip(*self._trail, strict=True))
         self._rays.set_data(*self._ray_lines())
         if self._ghost.get_visible():
-            self._ghost.center = self.vehicle["odometer"][0], self.vehicle["odometer"][1]
-        self._axes.set_title(f"{self.vehicle.time:.2f} s")
+            self._put(self._ghost, *self.vehicle["odometer"])
+        movers = poses_of(self.vehicle.movers)
+        for patch, shape, (at_x, at_y, cosine, sine) in zip(self._moving, self._solids, movers.tolist(), strict=True):
+            solid = shape.placed(at_x, at_y, math.atan2(sine, cosine))
+            if isinstance(patch, Circle):
+                patch.center, patch.radius = tuple(solid.points[0]), solid.radius
+            elif isinstance(patch, Polygon):
+                patch.set_xy(solid.points)
+        self._axes.set_title(f"{self.vehicle.time:.2f} s", color=style.INK)
+
+    def _put(self, patch: Patch, x: float, y: float, heading: float) -> None:
+        patch.set_transform(Affine2D().rotate(heading).translate(x, y) + self._axes.transData)
 
     def _ray_lines(self) -> tuple[list[float], list[float]]:
-        """Each ray from its sensor to what it meets, as far as things stay in place, one after another with gaps."""
-        x, y, heading = self.vehicle.pose
+        """Each ray from its sensor to what it meets at its height, one after another with gaps; beyond its reach there
+        is nothing to meet."""
+        arena = self.vehicle.arena
+        movers = self.vehicle.movers
+        scene = ffi.new("scene *", {"arena": arena.handle, "movers": movers, "movers_count": len(movers)})
         xs: list[float] = []
         ys: list[float] = []
+        for x, y, angle, reach, height in self._each_ray():
+            cosine, sine = math.cos(angle), math.sin(angle)
+            met = lib.scene_ray(scene, x, y, cosine, sine, reach, height, 0, ffi.NULL)
+            length = reach if met < 0 else met
+            xs += [x, x + length * cosine, math.nan]
+            ys += [y, y + length * sine, math.nan]
+        return xs, ys
+
+    def _each_ray(self) -> Iterator[tuple[float, float, float, float, float]]:
+        """Of each sensor that looks: where a ray begins, its direction, reach and height."""
+        x, y, heading = self.vehicle.pose
         for look, reach in self.vehicle.model.looks.values():
             x0 = x + look["x"] * math.cos(heading) - look["y"] * math.sin(heading)  # (3.9)
             y0 = y + look["x"] * math.sin(heading) + look["y"] * math.cos(heading)
             rays = int(look["rays"])
             for i in range(rays):
                 share = i / (rays - 1) - 0.5 if rays > 1 else 0.0
-                angle = heading + look["heading"] + share * look["opening"]  # (3.10), (3.11)
-                length = self.vehicle.arena.ray(x0, y0, angle, reach) or reach
-                xs += [x0, x0 + length * math.cos(angle), math.nan]
-                ys += [y0, y0 + length * math.sin(angle), math.nan]
-        return xs, ys
+                yield x0, y0, heading + look["heading"] + share * look["opening"], reach, look["height"]  # (3.10)
 
     def save(self, path: str | Path) -> Path:
-        """Writes the picture; the file's ending says its format."""
-        self.figure.savefig(path)
+        """Writes the picture; the file's ending says its format.
+
+        Raises:
+            BoebotError: it names none, or the file cannot be written.
+        """
+        try:
+            self.figure.savefig(path)
+        except OSError as error:
+            raise BoebotError(f"the picture cannot be written to {path}: {error.strerror}") from None
+        except ValueError as error:  # of matplotlib: a format that it does not know
+            raise BoebotError(f"the picture cannot be written to {path}: {error}") from None
         return Path(path)

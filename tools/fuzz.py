@@ -1,4 +1,5 @@
-"""Coverage-guided fuzzing of the firmware's C by libFuzzer with sanitizers: `make fuzz`; for seconds in `make test`.
+"""Coverage-guided fuzzing of the firmware's and the world's C by libFuzzer with sanitizers: `make fuzz`; for seconds in
+`make test`.
 
     python -m tools.fuzz [--seconds N] [FUZZER ...]
 
@@ -38,12 +39,14 @@ class Fuzzer(NamedTuple):
         sources: C files.
         flags: more for the compiler.
         size: longest input (bytes).
+        seeds: inputs that it starts from, where there are no golden frames.
     """
 
     end: str
     sources: tuple[Path, ...]
     flags: tuple[str, ...] = ()
     size: int = 160
+    seeds: tuple[tuple[int, ...], ...] = ()
 
 
 def firmware_sources() -> tuple[Path, ...]:
@@ -51,17 +54,15 @@ def firmware_sources() -> tuple[Path, ...]:
     return tuple(p for p in sorted(FIRMWARE.rglob("*.c")) if p.name != "main.c" and "avr" not in p.parts)
 
 
-HERE = ROOT / "firmware" / "fuzz"
-FUZZERS = {
-    "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME)),
-    "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME), ("-DFRAME_OF_HOST",)),
-    "link": Fuzzer("", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400),
-}
+def world_sources() -> tuple[Path, ...]:
+    """Worlds without boards."""
+    rooms = ("vehicles", "world", "world/sensors")
+    return tuple(path for room in rooms for path in sorted((ROOT / "sim_bridge" / room).glob("*.c")))
 
 
 # Actions of link_fuzzer.cpp: opens; arms and moves; presses a whisker; lets the supply sag; a message of each kind.
 RUN, OPEN, ARM, SET_POINT = (2, 40), (4, 7), (6,), (7, 50)
-ACTIONS: tuple[tuple[int, ...], ...] = (
+LINK = (
     (*RUN, *OPEN, *RUN),
     (*RUN, *OPEN, *RUN, *RUN, *ARM, *RUN, *SET_POINT, *RUN),
     (*RUN, *OPEN, *RUN, 3, 1, *RUN, 3, 0, *RUN),
@@ -69,6 +70,40 @@ ACTIONS: tuple[tuple[int, ...], ...] = (
     (*RUN, *OPEN, 5, 0, *RUN, *RUN),
     *((*RUN, *OPEN, 1, kind, *[0] * 12, *RUN) for kind in range(24)),
 )
+# Of vehicles_fuzzer.c: a room; a triangle, wall, disc, patch, lamp, charger or moving disc in it; then drives, hands a
+# state over as it is, spoilt, spoilt or cut with its checksum made good, drives by the brain, looks, starts anew.
+TRIANGLE, PLAIN = (3, 105, 105, 120, 105, 110, 130), (120, 120, 120, 0)
+SHAPES = (
+    *((1, 1, *TRIANGLE, *PLAIN, kind, 120, 120, 95, 100) for kind in range(6)),
+    (1, 1, *TRIANGLE, *PLAIN, 6, *(90, 120, 120, 90), *(120, 110, 115, 90), *(150, 90, 115, 90), 1, 0, 95, 1, 1),
+)
+DRIVE, BRAIN, LOOK, START = (
+    (5, 105, 100, 2, 50),
+    (3, 90, 90, 2, 100),
+    (4, 95, 95, 110, 91),
+    (0, 90, 90, 5, 1, 80, 80, 95),
+)
+WORLDS = tuple(
+    (*shapes, *DRIVE, 2, 90, 90, 1, *exchange, *DRIVE, *more)
+    for shapes in ((1, 0), (0, 0), *SHAPES)
+    for exchange, more in (
+        ((0, 1, 0), BRAIN),
+        ((1, 181, 9, 1, 0), LOOK),
+        ((1, 180, 7, 1, 1), START),
+        ((0, 0, 64, 1), BRAIN),
+    )
+)
+
+HERE = ROOT / "firmware" / "fuzz"
+WORLD = ROOT / "sim_bridge" / "fuzz" / "vehicles_fuzzer.c"
+FUZZERS = {
+    "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME)),
+    "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME), ("-DFRAME_OF_HOST",)),
+    "link": Fuzzer(
+        "", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400, LINK
+    ),
+    "vehicles": Fuzzer("", (WORLD, *world_sources()), ("-fsanitize=float-cast-overflow",), 200, WORLDS),
+}
 
 
 def build(name: str, folder: Path, instead: Mapping[Path, Path] | None = None) -> Path:
@@ -93,11 +128,11 @@ def build(name: str, folder: Path, instead: Mapping[Path, Path] | None = None) -
 
 
 def write_seeds(name: str, folder: Path) -> None:
-    """The golden frames to the fuzzer's end, each behind its session's seed; for others rows of actions."""
+    """The fuzzer's rows of actions, or the golden frames to its end, each behind its session's seed."""
     folder.mkdir(parents=True, exist_ok=True)
+    for number, actions in enumerate(FUZZERS[name].seeds):
+        (folder / f"actions-{number}").write_bytes(bytes(actions))
     if not FUZZERS[name].end:
-        for number, actions in enumerate(ACTIONS):
-            (folder / f"actions-{number}").write_bytes(bytes(actions))
         return
     rows = json.loads((ROOT / "protocol" / "vectors" / "frames.json").read_text(encoding="utf-8"))
     for number, row in enumerate(rows):

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from boebot.robot import Command, Observation, Robot
     from boebot.robots import load_robot
     from boebot.runner import run
-    from boebot.together import Member, run_together
+    from boebot.tasks import Member
+    from boebot.together import run_together
 
 __all__ = [
     "BoebotError",
@@ -40,7 +41,7 @@ __all__ = [
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
-    "Member": "together",
+    "Member": "tasks",
     "Observation": "robot",
     "Robot": "robot",
     "RunResult": "result",

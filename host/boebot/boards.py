@@ -15,6 +15,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from boebot.errors import BoardError
+from boebot.floor_plan import FloorPlan
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
 from boebot.link.ports.tcp import SocketTransport
@@ -64,9 +65,7 @@ class Truth:
     contact: NDArray[np.bool_]  # the body touches something
     left_speed: Floats | None = None  # m/s along the ground
     right_speed: Floats | None = None
-    arena_name: str = "arena"
-    outlines: Sequence[Floats] = ()  # closed polygons, one row per corner (m): walls and obstacles
-    charger: tuple[float, float, float] | None = None  # x, y, radius (m), where the arena has one
+    plan: FloorPlan = field(default_factory=FloorPlan)  # what stands and moves where it happened
 
 
 class BoardSession(Protocol):
@@ -111,6 +110,9 @@ class VehicleSession(Protocol):
     def step(self, left: float, right: float) -> None:
         """One step under these motor signals, -1 to 1."""
 
+    def stop(self) -> None:
+        """No motor signals from now on."""
+
     @property
     def ended(self) -> str:
         """Why it can go no further, or ""."""
@@ -132,15 +134,6 @@ class VehicleFactory(Protocol):
         """Opens a robot without a board; raises a BoebotError with one sentence if it cannot."""
 
 
-@runtime_checkable
-class HasPins(Protocol):
-    """A session whose board's pins can be reached, for tests."""
-
-    @property
-    def board(self) -> Any:
-        """Pins: log, drive, output, reset, counters."""
-
-
 class BoardFactory(Protocol):
     """What an entry point of the group `boebot.boards` loads to."""
 
@@ -158,12 +151,12 @@ class HasSwitches(Protocol):
 
 
 class SharedWorld(Protocol):
-    """Several robots in one simulated world, opened. Time passes only in `advance`: a session's transport that waits
-    calls who turns the clock, and goes on once its robot has woken."""
+    """Several robots in one simulated world, opened. Time passes only in `advance`: a session that waits calls who
+    turns the clock, and goes on once its robot has woken."""
 
     @property
-    def sessions(self) -> Sequence[BoardSession]:
-        """One per robot, in the order of the requests."""
+    def sessions(self) -> Sequence[BoardSession | VehicleSession]:
+        """One per robot, in the order of the requests: with a board for those whose description has one."""
 
     def on_wait(self, pause: Callable[[int], None]) -> None:
         """Who is called with a robot's index when it waits, and returns once it has woken."""
@@ -177,7 +170,7 @@ class SharedWorld(Protocol):
 
 @runtime_checkable
 class TogetherFactory(Protocol):
-    """A board factory that can put several robots into one world."""
+    """A factory of boards or vehicles that can put several robots into one world, one of boards also such without."""
 
     def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
         """Opens them; arena, seed of the world and pace are the first request's."""
@@ -245,26 +238,25 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     if is_live(url):
         if request.without:
             raise BoardError(f"nothing can be switched off of the robot at {url!r}: that is for simulated runs")
+        if request.start_pose is not None:
+            raise BoardError(f"the robot at {url!r} starts where it stands: a pose is for simulated runs")
         transport = open_port(url, _default_baud(request.robot))
         return LiveSession(transport, f"board at {transport.name}")
     raise BoardError(_unknown(url))
 
 
 def open_together(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
-    """Opens several robots in one simulated world, each on a board of the kind that `url` names.
+    """Opens several robots in one simulated world, those with boards on the kind of board that `url` names.
 
     Raises:
-        BoardError: no such kind, or one that cannot share a world; a robot without a board.
+        BoardError: no such kind, one that cannot share a world, or one that does not fit the robots.
     """
-    for request in requests:
-        if not request.robot.has_board:
-            raise BoardError(
-                f"robot {request.robot.name!r} has no board: it cannot yet run together with others; "
-                "run it alone, or take robots with boards"
-            )
     if is_live(url):
         raise BoardError(f"several robots in one run are simulated; {url!r} is a port: run each robot by itself there")
-    for point in entry_points(group=BOARDS_GROUP):
+    with_boards = [request.robot for request in requests if request.robot.has_board]
+    for robot in with_boards or [request.robot for request in requests]:
+        check_board(url, robot)
+    for point in entry_points(group=BOARDS_GROUP if with_boards else VEHICLES_GROUP):
         if point.name == url:
             factory = _load(point.load, url)
             if not isinstance(factory, TogetherFactory):
@@ -301,9 +293,9 @@ def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
     raise BoardError("there is no world for a robot without a board: the simulator is not installed")
 
 
-def default_board(robot: RobotDescription) -> str:
-    """What the robot runs on unless somebody says otherwise."""
-    return "native" if robot.has_board else DIRECT
+def default_board(robots: Sequence[RobotDescription]) -> str:
+    """What robots run on unless somebody says otherwise: those without boards need none."""
+    return "native" if any(robot.has_board for robot in robots) else DIRECT
 
 
 def find_server() -> Server:

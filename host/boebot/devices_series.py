@@ -5,6 +5,7 @@ Between two of their messages the last one stands, and its ages count on.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from boebot.equipment import SlowReader
 from boebot.link.messages import DevicesTelemetry
-from boebot.series import Bools, Floats
+from boebot.series import Bools, Floats, Readout
 
 _APART = 1 << 40  # ticks between two starts of the board, as positions have them
 
@@ -28,6 +29,19 @@ COLUMNS: dict[str, tuple[str, int, Callable[[Any], float | None]]] = {
     "right_zone": ("infrared_zone_right", 0, lambda view: view.zone),
     "turret": ("turret_rad", 4, lambda view: view.angle),
     "buzzer": ("buzzer_token", 0, lambda view: view.token),
+}
+
+# the same for people: unit, what the value is multiplied with, digits
+_SHOWN: dict[str, tuple[str, float, int]] = {
+    "left_light": ("ms", 1e3, 3),
+    "right_light": ("ms", 1e3, 3),
+    "compass": ("°", 180 / math.pi, 1),
+    "battery": ("V", 1.0, 2),
+    "analog_ir": ("m", 1.0, 3),
+    "left_zone": ("of 5", 1.0, 0),
+    "right_zone": ("of 5", 1.0, 0),
+    "turret": ("°", 180 / math.pi, 1),
+    "buzzer": ("tones", 1.0, 0),
 }
 
 
@@ -69,6 +83,14 @@ class DevicesSeries:
             heading, digits, _ = COLUMNS[name]
             found[heading] = (values, digits)
             found[f"{_without_unit(heading)}_age_s"] = (self.ages[name], 3)
+        return found
+
+    def readouts(self) -> list[Readout]:
+        """As `boebot.series.Series.readouts`."""
+        found = []
+        for name, values in self.values.items():
+            unit, factor, digits = _SHOWN[name]
+            found.append(Readout(name, unit, digits, values * factor, self.ages[name]))
         return found
 
 

@@ -11,6 +11,7 @@ from boebot.devices.battery import Battery, BatteryReader
 from boebot.devices.buzzer import Buzzer, BuzzerReader
 from boebot.devices.compass import Compass, CompassReader
 from boebot.devices.encoder import Encoder, EncoderReader
+from boebot.devices.freshness import MESSAGE_TICKS
 from boebot.devices.infrared import Infrared, InfraredReader, InfraredZone, InfraredZoneReader
 from boebot.devices.light import Light, LightReader
 from boebot.devices.ping import Ping, PingReader
@@ -98,8 +99,15 @@ class Equipment:
     turret: Callable[[Any], Turret]
     buzzer: Callable[[Any], Buzzer]
 
-    def __init__(self, robot: robots.RobotDescription, tick_s: float, layout: Layout | None = None) -> None:
-        """`layout`: where the readings of a robot without a board stand, once that is known."""
+    def __init__(
+        self,
+        robot: robots.RobotDescription,
+        tick_s: float,
+        layout: Layout | None = None,
+        told_ticks: int = MESSAGE_TICKS,
+    ) -> None:
+        """`layout`: where the readings of a robot without a board stand, once that is known. `told_ticks`: from one
+        message of a board's slow devices to the next."""
         self.robot_name = robot.name
         self.tick_s = tick_s
         body = robot.body
@@ -109,7 +117,7 @@ class Equipment:
         found: dict[str, Any] = {}
         slow: dict[str, Any] = {}
         if robot.has_board:
-            slow = {name: _of_told(reader) for name, reader in slow_readers(robot, tick_s).items()}
+            slow = {name: _of_told(reader) for name, reader in slow_readers(robot, tick_s, told_ticks).items()}
             found = _board_readers(robot, tick_s) | slow
         else:
             found.update(readers(robot, layout or {name: slice(0, 1) for name in robot.device if robot.has(name)}))
@@ -149,8 +157,11 @@ class Equipment:
 SlowReader = Callable[[messages.DevicesTelemetry, float], Any]
 
 
-def slow_readers(robot: robots.RobotDescription, tick_s: float) -> dict[str, SlowReader]:
-    """One reader of devices_telemetry for each slow device of a board, by the brain's name of it."""
+def slow_readers(
+    robot: robots.RobotDescription, tick_s: float, told_ticks: int = MESSAGE_TICKS
+) -> dict[str, SlowReader]:
+    """One reader of devices_telemetry for each slow device of a board, by the brain's name of it; `told_ticks`: from
+    one such message to the next."""
     found: dict[str, SlowReader] = {}
     for name, device in robot.device.items():
         if not device.on:
@@ -158,21 +169,23 @@ def slow_readers(robot: robots.RobotDescription, tick_s: float) -> dict[str, Slo
         match device:
             case robots.LightSensor() if name in ("light_left", "light_right"):
                 side = name.removeprefix("light_")
-                found[f"{side}_light"] = LightReader(side == "left", tick_s)
+                found[f"{side}_light"] = LightReader(side == "left", tick_s, told_ticks)
             case robots.Compass() if name == "compass":
-                found["compass"] = CompassReader(tick_s, device.offset_counts)
+                found["compass"] = CompassReader(tick_s, device.offset_counts, told_ticks)
             case robots.Battery() if name == "battery":
-                found["battery"] = BatteryReader(device.ratio, tick_s)
+                found["battery"] = BatteryReader(device.ratio, tick_s, told_ticks)
             case robots.AnalogInfrared() if name == "analog_infrared":
-                found["analog_ir"] = AnalogInfraredReader(tick_s)
+                found["analog_ir"] = AnalogInfraredReader(tick_s, told_ticks)
             case robots.PositionServo() if name == "turret":
-                found["turret"] = TurretReader(device.centre_us, device.gain_us_per_rad, tick_s)
+                found["turret"] = TurretReader(device.centre_us, device.gain_us_per_rad, tick_s, told_ticks)
             case robots.Buzzer() if name == "buzzer":
-                found["buzzer"] = BuzzerReader(tick_s)
+                found["buzzer"] = BuzzerReader(tick_s, told_ticks)
             case robots.InfraredSchedule() if name == "infrared" and device.sweep:
                 for side in ("left", "right"):
                     if robot.has(f"infrared_{side}"):
-                        found[f"{side}_zone"] = InfraredZoneReader(side == "left", device.period_ticks, tick_s)
+                        found[f"{side}_zone"] = InfraredZoneReader(
+                            side == "left", device.period_ticks, tick_s, told_ticks
+                        )
     return found
 
 

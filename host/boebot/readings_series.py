@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot import robots, vehicle_devices
-from boebot.readings import Layout
+from boebot.readings import BRAIN_NAMES, Layout
 from boebot.record import Record
-from boebot.series import Bools, Floats, Pose, Series
+from boebot.series import Bools, Floats, Pose, Readout, Series
 
 
 class ReadingsSeries(Series):
@@ -21,7 +21,7 @@ class ReadingsSeries(Series):
         super().__init__(record.times, record.steps)
         self._robot = robot
         self._layout = layout
-        samples = [sample for sample, _, _ in record.readings]
+        self._samples = samples = [sample for sample, _, _ in record.readings]
         width = max((where.stop for where in layout.values()), default=0)
         self.raw = np.array(
             [(sample.tick, sample.status, sample.values) for sample in samples],
@@ -84,6 +84,27 @@ class ReadingsSeries(Series):
         """See `Series`."""
         return np.asarray(self._signals[:, 1])
 
+    def readouts(self) -> list[Readout]:
+        """See `Series`; of a laser its nearest distance."""
+        found = []
+        for name, where in self._layout.items():
+            device = self._robot.device[name]
+            if type(device) not in _SHOWN or name not in BRAIN_NAMES:
+                continue
+            unit, factor, digits = _SHOWN[type(device)]
+            values = self.values(name)
+            if isinstance(device, vehicle_devices.Laser):
+                nearest = np.where(values < 0, np.inf, values).min(axis=1, initial=np.inf)
+                shown = np.where(np.isfinite(nearest), nearest, np.nan)
+            else:
+                shown = values[:, 0] * factor
+            found.append(Readout(BRAIN_NAMES[name], unit, digits, shown, self._ages[:, where.start]))
+        return found
+
+    @cached_property
+    def _ages(self) -> Floats:
+        return np.array([sample.ages for sample in self._samples], dtype=np.float64).reshape(len(self), -1)
+
     def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
         """See `Series`: the odometer's own estimate, laid off from `start`; without one it stays there."""
         x0, y0, heading0 = start
@@ -116,6 +137,16 @@ class ReadingsSeries(Series):
         found["status"] = (self.status, None)
         return found
 
+
+# for people: unit, what the value is multiplied with, digits
+_SHOWN: dict[type, tuple[str, float, int]] = {
+    vehicle_devices.InfraredProximity: ("", 1.0, 2),
+    vehicle_devices.Laser: ("m", 1.0, 2),
+    vehicle_devices.HeadingCompass: ("°", 180 / math.pi, 1),
+    vehicle_devices.Accelerometer: ("m/s²", 1.0, 2),
+    vehicle_devices.Phototransistor: ("W/m²", 1.0, 2),
+    vehicle_devices.Energy: ("V", 1.0, 2),
+}
 
 _COLUMNS: dict[type, tuple[str, ...]] = {
     vehicle_devices.Odometer: ("x_m", "y_m", "heading_rad"),

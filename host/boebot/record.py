@@ -11,7 +11,7 @@ from boebot.link.delivery import BoardEvent
 from boebot.readings import Readings
 
 
-@dataclass
+@dataclass(repr=False)
 class Record:
     """What is put aside while a run goes on.
 
@@ -34,3 +34,8 @@ class Record:
     stamps: list[tuple[float, float]] = field(default_factory=list)
     events: list[BoardEvent] = field(default_factory=list)
     steps: list[tuple[int, str, float, float]] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """How much of each there is."""
+        counts = ", ".join(f"{len(rows)} {name}" for name, rows in vars(self).items() if rows)
+        return f"<Record: {counts or 'empty'}>"

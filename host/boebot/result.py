@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from boebot import figures
 from boebot.boards import Truth
 from boebot.link.messages import Identity, Status
 from boebot.link.session import text
@@ -21,7 +23,7 @@ from boebot.series import Pose, Series, onsets, touch_indices, truth_at
 from boebot.telemetry_series import TelemetrySeries
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class RunResult:
     """What came of a run. Lengths in metres, times in seconds.
 
@@ -73,6 +75,27 @@ class RunResult:
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        """One line; the figures are in `table()`, everything else in the attributes."""
+        return f"<RunResult: {self.summary()}>"
+
+    def _repr_html_(self) -> str:
+        """The figures as a table, for notebooks."""
+        return figures.html_table(self.table())
+
+    def summary(self) -> str:
+        """The run in one line: who, where, how long, how far, how it ended."""
+        where = self.table()["arena"]
+        parts = [
+            f"{self.brain} on {self.robot.name} ({self.board})" + (f" in {where}" if where else ""),
+            f"{self.run_time:.1f} s",
+            f"{self.distance:.2f} m" if self.has_path else "way unknown",
+            f"{self.contacts} contact" + ("" if self.contacts == 1 else "s"),
+            f"seed {self.seed}",
+            "complete" if self.error is None else f"ended early: {textwrap.shorten(_why(self.error), 120)}",
+        ]
+        return ", ".join(parts)
 
     # ---- arrays --------------------------------------------------------------------------------------------
 
@@ -154,12 +177,27 @@ class RunResult:
         """Times the motors stopped because no fresh set-point came."""
         return self.series.rising(Status.DEAD_MAN)
 
+    @property
+    def has_odometry(self) -> bool:
+        """The robot has what an estimate of its pose needs: encoders, or an odometer."""
+        measures = ("odometer",) if self.layout is not None else ("encoder_left", "encoder_right")
+        return all(self.robot.has(device) for device in measures)
+
+    @property
+    def has_whiskers(self) -> bool:
+        """The robot has at least one."""
+        return self.robot.has("whisker_left") or self.robot.has("whisker_right")
+
+    @property
+    def has_path(self) -> bool:
+        """Somebody knows where the robot went: the simulator, or the robot by its odometry."""
+        return self.has_odometry or self.true_pose is not None
+
     @cached_property
     def odometry_error(self) -> float | None:
         """Distance of the estimate from the true place at the end (m), where somebody knows it and the robot has what
         an estimate needs."""
-        measures = ("odometer",) if self.layout is not None else ("encoder_left", "encoder_right")
-        if self.true_pose is None or not all(self.robot.has(device) for device in measures):
+        if self.true_pose is None or not self.has_odometry:
             return None
         return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
 
@@ -168,30 +206,45 @@ class RunResult:
         """How many times faster than the wall clock the run was."""
         return self.run_time / self.wall_time if self.wall_time > 0 else 0.0
 
+    @cached_property
+    def slow_reading_age(self) -> float | None:
+        """The greatest age (s) that a slow device's reading (light, compass, battery, ...) had at a step of the brain,
+        once it had said something; None without such a device."""
+        if self.layout is not None or not self.record.devices:
+            return None
+        steps = np.array([index for index, *_ in self.record.steps], dtype=np.intp)
+        ages = [values[steps[steps < len(values)]] for values in self.telemetry.devices.ages.values()]
+        known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
+        return float(known.max()) if len(known) else None
+
     def table(self) -> dict[str, float | int | str | None]:
-        """The run's figures by name, units in the names."""
+        """The run's figures by name, units in the names; None: not known, or nothing that this robot has."""
+        on_board = self.layout is None
+        slow_age = self.slow_reading_age
         return {
             "brain": self.brain,
             "robot": self.robot.name,
             "board": self.board,
-            "arena": (self.truth.arena_name if self.truth is not None else self.arena),
+            "arena": (self.truth.plan.name if self.truth is not None else self.arena),
             "seed": self.seed,
             "without": ", ".join(self.without) or None,
-            "period_ms": round(self.period * 1000, 3),
             "run_time_s": round(self.run_time, 3),
-            "distance_m": round(self.distance, 3),
-            "contacts": self.contacts,
-            "whisker_touches": self.whisker_touches,
+            "distance_m": round(self.distance, 3) if self.has_path else None,
+            "contacts": self.contacts if self.truth is not None or self.has_whiskers else None,
+            "whisker_touches": self.whisker_touches if self.has_whiskers else None,
             "odometry_error_m": None if self.odometry_error is None else round(self.odometry_error, 3),
-            "ticks": self.ticks,
+            "period_ms": round(self.period * 1000, 3),
             "steps": self.steps,
             "late_steps": self.late_steps,
-            "lost_frames": self.lost_frames,
-            "bad_frames": self.bad_frames,
-            "overruns": self.overruns,
-            "dead_man_stops": self.dead_man_stops,
-            "resets": self.resets,
-            "sessions_lost": self.sessions_lost,
+            "ticks": self.ticks,
+            "slow_readings": None if slow_age is None else len(self.record.devices),
+            "slow_reading_age_ms": None if slow_age is None else round(slow_age * 1000, 3),
+            "lost_frames": self.lost_frames if on_board else None,
+            "bad_frames": self.bad_frames if on_board else None,
+            "overruns": self.overruns if on_board else None,
+            "dead_man_stops": self.dead_man_stops if on_board else None,
+            "resets": self.resets if on_board else None,
+            "sessions_lost": self.sessions_lost if on_board else None,
             "real_time_factor": round(self.real_time_factor, 2),
             "firmware": None if self.identity is None else text(self.identity.firmware_version),
             "compiler": None if self.identity is None else text(self.identity.compiler),
@@ -211,7 +264,7 @@ class RunResult:
         return save(self, Path(folder))
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class TogetherResult:
     """What came of a run of several robots in one world.
 
@@ -222,6 +275,15 @@ class TogetherResult:
 
     robots: list[RunResult]
     error: BaseException | None
+
+    def __repr__(self) -> str:
+        """A line for each robot."""
+        robots = "".join(f"\n  {number}: {robot.summary()}" for number, robot in enumerate(self.robots, 1))
+        return f"<TogetherResult of {len(self.robots)}:{robots}>"
+
+    def _repr_html_(self) -> str:
+        """A table for each robot, for notebooks."""
+        return "".join(f"<h4>robot {n}</h4>{robot._repr_html_()}" for n, robot in enumerate(self.robots, 1))
 
     def table(self) -> dict[str, Any]:
         """The figures by name: of each robot, and how the run ended."""

@@ -7,6 +7,7 @@ keys' names; lengths are in the robot's frame, x forward, y left, origin at the 
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -17,11 +18,14 @@ from boebot.device import Device as Device
 from boebot.device import pin_name as pin_name
 from boebot.device import pin_number as pin_number
 from boebot.errors import RobotError
-from boebot.vehicle_devices import AnyVehicleDevice, DcMotor, VehicleDevice
+from boebot.geometry import Point, polygon_fault, way_out
+from boebot.vehicle_devices import AnyVehicleDevice, Energy, Laser, Motor, VehicleDevice
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
-Point = tuple[float, float]
+
+OUTLINE_CORNERS_MAXIMUM = 32
+VEHICLE_SENSORS_MAXIMUM = 24
 
 
 class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -37,6 +41,19 @@ class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     linear_damping_n_s_m: NotNegative
     angular_damping_n_m_s: NotNegative
     wheel_speed_maximum_m_s: Positive
+    outline_m: list[Point] = []  # collision outline around the axle's middle; none: the circle of radius_m
+    tyre_grip: NotNegative | None = None  # friction coefficient; none: as any rubber tyre's (imperfections)
+    tyre_slip: bool | None = None  # whether tyres slip beyond it; none: yes with a board, no without, as in the notes
+
+    @property
+    def front_m(self) -> float:
+        """From the axle's middle straight ahead to the body's edge."""
+        return way_out(self.outline_m) if self.outline_m else self.radius_m
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of the circle about the axle's middle that holds the body."""
+        return max((math.hypot(x, y) for x, y in self.outline_m), default=self.radius_m)
 
 
 class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -274,13 +291,18 @@ def load_robot(robot: str | Path) -> RobotDescription:
         RobotError: unknown robot, unreadable file, wrong key or value, or devices that cannot live on one board.
     """
     path = toml_files.find("robots", robot, RobotError)
-    description = toml_files.convert(_read(path, seen=()), RobotDescription, path.name, RobotError)
+    table = _read(path, seen=())
+    description = toml_files.convert(table, RobotDescription, path.name, RobotError)
+    if description.body.outline_m and (fault := polygon_fault(description.body.outline_m, OUTLINE_CORNERS_MAXIMUM)):
+        place = f"body.outline_m{fault.partition(' ')[0].rstrip(':')}"
+        raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
     if description.has_board:
         _check_supply(description, path.name)
         _check_pins(description, path.name)
         _check_image(description, path)
     else:
         _check_vehicle(description, path.name)
+        _check_vehicle_devices(description, table, path.name)
     return description
 
 
@@ -371,8 +393,32 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
             kind = device.__struct_config__.tag
             raise RobotError(f"{file}: device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}")
     for name in ("motor_left", "motor_right"):
-        if not (robot.has(name) and isinstance(robot.device[name], DcMotor)):
-            raise RobotError(f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor there")
+        if not (robot.has(name) and isinstance(robot.device[name], Motor)):
+            raise RobotError(
+                f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor or regulated_motor"
+            )
+    left, right = (robot.device[name].__struct_config__.tag for name in ("motor_left", "motor_right"))
+    if left != right:
+        raise RobotError(f"{file}: device.motor_right is {right}, device.motor_left {left}; expected the same type")
+
+
+def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
+    """Refuses what no model of a vehicle takes: keys that do not fit each other, too many sensors."""
+    sensors: list[VehicleDevice] = []
+    for name, device in robot.device.items():
+        if not isinstance(device, VehicleDevice) or not device.on:
+            continue
+        if fault := device.fault():
+            key = f"device.{name}.{fault[0]}"
+            raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
+        if isinstance(device, Motor):
+            continue
+        at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
+        if isinstance(device, (Laser, Energy)) and any(type(other) is type(device) for other in sensors):
+            raise RobotError(f"{at} is a second {device.__struct_config__.tag}; expected one")
+        sensors.append(device)
+        if len(sensors) > VEHICLE_SENSORS_MAXIMUM:
+            raise RobotError(f"{at} is one sensor too many; expected at most {VEHICLE_SENSORS_MAXIMUM}")
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without

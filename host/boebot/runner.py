@@ -10,22 +10,24 @@ the motors are stopped and the record is complete up to there.
 from __future__ import annotations
 
 import time as wall
-from collections.abc import Sequence
-from numbers import Integral, Real
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar, cast
 
 from boebot import brains, interrupts, report
-from boebot.boards import BoardRequest, default_board, open_board, open_vehicle
+from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
 from boebot.brains import LoadedBrain
 from boebot.driving import Driver, Progress, Task
-from boebot.driving.board import BoardDriver, check_time_to_live
+from boebot.driving.board import BoardDriver
 from boebot.driving.direct import DirectDriver
 from boebot.errors import BoebotError, BrainError
-from boebot.result import RunResult
-from boebot.robot import Equipment, Robot
-from boebot.robots import RobotDescription, load_robot
+from boebot.result import RunResult, TogetherResult
+from boebot.robot import Robot
+from boebot.robots import RobotDescription
+from boebot.tasks import Member, Terms, expect, task_of
 
-DEFAULT_PERIOD = 0.05  # s
+Result = TypeVar("Result", RunResult, TogetherResult)
 
 
 def run(
@@ -40,42 +42,32 @@ def run(
     period: float | None = None,
     progress: Progress | None = None,
     without: Sequence[str] = (),
+    pose: tuple[float, float, float] | None = None,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
     Args:
-        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with
-        `step(robot)`. robot: bundled name, .toml file, or a description. arena: bundled name or .toml file;
-        None: the simulator's own choice. Of no meaning on a real robot. on: "native", "avr", or a port:
-        "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot without a board. None: native or
-        direct. seconds: length of the run by the board's clock;
-        may be infinite. seed: of the brain's chance, and of the noise of the simulated world. realtime: slow
-        a simulated run down to the wall clock. out: folder for run.csv, run.png, replay.html and the raw
-        bytes. period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05. progress:
-        called with the seconds that have passed, about ten times a second. without: imperfections of a simulated
-        robot that are switched off, such as ("slip", "bounce"); docs/reference/imperfections.md names them.
+        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with `step(robot)`.
+        robot: bundled name, .toml file, or a description.
+        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
+        on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot
+            without a board. None: native or direct.
+        seconds: length of the run by the board's clock; may be infinite.
+        seed: of the brain's chance, and of the noise of the simulated world.
+        realtime: slow a simulated run down to the wall clock.
+        out: folder for run.csv, run.png, replay.html and the raw bytes.
+        period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05.
+        progress: called with the seconds that have passed, about ten times a second.
+        without: imperfections of a simulated robot that are switched off, such as ("slip", "bounce");
+            docs/reference/imperfections.md names them.
+        pose: where a simulated robot starts: x (m), y (m), heading (rad). None: where the arena says.
 
     Raises:
-        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board
-        that is not
+        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
-    if out is not None:
-        expect("out", out, "a folder or None", str, Path)
-        report.make_folder(Path(out))
-    result = execute(brain, robot, arena, on, seconds, seed, realtime, period, progress, without)
-    if out is not None:
-        try:
-            with interrupts.ignored():
-                result.save(out)
-        except BoebotError as unsaved:
-            if result.error is None:
-                raise
-            result.error.add_note(str(unsaved))
-    if result.error is not None:
-        raise result.error
-    return result
+    return keep(lambda: execute(brain, robot, arena, on, seconds, seed, realtime, period, progress, without, pose), out)
 
 
 def execute(
@@ -89,6 +81,7 @@ def execute(
     period: float | None = None,
     progress: Progress | None = None,
     without: Sequence[str] = (),
+    pose: tuple[float, float, float] | None = None,
 ) -> RunResult:
     """As `run`, but once the run has begun every end of it, even by an error, is a result: see
     `RunResult.error`.
@@ -96,56 +89,50 @@ def execute(
     Raises:
         BoebotError: the run could not begin.
     """
-    expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
-    expect("on", on, "the name of a board or a port", str, type(None))
-    expect("seed", seed, "a whole number", Integral)
-    loaded, description, period_s = prepare(brain, robot, seconds, period)
-    on = default_board(description) if on is None else on
-    request = BoardRequest(
-        robot=description,
-        arena=None if arena is None else str(arena),
-        seed=seed,
-        realtime=realtime,
-        without=switched_off(without),
-    )
-    task = Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, progress=progress)
-    if not description.has_board:
-        vehicle = open_vehicle(on, request)
-        try:
-            return _drive(DirectDriver(vehicle, task), loaded)
-        finally:
-            vehicle.close()
-    session = open_board(on, request)
+    terms = Terms(arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=progress)
+    terms.check()
+    task = task_of(Member(brain=brain, robot=robot, pose=pose, period=period, without=without), terms)
+    task = replace(task, on=default_board([task.request.robot]) if on is None else on)
+    opening = open_board if task.request.robot.has_board else open_vehicle
+    session = opening(task.on, task.request)
     try:
-        return _drive(BoardDriver(session, task), loaded)
+        return _drive(driver_of(session, task), task.brain)
     finally:
         session.close()
 
 
-def prepare(
-    brain: object, robot: str | Path | RobotDescription, seconds: float, period: float | None
-) -> tuple[LoadedBrain, RobotDescription, float]:
-    """Brain, robot and the brain's period (s), found and checked to fit each other.
+def keep(work: Callable[[], Result], out: str | Path | None) -> Result:
+    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one.
 
     Raises:
-        BoebotError: in one sentence.
+        BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
     """
-    expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
-    expect("seconds", seconds, "a number", Real)
-    expect("period", period, "seconds or None", Real, type(None))
-    if not seconds > 0:
-        raise BoebotError(f"a run cannot last {seconds:g} s; expected more than 0")
-    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
-    loaded = brains.load_brain(brain)
-    period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
-    if description.has_board:
-        check_time_to_live(period_s)
-    missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
-    if missing:
-        raise BrainError(
-            f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
-        )
-    return loaded, description, period_s
+    if out is not None:
+        expect("out", out, "a folder or None", str, Path)
+        report.make_folder(Path(out))
+    result = work()
+    if out is not None:
+        try:
+            with interrupts.ignored():
+                result.save(out)
+        except BoebotError as unsaved:
+            if result.error is None:
+                raise
+            result.error.add_note(str(unsaved))
+    if result.error is not None:
+        raise result.error
+    return result
+
+
+def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
+    """Who drives that robot: over the link to its board, or direct.
+
+    Raises:
+        BoebotError: it cannot be driven so.
+    """
+    if task.request.robot.has_board:
+        return BoardDriver(cast(BoardSession, session), task)
+    return DirectDriver(cast(VehicleSession, session), task)
 
 
 def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
@@ -181,20 +168,3 @@ def step_once(robot: Robot, brain: LoadedBrain) -> None:
         brain.step(robot)
     except (Exception, SystemExit) as error:
         raise BrainError(brains.explain(error, brain.path)) from error
-
-
-def switched_off(without: object) -> tuple[str, ...]:
-    """The names in the argument `without` of `run`, each once.
-
-    Raises:
-        BoebotError: it is no list of names.
-    """
-    if not isinstance(without, list | tuple) or not all(isinstance(name, str) for name in without):
-        raise BoebotError(f'without is {without!r}; expected a list of names, as in ("slip", "bounce")')
-    return tuple(dict.fromkeys(without))
-
-
-def expect(name: str, value: object, expected: str, *kinds: type) -> None:
-    """Raises a BoebotError if an argument of `run` is of no such kind."""
-    if not isinstance(value, kinds) or isinstance(value, bool):
-        raise BoebotError(f"{name} is {value!r}; expected {expected}")

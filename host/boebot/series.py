@@ -35,6 +35,20 @@ class Pose:
     """rad, counter-clockwise from the x axis"""
 
 
+@dataclass(frozen=True)
+class Readout:
+    """What one device said over time, for people to read: one entry per tick; NaN: nothing, or not known yet."""
+
+    device: str
+    """by the brain's name"""
+    unit: str
+    digits: int
+    values: Floats
+    """in that unit"""
+    ages: Floats
+    """s"""
+
+
 class Series(ABC):
     """What the robot told, and what was asked of it.
 
@@ -101,6 +115,10 @@ class Series(ABC):
     @abstractmethod
     def columns(self) -> dict[str, tuple[NDArray[np.generic], int | None]]:
         """What the devices said, for run.csv: heading (unit in its name) -> (values, digits; None: whole numbers)."""
+
+    def readouts(self) -> list[Readout]:
+        """What the devices said that have a number to tell, besides those above."""
+        return []
 
     @cached_property
     def commands(self) -> list[tuple[str, float, float]]:

@@ -18,7 +18,7 @@ from boebot.equipment import slow_readers
 from boebot.link.messages import Infrared, Telemetry, Whiskers
 from boebot.odometry import Odometry, WheelDirection
 from boebot.record import Record
-from boebot.series import Bools, Floats, Pose, Series
+from boebot.series import Bools, Floats, Pose, Readout, Series
 
 _NUMPY_CODES = {"b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 TELEMETRY_DTYPE = np.dtype(
@@ -144,6 +144,11 @@ class TelemetrySeries(Series):
             "overruns": (raw["overruns"], None),
             **self.devices.columns(),
         }
+
+    def readouts(self) -> list[Readout]:
+        """See `Series`: the slow devices, and the board's supply."""
+        supply = np.where(self.raw["supply"] > 0, self.raw["supply"] / 1000, np.nan)
+        return [*self.devices.readouts(), Readout("supply", "V", 2, supply, np.zeros(len(self)))]
 
     def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
         """The pose estimate at each tick, from `start` (x m, y m, heading rad) at the first."""

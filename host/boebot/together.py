@@ -1,9 +1,9 @@
 """Runs several robots in one simulated world: `boebot.run_together(...)`, and `boebot run` with several of them.
 
-Each has its own board, brain and seed, and they sense and bump each other. Brains step here, in the caller's thread;
-each robot's line is tended by a strand (boebot.driving.strand) that pauses while it waits. One clock turns them all:
-when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant go on in the
-order of their numbers. The run of each is then a function of what its own robot meets.
+Each has its own brain and seed, and a board or none, and they sense and bump each other. Brains step here, in the
+caller's thread; each robot is driven by a strand (boebot.driving.strand) that pauses while it waits. One clock turns
+them all: when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant go on
+in the order of their numbers. The run of each is then a function of what its own robot meets.
 
 An error in one ends the run: all motors are stopped, and the error says which robot it was.
 """
@@ -12,44 +12,21 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Sequence
-from dataclasses import dataclass
-from numbers import Integral, Real
+from dataclasses import replace
 from pathlib import Path
 
-from boebot import interrupts, report
-from boebot.boards import BoardRequest, BoardSession, SharedWorld, open_together
-from boebot.driving import PROGRESS_S, Progress, Task
-from boebot.driving.board import BoardDriver
+from boebot import interrupts
+from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, default_board, open_together
+from boebot.driving import PROGRESS_S, Driver, Progress, Task
 from boebot.driving.strand import PAUSED, Strand
 from boebot.errors import BoebotError
 from boebot.result import RunResult, TogetherResult
-from boebot.robots import RobotDescription
-from boebot.runner import expect, prepare, step_once, switched_off
+from boebot.runner import driver_of, keep, step_once
+from boebot.tasks import Member, Terms, expect, task_of
 
-DEFAULT_KIND = "native"
+__all__ = ["Member", "StoppedError", "execute_together", "run_together"]
+
 _STEP = "step"  # what a strand says when the brain is to step
-
-
-@dataclass(frozen=True, kw_only=True)
-class Member:
-    """One robot of a run of several.
-
-    Attributes:
-        brain: as for `boebot.run`.
-        robot: as for `boebot.run`; one with a board.
-        pose: where it starts: x (m), y (m), heading (rad). None: the arena's start for the first such robot, then free
-            places near it.
-        seed: of the brain's chance. None: the run's seed for the first robot, one more for each further one.
-        period: seconds from step to step of the brain. None: the brain's PERIOD, or 0.05.
-        without: its imperfections that are switched off, as for `boebot.run`.
-    """
-
-    brain: object = "wander"
-    robot: str | Path | RobotDescription = "shieldbot"
-    pose: tuple[float, float, float] | None = None
-    seed: int | None = None
-    period: float | None = None
-    without: Sequence[str] = ()
 
 
 class StoppedError(BoebotError):
@@ -60,21 +37,26 @@ def run_together(
     members: Sequence[Member],
     arena: str | Path | None = None,
     seconds: float = 60.0,
-    on: str = DEFAULT_KIND,
+    on: str | None = None,
     seed: int = 1,
     realtime: bool = False,
     out: str | Path | None = None,
     progress: Progress | None = None,
 ) -> TogetherResult:
-    """Runs several robots, each with its own board and brain, in one simulated world.
+    """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
         boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
 
     Args:
-        members: the robots. arena: bundled name or .toml file; None: the simulator's own choice. seconds: length of the
-        run by each board's clock. on: "native" or "avr". seed: of the world's noise and of the robots' imperfections.
-        realtime: slow down to the wall clock. out: folder for a picture and a page of all robots, and for a folder of
-        files per robot. progress: called with the seconds that have passed, about ten times a second.
+        members: the robots.
+        arena: bundled name or .toml file; None: the simulator's own choice.
+        seconds: length of the run by each robot's clock.
+        on: what the robots with boards run on: "native" or "avr"; "direct" where no robot has one. None: native or
+            direct.
+        seed: of the world's noise and of the robots' imperfections.
+        realtime: slow down to the wall clock.
+        out: folder for a picture and a page of all robots, and for a folder of files per robot.
+        progress: called with the seconds that have passed, about ten times a second.
 
     Returns:
         A result per robot, and what is common to them.
@@ -84,28 +66,14 @@ def run_together(
             place). The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    if out is not None:
-        expect("out", out, "a folder or None", str, Path)
-        report.make_folder(Path(out))
-    result = execute_together(members, arena, seconds, on, seed, realtime, progress)
-    if out is not None:
-        try:
-            with interrupts.ignored():
-                result.save(out)
-        except BoebotError as unsaved:
-            if result.error is None:
-                raise
-            result.error.add_note(str(unsaved))
-    if result.error is not None:
-        raise result.error
-    return result
+    return keep(lambda: execute_together(members, arena, seconds, on, seed, realtime, progress), out)
 
 
 def execute_together(
     members: Sequence[Member],
     arena: str | Path | None = None,
     seconds: float = 60.0,
-    on: str = DEFAULT_KIND,
+    on: str | None = None,
     seed: int = 1,
     realtime: bool = False,
     progress: Progress | None = None,
@@ -117,50 +85,24 @@ def execute_together(
         BoebotError: the run could not begin.
     """
     expect("members", members, "a list of boebot.Member", list, tuple)
-    expect("arena", arena, "a name, a .toml file or None", str, Path, type(None))
-    expect("on", on, "the name of a board", str)
-    expect("seconds", seconds, "a number", Real)
-    expect("seed", seed, "a whole number", Integral)
+    terms = Terms(arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=None)
+    terms.check()
     if not members:
         raise BoebotError("there is no robot to run; expected at least one Member")
     tasks = []
     for number, member in enumerate(members, 1):
         expect("members", member, "a list of boebot.Member", Member)
         try:
-            tasks.append(_task(member, number, arena, on, seconds, seed, realtime))
+            tasks.append(task_of(member, terms, number))
         except BoebotError as error:
             raise _of_robot(error, number, len(members)) from None
-    world = open_together(on, [task.request for task in tasks])
+    kind = default_board([task.request.robot for task in tasks]) if on is None else on
+    tasks = [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+    world = open_together(kind, [task.request for task in tasks])
     try:
         return _Run(world, tasks, progress).run()
     finally:
         world.close()
-
-
-def _task(
-    member: Member, number: int, arena: str | Path | None, on: str, seconds: float, seed: int, realtime: bool
-) -> Task:
-    expect("seed", member.seed, "a whole number or None", Integral, type(None))
-    loaded, description, period_s = prepare(member.brain, member.robot, seconds, member.period)
-    request = BoardRequest(
-        robot=description,
-        arena=None if arena is None else str(arena),
-        seed=seed,
-        realtime=realtime,
-        start_pose=_pose(member.pose),
-        without=switched_off(member.without),
-    )
-    own = seed + number - 1 if member.seed is None else member.seed
-    return Task(brain=loaded, request=request, on=on, seconds=seconds, period_s=period_s, brain_seed=own)
-
-
-def _pose(pose: object) -> tuple[float, float, float] | None:
-    if pose is None:
-        return None
-    if isinstance(pose, tuple | list) and len(pose) == 3 and all(isinstance(value, Real) for value in pose):
-        x, y, heading = pose
-        return float(x), float(y), float(heading)
-    raise BoebotError(f"pose is {pose!r}; expected (x in m, y in m, heading in rad)")
 
 
 def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
@@ -173,10 +115,10 @@ def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
 class _Robot:
     """One robot of a run: its driver on a strand, and its brain."""
 
-    def __init__(self, session: BoardSession, task: Task, number: int) -> None:
+    def __init__(self, session: BoardSession | VehicleSession, task: Task, number: int) -> None:
         self.number = number
         self.task = task
-        self.driver: BoardDriver | None = None
+        self.driver: Driver | None = None
         self.error: BaseException | None = None
         self.result: RunResult | None = None
         self.is_ending = False  # its motors are being stopped
@@ -185,8 +127,8 @@ class _Robot:
         self.strand = Strand(self._work, f"robot {number}")
 
     def _work(self) -> None:
-        """What the strand does: the whole run, from the link opened to the motors stopped."""
-        self.driver = driver = BoardDriver(self._session, self.task)
+        """What the strand does: the whole run, from the robot made ready to the motors stopped."""
+        self.driver = driver = driver_of(self._session, self.task)
         try:
             driver.begin()
             for self.time_s in driver.steps():

@@ -5,21 +5,27 @@ What is wrong is said in one sentence with the file, the line, the full key and 
 
 from __future__ import annotations
 
+import re
+import reprlib
+import sys
 import tomllib
 import types
 import typing
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from boebot import resources
+from boebot import resources, toml_numbers
 from boebot.errors import BoebotError
 from boebot.toml_lines import line_of, lines_of
 
 _T = TypeVar("_T")
 
 SIZE_MAXIMUM = 8_000_000  # bytes of a file
+LARGE = 50_000  # from here on it is worth while to read rows of points by themselves ...
+SLOW = 2_000_000  # ... and from here on it takes seconds, and somebody waits
 
 
 class Table(dict[str, Any]):
@@ -51,7 +57,10 @@ def bundled_names(kind: str) -> list[str]:
 
 def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
     """The file of a bundled name, or the .toml file that `name` is. Raises `error` if there is none."""
-    path, thing = Path(name), kind.removesuffix("s")
+    thing = kind.removesuffix("s")
+    if not isinstance(name, (str, Path)):
+        raise error(f"{thing} is {reprlib.repr(name)}; expected a name or a .toml file")
+    path = Path(name)
     if path.suffix == ".toml":
         if path.is_file():
             return path
@@ -68,16 +77,37 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         size = path.stat().st_size
         if size > SIZE_MAXIMUM:
             raise error(f"{path.name} has {size:,} bytes; expected at most {SIZE_MAXIMUM:,}")
-        text = path.read_text(encoding="utf-8")
-        table = Table(tomllib.loads(text))
+        if size > SLOW:
+            print(f"reading {path.name}, {size / 1e6:.1f} MB ...", file=sys.stderr)
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin with a byte order mark
+        table = Table(toml_numbers.loads(text) if size > LARGE else tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
     except RecursionError:
         raise error(f"{path.name} is nested too deeply; expected a flat description") from None
     except ValueError as cause:  # also a number of thousands of digits, which tomllib passes on
-        raise error(f"{path.name} is no valid TOML: {' '.join(str(cause).split())}") from None
+        raise error(_no_toml(path.name, text, cause)) from None
     table.sources = ((path.name, text),)
     return table
+
+
+def _no_toml(name: str, text: str, cause: ValueError) -> str:
+    """The sentence about a text that tomllib refuses; in our words where its own say nothing to most people."""
+    what = " ".join(str(cause).split())
+    if not isinstance(cause, tomllib.TOMLDecodeError):
+        digits = re.search(rf"[0-9_]{{{sys.get_int_max_str_digits()},}}", text)
+        line = text.count("\n", 0, digits.start()) + 1 if digits else 1
+        return (
+            f"{name}:{line}: a number has {len(digits[0]) if digits else 'too many'} digits; expected a finite number"
+        )
+    at = re.search(r"\(at line (\d+), ", what)
+    line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
+    if what.startswith(("Cannot overwrite a value", "Duplicate inline table key", "Cannot declare")):
+        said = re.search(r"key '(.*)' \(at ", what) or re.match(
+            r"[\s\[]*([^\s=\[\]]+)\s*[=\]]", text.split("\n")[line - 1]
+        )
+        return f"{name}:{line}: {repr(said[1]) if said else 'a key'} is given twice; expected each key and table once"
+    return f"{name} is no valid TOML: {what}"
 
 
 def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) -> Table:
@@ -115,12 +145,22 @@ def _not_finite(value: Any, key: str) -> Fault | None:
     if isinstance(value, dict):
         places = ((f"{key}.{name}" if key else name, entry) for name, entry in value.items())
     elif isinstance(value, list):
+        if _all_finite(value):
+            return None
         places = ((f"{key}[{index}]", entry) for index, entry in enumerate(value))
     elif isinstance(value, (int, float)) and not abs(value) < 1e300:
         return Fault(key, f"{key}: expected a finite number")
     else:
         return None
     return next((found for place, entry in places if (found := _not_finite(entry, place))), None)
+
+
+def _all_finite(rows: list[Any]) -> bool:
+    """Whether these are rows of finite numbers, found without looking at each in Python; False: look."""
+    try:
+        return bool(sum(map(abs, chain.from_iterable(rows))) < 1e300)
+    except (TypeError, OverflowError):
+        return False
 
 
 def _fault(value: Any, kind: Any, key: str) -> Fault | None:
@@ -135,6 +175,9 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
         places = ((_below(key, str(place)) if origin is dict else f"{key}[{place}]", item) for place, item in items)
         if fault := next((fault for place, item in places if (fault := _fault(item, inner[-1], place))), None):
             return fault
+    choices = _choices(kind)
+    if choices and value not in choices:
+        return Fault(key, f"{key} is {value!r}; expected one of {', '.join(map(str, choices))}")
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as cause:
@@ -170,6 +213,12 @@ def _struct_fault(value: dict[str, Any], kind: Any, key: str) -> Fault | None:
         elif fault := _fault(value[name], field.type, _below(key, name)):
             return fault
     return None
+
+
+def _choices(kind: Any) -> tuple[Any, ...]:
+    """The values that a Literal allows, () for any other type."""
+    plain = typing.get_args(kind)[0] if typing.get_origin(kind) is typing.Annotated else kind
+    return typing.get_args(plain) if typing.get_origin(plain) is typing.Literal else ()
 
 
 def _below(key: str, name: str) -> str:

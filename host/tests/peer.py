@@ -27,6 +27,7 @@ from channel import Channel
 
 from boebot.boards import Truth
 from boebot.errors import BoardError
+from boebot.floor_plan import FloorPlan, Solid
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch, Status
@@ -550,8 +551,7 @@ class Peer:
             y=y,
             heading=heading,
             contact=contact.astype(bool),
-            arena_name="square",
-            outlines=[corners],
+            plan=FloorPlan(name="square", solids=[Solid(kind="outline", points=corners)]),
         )
 
     def _pulse(self, signal: float, gain_us: float) -> int:

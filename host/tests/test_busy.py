@@ -5,6 +5,8 @@ Each is compared with its counterpart on the same machine; `make bench` measures
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from boebot.link.ports.descriptor import HAS_THREAD
@@ -14,20 +16,33 @@ from tools.bench.busy import DEFAULT_INTERVAL_S, measure, measure_round_trips, p
 pytestmark = pytest.mark.skipif(not HAS_THREAD, reason="there is no C thread on this system")
 
 COUNT = 150
+TRIES = 4
+
+
+def holds_once(compare: Callable[[], bool]) -> bool:
+    """One of some tries: what else runs on the machine may spoil a comparison, but makes none come true by itself."""
+    return any(compare() for _ in range(TRIES))
 
 
 def test_stamps_do_not_wait_for_python() -> None:
     """Without the thread, bytes are stamped after the computing thread's turn of 5 ms."""
-    by_thread = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
-    by_caller = measure(thread=False, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
-    assert by_thread.min() > 0, "never before the sending"
-    assert per_cent(by_thread, 50) < per_cent(by_caller, 50) / 2
+
+    def earlier() -> bool:
+        by_thread = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
+        by_caller = measure(thread=False, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
+        assert by_thread.min() > 0, "never before the sending"
+        return per_cent(by_thread, 50) < per_cent(by_caller, 50) / 2
+
+    assert holds_once(earlier)
 
 
 def test_brain_wakes_up_earlier_by_the_short_interval() -> None:
-    short = measure(thread=True, interval_s=INTERVAL_S, count=COUNT).wake_up
-    usual = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).wake_up
-    assert per_cent(short, 75) < per_cent(usual, 75) / 1.5
+    def earlier() -> bool:
+        short = measure(thread=True, interval_s=INTERVAL_S, count=COUNT).wake_up
+        usual = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).wake_up
+        return per_cent(short, 75) < per_cent(usual, 75) / 1.5
+
+    assert holds_once(earlier)
 
 
 def test_every_request_is_answered() -> None:

@@ -104,9 +104,17 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
         ),
         (("run", "wander", "--robots", "65", "--arena", "empty"), 1, "65 robots are too many; expected at most 64"),
         (("run", "wander", "--pose", "1,2"), 1, "--pose '1,2' is no pose; expected X,Y,DEGREES, as in 0.5,1.2,90"),
-        (("run", "wander", "--pose", "9,9,0", "--arena", "room"), 1, "cannot start at x = 9 m, y = 9 m: no free space"),
+        (
+            ("run", "wander", "--robot", "arsim", "--pose", "90,9,0"),
+            1,
+            "cannot start at x = 90 m, y = 9 m: no free space",
+        ),
         (("run", "wander", "--pose", "0,0,0", "--pose", "0.1,0,90", "--arena", "empty"), 1, "robots 1 and 2 overlap"),
-        (("run", "wander", "--robots", "2", "--robot", "arsim"), 1, "it cannot yet run together with others"),
+        (
+            ("run", "wander", "--robots", "2", "--robot", "arsim", "--on", "avr"),
+            1,
+            "it cannot run on 'avr'; expected 'direct'",
+        ),
         (("run", "wander", "--robots", "2", "--on", "COM3"), 1, "'COM3' is a port: run each robot by itself there"),
         (("run",), 2, "BRAIN"),
         (("run", "wander", "--sedes", "1"), 2, "No such option"),
@@ -115,6 +123,11 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
         (("info", "toaster"), 1, "there is no board 'toaster'"),
         (("serve", "--on", "avr"), 2, "give one of --pty and --tcp PORT"),
         (("serve", "--pty", "--tcp", "0"), 2, "give one of --pty and --tcp PORT"),
+        (
+            ("serve", "--tcp", "0", "--on", "native", "--without", "slop"),
+            1,
+            "there is no imperfection 'slop' to switch off",
+        ),
         (("serve", "--pty", "--on", "toaster"), 1, "there is no emulated board 'toaster' to serve"),
         (("new", "my brain"), 1, "'my brain' cannot be a brain's name"),
         (("new", "nowhere/brain"), 1, "'nowhere/brain' cannot be a brain's name"),
@@ -301,6 +314,19 @@ cli.main()
 """
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=20, preexec_fn=heed_signals, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
+
+
+def test_interrupt_within_an_exec_ends_with_the_same_code(tmp_path: Path) -> None:
+    """CPython's -m remembers that one left an exec of a text, and ends by the signal even if it was caught since."""
+    (tmp_path / "again.py").write_text("""
+import boebot.cli as cli
+cli._run = lambda: exec("raise KeyboardInterrupt")
+cli.main()
+""")
+    done = subprocess.run(
+        [sys.executable, "-m", "again"], cwd=tmp_path, capture_output=True, text=True, timeout=20, check=False
     )
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 

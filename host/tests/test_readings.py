@@ -75,6 +75,38 @@ def variant(folder: Path, text: str) -> Path:
         ("[device.compass]\nsigma_rad = -1.0", "device.compass.sigma_rad: expected float >= 0.0"),
         ("[device.laser]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\nrays = 0", "device.laser.rays: expected"),
         ("[device.infrared_left]\nthreshold = 1.5", "device.infrared_left.threshold: expected"),
+        ("[device.infrared_left]\nrays = 33", r"variant\.toml:3: device\.infrared_left\.rays: expected int <= 32"),
+        (
+            "[device.infrared_left]\nbeam_rad = 3.2",
+            r"variant\.toml:3: device\.infrared_left\.beam_rad: expected float <=",
+        ),
+        ("[device.infrared_left]\nheading_rad = 2e4", r"variant\.toml:3: device\.infrared_left\.heading_rad: expected"),
+        ("[device.infrared_left]\nrange_m = 2e12", r"variant\.toml:3: device\.infrared_left\.range_m: expected"),
+        ("[device.compass]\nbias_rad = 7", r"variant\.toml:3: device\.compass\.bias_rad: expected"),
+        (
+            "[device.sonar]\ntype = 'sonar'\nposition_m = [0, 0]\nheading_rad = 0\nrange_min_m = 3",
+            r"variant\.toml:6: device\.sonar\.range_min_m is 3; expected less than range_max_m, 3$",
+        ),
+        (
+            "[device.laser]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\nstep_rad = 0.1",
+            r"variant\.toml:5: device\.laser\.step_rad is 0\.1; expected a fan of 683 rays of less than a turn$",
+        ),
+        (
+            "[device.w]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.1, 0]",
+            r"variant\.toml:5: device\.w\.tip_m is where root_m is; expected a whisker that has a length$",
+        ),
+        (
+            "[device.e]\ntype = 'energy'\nempty_v = 7\nfull_v = 5",
+            r"variant\.toml:5: device\.e\.full_v is 5; expected more than empty_v, 7 V$",
+        ),
+        (
+            "".join(f"[device.l{i}]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\n" for i in range(2)),
+            r"variant\.toml:5: device\.l1 is a second laser_range_finder; expected one$",
+        ),
+        (
+            "".join(f"[device.w{i}]\ntype = 'touch_whisker'\nroot_m = [0, 0]\ntip_m = [1, 0]\n" for i in range(24)),
+            r"variant\.toml:\d+: device\.w\d+ is one sensor too many; expected at most 24$",
+        ),
     ],
 )
 def test_wrong_descriptions_get_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:

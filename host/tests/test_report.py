@@ -20,7 +20,7 @@ from boebot import runner
 from boebot.driving import board
 from boebot.errors import BoebotError
 from boebot.link import frame, messages
-from boebot.report import picture, replay
+from boebot.report import picture, replay, scene
 from boebot.result import RunResult
 from peer import InProcess, Peer
 
@@ -91,7 +91,7 @@ def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> No
 
 
 def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
-    assert json.loads((folder / "summary.json").read_text()) == result.table() | {"counters": {}}
+    assert json.loads((folder / "summary.json").read_text()) == {"format": 2} | result.table() | {"counters": {}}
 
 
 def test_picture_shows_something(folder: Path) -> None:
@@ -104,7 +104,7 @@ def test_picture_counts_in_words_that_agree(result: RunResult, tmp_path: Path, m
     texts: list[str] = []
     monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
     picture.write(result, tmp_path / "run.png")
-    assert "   ·   1 contact   ·   2 whisker touches   ·   " in texts[1]
+    assert "   ·   1 contact   ·   2 whisker touches" in texts[1]
 
 
 class Loads(HTMLParser):
@@ -120,10 +120,16 @@ class Loads(HTMLParser):
 
 def data_of(page: str) -> dict[str, Any]:
     """Of the first robot."""
-    match = re.search(r"const runs = (\[.*\]);\n", page)
-    assert match
-    data: dict[str, Any] = json.loads(match[1].replace("<\\/", "</"))[0]
+    data: dict[str, Any] = content_of(page)["runs"][0]
     return data
+
+
+def content_of(page: str) -> dict[str, Any]:
+    """The data of a page."""
+    match = re.search(r"const page = (\{.*\});\n", page)
+    assert match
+    content: dict[str, Any] = json.loads(match[1].replace("<\\/", "</"))
+    return content
 
 
 def test_replay_page_needs_nothing_from_outside(folder: Path) -> None:
@@ -148,7 +154,7 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
 
 def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay, "FRAMES_AT_MOST", 1000)
-    data = replay.page_data(result)
+    data = replay.run_data(result, scene.view(result))
     count = len(base64.b64decode(data["time"])) // 4
     assert 700 < count <= 1001
     assert len(base64.b64decode(data["flags"])) == count
@@ -170,8 +176,9 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(runner, "open_board", lambda url, request: session)
     result = boebot.run("wander", seconds=5, out=tmp_path)
     assert result.odometry_error is None
-    data = data_of((tmp_path / "replay.html").read_text())
-    assert not data["known"] and data["estimate"] is None and data["outlines"] == []
+    content = content_of((tmp_path / "replay.html").read_text())
+    data = content["runs"][0]
+    assert not data["known"] and data["estimate"] is None and content["plan"]["solids"] == []
     header = (tmp_path / "run.csv").read_text().splitlines()[0]
     assert "odometry_x_m" in header and "true_x_m" not in header
 

@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boebot import runner
+from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, told
 from boebot.devices_series import DevicesSeries
 from boebot.equipment import slow_readers
@@ -298,3 +299,34 @@ def test_arrays_have_the_newest_message_of_each_tick(data: st.DataObject) -> Non
             assert math.isnan(token) and math.isnan(age)
         else:
             assert token == wanted[0] and age == pytest.approx(wanted[1] * TICK_S)
+
+
+# ---- how long a reading is fresh -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("period", "baud", "ticks"),
+    [(2, 500_000, 2), (2, 115_200, 2), (50, 500_000, 50), (2, 19_200, 9), (2, 9600, 17), (2, 0, 2)],
+)
+def test_messages_take_a_quarter_of_the_line_at_most(period: int, baud: int, ticks: int) -> None:
+    """39 bytes of 10 bits each, in ticks of 10 ms: the firmware's figure (17 on the slowest line)."""
+    assert message_ticks(period, 10 / baud if baud else 0.0, TICK_S) == ticks
+
+
+@pytest.mark.parametrize("period", [2, 20])
+def test_readings_stay_fresh_from_message_to_message(period: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However rarely the board was told to tell: fresh up to three periods of the messages."""
+    peer = Peer(BASIC)
+    peer.parameters[messages.PARAMETERS["devices_period"].id] = period
+    seen: list[tuple[float, bool]] = []
+
+    def step(robot: Robot) -> None:
+        seen.append((robot.left_light.age, robot.left_light.valid))
+        if robot.time >= 1.0:
+            peer.parameters[messages.PARAMETERS["devices"].id] = 0  # it says no more
+
+    run_on(peer, step, monkeypatch, seconds=2.5, period=0.01)
+    limit = 3 * max(period, 2) * TICK_S + 1e-9
+    told = [(age, valid) for age, valid in seen if not math.isinf(age)]
+    assert all(valid == (age <= limit) for age, valid in told)
+    assert all(valid for _, valid in told[:80]) and not told[-1][1]

@@ -39,7 +39,9 @@ def watch(
         step(robot)
 
     request = BoardRequest(robot=load_robot(robot), arena=arena, noise=False, start_pose=pose)
-    task = Task(brain=LoadedBrain("watch", brain), request=request, on="native", seconds=seconds, period_s=0.05)
+    task = Task(
+        brain=LoadedBrain("watch", brain), request=request, on="native", seconds=seconds, period_s=0.05, brain_seed=1
+    )
     session = open_board("native", request)
     try:
         driver = BoardDriver(session, task)

@@ -123,7 +123,13 @@ class Whole(msgspec.Struct, forbid_unknown_fields=True):
         ("[[part]]\nname = 'a'\n[[part.screw]]\nx = 'y'", "it.toml:4: part[0].screw[0].x: expected int, got str"),
         ("[[part]]\nname = 'a'\nscrew = [{x = 1},\n{y = 2}]", "it.toml:4: part[0].screw[1]: there is no key 'y' here"),
         ("[[part]]\nname = 'a'\nscrew = [\n{x = inf}]", "it.toml:4: part[0].screw[0].x: expected a finite number"),
-        (f"x = {'9' * 5000}", "it.toml is no valid TOML: "),
+        (f"x = 1\ny = {'9' * 5000}", "it.toml:2: a number has 5000 digits; expected a finite number"),
+        ("a = 1\nb = 2\na = 3", "it.toml:3: 'a' is given twice; expected each key and table once"),
+        ("a = 1\na = [\n2\n]\nb = 2", "it.toml:4: a key is given twice; expected each key and table once"),
+        ("[x]\na = 1\n[x]\nb = 1\n", "it.toml:3: 'x' is given twice; expected each key and table once"),
+        ("a = 1\n[[a]]\nb = 1\n", "it.toml:2: 'a' is given twice; expected each key and table once"),
+        ("a = {b = 1, b = 2}\n", "it.toml:1: 'b' is given twice; expected each key and table once"),
+        ("a = ", "it.toml is no valid TOML: Invalid value (at end of document)"),
         (f"x = {'9' * 400}", "it.toml:1: x: expected a finite number"),
         (f"x = {'[' * 100_000}", "it.toml is "),
     ],
@@ -135,6 +141,17 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, sentence
         toml_files.convert(toml_files.read(file, RobotError), Whole, file.name, RobotError)
     assert str(caught.value).startswith(sentence)
     assert "\n" not in str(caught.value)
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+    """As Windows' Notepad writes it; lines of errors are the same."""
+    file = tmp_path / "it.toml"
+    for text in ("x = 1\n", f"x = 1\ny = [{'[1, 2], ' * 9000}]\n"):
+        file.write_bytes(b"\xef\xbb\xbf" + text.encode())
+        assert toml_files.read(file, RobotError) == tomllib.loads(text)
+    file.write_bytes("\ufeff[[part]]\n\nname = 1".encode())
+    with pytest.raises(RobotError, match=r"^it\.toml:3: part\[0\]\.name: expected str, got int$"):
+        toml_files.convert(toml_files.read(file, RobotError), Whole, file.name, RobotError)
 
 
 def test_a_file_too_large_is_not_read(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ Works on every kind of board: the extension that made it lends its `board_access
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -71,19 +72,27 @@ COUNTERS = (
 )
 
 
-class BoardMemory:
+class BoardMemory(ABC):
     """What lies inside a board: the data space of an AVR, the EEPROM of every kind of microcontroller."""
 
-    def __init__(self, lib: Any, ffi: Any, pointer: Any) -> None:
-        """Of the board at `pointer`, which its owner keeps alive."""
+    def __init__(self, lib: Any, ffi: Any) -> None:
+        """By the functions of that extension."""
         self._memory_lib = lib
         self._memory_ffi = ffi
-        self._memory_board = pointer
+
+    @property
+    @abstractmethod
+    def _board(self) -> Any:
+        """Its C `board *`, which its owner keeps alive.
+
+        Raises:
+            BoardError: the board is closed.
+        """
 
     def _data(self, address: int, count: int) -> Any:
-        self._check_open()
-        _check_range("data", address, count, DATA_SIZE)
-        data = self._memory_lib.board_memory(self._memory_board)
+        board = self._board
+        check_range("data", address, count, DATA_SIZE)
+        data = self._memory_lib.board_memory(board)
         if data == self._memory_ffi.NULL:
             raise BoardError("this kind of board has no data memory to look into; only the emulated ATmega328P has")
         return self._memory_ffi.buffer(data + address, count)
@@ -105,13 +114,8 @@ class BoardMemory:
         data = bytes(data)
         self._data(address, len(data))[:] = data
 
-    def _check_open(self) -> None:
-        if self._memory_board == self._memory_ffi.NULL:
-            raise BoardError("this board is closed")
-
     def _eeprom(self) -> Any:
-        self._check_open()
-        eeprom = self._memory_lib.board_eeprom_of(self._memory_board)
+        eeprom = self._memory_lib.board_eeprom_of(self._board)
         if eeprom == self._memory_ffi.NULL:
             raise BoardError("this kind of board has no EEPROM")
         return eeprom
@@ -123,7 +127,7 @@ class BoardMemory:
     def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
         """Puts bytes into the EEPROM at once."""
         data = bytes(data)
-        _check_range("EEPROM", address, len(data), EEPROM_SIZE)
+        check_range("EEPROM", address, len(data), EEPROM_SIZE)
         self._memory_ffi.buffer(self._eeprom().bytes + address, len(data))[:] = data
 
     def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
@@ -132,7 +136,8 @@ class BoardMemory:
         eeprom.damage, eeprom.garbage = int(damage), garbage
 
 
-def _check_range(what: str, address: int, count: int, size: int) -> None:
+def check_range(what: str, address: int, count: int, size: int) -> None:
+    """Raises ValueError where those are no addresses of a memory of that size."""
     if address < 0 or count < 0 or address + count > size:
         raise ValueError(f"no {what} at 0x{address:X}..0x{address + count - 1:X}; the last address is 0x{size - 1:X}")
 
@@ -142,13 +147,20 @@ class BoardAccess(BoardMemory):
 
     def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None) -> None:
         """Becomes the listener of the board at `pointer`; `owner` is kept alive."""
-        super().__init__(lib, ffi, pointer)
+        super().__init__(lib, ffi)
+        self._pointer = pointer
         self._lib = lib
         self._ffi = ffi
         self._owner = owner
         self._access = lib.board_access_open(pointer)
         if self._access == ffi.NULL:
             raise BoardError("This board was built for another version of the board interface; build it again.")
+
+    @property
+    def _board(self) -> Any:
+        if self._pointer == self._ffi.NULL:
+            raise BoardError("this board is closed")
+        return self._pointer
 
     @property
     def now(self) -> int:
@@ -232,5 +244,5 @@ class BoardAccess(BoardMemory):
         """Lets go of the board."""
         if self._access != self._ffi.NULL:
             self._lib.board_access_close(self._access)
-            self._access = self._memory_board = self._ffi.NULL
+            self._access = self._pointer = self._ffi.NULL
             self._owner = None

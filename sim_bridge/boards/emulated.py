@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,25 +16,78 @@ from sim_bridge._core import ffi, lib
 class EmulatedBoard:
     """A board by its address, and whatever must live as long as it does."""
 
-    def __init__(self, address: int, description: str, release: Callable[[], None], keep: Any = None) -> None:
-        """`release` frees the board.
+    def __init__(
+        self,
+        address: int,
+        description: str,
+        release: Callable[[], None],
+        keep: Any = None,
+        firmware: bytes = b"",
+        again: Callable[[], EmulatedBoard] | None = None,
+    ) -> None:
+        """`release` frees the board, `again` makes one more like it; `firmware` is the file that it runs.
 
         Raises:
             BoardError: the board was built for another version of this package.
         """
-        self.address = address
+        self._address = address
         self.description = description
+        self.firmware = hashlib.sha256(firmware).hexdigest()
         self._release: Callable[[], None] | None = release
+        self._free = weakref.finalize(self, release)  # for one that is dropped; at the exit its world may still hold it
+        self._free.atexit = False
         self._keep = keep
+        self._again = again
+        self.is_in_use: Callable[[], bool] = _in_no_simulation
+        """whether a simulation runs it"""
         if lib.board_check(address) != lib.SIM_OK:
             self.close()
             raise BoardError(f"the {description} was built for another version of the simulator; build it again")
 
+    @property
+    def address(self) -> int:
+        """Of the board in C.
+
+        Raises:
+            BoardError: it is closed.
+        """
+        if self._release is None:
+            raise BoardError(f"the {self.description} is closed; expected one that is open")
+        return self._address
+
+    @property
+    def can_repeat(self) -> bool:
+        """Whether it runs firmware, so that there can be one more like it."""
+        return self._again is not None
+
+    def again(self) -> EmulatedBoard:
+        """One more of its kind with the same firmware, just powered on.
+
+        Raises:
+            BoardError: it runs no firmware, or the file is another one by now.
+        """
+        if self._again is None:
+            raise BoardError(f"the {self.description} runs no firmware; expected an emulated board that does")
+        board = self._again()
+        if board.firmware != self.firmware:
+            board.close()
+            raise BoardError(f"the firmware of the {self.description} has changed on disk since it was loaded")
+        return board
+
     def close(self) -> None:
-        """Frees the board. May be called twice."""
-        release, self._release = self._release, None
-        if release is not None:
-            release()
+        """Frees the board. May be called twice.
+
+        Raises:
+            BoardError: a simulation runs it.
+        """
+        if self.is_in_use():
+            raise BoardError(f"the {self.description} is in a simulation; expected Sim.close()")
+        self._release = None
+        self._free()
+
+
+def _in_no_simulation() -> bool:
+    return False
 
 
 def native_library(pin_map: str) -> Path:
@@ -60,7 +115,13 @@ def native_board(library: Path) -> EmulatedBoard:
     if board == ffi.NULL:
         raise BoardError(f"{library.name}: {ffi.string(error).decode(errors='replace')}")
     address = int(ffi.cast("uintptr_t", board))
-    return EmulatedBoard(address, "emulated native board", lambda: lib.board_destroy(address))
+    return EmulatedBoard(
+        address,
+        "emulated native board",
+        lambda: lib.board_destroy(address),
+        firmware=library.read_bytes(),
+        again=lambda: native_board(library),
+    )
 
 
 def avr_board(image: Path) -> EmulatedBoard:
@@ -72,7 +133,14 @@ def avr_board(image: Path) -> EmulatedBoard:
     from sim_bridge.boards import avr
 
     board = avr.create(image)
-    return EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board)
+    return EmulatedBoard(
+        board.pointer,
+        "emulated ATmega328P",
+        board.close,
+        keep=board,
+        firmware=image.read_bytes(),
+        again=lambda: avr_board(image),
+    )
 
 
 def avr_image(pin_map: str) -> Path:

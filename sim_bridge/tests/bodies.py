@@ -115,8 +115,16 @@ class Body:
 
     @property
     def energy(self) -> float:
-        """Kinetic, wheels included (J)."""
-        return float(lib.body_energy(self.body))
+        """Kinetic, wheels included (J): a wheel that may slip turns with the rotor behind its gear (body.h)."""
+        s, p = self.state, self.parameters
+        v, w, half = s.speed, s.turn_rate, p.half_track
+        rims = (s.rim_left, s.rim_right) if s.slipping else (v - half * w, v + half * w)
+        spin = p.wheel_inertia / p.wheel_radius**2
+        if p.slip:
+            spin = p.spin_inertia / p.wheel_radius**2 if p.spin_inertia > 0 else max(spin, 0.1 * p.mass)
+        mass, inertia = p.mass + 2 * p.wheel_mass, p.inertia + 2 * p.wheel_mass * half**2
+        turning = inertia * w**2 + spin * (rims[0] ** 2 + rims[1] ** 2)
+        return float(0.5 * (mass * (v**2 + s.lateral**2) + turning))
 
     def core(self) -> tuple[Any, float]:
         """What of it makes contact, by shapely: all within so many metres of a point or polygon."""
@@ -125,8 +133,8 @@ class Body:
             return shapely.Point(x, y), float(self.parameters.radius)
         c, s = math.cos(heading), math.sin(heading)
         polygon = shapely.Polygon(np.array(self.corners) @ np.array([[c, s], [-s, c]]) + (x, y))
-        # its outward corners are rounded by 1 mm
-        return polygon.buffer(-1e-3, join_style="mitre", mitre_limit=100), 1e-3
+        rounding = float(self.outline.rounding)  # of its outward corners
+        return polygon.buffer(-rounding, join_style="mitre", mitre_limit=100), rounding
 
     def depth_in(self, other: Any, rounding: float = 0.0) -> float:
         """How deep it is in another thing: positive if the surfaces have passed each other (m)."""
@@ -176,15 +184,16 @@ class World:
         return mover
 
     def step(self, torques: Sequence[tuple[float, float]], dt: float, order: Sequence[int] | None = None) -> int:
-        """One step; moving obstacles go on along their velocities."""
+        """One step; moving obstacles go on along their velocities unless they wait."""
         places = range(len(self.robots)) if order is None else order
         bodies = ffi.new("body *[]", [self.robots[i].body for i in places])
         status = int(lib.body_step(bodies, len(bodies), self.scene, [list(torques[i]) for i in places], dt))
         for i in range(self.scene.movers_count):
             mover = self._movers[i]
-            mover.x += mover.vx * dt
-            mover.y += mover.vy * dt
-            c, s = math.cos(mover.turn_rate * dt), math.sin(mover.turn_rate * dt)
+            gone = mover.stops  # it may have waited for the rest of the step
+            mover.x += mover.vx * gone
+            mover.y += mover.vy * gone
+            c, s = math.cos(mover.turn_rate * gone), math.sin(mover.turn_rate * gone)
             mover.cosine, mover.sine = mover.cosine * c - mover.sine * s, mover.sine * c + mover.cosine * s
         return status
 

@@ -1,13 +1,16 @@
 /* hash_runs.c: runs worlds of every sensor and both drives and prints a hash of each. The test compiles it with several
- * compilers and options: the hashes are the same. */
+ * compilers and options: the hashes are the same. Its arguments are the body of the notes' robot, as vehicle.py has it:
+ * mass, inertia, radius, half track, wheel radius, linear and angular damping, grip. */
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
 
 #define WORLDS 6
 #define STEPS 600
+#define BODY 8
 
 static arena *room(void) {
   static const double outline[] = {-1.8, -1.8, 1.8, -1.8, 1.8, 1.8, -1.8, 1.8};
@@ -18,7 +21,7 @@ static arena *room(void) {
   arena_add_polygon(where, pillar, 4, ARENA_OBSTACLE, NULL);
   arena_add_disc(where, 0.8, -0.8, 0.15, NULL);
   arena_add_light(where, 1.5, 1.5, 0.3, 2.0);
-  arena_add_moving(where, pillar, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);
+  arena_add_moving(where, NULL, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);
   arena_build(where);
   return where;
 }
@@ -45,7 +48,7 @@ static int add_sensors(vehicle_model *m) {
              m, &(sharp_infrared_parameters){
                     .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076}) < 0;
   bad |= vehicle_model_add_laser(
-             m, &(laser_parameters){.first = 2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
+             m, &(laser_parameters){.first = -2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
   bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01}, 0.0) < 0;
   bad |= vehicle_model_add_accelerometer(m, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1}, 0.0) < 0;
   bad |=
@@ -63,7 +66,7 @@ static int add_sensors(vehicle_model *m) {
   return bad;
 }
 
-static vehicle_model *model(int servos) {
+static vehicle_model *model(int servos, const double notes[BODY]) {
   const body_parameters small = {.mass = 0.6,
                                  .inertia = 1.2e-3,
                                  .radius = 0.07,
@@ -75,24 +78,25 @@ static vehicle_model *model(int servos) {
                                  .angular_damping = 0.004,
                                  .grip = 0.7,
                                  .slip = servos};
-  const body_parameters large = {.mass = 3.0,
-                                 .inertia = 0.2,
-                                 .radius = 0.2,
-                                 .half_track = 0.2,
-                                 .wheel_radius = 0.1,
-                                 .linear_damping = 1.0,
-                                 .angular_damping = 0.1,
-                                 .grip = 0.7};
-  servo_motor_parameters left = {.mount = 1.0,
-                                 .wheel_radius = 0.0331,
-                                 .centre_us = 1502.0,
-                                 .dead_band_us = 9.0,
-                                 .top_ccw_rad_s = 5.4,
-                                 .scale_ccw_us = 78.5,
-                                 .top_cw_rad_s = 5.2,
-                                 .scale_cw_us = 75.0,
-                                 .lag_s = 0.055,
-                                 .motor = {1.2, 0.268, 0.3, 0.05}};
+  const body_parameters large = {.mass = notes[0],
+                                 .inertia = notes[1],
+                                 .radius = notes[2],
+                                 .half_track = notes[3],
+                                 .wheel_radius = notes[4],
+                                 .linear_damping = notes[5],
+                                 .angular_damping = notes[6],
+                                 .grip = notes[7]};
+  servo_motor_parameters left = {
+      .mount = 1.0,
+      .wheel_radius = 0.0331,
+      .centre_us = 1502.0,
+      .dead_band_us = 9.0,
+      .top_ccw_rad_s = 5.4,
+      .scale_ccw_us = 78.5,
+      .top_cw_rad_s = 5.2,
+      .scale_cw_us = 75.0,
+      .lag_s = 0.055,
+      .motor = {.gain_n_s = 1.2, .torque_maximum_n_m = 0.268, .coast_n_s = 0.3, .coast_maximum_n_m = 0.05}};
   servo_motor_parameters right = left;
   right.mount = -1.0;
   vehicle_model *m = vehicle_model_new(servos ? &small : &large, servos ? 0.001 : 0.01);
@@ -106,10 +110,13 @@ static vehicle_model *model(int servos) {
   return m;
 }
 
-int main(void) {
+int main(int count, char **arguments) {
+  double notes[BODY];
+  if (count != BODY + 1) return 2;
+  for (int i = 0; i < BODY; i++) notes[i] = strtod(arguments[i + 1], NULL);
   arena *where = room();
   for (int servos = 0; servos < 2; servos++) {
-    vehicle_model *m = model(servos);
+    vehicle_model *m = model(servos, notes);
     vehicles *worlds = vehicles_new(m, WORLDS, sizeof(vehicle_wander_state));
     for (size_t i = 0; i < WORLDS; i++) {
       if (vehicles_place(worlds, i, where, 100 + i, (uint32_t)i + 1, -0.5 + 0.1 * (double)i, 0.0, (double)i))

@@ -15,7 +15,8 @@ from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Sim, SimRobot
+from sim_bridge.sim import Sim
+from sim_bridge.sim_robot import SimRobot
 
 MS = CLOCK_HZ // 1000
 SUPPLY = Supply(7.75, 5.0, 7200.0, 0.6, 0.5, "regulated", 4.2)  # full, empty, A s, ohm, drop-out, servos, minimum
@@ -61,7 +62,7 @@ class Scripted:
 
     def run(self, seconds: float) -> None:
         cycles = round(seconds * CLOCK_HZ)
-        self.sim.run(cycles, cycles)
+        self.sim.run(cycles)
 
     def edge(self, cycle: int, pin: int, level: int) -> None:
         """The board will do `level` to `pin` at `cycle`; call in order of time."""

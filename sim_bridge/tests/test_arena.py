@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from boebot.errors import ArenaError
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
+from sim_bridge.arena_description import Moving, Waypoint
 from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))
@@ -110,26 +112,14 @@ def test_free_space_is_outside_of_obstacles(arena: Arena, x: float, y: float) ->
     assert arena.is_free(x, y, 0.07) == (not solid.contains(point) and edges_apart)
 
 
-def test_free_cells_of_a_room() -> None:
-    arena = arena_of(square(0.1, 0.1, 0.19), outline=square(0, 0, 1))
-    cells = arena.free_cells(0.2, 0.05)
-    # Cells of 0.2 m on a lattice through the origin: between -0.5 and 0.5 lie four whole ones each way and two halves,
-    # whose centres are on the wall; the obstacle fills one.
-    assert len(cells) == 15
-    assert not any(np.allclose(cell, (0.1, 0.1)) for cell in cells)
-    assert len(arena_of().free_cells(0.2, 0.05)) == 0
-
-
-def test_moved_polygon_is_met_where_it_is() -> None:
-    for index in (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID):
-        arena = arena_of(square(1, 0, 0.2), square(0, 3, 0.2))
-        lib.arena_use_index(arena.handle, index)
-        assert arena.ray(0, 0, 0, 5) == pytest.approx(0.9)
-        arena.move("0", 1.0, 0.0)
-        assert arena.ray(0, 0, 0, 5) == pytest.approx(1.9)
-        assert arena.outlines[0].min() == pytest.approx(-0.1)
-    with pytest.raises(ArenaError, match="no polygon 'nobody'"):
-        arena.move("nobody", 0, 0)
+@pytest.mark.parametrize("radius", [0.0, 1e-6, 0.05])
+@pytest.mark.parametrize("shape", [{"radius_m": 0.1}, {"corners_m": square(0, 0, 0.2)}], ids=["disc", "polygon"])
+def test_within_what_moves_nothing_is_free(shape: dict[str, Any], radius: float) -> None:
+    arena = Arena(ArenaDescription(name="one", moving=[Moving(path=[Waypoint(0, 0.5, 0)], **shape)]))
+    for x in (0.5, 0.45, 0.599, 0.401):
+        assert not arena.is_free(x, 0, radius)
+    assert arena.is_free(0.601 + radius, 0, radius)
+    assert arena.is_free(0.5, -0.101 - radius, radius)
 
 
 @pytest.mark.parametrize("name", arena_names())

@@ -82,6 +82,11 @@ def error_of(folder: Path, text: str | bytes) -> str:
             FRAME + "[start]\nx_m = 0.5\ny_m = 0.5\n[[obstacle]]\n" + SQUARE,
             "mine.toml:2: start: x_m = 0.5, y_m = 0.5 is in or behind something; expected free space",
         ),
+        (
+            FRAME
+            + "[start]\nx_m = 0.05\ny_m = 0\n[[moving]]\nradius_m = 0.1\npath = [{ time_s = 0, x_m = 0, y_m = 0 }]",
+            "mine.toml:2: start: x_m = 0.05, y_m = 0 is in or behind something; expected free space",
+        ),
         (FRAME.encode() + b"title = '\xff'", "mine.toml cannot be read: "),
     ],
 )

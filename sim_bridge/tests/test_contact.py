@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
-from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant
+from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of
 from sim_bridge.tests.simulated import arena_of, square
 
 BOX = [(-0.08, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.08, 0.05)]
@@ -28,7 +28,9 @@ FORK = [
     (0.07, 0.06),
     (-0.05, 0.06),
 ]
-shapes = st.sampled_from([None, BOX, CHASSIS, FORK])
+# Sharp ahead, 39 degrees.
+WEDGE = [(-0.05, -0.05), (0.09, 0.0), (-0.05, 0.05)]
+shapes = st.sampled_from([None, BOX, CHASSIS, FORK, WEDGE])
 arenas = st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(0.05, 0.4)), max_size=4)
 
 
@@ -240,17 +242,6 @@ def test_disc_is_met_like_a_wall() -> None:
         assert body.state.touching
 
 
-def test_obstacle_pushed_near_is_noticed() -> None:
-    """Lists of near edges are renewed when the arena changes."""
-    arena = arena_of(square(5, 0, 1))
-    body = Body(arena)
-    body.regulate(constant(0.1, 0.1), 1.2, 0.5, 0.001)
-    arena.move("0", -5 + body.state.x + 0.5 + RADIUS + 0.02, 0)
-    body.regulate(constant(0.1, 0.1), 1.2, 2.0, 0.001)
-    assert body.state.touching
-    assert body.depth < 1e-6
-
-
 def test_segment_on_the_body_touches_what_it_crosses() -> None:
     body = Body(arena_of(square(1, 0, 1)))  # face at x = 0.5
 
@@ -288,6 +279,7 @@ def test_segment_on_the_body_touches_what_it_crosses() -> None:
         ([(0, 0), (1, 1), (1, 0), (0, 1)], lib.OUTLINE_CROSSING),
         ([(0, 0), (2, 0), (1, 0), (1, 1)], lib.OUTLINE_CROSSING),
         ([(0, 0), (1, 0), (1, 3e-4), (0, 3e-4)], lib.OUTLINE_THIN),
+        ([(0.3, 0), (-0.1, 0.02), (-0.1, -0.02)], lib.OUTLINE_SHARP),
     ],
 )
 def test_outline_that_is_none_is_refused(corners: Points, expected: int) -> None:
@@ -309,6 +301,40 @@ def test_outline_is_the_polygon_with_rounded_corners() -> None:
     thin = ffi.new("body_outline *")
     assert lib.body_outline_make(thin, [0, 0, 0.1, 0, 0.1, 0.001, 0, 0.001], 4) == lib.OUTLINE_OK
     assert 1e-4 < thin.rounding < 0.5e-3
+
+
+def isosceles(degrees: float, long: float = 0.2) -> list[tuple[float, float]]:
+    """A triangle with a tip of that angle at (long, 0), its base behind the axle."""
+    half = 1.5 * long * math.tan(math.radians(degrees) / 2)
+    return [(-0.5 * long, -half), (long, 0.0), (-0.5 * long, half)]
+
+
+@given(st.floats(15.01, 120.0), st.floats(0.05, 0.5))
+def test_no_corner_loses_more_than_a_tenth_of_a_millimetre(degrees: float, long: float) -> None:
+    """Of the body that makes contact, all within the rounding of its core, by shapely."""
+    corners = isosceles(degrees, long)
+    outline = outline_of(corners)
+    core = shapely.Polygon([(outline.core[2 * i], outline.core[2 * i + 1]) for i in range(outline.corners)])
+    for corner in corners:
+        lost = core.distance(shapely.Point(corner)) - outline.rounding
+        assert -1e-9 < lost < 1e-4 + 1e-9
+    assert outline.rounding <= 1e-3 + 1e-12
+
+
+@pytest.mark.parametrize("corners", [WEDGE, isosceles(36.9), isosceles(15.1), BOX])
+@pytest.mark.parametrize("heading", [0.0, 0.3])
+def test_a_tip_driven_into_a_wall_stops_there(corners: Points, heading: float) -> None:
+    """Its true polygon, not the rounded one, is in the wall by at most what a corner loses."""
+    body = Body(arena_of(square(10, 0, 19)), corners=corners)  # face at x = 0.5
+    body.place(0.49 - max(math.hypot(x, y) for x, y in corners), 0, heading)
+    touched, deepest = False, -1.0
+    for _ in range(800):
+        body.regulate(constant(0.17, 0.17), 1.2, 0.001, 0.001)
+        touched |= bool(body.state.touching)
+        c, s = math.cos(body.state.heading), math.sin(body.state.heading)
+        deepest = max(deepest, *(body.state.x + c * x - s * y - 0.5 for x, y in corners))
+    assert touched
+    assert -1e-5 < deepest < 1e-4 + 1e-6
 
 
 def test_default_robot_within_the_contact_guard() -> None:

@@ -37,7 +37,7 @@ def test_steady_speed_is_that_of_the_notes(signal: float, speed: float) -> None:
     assert result.error is None and result.truth is not None and result.truth.left_speed is not None
     assert result.truth.left_speed[-1] == pytest.approx(speed, abs=0.001)
     rise = np.flatnonzero(np.abs(result.truth.left_speed) >= 0.632 * abs(speed))[0] * result.tick
-    assert 0.13 <= rise <= 0.19, "63 % after about 0.15 s"
+    assert rise == pytest.approx(0.15, abs=0.02 + 1e-9), "63 %, E05"
 
 
 def test_in_place_turn_is_that_of_the_notes() -> None:

@@ -37,7 +37,7 @@ class Master:
 
     def wait(self, seconds: float) -> None:
         self.at = max(self.at, self.robot.sim.cycle) + round(seconds * CLOCK_HZ)
-        self.robot.sim.run(self.at - self.robot.sim.cycle, self.at)
+        self.robot.sim.run(self.at - self.robot.sim.cycle)
 
     def line(self, pin: int, high: int) -> None:
         self.robot.edge(self.at, pin, 2 if high else 0)
@@ -67,7 +67,7 @@ class Master:
             self.step()
             self.line(SCL, 0)
             self.at += 6  # the next change of SDA comes after the clock has fallen
-        self.robot.sim.run(self.at - self.robot.sim.cycle, self.at)
+        self.robot.sim.run(self.at - self.robot.sim.cycle)
         log = self.robot.inputs(SDA)
         return [own & [level for cycle, level in log if cycle <= at][-1] for at, own in times]
 
@@ -311,7 +311,7 @@ def test_the_chip_of_the_emulated_board_reads_it(heading: float) -> None:
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)
     robot = sim.add(board, load_robot("shieldbot"), pose=(0, 0, heading))
     assert lib.sim_add_compass(sim.handle, 0, SDA, SCL, parameters()) == 0
-    sim.run(round(0.02 * CLOCK_HZ), CLOCK_HZ)
+    sim.run(round(0.02 * CLOCK_HZ))
     from sim_bridge.pins import BoardPins
 
     results = BoardPins(robot).read_memory(RESULTS, 5 + 12)

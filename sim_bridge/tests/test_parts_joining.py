@@ -96,7 +96,7 @@ def test_a_start_on_a_robot_or_on_an_obstacle_on_its_way_is_refused() -> None:
         else:
             with pytest.raises(ArenaError, match="no free space"):
                 add_scripted(sim, pose=(x, 0.0, 0.0))
-    sim.run(5 * CLOCK_HZ, 5 * CLOCK_HZ)
+    sim.run(5 * CLOCK_HZ)
     for x, free in ((0.141, True), (0.0, False), (1.34, False), (1.2, True), (1.7, True)):
         if free:
             second.pins.place(x, 0.0, 0.0)
@@ -113,7 +113,7 @@ def firmware_run(order: tuple[int, ...]) -> tuple[int, list[bytes]]:
         n: sim.add(native_board(native_library("shieldbot")), load_robot("shieldbot"), pose=poses[n], number=n)
         for n in order
     }
-    sim.run(CLOCK_HZ, CLOCK_HZ)
+    sim.run(CLOCK_HZ)
     outcome = sim.hash(), [members[n].receive() for n in sorted(members)]
     sim.close()
     return outcome

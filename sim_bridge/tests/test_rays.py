@@ -43,13 +43,15 @@ def test_rays_asked_together_get_the_same_bits(
     for middle in (turn, 0.0, math.pi / 2, *toward):
         looks = [middle + opening * (k / (rays - 1) - 0.5) if rays > 1 else middle for k in range(rays)]
         cosines, sines = [math.cos(look) for look in looks], [math.sin(look) for look in looks]
-        together = ffi.new("double[]", rays)
+        fan, together = ffi.new("ray_fan *"), ffi.new("double[]", 12)
+        lib.ray_fan_set(fan, cosines, sines, rays)
         for index in INDEXES:
             scene.build(index)
             for height in (0.0, 0.1):
                 alone = [scene.ray(x, y, look, reach, height)[0] for look in looks]
-                lib.arena_fan(scene.handle, x, y, cosines, sines, rays, reach, height, together)
-                assert list(together) == alone
+                question = ffi.new("fan_question *", (scene.handle, fan, x, y, 1.0, 0.0, reach, height, together))
+                lib.arena_fans(question, 1)
+                assert list(together)[:rays] == alone
 
 
 @given(scenes(), coordinates, coordinates)
@@ -216,7 +218,6 @@ def test_things_that_are_no_shapes_are_refused() -> None:
     assert lib.arena_add_wall(handle, ffi.new("double[]", [1, 1, 1, 1]), 2, ffi.NULL) == -1
     assert lib.arena_add_disc(handle, 0, 0, 0, ffi.NULL) == -1
     assert lib.arena_edge_count(handle) == lib.arena_shape_count(handle) == 0
-    assert lib.arena_move_polygon(handle, 0, 1, 1) == -1
 
 
 def test_grip_is_that_of_the_last_patch() -> None:

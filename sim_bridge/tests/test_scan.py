@@ -30,11 +30,14 @@ class Scan:
         self.scene = ffi.new("scene *", {"arena": shapes.build().handle, **moving})
 
     def look(self, x: float, y: float, heading: float, reach: float, height: float = 0.1, self_id: int = 0) -> Floats:
-        distances = np.full(self.count, np.nan)
+        """By two lanes, and by as many as the processor has: the same bits."""
+        narrow, wide = (np.full(self.count, np.nan) for _ in range(2))
         pose = (x, y, math.cos(heading), math.sin(heading))
-        out = ffi.from_buffer("double[]", distances)
-        lib.scan_look(self.fan, self.scene, *pose, reach, height, self_id, out)
-        return distances
+        for use, distances in enumerate((narrow, wide)):
+            lib.scan_fan_use_wide(self.fan, use)
+            lib.scan_look(self.fan, self.scene, *pose, reach, height, self_id, ffi.from_buffer("double[]", distances))
+        assert np.array_equal(narrow.view(np.uint64), wide.view(np.uint64))
+        return wide
 
     def rays(self, x: float, y: float, heading: float, reach: float, height: float = 0.1, aside: float = 0) -> Floats:
         bearings = heading + np.linspace(self.first, self.last, self.count) + aside
@@ -92,6 +95,58 @@ def test_inside_outside_and_near_a_corner(corners: int, place: tuple[float, floa
         scan = Scan(Shapes().polygon(ring_of(0, 0, 1, corners)[::turn]))
         for heading in (0.0, 1.0, -2.5):
             assert_agrees(scan, *place, heading, 10)
+
+
+@pytest.mark.parametrize("kind", ["walls", "pillars", "discs"])
+def test_a_thousand_things_of_which_most_are_hidden(kind: str) -> None:
+    """More than one block of edges; what is near ends the search for what is far."""
+    draw = np.random.default_rng(3)
+    shapes = Shapes()
+    for x, y, turn in draw.uniform((-4, -4, -math.pi), (4, 4, math.pi), (1000, 3)):
+        dx, dy = 0.4 * math.cos(turn), 0.4 * math.sin(turn)
+        if kind == "walls":
+            shapes.wall([(x - dx, y - dy), (x + dx, y + dy)])
+        elif kind == "pillars":
+            shapes.polygon([(x + dx / 4, y + dy / 4), (x - dy / 4, y + dx / 4), (x - dx / 4, y - dy / 4)])
+        else:
+            shapes.disc(x, y, 0.1)
+    for fan in (LRF, (-math.pi, math.pi, 361)):
+        scan = Scan(shapes, fan=fan)
+        for x, y, heading in draw.uniform((-4, -4, -math.pi), (4, 4, math.pi), (8, 3)):
+            assert_agrees(scan, x, y, heading, 10)
+
+
+def test_a_sensor_in_line_with_edges_and_close_to_one() -> None:
+    """Faces of pillars in a row, seen along their common line; the beam along it meets the first one's corner."""
+    shapes = Shapes()
+    for i in range(1, 30):
+        shapes.polygon(square(i, 0.1, 0.2)).polygon(square(-i, -0.1, 0.2))
+    for heading in (0.0, math.pi / 2, math.pi):
+        scan = Scan(shapes)
+        assert_agrees(scan, 0, 1e-10, heading, 40)
+        assert_agrees(scan, 0, 0.05, heading, 40)
+    assert Scan(shapes).look(0, 0, 0, 40)[341] == pytest.approx(0.9)
+    before_it = Scan(Shapes().wall([(-1, 0), (1, 0)])).look(0, 1e-6, -math.pi / 2, 5)
+    angle = np.linspace(*LRF)
+    ahead = np.abs(angle) < math.pi / 2 - 1e-5
+    assert before_it[ahead] == pytest.approx(1e-6 / np.cos(angle[ahead]), abs=1e-12)
+    assert (before_it[~ahead] == -1).all()
+
+
+@given(
+    st.lists(st.tuples(st.one_of(st.just(-1.0), st.floats(0, 5)), st.floats(-6, 6)), max_size=40),
+    st.sampled_from([0.0, 0.01, 0.5]),
+    st.sampled_from([0.5, 4.0]),
+)
+def test_noise_of_distances_is_3_1(pairs: list[tuple[float, float]], sigma: float, reach: float) -> None:
+    """Bit for bit d (1 + sigma draw), clamped; -1 stays; what stands beside the array as well."""
+    distances = np.array([d for d, _ in pairs] + [math.pi])
+    draws = np.array([draw for _, draw in pairs] + [9.0])
+    expected = np.where(distances < 0, distances, np.clip(distances * (1.0 + sigma * draws), 0.0, reach))
+    lib.scan_spread(
+        ffi.from_buffer("double[]", distances), ffi.from_buffer("double[]", draws), len(pairs), sigma, reach
+    )
+    assert np.array_equal(distances[:-1], expected[:-1]) and distances[-1] == math.pi
 
 
 def test_no_crack_opens_between_neighbours() -> None:

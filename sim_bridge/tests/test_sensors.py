@@ -296,7 +296,7 @@ def test_echo_time_depends_on_the_temperature() -> None:
 
 def laser(**changes: Any) -> Any:
     step = 2 * math.pi / 1024
-    hokuyo = {"height": 0.1, "first": 341 * step, "step": step, "rays": 683, "range": 4.0, "sigma": 0.0}
+    hokuyo = {"height": 0.1, "first": -341 * step, "step": step, "rays": 683, "range": 4.0, "sigma": 0.0}
     handle = lib.laser_new(ffi.new("laser_parameters *", hokuyo | changes))
     assert handle != ffi.NULL
     return ffi.gc(handle, lib.laser_destroy)
@@ -366,5 +366,5 @@ def test_bad_lasers_are_refused() -> None:
         {"range": math.nan},
         {"first": math.inf},
     ):
-        parameters = {"first": 1.0, "step": 0.003, "rays": 683, "range": 4.0} | changes
+        parameters = {"first": -1.0, "step": 0.003, "rays": 683, "range": 4.0} | changes
         assert lib.laser_new(ffi.new("laser_parameters *", parameters)) == ffi.NULL

@@ -24,8 +24,8 @@ from sim_bridge import imperfections as parts
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription
 from sim_bridge.arena_description import Patch
-from sim_bridge.direct import vehicle_model
 from sim_bridge.imperfections import Draw
+from sim_bridge.model_file import vehicle_model
 from sim_bridge.sim import Sim
 from sim_bridge.switches import SWITCHES
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square
@@ -228,7 +228,7 @@ def test_only_the_robot_that_switches_it_off_is_spared_cross_talk() -> None:
         hearer = add_scripted(sim, pose=(-dx, -dy, turn), without=without)
         sender = add_scripted(sim, pose=(1 + dx, dy, back))
         sender.burst(5 * MS, LED)
-        sim.run(40 * MS, 40 * MS)
+        sim.run(40 * MS)
         return len(hearer.inputs(RECEIVER)) > 1
 
     assert lit() and not lit("cross_talk")

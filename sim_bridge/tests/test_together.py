@@ -22,13 +22,15 @@ from boebot.boards import BoardRequest, SharedWorld, open_together
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
-from boebot.report import scene
+from boebot.report import style
 from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.robots import load_robot
 from boebot.together import StoppedError, execute_together
 from sim_bridge.arena import load_arena
-from sim_bridge.together import SimWorld, places_of
+from sim_bridge.places import places_of
+from sim_bridge.session import SimSession
+from sim_bridge.together import SimWorld
 
 SECONDS = 8.0
 
@@ -140,7 +142,9 @@ def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
     def unlucky(robot: Robot) -> None:
         robot.drive(0.6, 0.6)
         if robot.time == 1.0:
-            worlds[-1].sessions[1].board.reset("external")
+            session = worlds[-1].sessions[1]
+            assert isinstance(session, SimSession)
+            session.board.reset("external")
 
     monkeypatch.setattr(together, "open_together", opened)
     far = (50.0, 0.0, 0.0)
@@ -226,13 +230,17 @@ def test_interrupt_in_a_brain_stops_all() -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 @pytest.mark.parametrize("after_s", [0.0, 0.7])
 def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) -> None:
+    brain, begun = tmp_path / "brain.py", tmp_path / "begun"
+    brain.write_text(f"def step(robot):\n    robot.drive(0.3, 0.3)\n    open({str(begun)!r}, 'w').close()\n")
     process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", "wander", "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path),
+        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path),
          "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
     )  # fmt: skip
-    time.sleep(2.5 + after_s)
+    while not begun.exists() and process.poll() is None:
+        time.sleep(0.01)
+    time.sleep(after_s)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
@@ -253,7 +261,8 @@ def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
     [
         ([], {}, BoebotError, "there is no robot to run"),
         ([Member(), Member(brain="wonder")], {}, BrainError, "robot 2: there is no brain 'wonder'"),
-        ([Member(), Member(robot="arsim")], {}, BoardError, "robot 'arsim' has no board: it cannot yet run together"),
+        ([Member(robot="arsim")] * 2, {"on": "native"}, BoardError, "robot 'arsim' has no board: it cannot run on"),
+        ([Member(robot="arsim"), Member()], {"on": "direct"}, BoardError, "robot 'shieldbot' is driven by its board"),
         ([Member(), Member()], {"on": "/dev/ttyACM0"}, BoardError, "run each robot by itself there"),
         ([Member(), Member()], {"on": "toaster"}, BoardError, "there is no board 'toaster'"),
         ([Member()] * 65, {"arena": "empty"}, BoardError, "65 robots are too many; expected at most 64"),
@@ -314,9 +323,9 @@ def test_files_show_all_robots(tmp_path: Path) -> None:
     result = boebot.run_together([Member(), Member(brain=ahead)], "room", 3.0, out=tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"run.png", "replay.html", "robot-1", "robot-2"}
     assert {path.name for path in (tmp_path / "robot-2").iterdir()} >= {"run.csv", "run.png", "replay.html"}
-    page = re.search(r"const runs = (\[.*\]);\n", (tmp_path / "replay.html").read_text())
+    page = re.search(r"const page = (\{.*\});\n", (tmp_path / "replay.html").read_text())
     assert page
-    runs = json.loads(page[1].replace("<\\/", "</"))
+    runs = json.loads(page[1].replace("<\\/", "</"))["runs"]
     assert [run["brain"] for run in runs] == ["wander", "ahead"]
     assert [run["begin"] for run in runs] == [robot.clock_offset for robot in result.robots]
     import matplotlib.image
@@ -324,5 +333,5 @@ def test_files_show_all_robots(tmp_path: Path) -> None:
 
     picture = (matplotlib.image.imread(tmp_path / "run.png")[:, :, :3] * 255).round().astype(int)
     for number in (1, 2):
-        wanted = [int(scene.colour(number)[i : i + 2], 16) for i in (1, 3, 5)]
+        wanted = [int(style.colour(number)[i : i + 2], 16) for i in (1, 3, 5)]
         assert np.any(np.abs(picture - wanted).sum(axis=2) < 12), f"robot {number} is in the picture"

@@ -8,25 +8,16 @@
 static int positive(double value) { return value > 0.0 && isfinite(value); }
 
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
-  const body_parameters *b = parameters;
-  if (!positive(dt) || !positive(b->mass) || !positive(b->inertia) || !positive(b->radius)) return NULL;
-  if (!positive(b->half_track) || !positive(b->wheel_radius)) return NULL;
-  if (!(b->wheel_mass >= 0.0 && b->wheel_inertia >= 0.0)) return NULL;
-  if (!(b->linear_damping >= 0.0 && b->angular_damping >= 0.0)) return NULL;
-  if (!isfinite(b->wheel_mass + b->wheel_inertia + b->linear_damping + b->angular_damping)) return NULL;
+  if (!positive(dt) || body_parameters_wrong(parameters) != NULL) return NULL;
   vehicle_model *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
-  self->body = *b;
+  self->body = *parameters;
   self->dt = dt;
   self->noise = self->ends_at_collision = 1;
   return self;
 }
 
 void vehicle_model_destroy(vehicle_model *self) { free(self); }
-
-double vehicle_model_dt(const vehicle_model *self) { return self->dt; }
-
-size_t vehicle_model_readings(const vehicle_model *self) { return self->readings; }
 
 void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision) {
   self->noise = noise;
@@ -38,6 +29,7 @@ void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision)
 /* Torque that one wheel loses per rad/s of its speed, N m s. */
 static double slope(const vehicle_model *self, int side) {
   if (self->drive == DRIVE_SERVO) return self->servo[side].motor.gain_n_s * self->body.wheel_radius; /* (3.15) */
+  if (self->drive == DRIVE_REGULATED) return self->regulated[side].gain_n_s * self->body.wheel_radius;
   if (self->drive != DRIVE_DC) return 0.0;
   const motor_dc_parameters *m = &self->dc[side];
   const double motor = m->torque_constant * m->emf_constant / m->resistance_ohm + m->viscous_n_m_s; /* (1.8), (1.9) */
@@ -50,6 +42,7 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   const double along = (2.0 * body_a(b) * steeper / b->wheel_radius + b->linear_damping) / b->mass;
   const double around = (2.0 * body_b(b) * steeper * b->half_track / b->wheel_radius + b->angular_damping) / b->inertia;
   const double rate = along > around ? along : around;
+  if (isnan(along + around)) return 0.0; /* numbers that no arithmetic holds: no step is small enough */
   return rate > 0.0 ? 2.0 / rate : INFINITY;
 }
 
@@ -94,6 +87,21 @@ int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters 
   return check_step(self);
 }
 
+static int regulated_usable(const motor_regulated_parameters *m) {
+  const double sum = m->gain_n_s + m->torque_maximum_n_m + m->coast_n_s + m->coast_maximum_n_m + m->speed_maximum_m_s;
+  return isfinite(sum) && m->gain_n_s > 0.0 && m->torque_maximum_n_m >= 0.0 && m->speed_maximum_m_s >= 0.0;
+}
+
+int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
+                                  const motor_regulated_parameters *right) {
+  if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
+  if (!regulated_usable(left) || !regulated_usable(right)) return VEHICLE_BAD_NUMBER;
+  self->drive = DRIVE_REGULATED;
+  self->regulated[0] = *left;
+  self->regulated[1] = *right;
+  return check_step(self);
+}
+
 /* ---- sensors ------------------------------------------------------------------------------------------------------ */
 
 /* A new sensor with so many readings, NULL where there is no room or the period is no time. */
@@ -111,10 +119,18 @@ static vehicle_sensor *added(vehicle_model *self, int kind, double period, size_
   return sensor;
 }
 
+static int is_eye(const vehicle_sensor *sensor) {
+  return sensor->kind == SENSOR_INFRARED_PROXIMITY && !sensor->as.infrared_proximity.reflectance;
+}
+
 /* What adding a sensor returns; one that is not `usable` leaves again. */
 static int done(vehicle_model *self, const vehicle_sensor *sensor, int usable, size_t readings) {
   if (sensor == NULL) return self->sensors_count == VEHICLE_SENSORS ? VEHICLE_TOO_MANY : VEHICLE_BAD_NUMBER;
-  if (usable) return (int)sensor->first;
+  if (usable) {
+    sensor_list *list = is_eye(sensor) ? &self->eyes : &self->others;
+    list->number[list->count++] = (uint8_t)(sensor - self->sensors);
+    return (int)sensor->first;
+  }
   self->sensors_count--;
   self->readings -= readings;
   return VEHICLE_BAD_NUMBER;
@@ -198,14 +214,4 @@ int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, 
   self->energy = *energy;
   self->has_battery = s != NULL && isfinite(sum) && sigma >= 0.0;
   return done(self, s, self->has_battery, 1);
-}
-
-uint64_t vehicle_model_print(const vehicle_model *self) {
-  uint64_t dt;
-  memcpy(&dt, &self->dt, sizeof dt);
-  uint64_t print = noise_mix(dt) ^ (uint64_t)(unsigned)self->drive;
-  for (size_t i = 0; i < self->sensors_count; i++) {
-    print = noise_mix(print ^ self->sensors[i].device) ^ (uint64_t)self->sensors[i].first;
-  }
-  return noise_mix(print ^ (uint64_t)self->readings);
 }

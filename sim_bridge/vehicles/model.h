@@ -12,6 +12,7 @@
 
 #include "../world/body.h"
 #include "../world/motor_dc.h"
+#include "../world/motor_regulated.h"
 #include "../world/sensors/accelerometer.h"
 #include "../world/sensors/compass.h"
 #include "../world/sensors/infrared_proximity.h"
@@ -35,23 +36,29 @@ enum {
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
   VEHICLE_TOO_MANY = -4,   /* sensors, or a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
-  VEHICLE_BAD_SNAPSHOT = -6, /* not made by this version, of another model, or damaged */
-  VEHICLE_NOT_PLACED = -7,   /* a world without an arena, or a model without a drive */
+  VEHICLE_BAD_SNAPSHOT = -6, /* not made by this version, or damaged */
+  VEHICLE_NOT_PLACED = -7,   /* a world that is not there or without an arena, or a model without a drive */
+  VEHICLE_OTHER_MODEL = -8,  /* a saved state is of another model */
+  VEHICLE_OTHER_ARENA = -9,
+  VEHICLE_OTHER_MEMORY = -10, /* its compiled brain's memory has another size */
 };
 
 typedef struct vehicle_model vehicle_model;
 
 /* A model that steps by `dt` seconds, without drive and sensors; NULL without memory or with a body whose mass, inertia,
- * radius, half track or wheel radius is not positive, or dt <= 0. */
+ * radius, half track or wheel radius is not positive (see body_parameters_wrong), or dt <= 0. */
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt);
 void vehicle_model_destroy(vehicle_model *self);
 
-/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the inductance if `full`. Servo: 1500 us
- * +- 200 us s, one pulse every 20 ms. */
+/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
+ * with inductance 0 is quasi-static nevertheless). Servo: 1500 us +- 200 us s, one pulse every 20 ms. Regulated: (3.15)
+ * with the reference s v_max. */
 int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
                            int full);
 int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
                               const servo_motor_parameters *right);
+int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
+                                  const motor_regulated_parameters *right);
 
 /* The notes' battery; its reading is the voltage empty + E (full - empty) with noise sigma, V. */
 int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, double empty, double full,
@@ -71,16 +78,13 @@ int vehicle_model_add_accelerometer(vehicle_model *self, const accelerometer_par
 int vehicle_model_add_phototransistor(vehicle_model *self, const phototransistor_parameters *p, double period);
 int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p);
 
-/* A sensor known by its table: distance along one ray, angle of incidence at what it meets; `none` beyond `range`. The
- * table stays the caller's. */
+/* A sensor known by its table: distance and angle of incidence at the nearest thing that its rays meet; `none` beyond
+ * `range`. The table stays the caller's. */
 int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
                             double none, double period);
 
 /* Whisker: a segment from (x0, y0) to (x1, y1) in the body's frame; reads 1 while it touches something. */
 int vehicle_model_add_whisker(vehicle_model *self, double x0, double y0, double x1, double y1);
-
-double vehicle_model_dt(const vehicle_model *self);
-size_t vehicle_model_readings(const vehicle_model *self);
 
 /* Above this step, s, Euler's method diverges for the drive and body: 2 / (the faster of their two linearised rates). */
 double vehicle_model_euler_limit(const vehicle_model *self);
@@ -100,7 +104,7 @@ enum {
   SENSOR_BATTERY,
 };
 
-enum { DRIVE_NONE = 0, DRIVE_DC, DRIVE_SERVO };
+enum { DRIVE_NONE = 0, DRIVE_DC, DRIVE_SERVO, DRIVE_REGULATED };
 
 typedef struct {
   beam beam;
@@ -138,6 +142,11 @@ typedef struct {
   } as;
 } vehicle_sensor;
 
+/* Numbers of some of the sensors. */
+typedef struct {
+  uint8_t count, number[VEHICLE_SENSORS];
+} sensor_list;
+
 struct vehicle_model {
   body_parameters body;
   double reach; /* of body and whiskers, m */
@@ -145,15 +154,18 @@ struct vehicle_model {
   int drive, full;
   motor_dc_parameters dc[2];
   servo_motor_parameters servo[2];
+  motor_regulated_parameters regulated[2];
   int has_battery;
   const vehicle_sensor *laser; /* NULL: there is none */
   energy_parameters energy;
   int noise, ends_at_collision;
   size_t sensors_count, readings;
   vehicle_sensor sensors[VEHICLE_SENSORS];
+  sensor_list eyes;   /* IR proximity sensors without `reflectance`: asked all at once */
+  sensor_list others; /* one by one */
 };
 
-/* A number that two models share only if they hold the same sensors and drive and step alike. */
+/* A hash of all parameters: equal for two models only if their worlds go on alike from the same state. */
 uint64_t vehicle_model_print(const vehicle_model *self);
 
 #endif

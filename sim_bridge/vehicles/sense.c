@@ -31,28 +31,27 @@ void vehicle_sensors_start(vehicles *self, size_t i) {
 
 /* Current of both motors, A. */
 static double motor_current(const sensing *s) {
-  const vehicle_model *m = s->all->model;
-  if (m->drive != DRIVE_DC) return 0.0;
-  double sum = 0.0;
-  for (int side = 0; side < 2; side++) {
-    const double speed = side == 0 ? s->world->body.state.rim_left : s->world->body.state.rim_right;
-    const double volts = motor_dc_voltage(&m->dc[side], s->world->state.signals[side]);
-    const double current =
-        m->full ? s->world->state.currents[side] : motor_dc_current(&m->dc[side], volts, speed / m->body.wheel_radius);
-    sum += fabs(current);
-  }
-  return sum;
+  double currents[2];
+  vehicles_currents(s->all, (size_t)(s->world - s->all->worlds), currents);
+  return fabs(currents[0]) + fabs(currents[1]);
 }
 
 static double table_reading(const table_sensor *t, const viewpoint *from, noise_source *noise) {
-  ray_hit hit;
-  const double d = beam_ray(&t->beam, from, beam_from(&t->beam, from), 0, t->range, &hit);
-  if (d < 0.0) return t->none;
-  double cosine, sine;
-  beam_direction(&t->beam, from, 0, &cosine, &sine);
-  const double along = -(cosine * hit.normal_x + sine * hit.normal_y);
-  const double across = cosine * hit.normal_y - sine * hit.normal_x;
-  return table_noise_read(t->table, d, number_atan2(fabs(across), along), noise);
+  const beam_origin at = beam_from(&t->beam, from);
+  double nearest = -1.0;
+  double angle = 0.0;
+  for (int i = 0; i < t->beam.rays; i++) {
+    ray_hit hit;
+    const double d = beam_ray(&t->beam, from, at, i, nearest < 0.0 ? t->range : nearest, &hit);
+    if (d < 0.0) continue;
+    double cosine, sine;
+    beam_direction(&t->beam, from, i, &cosine, &sine);
+    const double along = -(cosine * hit.normal_x + sine * hit.normal_y);
+    const double across = cosine * hit.normal_y - sine * hit.normal_x;
+    nearest = d;
+    angle = number_atan2(fabs(across), along);
+  }
+  return nearest < 0.0 ? t->none : table_noise_read(t->table, nearest, angle, noise);
 }
 
 static void read_odometer(const sensing *s, const odometer_parameters *p, odometer_state *state, noise_source *noise,
@@ -111,12 +110,72 @@ static void read(const sensing *s, const vehicle_sensor *sensor, sensor_slot *sl
   }
 }
 
+static int due(const vehicle_sensor *sensor, const sensor_slot *slot, double time) {
+  return !(sensor->period > 0.0) || sample_hold_due(&slot->hold, time);
+}
+
+/* From here on a sensor's draws are those of this step. */
+static void key_noise(noise_source *noise, const sensor_slot *slot, uint64_t step) {
+  noise->key = slot->key;
+  noise_at(noise, step);
+}
+
+/* The IR proximity sensors that are due: first all questions, then all answers. */
+static void read_eyes(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
+  const vehicle_model *m = s->all->model;
+  const vehicle_sensor *sensors[VEHICLE_SENSORS];
+  const infrared_proximity *eyes[VEHICLE_SENSORS];
+  fan_question asked[VEHICLE_SENSORS];
+  double distances[VEHICLE_SENSORS * BEAM_RAYS];
+  double sums[VEHICLE_SENSORS];
+  double *room = distances;
+  size_t count = 0;
+  for (size_t k = 0; k < m->eyes.count; k++) {
+    const size_t number = m->eyes.number[k];
+    const vehicle_sensor *sensor = &m->sensors[number];
+    if (!due(sensor, &slots[number], s->time)) continue;
+    sensors[count] = sensor;
+    eyes[count] = &sensor->as.infrared_proximity;
+    asked[count] = infrared_proximity_ask(eyes[count], &s->from, room);
+    room += ((size_t)eyes[count]->beam.rays + RAY_FAN_GROUP - 1u) / RAY_FAN_GROUP * RAY_FAN_GROUP;
+    count++;
+  }
+  if (count == 0) return;
+  arena_fans(asked, count);
+  if (s->from.around->movers_count > 0) {
+    for (size_t k = 0; k < count; k++) scene_fan_movers(s->from.around, &asked[k], s->from.id);
+  }
+  infrared_proximity_sums(eyes, asked, count, sums);
+  for (size_t k = 0; k < count; k++) {
+    sensor_slot *slot = &slots[sensors[k] - m->sensors];
+    double *out = &readings[sensors[k]->first];
+    key_noise(noise, slot, s->world->state.step);
+    *out = infrared_proximity_finish(eyes[k], sums[k], noise);
+    if (sensors[k]->period > 0.0) sample_hold_take(&slot->hold, s->time, *out);
+  }
+}
+
+static void read_others(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
+  const vehicle_model *m = s->all->model;
+  const vehicle_state *state = &s->world->state;
+  for (size_t k = 0; k < m->others.count; k++) {
+    const vehicle_sensor *sensor = &m->sensors[m->others.number[k]];
+    sensor_slot *slot = &slots[m->others.number[k]];
+    if (sensor->kind == SENSOR_ACCELEROMETER && state->step > 0)
+      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, state->acceleration, m->dt);
+    if (!due(sensor, slot, s->time)) continue;
+    key_noise(noise, slot, state->step);
+    read(s, sensor, slot, noise, &readings[sensor->first]);
+    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, readings[sensor->first]);
+  }
+}
+
 void vehicle_sense(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
   const body_state *b = &w->body.state;
-  const scene around = vehicle_scene(w);
+  const scene around = vehicle_surroundings(w);
   const sensing s = {.all = self,
                      .world = w,
                      .from = {.around = &around,
@@ -129,16 +188,8 @@ void vehicle_sense(vehicles *self, size_t i) {
                      .time = (double)w->state.step * m->dt};
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
-  for (size_t k = 0; k < m->sensors_count; k++) {
-    const vehicle_sensor *sensor = &m->sensors[k];
-    sensor_slot *slot = &slots[k];
-    if (sensor->kind == SENSOR_ACCELEROMETER && w->state.step > 0)
-      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, w->state.acceleration, m->dt);
-    if (sensor->period > 0.0 && !sample_hold_due(&slot->hold, s.time)) continue;
-    noise_source noise = {.key = slot->key, .keyed = 1, .on = m->noise != 0};
-    noise_at(&noise, w->state.step);
-    read(&s, sensor, slot, &noise, &readings[sensor->first]);
-    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s.time, readings[sensor->first]);
-  }
+  noise_source noise = {.keyed = 1, .on = m->noise != 0};
+  read_eyes(&s, slots, &noise, readings);
+  read_others(&s, slots, &noise, readings);
   w->state.sensed = w->state.step + 1;
 }

@@ -1,92 +1,209 @@
-/* snapshot.c: the state of one world as a hash and as bytes. A snapshot opens with its version, the print of its model and
- * a checksum of the rest. */
-#include <string.h>
+/* snapshot.c: the state of one world as a hash and as bytes.
+ *
+ * One walk goes through all numbers that a world has come to, in one order; it hashes, writes, checks or reads them. What
+ * follows from model, arena and the rest is not among them. Bytes are words of 64 bits, the lowest byte first, the same on
+ * every machine: a heading (version, model, arena, brain's memory, checksum), then the walk. */
+#include <float.h>
+#include <math.h>
 
+#include "../world/hash.h"
 #include "vehicle.h"
 
-#define MAGIC UINT64_C(0x31766f6265623176) /* with the layout's version in it */
+#define VERSION UINT64_C(0x32746f6f62656f62) /* "boeboot2": changes with the walk */
+#define LARGEST 1e12                         /* of a state's numbers */
+#define FASTEST 1e5                          /* m/s, rad/s: a step's time goes with the speed */
+#define HEADING_WORDS 5u
+
+enum { COUNT, HASH, WRITE, CHECK, READ };
 
 typedef struct {
-  uint64_t magic, print, size, checksum;
-} heading_of_snapshot;
+  int mode;
+  int good;     /* CHECK */
+  size_t count; /* of words so far */
+  uint64_t sum; /* HASH */
+  unsigned char *out;
+  const unsigned char *in;
+} stream;
 
-typedef struct {
-  body_state body;
-  vehicle_state state;
-} fixed_part;
+static void put(unsigned char *bytes, size_t number, uint64_t word) {
+  for (size_t i = 0; i < 8; i++) bytes[8 * number + i] = (unsigned char)(word >> (8 * i));
+}
 
-static uint64_t mixed(uint64_t sum, const void *bytes, size_t size) {
-  const unsigned char *at = bytes;
-  for (size_t i = 0; i < size; i += sizeof(uint64_t)) {
-    uint64_t word = 0;
-    memcpy(&word, at + i, size - i < sizeof word ? size - i : sizeof word);
-    sum = noise_mix(sum ^ word);
+static uint64_t get(const unsigned char *bytes, size_t number) {
+  uint64_t word = 0;
+  for (size_t i = 0; i < 8; i++) word |= (uint64_t)bytes[8 * number + i] << (8 * i);
+  return word;
+}
+
+/* ---- one value ---------------------------------------------------------------------------------------------------- */
+
+/* The word that is now there, or was saved in its place. */
+static uint64_t pass(stream *s, uint64_t now) {
+  const size_t number = s->count++;
+  if (s->mode == CHECK || s->mode == READ) return get(s->in, number);
+  if (s->mode == HASH) s->sum = hash_word(s->sum, now);
+  if (s->mode == WRITE) put(s->out, number, now);
+  return now;
+}
+
+static void whole(stream *s, uint64_t *value, uint64_t least, uint64_t most) {
+  const uint64_t found = pass(s, *value);
+  if (s->mode == CHECK) s->good &= found >= least && found <= most;
+  if (s->mode == READ) *value = found;
+}
+
+static void whole_int(stream *s, int *value, int most) {
+  uint64_t wide = (uint64_t)*value;
+  whole(s, &wide, 0, (uint64_t)most);
+  if (s->mode == READ) *value = (int)wide;
+}
+
+static void number(stream *s, double *value, double most) {
+  const uint64_t bits = pass(s, hash_bits(*value));
+  double found;
+  memcpy(&found, &bits, sizeof found);
+  if (s->mode == CHECK) s->good &= fabs(found) <= most;
+  if (s->mode == READ) *value = found;
+}
+
+#define NUMBERS(s, most, ...)                                                           \
+  do {                                                                                  \
+    double *const values[] = {__VA_ARGS__};                                             \
+    for (size_t number_of = 0; number_of < sizeof values / sizeof *values; number_of++) \
+      number((s), values[number_of], (most));                                           \
+  } while (0)
+
+/* ---- the walk ----------------------------------------------------------------------------------------------------- */
+
+static void walk_body(stream *s, body_state *b) {
+  NUMBERS(s, LARGEST, &b->x, &b->y);
+  NUMBERS(s, FASTEST, &b->speed, &b->turn_rate, &b->lateral, &b->rim_left, &b->rim_right);
+  NUMBERS(s, LARGEST, &b->wheel_left, &b->wheel_right, &b->distance, &b->touch_x, &b->touch_y);
+  NUMBERS(s, 3.2, &b->heading);
+  NUMBERS(s, 1.0 + 1e-9, &b->cosine, &b->sine);
+  whole_int(s, &b->touching, 1);
+  whole_int(s, &b->slipping, 1);
+}
+
+static void walk_state(stream *s, vehicle_state *v) {
+  uint64_t id = v->id;
+  int flag = v->flag;
+  whole(s, &v->seed, 0, UINT64_MAX);
+  whole(s, &id, 1, SCENE_FIRST_MOVER - 1);
+  whole(s, &v->step, 0, UINT64_C(1) << 52);
+  whole(s, &v->sensed, 0, (UINT64_C(1) << 52) + 1);
+  whole(s, &v->next_pulse, 0, UINT64_C(1) << 53);
+  whole_int(s, &flag, VEHICLE_BRAIN_FAILED);
+  NUMBERS(s, 1.0, &v->signals[0], &v->signals[1], &v->energy);
+  NUMBERS(s, LARGEST, &v->currents[0], &v->currents[1], &v->acceleration);
+  for (int side = 0; side < 2; side++) {
+    servo_motor *m = &v->servos[side];
+    NUMBERS(s, LARGEST, &m->pulse_us, &m->age_s, &m->target, &m->reference);
   }
+  if (s->mode != READ) return;
+  v->id = (uint32_t)id;
+  v->flag = flag;
+}
+
+/* Where a moving shape is follows from the time and how long it has waited. */
+static void walk_mover(stream *s, mover *m) {
+  NUMBERS(s, LARGEST, &m->waited);
+  whole_int(s, &m->waits, 1);
+}
+
+static void walk_sensor(stream *s, const vehicle_sensor *sensor, sensor_slot *slot) {
+  if (sensor->period > 0.0) NUMBERS(s, LARGEST, &slot->hold.next, &slot->hold.taken, &slot->hold.value);
+  if (sensor->kind == SENSOR_SHARP_INFRARED) {
+    sharp_infrared_state *a = &slot->as.sharp_infrared;
+    NUMBERS(s, LARGEST, &a->next, &a->pending, &a->pending_due, &a->output);
+  } else if (sensor->kind == SENSOR_ACCELEROMETER) {
+    NUMBERS(s, LARGEST, &slot->as.accelerometer.deflection, &slot->as.accelerometer.speed);
+  } else if (sensor->kind == SENSOR_ODOMETER) {
+    odometer_state *o = &slot->as.odometer;
+    NUMBERS(s, LARGEST, &o->x, &o->y, &o->heading, &o->wheel_left, &o->wheel_right, &o->rest_left, &o->rest_right,
+            &o->distance);
+  }
+}
+
+static void walk_brain(stream *s, unsigned char *memory, size_t size) {
+  for (size_t at = 0; at < size; at += 8) {
+    const uint64_t found = pass(s, get(memory + at, 0));
+    if (s->mode == READ) put(memory + at, 0, found);
+  }
+}
+
+static size_t moving_count(const vehicle *w) { return vehicle_scene(w).movers_count; }
+
+static void walk(stream *s, vehicles *all, size_t i) {
+  const vehicle_model *m = all->model;
+  walk_body(s, &all->worlds[i].body.state);
+  walk_state(s, &all->worlds[i].state);
+  for (size_t k = 0; k < moving_count(&all->worlds[i]); k++) walk_mover(s, &all->worlds[i].movers[k]);
+  for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(s, &m->sensors[k], &all->slots[i * m->sensors_count + k]);
+  for (size_t k = 0; k < m->readings; k++) number(s, &all->readings[i * m->readings + k], DBL_MAX);
+  walk_brain(s, all->brains + i * all->state_size, all->state_size);
+}
+
+/* ---- what is offered ---------------------------------------------------------------------------------------------- */
+
+uint64_t vehicles_hash(const vehicles *self, size_t i) {
+  stream s = {.mode = HASH};
+  walk(&s, (vehicles *)self, i); /* changes nothing */
+  return s.sum;
+}
+
+size_t vehicles_snapshot_size(const vehicles *self, size_t i) {
+  stream s = {.mode = COUNT};
+  walk(&s, (vehicles *)self, i); /* changes nothing */
+  return 8 * (HEADING_WORDS + s.count);
+}
+
+/* Of the words behind the heading. */
+static uint64_t checksum(const unsigned char *bytes, size_t size) {
+  uint64_t sum = VERSION;
+  for (size_t k = 0; 8 * k < size; k++) sum = hash_word(sum, get(bytes, k));
   return sum;
 }
 
-uint64_t vehicles_hash(const vehicles *self, size_t i) {
-  const vehicle_model *m = self->model;
-  const vehicle *w = &self->worlds[i];
-  const body_state *b = &w->body.state;
-  const vehicle_state *s = &w->state;
-  const double values[] = {b->x,          b->y,           b->heading,     b->speed,        b->turn_rate, b->lateral,
-                           b->rim_left,   b->rim_right,   b->wheel_left,  b->wheel_right,  b->distance,  s->signals[0],
-                           s->signals[1], s->currents[0], s->currents[1], s->acceleration, s->energy};
-  const uint64_t counts[] = {s->step, s->id, (uint64_t)(uint32_t)s->flag, (uint64_t)(b->touching != 0)};
-  uint64_t sum = mixed(mixed(0, values, sizeof values), counts, sizeof counts);
-  return mixed(sum, &self->readings[i * m->readings], m->readings * sizeof(double));
-}
-
-static size_t slots_size(const vehicles *self) { return self->model->sensors_count * sizeof(sensor_slot); }
-
-static size_t readings_size(const vehicles *self) { return self->model->readings * sizeof(double); }
-
-size_t vehicles_snapshot_size(const vehicles *self) {
-  return sizeof(heading_of_snapshot) + sizeof(fixed_part) + slots_size(self) + readings_size(self) + self->state_size;
-}
-
 void vehicles_save(const vehicles *self, size_t i, void *bytes) {
-  unsigned char *at = (unsigned char *)bytes + sizeof(heading_of_snapshot);
-  fixed_part fixed;
-  memset(&fixed, 0, sizeof fixed);
-  fixed.body = self->worlds[i].body.state;
-  fixed.state = self->worlds[i].state;
-  memcpy(at, &fixed, sizeof fixed);
-  at += sizeof fixed;
-  memcpy(at, &self->slots[i * self->model->sensors_count], slots_size(self));
-  at += slots_size(self);
-  memcpy(at, &self->readings[i * self->model->readings], readings_size(self));
-  at += readings_size(self);
-  memcpy(at, self->brains + i * self->state_size, self->state_size);
-  const size_t size = vehicles_snapshot_size(self);
-  const unsigned char *rest = (const unsigned char *)bytes + sizeof(heading_of_snapshot);
-  const heading_of_snapshot heading = {MAGIC, vehicle_model_print(self->model), size,
-                                       mixed(MAGIC, rest, size - sizeof(heading_of_snapshot))};
-  memcpy(bytes, &heading, sizeof heading);
+  unsigned char *rest = (unsigned char *)bytes + 8 * HEADING_WORDS;
+  stream s = {.mode = WRITE, .out = rest};
+  walk(&s, (vehicles *)self, i); /* changes nothing */
+  put(bytes, 0, VERSION);
+  put(bytes, 1, vehicle_model_print(self->model));
+  put(bytes, 2, self->worlds[i].where != NULL ? arena_print(self->worlds[i].where) : 0);
+  put(bytes, 3, self->state_size);
+  put(bytes, 4, checksum(rest, 8 * s.count));
+}
+
+/* VEHICLE_OK if these bytes can become the state of world i. */
+static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t size) {
+  if (size < 8 * HEADING_WORDS || size % 8 != 0 || get(bytes, 0) != VERSION) return VEHICLE_BAD_SNAPSHOT;
+  const unsigned char *rest = bytes + 8 * HEADING_WORDS;
+  if (get(bytes, 4) != checksum(rest, size - 8 * HEADING_WORDS)) return VEHICLE_BAD_SNAPSHOT;
+  if (get(bytes, 1) != vehicle_model_print(self->model)) return VEHICLE_OTHER_MODEL;
+  if (get(bytes, 2) != arena_print(self->worlds[i].where)) return VEHICLE_OTHER_ARENA;
+  if (get(bytes, 3) != self->state_size) return VEHICLE_OTHER_MEMORY;
+  if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
+  stream s = {.mode = CHECK, .good = 1, .in = rest};
+  walk(&s, self, i);
+  return s.good ? VEHICLE_OK : VEHICLE_BAD_SNAPSHOT;
 }
 
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
-  heading_of_snapshot heading;
+  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  const int status = check(self, i, bytes, size);
+  if (status != VEHICLE_OK) return status;
   vehicle *w = &self->worlds[i];
-  if (w->where == NULL) return VEHICLE_NOT_PLACED;
-  if (size != vehicles_snapshot_size(self)) return VEHICLE_BAD_SNAPSHOT;
-  memcpy(&heading, bytes, sizeof heading);
-  const unsigned char *at = (const unsigned char *)bytes + sizeof heading;
-  if (heading.magic != MAGIC || heading.size != size || heading.print != vehicle_model_print(self->model) ||
-      heading.checksum != mixed(MAGIC, at, size - sizeof heading))
-    return VEHICLE_BAD_SNAPSHOT;
-  fixed_part fixed;
-  memcpy(&fixed, at, sizeof fixed);
-  at += sizeof fixed;
-  memcpy(&self->slots[i * self->model->sensors_count], at, slots_size(self));
-  at += slots_size(self);
-  memcpy(&self->readings[i * self->model->readings], at, readings_size(self));
-  at += readings_size(self);
-  memcpy(self->brains + i * self->state_size, at, self->state_size);
-  body_place(&w->body, fixed.body.x, fixed.body.y, fixed.body.heading); /* forgets what was near */
-  w->body.state = fixed.body;
-  w->state = fixed.state;
+  stream s = {.mode = READ, .in = (const unsigned char *)bytes + 8 * HEADING_WORDS};
+  walk(&s, self, i);
+  w->body.id = w->state.id;
+  const body_state saved = w->body.state;
+  body_place(&w->body, saved.x, saved.y, saved.heading); /* forgets what was near */
+  w->body.state = saved;
+  for (size_t k = 0; k < self->model->sensors_count; k++)
+    self->slots[i * self->model->sensors_count + k].key =
+        noise_key(w->state.seed, w->state.id, self->model->sensors[k].device);
   vehicles_update_arena(self, i);
   return VEHICLE_OK;
 }

@@ -8,11 +8,11 @@
 #include "sense.h"
 
 #define SERVO_PERIOD_S 0.020
-#define FIRST_MOVER 0x80000000u /* ids of the arena's moving shapes */
-#define SPEED_LIMIT 100.0       /* m/s: as body.c limits it */
-#define TURN_LIMIT 1000.0       /* rad/s */
+#define SPEED_LIMIT 100.0 /* m/s: as body.c limits it */
+#define TURN_LIMIT 1000.0 /* rad/s */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
+  if (state_size > SIZE_MAX - 15u) return NULL;
   const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
   vehicles *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
@@ -22,7 +22,7 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   self->worlds = calloc(count + 1, sizeof *self->worlds);
   self->slots = calloc(count * model->sensors_count + 1, sizeof *self->slots);
   self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
-  self->brains = calloc(count * block + 1, 1);
+  self->brains = calloc(count + 1, block + 1);
   if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
   vehicles_destroy(self);
   return NULL;
@@ -48,14 +48,16 @@ void vehicles_destroy(vehicles *self) {
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading) {
   const vehicle_model *m = self->model;
-  if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
+  if (m->drive == DRIVE_NONE || i >= self->count) return VEHICLE_NOT_PLACED;
   if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
-  if (!isfinite(x) || !isfinite(y) || !(fabs(heading) < 1e5) || id == 0 || id >= FIRST_MOVER) return VEHICLE_BAD_NUMBER;
+  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) <= BODY_HEADING_LIMIT))
+    return VEHICLE_BAD_NUMBER;
+  if (id == 0 || id >= SCENE_FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
   if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
-  scene_moving(where, 0.0, FIRST_MOVER, movers);
+  scene_moving(where, 0.0, m->dt, SCENE_FIRST_MOVER, movers);
   body at;
   body_init(&at, &m->body, m->reach);
   const scene around = {.arena = where, .movers = movers, .movers_count = moving};
@@ -105,7 +107,10 @@ int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate
 
 void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
 
-static double limited(double signal) { return signal > 1.0 ? 1.0 : (signal < -1.0 ? -1.0 : signal); }
+static double limited(double signal) {
+  const double below = signal < 1.0 ? signal : 1.0;
+  return below > -1.0 ? below : -1.0;
+}
 
 int vehicles_send(vehicles *self, size_t i, double left, double right) {
   if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
@@ -128,6 +133,13 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
     }
     return;
   }
+  if (m->drive == DRIVE_REGULATED) {
+    for (int side = 0; side < 2; side++) {
+      const motor_regulated_parameters *motor = &m->regulated[side];
+      out[side] = motor_regulated(motor, motor_regulated_reference(motor, s->signals[side]), rims[side], 1.0);
+    }
+    return;
+  }
   const int pulse = s->step >= s->next_pulse;
   for (int side = 0; side < 2; side++) {
     const servo_motor_parameters *servo = &m->servo[side];
@@ -137,6 +149,14 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
 }
 
+void vehicle_torques(vehicles *self, size_t i, double out[2]) { torques(self->model, &self->worlds[i], out); }
+
+void vehicle_moved(vehicles *self, size_t i, double speed) {
+  vehicle *w = &self->worlds[i];
+  w->state.acceleration = (w->body.state.speed - speed) / self->model->dt;
+  w->state.step++;
+}
+
 void vehicles_move(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   double torque[2];
@@ -144,29 +164,21 @@ void vehicles_move(vehicles *self, size_t i) {
   torques(self->model, w, torque);
   const scene around = vehicle_scene(w);
   body_advance(&w->body, &around, torque[0], torque[1], self->model->dt);
-  w->state.acceleration = (w->body.state.speed - before) / self->model->dt;
-  w->state.step++;
+  vehicle_moved(self, i, before);
 }
 
 void vehicles_update_arena(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
-  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * self->model->dt, FIRST_MOVER, w->movers);
-}
-
-/* 1 at a charging station. */
-static int charges(const vehicle *w) {
-  const arena_charger *charger = arena_charger_of(w->where);
-  if (charger == NULL) return 0;
-  const double dx = w->body.state.x - charger->x;
-  const double dy = w->body.state.y - charger->y;
-  return dx * dx + dy * dy < charger->radius * charger->radius;
+  const double dt = self->model->dt;
+  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, SCENE_FIRST_MOVER, w->movers);
 }
 
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
-  if (m->has_battery)
-    s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], charges(&self->worlds[i]), m->dt);
+  const body_state *b = &self->worlds[i].body.state;
+  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].where, b->x, b->y);
+  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
   if (m->ends_at_collision && self->worlds[i].body.state.touching) {
     s->flag = VEHICLE_COLLIDED;
   } else if (m->has_battery && s->energy <= 0.0) {
@@ -225,6 +237,7 @@ int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brai
       const int sent = vehicles_send(self, i, signals[0], signals[1]);
       if (sent != VEHICLE_OK) {
         status = sent;
+        self->worlds[i].state.flag = VEHICLE_BRAIN_FAILED;
         break;
       }
       finish_step(self, i);
@@ -256,9 +269,29 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 
 const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
 
+const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
+  const scene own = vehicle_scene(&self->worlds[i]);
+  *count = own.movers_count;
+  return own.movers;
+}
+
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
 
 double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
+
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  for (int side = 0; side < 2; side++) {
+    currents[side] = 0.0;
+    if (m->drive != DRIVE_DC) continue;
+    const motor_dc_parameters *motor = &m->dc[side];
+    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
+    currents[side] =
+        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
+  }
+}
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;

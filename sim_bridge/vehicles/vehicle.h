@@ -13,7 +13,7 @@
 
 /* python: begin */
 /* Why a run ended. */
-enum { VEHICLE_RUNS = 0, VEHICLE_COLLIDED = 1, VEHICLE_EXHAUSTED = 2 };
+enum { VEHICLE_RUNS = 0, VEHICLE_COLLIDED = 1, VEHICLE_EXHAUSTED = 2, VEHICLE_BRAIN_FAILED = 3 };
 
 typedef struct vehicles vehicles;
 
@@ -42,8 +42,8 @@ int vehicles_step(vehicles *self, size_t first, size_t count, const double *sign
 /* One step of one world. Returns VEHICLE_RUNS or why the run has ended, or an error. */
 int vehicles_step_one(vehicles *self, size_t i, double left, double right);
 
-/* The same with a brain in compiled code that is asked in every step. A signal that is not a number stops that world and
- * is reported. */
+/* The same with a brain in compiled code that is asked in every step. A signal that is not a number ends that world's run
+ * and is reported. What the brain needs, memory and readings, is the caller's to see to. */
 int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps);
 
 /* The stages of one step of one world by themselves, for whoever looks on in between: sense, then (the brain), send, move,
@@ -68,13 +68,22 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 /* Truth of one world, for records and tests: never for a brain. */
 const body_state *vehicles_body(const vehicles *self, size_t i);
 uint64_t vehicles_steps_done(const vehicles *self, size_t i);
+
+/* The arena's moving shapes as they stand in that world; good until it is placed anew. */
+const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count);
 double vehicles_energy(const vehicles *self, size_t i);
 
-/* Of everything that a world has come to; equal for runs that are equal bit for bit. */
+/* Currents of the DC motors, left and right, A: the state of the full motor, else what the last signals and the speed now
+ * give; 0 with another drive. */
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
+
+/* Of everything that a world has come to, which is what vehicles_save writes, in the same order; the same on every
+ * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
-/* One world as bytes, and back into a world of the same model that is placed in the same arena. */
-size_t vehicles_snapshot_size(const vehicles *self);
+/* World i as bytes, the same on every machine, and back into a world of the same model that is placed in the same arena.
+ * Restoring checks model, arena, the brain's memory and every number; what it refuses changes nothing. */
+size_t vehicles_snapshot_size(const vehicles *self, size_t i);
 void vehicles_save(const vehicles *self, size_t i, void *bytes);
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
 
@@ -110,9 +119,10 @@ typedef struct {
 
 typedef struct {
   const arena *where;
-  laser *laser;  /* NULL: the model has none */
-  mover *movers; /* as many as the arena has moving shapes */
-  double hold;   /* of the DC motors' friction, see motor_dc.h */
+  laser *laser;        /* NULL: the model has none */
+  mover *movers;       /* as many as the arena has moving shapes */
+  double hold;         /* of the DC motors' friction, see motor_dc.h */
+  const scene *shared; /* what is around it in a world that is not its own alone; NULL: in its own */
   body body;
   vehicle_state state;
 } vehicle;
@@ -122,6 +132,16 @@ static inline scene vehicle_scene(const vehicle *self) {
                  .movers = self->movers,
                  .movers_count = self->movers == NULL ? 0 : arena_moving_count(self->where)};
 }
+
+/* What its sensors meet. */
+static inline scene vehicle_surroundings(const vehicle *self) {
+  return self->shared != NULL ? *self->shared : vehicle_scene(self);
+}
+
+/* For a world that somebody else moves: the wheels' torques for the next step, and what is to be done when the body, which
+ * went at `speed` before, has made it. */
+void vehicle_torques(vehicles *self, size_t i, double out[2]);
+void vehicle_moved(vehicles *self, size_t i, double speed);
 
 struct vehicles {
   const vehicle_model *model;

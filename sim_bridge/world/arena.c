@@ -7,8 +7,6 @@
 
 #include "arena_data.h"
 
-#define FARTHEST 1e6 /* m: positions beyond lose the precision that rays need */
-
 static const arena_surface PLAIN = {.height = 1e300, .infrared_reflectance = 1.0, .sound_reflectance = 1.0};
 
 arena *arena_new(void) {
@@ -53,9 +51,15 @@ static void *grown(void *array, size_t count, size_t more, size_t size) {
 
 static int all_finite(const double *values, size_t count) {
   for (size_t i = 0; i < count; i++) {
-    if (!(fabs(values[i]) <= FARTHEST)) return 0;
+    if (!(fabs(values[i]) <= ARENA_FARTHEST_M)) return 0;
   }
   return 1;
+}
+
+static int share(double value) { return value >= 0.0 && value <= 1.0; }
+
+static int usable(const arena_surface *s) {
+  return s == NULL || (s->height > 0.0 && share(s->infrared_reflectance) && share(s->sound_reflectance));
 }
 
 /* The circle around a shape's box. */
@@ -85,6 +89,7 @@ static void enclose(const arena *self, arena_shape *shape) {
 }
 
 static int add_shape(arena *self, int kind, const arena_surface *surface, size_t first, size_t count) {
+  if (!usable(surface)) return -1;
   arena_shape *shapes = grown(self->shape, self->shape_count, 1, sizeof *shapes);
   if (shapes == NULL) return -1;
   self->shape = shapes;
@@ -108,7 +113,7 @@ static int add_edges(arena *self, const double *xy, size_t count, size_t edge_co
     arena_edge e = {.ax = a[0], .ay = a[1], .ex = b[0] - a[0], .ey = b[1] - a[1], .shape = (int)self->shape_count};
     e.length_squared = e.ex * e.ex + e.ey * e.ey;
     e.height = surface != NULL ? surface->height : PLAIN.height;
-    if (!(e.length_squared > 1e-24)) return -1;
+    if (!(e.length_squared >= ARENA_SHORTEST_M * ARENA_SHORTEST_M)) return -1;
     edges[self->edge_count + i] = e;
   }
   const int number = add_shape(self, kind, surface, self->edge_count, edge_count);
@@ -177,14 +182,25 @@ static int path_is_good(const path_waypoint *waypoints, size_t count, int repeat
   for (size_t i = 0; i < count; i++) {
     const path_waypoint *w = &waypoints[i];
     if (!all_finite((const double[]){w->time, w->x, w->y}, 3) || !(fabs(w->heading) < 1e5)) return 0;
-    if (i > 0 && !(w->time > waypoints[i - 1].time)) return 0;
+    if (i > 0 && !(w->time - waypoints[i - 1].time >= ARENA_WAYPOINTS_US * 1e-6)) return 0;
   }
   return 1;
 }
 
+double arena_path_speed(const path_waypoint *waypoints, size_t count, double radius) {
+  double fastest = 0.0;
+  for (size_t i = 1; i < count; i++) {
+    const path_waypoint *a = &waypoints[i - 1];
+    const path_waypoint *b = &waypoints[i];
+    const double way = sqrt((b->x - a->x) * (b->x - a->x) + (b->y - a->y) * (b->y - a->y));
+    fastest = fmax(fastest, (way + radius * fabs(b->heading - a->heading)) / (b->time - a->time));
+  }
+  return fastest;
+}
+
 int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
                      const path_waypoint *waypoints, size_t waypoint_count, int repeat) {
-  if (!path_is_good(waypoints, waypoint_count, repeat)) return -1;
+  if (!path_is_good(waypoints, waypoint_count, repeat) || !usable(surface)) return -1;
   arena_moving added = {.radius = radius, .surface = surface != NULL ? *surface : PLAIN};
   if (outline != NULL) {
     if (corners < 3 || !all_finite(outline, 2 * corners)) return -1;
@@ -196,6 +212,7 @@ int arena_add_moving(arena *self, const double *outline, size_t corners, double 
     added.radius *= 1.0 + 1e-12;
   }
   if (!all_finite(&added.radius, 1) || !(added.radius > 0.0)) return -1;
+  if (arena_path_speed(waypoints, waypoint_count, added.radius) > ARENA_FASTEST_M_S) return -1;
   arena_moving *movings = grown(self->moving, self->moving_count, 1, sizeof *movings);
   if (movings == NULL) return -1;
   self->moving = movings;
@@ -222,6 +239,7 @@ int arena_set_charger(arena *self, double x, double y, double radius) {
 void arena_build(arena *self) {
   const grid_items items = arena_items(self);
   index_drop(self);
+  self->print = arena_reckon_print(self);
   for (size_t i = 0; i < self->shape_count; i++) enclose(self, &self->shape[i]);
   if (self->index_choice >= ARENA_INDEX_GRID && grid_build(&self->grid, &items) == 0 &&
       self->index_choice >= ARENA_INDEX_LISTS) {
@@ -235,19 +253,6 @@ void arena_use_index(arena *self, int choice) {
   arena_build(self);
 }
 
-int arena_move_polygon(arena *self, int number, double dx, double dy) {
-  if (number < 0 || (size_t)number >= self->shape_count || self->shape[number].kind == ARENA_DISC) return -1;
-  if (!all_finite((const double[]){dx, dy}, 2)) return -1;
-  const arena_shape *s = &self->shape[number];
-  for (uint32_t i = 0; i < s->count; i++) {
-    self->edge[s->first + i].ax += dx;
-    self->edge[s->first + i].ay += dy;
-  }
-  self->version++;
-  arena_build(self);
-  return 0;
-}
-
 size_t arena_edge_count(const arena *self) { return self->edge_count; }
 size_t arena_disc_count(const arena *self) { return self->disc_count; }
 size_t arena_shape_count(const arena *self) { return self->shape_count; }
@@ -258,7 +263,15 @@ const arena_disc *arena_discs(const arena *self) { return self->disc; }
 const arena_light *arena_lights(const arena *self) { return self->light; }
 const arena_moving *arena_movings(const arena *self) { return self->moving; }
 const arena_charger *arena_charger_of(const arena *self) { return self->has_charger ? &self->charger : NULL; }
+
+int arena_is_at_charger(const arena *self, double x, double y) {
+  const double dx = x - self->charger.x;
+  const double dy = y - self->charger.y;
+  return self->has_charger && dx * dx + dy * dy <= self->charger.radius * self->charger.radius;
+}
+
 uint32_t arena_version(const arena *self) { return self->version; }
+uint64_t arena_print(const arena *self) { return self->print; }
 
 const arena_shape *arena_shape_at(const arena *self, size_t number) {
   return number < self->shape_count ? &self->shape[number] : NULL;

@@ -8,10 +8,8 @@
 #include "ground.h"
 #include "numbers.h"
 
-#define LOOK_AHEAD 0.05      /* m: how far the list of near things stays good */
-#define CLEARANCE_LIMIT 0.75 /* m */
-#define SPEED_LIMIT 100.0    /* m/s: a drive that diverges stays finite */
-#define TURN_LIMIT 1000.0    /* rad/s */
+#define SPEED_LIMIT 100.0 /* m/s: a drive that diverges stays finite */
+#define TURN_LIMIT 1000.0 /* rad/s */
 #define SLIP_ROUNDS 40
 #define SLIP_SETTLED 1e-12 /* m/s */
 #define SPIN_SHARE 0.1     /* least spin inertia of a slipping wheel / M r^2 */
@@ -24,7 +22,7 @@ const char *body_parameters_wrong(const body_parameters *p) {
   } all[] = {
       {"mass", p->mass, 0},
       {"inertia", p->inertia, 0},
-      {"radius", p->outline != NULL ? p->outline->reach : p->radius, 0},
+      {"radius", body_reach_of(p), 0},
       {"half_track", p->half_track, 0},
       {"wheel_radius", p->wheel_radius, 0},
       {"wheel_mass", p->wheel_mass, 1},
@@ -56,7 +54,7 @@ void body_init(body *self, const body_parameters *parameters, double reach) {
   const body_parameters *p = parameters;
   memset(self, 0, sizeof *self);
   self->parameters = *p;
-  self->body_reach = p->outline != NULL ? p->outline->reach : p->radius;
+  self->body_reach = body_reach_of(p);
   self->reach = reach > self->body_reach + BODY_SKIN ? reach : self->body_reach + BODY_SKIN;
   self->force_gain = body_a(p) / p->mass;
   self->drag = p->linear_damping / p->mass;
@@ -105,117 +103,11 @@ void body_as_mover(const body *self, mover *out) {
   };
 }
 
-double body_energy(const body *self) {
-  const body_state *s = &self->state;
-  const double spin = self->parameters.slip ? self->slip_spin : self->spin;
-  const double left = s->slipping ? s->rim_left : body_left_speed(self);
-  const double right = s->slipping ? s->rim_right : body_right_speed(self);
-  return 0.5 * (self->mass * (s->speed * s->speed + s->lateral * s->lateral) +
-                self->inertia * s->turn_rate * s->turn_rate + spin * (left * left + right * right));
-}
-
 double body_wheel_hold(const body *self, double dt) {
   const body_parameters *p = &self->parameters;
   const double straight = 0.5 * self->mass + self->spin; /* at the rim, one of two wheels */
   const double turning = 0.5 * self->inertia / (p->half_track * p->half_track) + self->spin;
   return (straight < turning ? straight : turning) * p->wheel_radius * p->wheel_radius / dt;
-}
-
-/* ---- what is near -------------------------------------------------------------------------------------------------- */
-
-/* 1 if the lists are good while the body is within `share` of their slack. */
-static inline int knows(const body *self, const arena *where, double share) {
-  const body_surroundings *near = &self->near;
-  const double dx = self->state.x - near->x;
-  const double dy = self->state.y - near->y;
-  const double good = share * near->slack;
-  return good > 0.0 && dx * dx + dy * dy < good * good && near->version == arena_version(where);
-}
-
-void body_look_around(body *self, const arena *where, double share) {
-  if (knows(self, where, share)) return;
-  body_surroundings *near = &self->near;
-  near->x = self->state.x;
-  near->y = self->state.y;
-  near->version = arena_version(where);
-  near->edge_count = near->disc_count = 0;
-  const double clearance = arena_clearance(where, near->x, near->y, CLEARANCE_LIMIT + self->reach);
-  if (clearance > self->reach + LOOK_AHEAD) {
-    near->slack = clearance - self->reach;
-    return;
-  }
-  near->slack = LOOK_AHEAD;
-  const double reach = self->reach + LOOK_AHEAD;
-  const size_t edges = arena_edges_near(where, near->x, near->y, reach, near->edges, BODY_EDGES_CAPACITY);
-  const size_t discs = arena_discs_near(where, near->x, near->y, reach, near->discs, BODY_DISCS_CAPACITY);
-  near->edge_count = (uint16_t)(edges > BODY_EDGES_CAPACITY ? BODY_EDGES_CAPACITY + 1 : edges);
-  near->disc_count = (uint16_t)(discs > BODY_DISCS_CAPACITY ? BODY_DISCS_CAPACITY + 1 : discs);
-}
-
-const uint32_t *body_near_edges(const body *self, const arena *where, size_t *count) {
-  const int all = self->near.edge_count > BODY_EDGES_CAPACITY;
-  *count = all ? arena_edge_count(where) : self->near.edge_count;
-  return all ? NULL : self->near.edges;
-}
-
-const uint32_t *body_near_discs(const body *self, const arena *where, size_t *count) {
-  const int all = self->near.disc_count > BODY_DISCS_CAPACITY;
-  *count = all ? arena_disc_count(where) : self->near.disc_count;
-  return all ? NULL : self->near.discs;
-}
-
-int body_is_clear(body *self, const arena *where) {
-  if (!knows(self, where, 1.0)) body_look_around(self, where, 1.0);
-  return self->near.edge_count == 0 && self->near.disc_count == 0;
-}
-
-static int mover_meets_segment(const mover *m, double ax, double ay, double bx, double by) {
-  if (m->outline == NULL) {
-    const arena_disc disc = {.x = m->x, .y = m->y, .radius = m->radius};
-    return arena_disc_meets_segment(&disc, ax, ay, bx, by);
-  }
-  const double px = (ax - m->x) * m->cosine + (ay - m->y) * m->sine; /* in the mover's frame */
-  const double py = (ay - m->y) * m->cosine - (ax - m->x) * m->sine;
-  const double qx = (bx - m->x) * m->cosine + (by - m->y) * m->sine;
-  const double qy = (by - m->y) * m->cosine - (bx - m->x) * m->sine;
-  for (size_t i = 0; i < m->corners; i++) {
-    const double *a = m->outline + 2 * i;
-    const double *b = m->outline + 2 * (i + 1 < m->corners ? i + 1 : 0);
-    arena_edge e = {.ax = a[0], .ay = a[1], .ex = b[0] - a[0], .ey = b[1] - a[1]};
-    e.length_squared = e.ex * e.ex + e.ey * e.ey;
-    if (arena_edge_meets_segment(&e, px, py, qx, qy)) return 1;
-  }
-  return 0;
-}
-
-int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1, double height) {
-  const arena *where = around->arena;
-  const int clear = body_is_clear(self, where);
-  if (clear && around->movers_count == 0) return 0;
-  const body_state *s = &self->state;
-  const double ax = s->x + x0 * s->cosine - y0 * s->sine;
-  const double ay = s->y + x0 * s->sine + y0 * s->cosine;
-  const double bx = s->x + x1 * s->cosine - y1 * s->sine;
-  const double by = s->y + x1 * s->sine + y1 * s->cosine;
-  size_t count;
-  const uint32_t *list = body_near_edges(self, where, &count);
-  for (size_t i = 0; i < count; i++) {
-    const arena_edge *edge = &arena_edges(where)[list != NULL ? list[i] : i];
-    if (edge->height >= height && arena_edge_meets_segment(edge, ax, ay, bx, by)) return 1;
-  }
-  list = body_near_discs(self, where, &count);
-  for (size_t i = 0; i < count; i++) {
-    const arena_disc *disc = &arena_discs(where)[list != NULL ? list[i] : i];
-    if (disc->height >= height && arena_disc_meets_segment(disc, ax, ay, bx, by)) return 1;
-  }
-  for (size_t i = 0; i < around->movers_count; i++) {
-    const mover *m = &around->movers[i];
-    if ((m->id == self->id && self->id != 0) || m->height < height) continue;
-    const double reach = m->radius + self->reach;
-    if ((m->x - s->x) * (m->x - s->x) + (m->y - s->y) * (m->y - s->y) > reach * reach) continue;
-    if (mover_meets_segment(m, ax, ay, bx, by)) return 1;
-  }
-  return 0;
 }
 
 /* ---- speeds ------------------------------------------------------------------------------------------------------- */
@@ -225,12 +117,12 @@ static double limited(double value, double limit) { return value > limit ? limit
 /* Tyres that slip, and what the body leans on meanwhile, answer each other until they agree. */
 static void slide(body *self, const scene *around, const double limits[2], const double torque[2], double dt) {
   ground floor;
-  contacts at = {.count = 0};
-  if (self->state.touching) contact_find(self, around, 0.0, BODY_SKIN, &at);
+  contact_holds at;
+  contact_lean(self, around, dt, &at);
   ground_begin(&floor, self, limits, torque[0], torque[1], dt);
   for (int round = 0; round < SLIP_ROUNDS; round++) {
     double change = ground_round(&floor, self);
-    if (at.count > 0) change += contact_stop(self, &at, dt);
+    if (at.count > 0) change += contact_stop(self, &at);
     if (change < SLIP_SETTLED) break;
   }
   ground_end(&floor, self, dt);
@@ -239,8 +131,8 @@ static void slide(body *self, const scene *around, const double limits[2], const
 /* Rolling for certain (slip switched off), held across the heading by friction that something may have overcome. */
 static void hold_across(body *self, const scene *around, const double limits[2], double dt) {
   body_state *s = &self->state;
-  contacts at = {.count = 0};
-  if (s->touching) contact_find(self, around, 0.0, BODY_SKIN, &at);
+  contact_holds at;
+  contact_lean(self, around, dt, &at);
   const double most = (limits[0] + limits[1]) * dt / self->mass;
   double held = 0.0;
   for (int round = 0; round < SLIP_ROUNDS; round++) {
@@ -248,7 +140,7 @@ static void hold_across(body *self, const scene *around, const double limits[2],
     double change = fabs(wanted - held);
     s->lateral += wanted - held;
     held = wanted;
-    if (at.count > 0) change += contact_stop(self, &at, dt);
+    if (at.count > 0) change += contact_stop(self, &at);
     if (change < SLIP_SETTLED) return;
   }
 }
@@ -285,17 +177,37 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
 
 /* ---- steps -------------------------------------------------------------------------------------------------------- */
 
-static inline double way_of(const body *self, double dt) {
-  const body_state *s = &self->state;
-  if (s->lateral == 0.0) return fabs(s->speed) * dt;
-  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
+/* Distance of a mover from the circle that holds the body. */
+static double mover_gap(const body *self, const mover *m) {
+  const double dx = m->x - self->state.x;
+  const double dy = m->y - self->state.y;
+  return sqrt(dx * dx + dy * dy) - m->radius - self->body_reach;
+}
+
+/* 1 if the two could meet within the step, in which the body's middle moves by `way`. */
+static int mover_is_near(const body *self, const mover *m, double way, double dt) {
+  return mover_gap(self, m) < way + contact_mover_speed(m) * dt + BODY_LOOK_AHEAD;
+}
+
+/* 1 if contact would cut the step into parts even where nothing is near, because the body or a mover goes so far in it. */
+static int is_long(const body *self, const scene *around, double way, double dt) {
+  double least = body_looks_far(self);
+  double fastest = 0.0;
+  for (size_t i = 0; i < around->movers_count; i++) {
+    const mover *m = &around->movers[i];
+    least = fmin(least, mover_gap(self, m));
+    fastest = fmax(fastest, contact_mover_speed(m));
+  }
+  return body_core_way(self, way, self->state.turn_rate * dt) + fastest * dt > 0.5 * least;
 }
 
 /* 1 if nothing can come within the body's reach during the step, in which its middle moves by `way`: it stays within the
- * clear circle around where it looked, and no mover is near. */
+ * clear circle around where it looked, and no mover is near. Where it looked last must not show: what goes through
+ * contact without touching anything comes out the same. */
 static int stays_clear(body *self, const scene *around, double way, double dt) {
   const body_state *s = &self->state;
   const body_surroundings *near = &self->near;
+  if (is_long(self, around, way, dt)) return 0;
   if (!body_is_clear(self, around->arena)) return 0;
   const double dx = s->x - near->x;
   const double dy = s->y - near->y;
@@ -305,9 +217,7 @@ static int stays_clear(body *self, const scene *around, double way, double dt) {
     if (!body_is_clear(self, around->arena) || way >= near->slack) return 0;
   }
   for (size_t i = 0; i < around->movers_count; i++) {
-    const mover *m = &around->movers[i];
-    const double reach = self->body_reach + m->radius + way + contact_mover_speed(m) * dt + LOOK_AHEAD;
-    if ((m->x - s->x) * (m->x - s->x) + (m->y - s->y) * (m->y - s->y) < reach * reach) return 0;
+    if (mover_is_near(self, &around->movers[i], way, dt)) return 0;
   }
   return 1;
 }
@@ -322,25 +232,12 @@ static void move_freely(body *self, double way, double dt) {
   s->touching = 0;
 }
 
-static void move_in_contact(body *const bodies[], size_t count, const scene *around, double dt) {
-  double from[BODY_MAXIMUM][2];
-  for (size_t i = 0; i < count; i++) {
-    from[i][0] = bodies[i]->state.x;
-    from[i][1] = bodies[i]->state.y;
-  }
-  contact_move(bodies, count, around, dt);
-  for (size_t i = 0; i < count; i++) {
-    body_state *s = &bodies[i]->state;
-    s->distance += sqrt((s->x - from[i][0]) * (s->x - from[i][0]) + (s->y - from[i][1]) * (s->y - from[i][1]));
-  }
-}
-
 static void move_alone(body *self, const scene *around, double dt) {
-  const double way = way_of(self, dt);
+  const double way = body_way(self, dt);
   if (stays_clear(self, around, way, dt)) {
     move_freely(self, way, dt);
   } else {
-    move_in_contact(&self, 1, around, dt);
+    contact_move(&self, 1, around, dt);
   }
 }
 
@@ -357,32 +254,66 @@ static void turn_wheels(body *self, double dt) {
   s->wheel_right += s->rim_right * angle;
 }
 
+/* While motors drive, a mover that waited presses on nobody: what it pinches would have to have two speeds. */
+static void rest_movers(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = around->movers[i].waits ? 0.0 : dt;
+}
+
+/* All movers go, until contacts stop one. */
+static void start_movers(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = dt;
+}
+
+static void count_waits(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) {
+    mover *m = &around->movers[i];
+    m->waits = m->stops < dt;
+    m->waited += dt - m->stops;
+  }
+}
+
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
   const double torque[2] = {torque_left, torque_right};
   if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
   if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
+  rest_movers(around, dt);
   drive(self, around, torque, dt);
+  start_movers(around, dt);
   move_alone(self, around, dt);
+  count_waits(around, dt);
   turn_wheels(self, dt);
   return BODY_OK;
 }
 
-/* Numbers the groups of robots that could meet within the step: each gets the least place of its group. */
-static void find_groups(body *const bodies[], size_t count, double dt, size_t group[]) {
+/* Makes the groups of places i and k one. */
+static void join(size_t group[], size_t count, size_t i, size_t k) {
+  const size_t less = group[i] < group[k] ? group[i] : group[k];
+  const size_t more = group[i] < group[k] ? group[k] : group[i];
+  for (size_t n = 0; n < count && less != more; n++) {
+    if (group[n] == more) group[n] = less;
+  }
+}
+
+/* Numbers the groups of robots that could meet within the step, or the same mover: it waits for all or for none. Each gets
+ * the least place of its group. */
+static void find_groups(body *const bodies[], size_t count, const scene *around, double dt, size_t group[]) {
   for (size_t i = 0; i < count; i++) group[i] = i;
   for (size_t i = 0; i < count; i++) {
     for (size_t k = 0; k < i; k++) {
       const body *a = bodies[i];
       const body *b = bodies[k];
-      const double reach = a->body_reach + b->body_reach + way_of(a, dt) + way_of(b, dt) + LOOK_AHEAD;
+      const double reach = a->body_reach + b->body_reach + body_way(a, dt) + body_way(b, dt) + BODY_LOOK_AHEAD;
       const double dx = a->state.x - b->state.x;
       const double dy = a->state.y - b->state.y;
-      if (dx * dx + dy * dy >= reach * reach || group[i] == group[k]) continue;
-      const size_t less = group[i] < group[k] ? group[i] : group[k];
-      const size_t more = group[i] < group[k] ? group[k] : group[i];
-      for (size_t n = 0; n <= i; n++) {
-        if (group[n] == more) group[n] = less;
-      }
+      if (dx * dx + dy * dy < reach * reach) join(group, count, i, k);
+    }
+  }
+  for (size_t m = 0; m < around->movers_count; m++) {
+    size_t first = count;
+    for (size_t i = 0; i < count; i++) {
+      if (!mover_is_near(bodies[i], &around->movers[m], body_way(bodies[i], dt), dt)) continue;
+      if (first == count) first = i;
+      join(group, count, first, i);
     }
   }
 }
@@ -414,11 +345,13 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
+  rest_movers(around, dt);
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
     drive(sorted[i], around, torques[order[i]], dt);
   }
-  find_groups(sorted, count, dt, group);
+  start_movers(around, dt);
+  find_groups(sorted, count, around, dt, group);
   for (size_t i = 0; i < count; i++) {
     if (group[i] != i) continue;
     size_t members = 0;
@@ -428,9 +361,10 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     if (members == 1) {
       move_alone(sorted[i], around, dt);
     } else {
-      move_in_contact(together, members, around, dt);
+      contact_move(together, members, around, dt);
     }
   }
+  count_waits(around, dt);
   for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
   return BODY_OK;
 }

@@ -8,6 +8,7 @@
 #ifndef WORLD_BODY_H
 #define WORLD_BODY_H
 
+#include <math.h>
 #include <stdint.h>
 
 #include "arena.h"
@@ -15,6 +16,8 @@
 #include "scene.h"
 
 /* python: begin */
+enum { BODY_HEADING_LIMIT = 100000 }; /* rad, that a body may be placed at: beyond it an angle loses its precision */
+
 typedef struct {
   double mass;                 /* M, kg, without wheels */
   double inertia;              /* I, kg m^2, about the vertical axis through the axle's middle, without wheels */
@@ -62,7 +65,8 @@ double body_b(const body_parameters *p);
 
 #define BODY_EDGES_CAPACITY 24u
 #define BODY_DISCS_CAPACITY 8u
-#define BODY_SKIN 1e-5 /* m; nearer than this counts as touching */
+#define BODY_SKIN 1e-5       /* m; nearer than this counts as touching */
+#define BODY_LOOK_AHEAD 0.05 /* m: how far the list of near things stays good */
 #define BODY_GRAVITY 9.81
 
 /* What of the arena the body or what it carries could reach before it has moved by `slack` from (x, y). */
@@ -93,6 +97,11 @@ typedef struct {
   body_surroundings near;
 } body;
 
+/* How far the body gets from the axle's middle, in m. */
+static inline double body_reach_of(const body_parameters *p) {
+  return p->outline != NULL ? p->outline->reach : p->radius;
+}
+
 /* A body at rest at a pose. `reach` is how far anything on it that touches gets from the axle's middle, in m. */
 void body_init(body *self, const body_parameters *parameters, double reach);
 
@@ -101,7 +110,8 @@ void body_place(body *self, double x, double y, double heading);
 
 /* One step of `dt` seconds of all robots of one world under their wheels' torques (left, right; N m; in the order of the
  * bodies). `around`: the arena and its moving obstacles as they are at the step's beginning, without the robots. Moving
- * obstacles push and are not pushed; robots push each other. The result does not depend on the order of the bodies.
+ * obstacles push and are not pushed; one that would push a robot into something waits, and `waited` of it grows. Robots
+ * push each other. The result does not depend on the order of the bodies.
  * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, BODY_BAD_TORQUE for one that is no finite
  * number, and then nothing has moved. A body is saved and restored as a whole: its lists of near things belong to it. */
 int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
@@ -111,9 +121,6 @@ int body_advance(body *self, const scene *around, double torque_left, double tor
 
 /* How others see it. Reflectances are 1. */
 void body_as_mover(const body *self, mover *out);
-
-/* Kinetic energy with the wheels' turning (as slipping wheels have it), J. */
-double body_energy(const body *self);
 
 /* Torque per rad/s that stops a wheel within `dt`: the least inertia felt at a wheel / dt. For motor_dc_torque. */
 double body_wheel_hold(const body *self, double dt);
@@ -126,6 +133,18 @@ static inline double body_right_speed(const body *self) {
   return self->state.speed + self->parameters.half_track * self->state.turn_rate;
 }
 
+/* How far its middle goes within `dt` by the speeds that it has, m. */
+static inline double body_way(const body *self, double dt) {
+  const body_state *s = &self->state;
+  if (s->lateral == 0.0) return fabs(s->speed) * dt;
+  return sqrt(s->speed * s->speed + s->lateral * s->lateral) * dt;
+}
+
+/* The farthest that a point of its core (outline.h) goes while the middle goes `way` and the body turns by `angle`. */
+static inline double body_core_way(const body *self, double way, double angle) {
+  return self->parameters.outline != NULL ? way + fabs(angle) * self->body_reach : way;
+}
+
 /* 1 if the segment from (x0, y0) to (x1, y1), in the body's frame and within its reach, meets something that is at least
  * `height` high: an edge or disc of the arena, a mover with another id. */
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1, double height);
@@ -135,6 +154,11 @@ int body_is_clear(body *self, const arena *where);
 
 /* Renews the lists of near things when the body has moved by more than `share` of what they are good for. */
 void body_look_around(body *self, const arena *where, double share);
+
+/* What is on neither list, after looking around with a share of 1/2, is at least so far from the body's core (outline.h). */
+static inline double body_looks_far(const body *self) {
+  return self->reach + 0.5 * BODY_LOOK_AHEAD - (self->parameters.outline != NULL ? self->body_reach : 0.0);
+}
 
 /* Numbers of the near edges or discs; NULL: all of the arena's are to be looked at. */
 const uint32_t *body_near_edges(const body *self, const arena *where, size_t *count);

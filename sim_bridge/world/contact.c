@@ -11,6 +11,7 @@ typedef struct {
   double rounding;
   int one_end; /* 1: the other end belongs to the next segment as well */
   body *other;
+  mover *pusher;
   double x, y, vx, vy, turn_rate; /* of what it belongs to, if that does not give way */
 } capsule;
 
@@ -33,12 +34,24 @@ static double nearest_share(double ax, double ay, double bx, double by, double x
   return t < squared ? t / squared : 1.0;
 }
 
+/* Where one more contact goes: the shallowest of too many gives way. NULL: that is the new one. */
+static contact *room_for(contacts *out, double gap) {
+  if (out->count < CONTACTS_CAPACITY) return &out->list[out->count++];
+  contact *shallowest = &out->list[0];
+  for (int i = 1; i < CONTACTS_CAPACITY; i++) {
+    if (out->list[i].gap > shallowest->gap) shallowest = &out->list[i];
+  }
+  return gap < shallowest->gap ? shallowest : NULL;
+}
+
 static void add(contacts *out, const body *self, const capsule *c, double px, double py, double qx, double qy,
                 double apart, double distance) {
-  if (out->count == CONTACTS_CAPACITY || distance <= 0.0) return;
+  contact *k = distance > 0.0 ? room_for(out, distance - apart) : NULL;
+  if (k == NULL) return;
   const body_state *s = &self->state;
-  contact *k = &out->list[out->count++];
   k->other = c->other;
+  k->pusher = c->pusher;
+  k->gap = distance - apart;
   k->nx = (px - qx) / distance;
   k->ny = (py - qy) / distance;
   k->px = (px - s->x) * s->cosine + (py - s->y) * s->sine;
@@ -155,9 +168,11 @@ double contact_mover_speed(const mover *self) {
   return sqrt(self->vx * self->vx + self->vy * self->vy) + fabs(self->turn_rate) * self->radius;
 }
 
-static void meet_mover(contacts *out, const body *self, const mover *m, double elapsed, double margin) {
-  const double x = m->x + m->vx * elapsed;
-  const double y = m->y + m->vy * elapsed;
+static void meet_mover(contacts *out, const body *self, mover *m, double elapsed, double margin) {
+  const int waits = elapsed >= m->stops;
+  const double gone = waits ? m->stops : elapsed;
+  const double x = m->x + m->vx * gone;
+  const double y = m->y + m->vy * gone;
   const double dx = x - self->state.x;
   const double dy = y - self->state.y;
   const double far = sqrt(dx * dx + dy * dy) - m->radius - self->body_reach;
@@ -167,15 +182,16 @@ static void meet_mover(contacts *out, const body *self, const mover *m, double e
   }
   double turned_s = 0.0;
   double turned_c = 1.0;
-  if (m->turn_rate != 0.0 && elapsed != 0.0) number_sincos(m->turn_rate * elapsed, &turned_s, &turned_c);
+  if (m->turn_rate != 0.0 && gone != 0.0) number_sincos(m->turn_rate * gone, &turned_s, &turned_c);
   const double cosine = m->cosine * turned_c - m->sine * turned_s;
   const double sine = m->sine * turned_c + m->cosine * turned_s;
   capsule c = {.rounding = m->outline == NULL ? m->radius : 0.0,
+               .pusher = m,
                .x = x,
                .y = y,
-               .vx = m->vx,
-               .vy = m->vy,
-               .turn_rate = m->turn_rate};
+               .vx = waits ? 0.0 : m->vx,
+               .vy = waits ? 0.0 : m->vy,
+               .turn_rate = waits ? 0.0 : m->turn_rate};
   meet_ring(out, self, &c, m->outline, m->outline == NULL ? 0 : m->corners, x, y, cosine, sine, margin);
 }
 
@@ -187,10 +203,8 @@ static void clear(contacts *out) {
 void contact_find(body *self, const scene *around, double elapsed, double margin, contacts *out) {
   clear(out);
   body_look_around(self, around->arena, 0.5);
-  const body_surroundings *near = &self->near;
-  const double dx = self->state.x - near->x;
-  const double dy = self->state.y - near->y;
-  out->nearest = near->slack - sqrt(dx * dx + dy * dy); /* what is not in the list is farther than this */
+  out->nearest = body_looks_far(self);
+  for (size_t i = 0; i < around->movers_count; i++) meet_mover(out, self, &around->movers[i], elapsed, margin);
   const arena_edge *edges = arena_edges(around->arena);
   size_t count;
   const uint32_t *list = body_near_edges(self, around->arena, &count);
@@ -206,7 +220,6 @@ void contact_find(body *self, const scene *around, double elapsed, double margin
     const capsule c = {.ax = d->x, .ay = d->y, .bx = d->x, .by = d->y, .rounding = d->radius, .one_end = 1};
     meet(out, self, &c, margin);
   }
-  for (size_t i = 0; i < around->movers_count; i++) meet_mover(out, self, &around->movers[i], elapsed, margin);
 }
 
 void contact_find_pair(body *self, body *other, double margin, contacts *out) {

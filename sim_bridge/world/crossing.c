@@ -1,4 +1,4 @@
-/* crossing.c: whether a polygon is simple, see arena_crossing in arena.h. A grid finds the pairs of edges that are near
+/* crossing.c: whether a polygon is simple, see arena_repeated and arena_crossing in arena.h. A grid finds the pairs of edges that are near
  * each other. */
 #include <math.h>
 #include <stdlib.h>
@@ -69,6 +69,19 @@ static int search(const ring *self, const grid *g, uint32_t *one, uint32_t *othe
     }
   }
   return found;
+}
+
+int64_t arena_repeated(const double *xy, size_t count, int closed) {
+  const ring row = {xy, (uint32_t)count};
+  const uint32_t steps = closed ? row.count : row.count - 1;
+  for (uint32_t i = 0; i < steps; i++) {
+    const double *a = corner(&row, i);
+    const double *b = corner(&row, i + 1);
+    const double dx = b[0] - a[0];
+    const double dy = b[1] - a[1];
+    if (!(dx * dx + dy * dy >= ARENA_SHORTEST_M * ARENA_SHORTEST_M)) return i;
+  }
+  return -1;
 }
 
 int arena_crossing(const double *xy, size_t count, uint32_t *one, uint32_t *other) {

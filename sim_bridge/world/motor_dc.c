@@ -7,7 +7,11 @@
 
 #define STANDSTILL 1e-6 /* rad/s of the motor's axis */
 
-static double limited(double value, double limit) { return value > limit ? limit : (value < -limit ? -limit : value); }
+/* Each comparison is a single operation without a branch. */
+static double limited(double value, double limit) {
+  const double below = value < limit ? value : limit;
+  return below > -limit ? below : -limit;
+}
 
 void motor_dc_default(motor_dc_parameters *out) {
   *out = (motor_dc_parameters){

@@ -1,14 +1,22 @@
 /* motor_regulated.c: see motor_regulated.h. */
 #include "motor_regulated.h"
 
-static double limited(double torque, double maximum) {
-  if (torque > maximum) return maximum;
-  if (torque < -maximum) return -maximum;
-  return torque;
+static double limited(double value, double maximum) {
+  if (value > maximum) return maximum;
+  if (value < -maximum) return -maximum;
+  return value;
 }
 
 double motor_regulated(const motor_regulated_parameters *self, double reference, double speed, double supply) {
   return limited(self->gain_n_s * (reference - speed), self->torque_maximum_n_m * supply); /* (3.15) */
+}
+
+void motor_regulated_default(motor_regulated_parameters *out) {
+  *out = (motor_regulated_parameters){.gain_n_s = 10.0, .torque_maximum_n_m = 1.0, .speed_maximum_m_s = 0.3};
+}
+
+double motor_regulated_reference(const motor_regulated_parameters *self, double signal) {
+  return limited(signal, 1.0) * self->speed_maximum_m_s;
 }
 
 double motor_coasting(const motor_regulated_parameters *self, double speed) {

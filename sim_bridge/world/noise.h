@@ -24,6 +24,9 @@ double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
 /* Layer i of the bell is as wide as edge i, [0, 256]; edge 256 is 0. */
 double noise_layer_edge(int i);
 
+/* How high the bell, 1 in its middle, is there. */
+double noise_layer_height(int i);
+
 /* A device's own sequence: each draw takes the next step. */
 typedef struct {
   uint64_t seed;
@@ -38,6 +41,9 @@ typedef struct {
 
 /* Right edges of the layers, the widest first. */
 extern const double noise_layer_edges[NOISE_LAYERS + 1];
+
+/* The bell's heights there. */
+extern const double noise_layer_heights[NOISE_LAYERS + 1];
 
 /* Finaliser of 64 bits: each bit of the result depends on each bit of x. */
 static inline uint64_t noise_mix(uint64_t x) {

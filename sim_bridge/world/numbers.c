@@ -11,8 +11,11 @@ void number_sincos(double angle, double *sine, double *cosine) {
   static const double part_1 = 1.57079632673412561417e+00;
   static const double part_2 = 6.07710050630396597660e-11;
   static const double part_3 = 2.02226624879595063154e-21;
-  const long long quarter = number_floor(angle * (2.0 / NUMBERS_PI) + 0.5);
-  const double n = (double)quarter;
+  const double shifted =
+      angle * (2.0 / NUMBERS_PI) + 0x1.8p52; /* its last bits are those of the nearest whole number */
+  const double n = shifted - 0x1.8p52;
+  uint64_t quarter;
+  memcpy(&quarter, &shifted, sizeof quarter);
   const double r = ((angle - n * part_1) - n * part_2) - n * part_3;
   const double z = r * r;
   const double s = r + r * z *
@@ -28,24 +31,18 @@ void number_sincos(double angle, double *sine, double *cosine) {
                                   z * (2.48015872894767294178e-05 +
                                        z * (-2.75573143513906633035e-07 +
                                             z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
-  switch ((unsigned)(unsigned long long)quarter & 3u) {
-    case 0:
-      *sine = s;
-      *cosine = c;
-      break;
-    case 1:
-      *sine = c;
-      *cosine = -s;
-      break;
-    case 2:
-      *sine = -s;
-      *cosine = -c;
-      break;
-    default:
-      *sine = -c;
-      *cosine = s;
-      break;
-  }
+  /* Turned by so many quarters: sine and cosine change places by each, and signs by each second one. */
+  const uint64_t swap = (uint64_t)0 - (quarter & 1u);
+  const uint64_t sine_sign = (quarter & 2u) << 62;
+  const uint64_t cosine_sign = ((quarter + 1u) & 2u) << 62;
+  uint64_t s_bits, c_bits;
+  memcpy(&s_bits, &s, sizeof s_bits);
+  memcpy(&c_bits, &c, sizeof c_bits);
+  const uint64_t change = (s_bits ^ c_bits) & swap;
+  s_bits ^= change ^ sine_sign;
+  c_bits ^= change ^ cosine_sign;
+  memcpy(sine, &s_bits, sizeof s_bits);
+  memcpy(cosine, &c_bits, sizeof c_bits);
 }
 
 /* e^r - 1 for |r| <= 0.35, by its series. */

@@ -5,7 +5,9 @@
 #include <string.h>
 
 #define ROUNDING 1e-3
-#define ROUNDING_LEAST 1e-4
+#define ROUNDING_NARROW 1e-4  /* m: a narrow place needs no less */
+#define ROUNDING_LEAST 1.5e-5 /* m: of a corner of 15 degrees */
+#define CORNER_LOSS 1e-4      /* m: a corner's tip is at most so far outside of what is rounded */
 #define EDGE_LEAST 1e-6
 
 static double cross(const double *o, const double *a, const double *b) {
@@ -80,6 +82,24 @@ static int shrink(const double *xy, size_t n, double by, double *core) {
   return is_simple(core, n);
 }
 
+/* The rounding r with which no outward corner of angle a loses more than CORNER_LOSS: r (1 / sin(a/2) - 1), the distance
+ * of its tip from the circle of radius r that touches both edges. */
+static double rounding_of(const double *xy, size_t n) {
+  double rounding = ROUNDING;
+  for (size_t i = 0; i < n; i++) {
+    const double *a = xy + 2 * ((i + n - 1) % n);
+    const double *b = xy + 2 * i;
+    const double *c = xy + 2 * ((i + 1) % n);
+    if (!(cross(a, b, c) > 0.0)) continue;
+    const double ux = a[0] - b[0], uy = a[1] - b[1];
+    const double wx = c[0] - b[0], wy = c[1] - b[1];
+    const double cosine = (ux * wx + uy * wy) / sqrt((ux * ux + uy * uy) * (wx * wx + wy * wy));
+    const double half = sqrt(fmax(0.5 * (1.0 - cosine), 0.0)); /* sin(a/2) */
+    if (rounding * (1.0 - half) > CORNER_LOSS * half) rounding = CORNER_LOSS * half / (1.0 - half);
+  }
+  return rounding;
+}
+
 int body_outline_make(body_outline *self, const double *xy, size_t corners) {
   memset(self, 0, sizeof *self);
   if (corners < 3 || corners > BODY_CORNERS_MAXIMUM) return OUTLINE_CORNERS;
@@ -101,7 +121,9 @@ int body_outline_make(body_outline *self, const double *xy, size_t corners) {
     const double reach = sqrt(xy[2 * i] * xy[2 * i] + xy[2 * i + 1] * xy[2 * i + 1]);
     if (reach > self->reach) self->reach = reach;
   }
-  for (double by = ROUNDING; by >= ROUNDING_LEAST; by *= 0.5) {
+  const double most = rounding_of(self->xy, corners);
+  if (most < ROUNDING_LEAST) return OUTLINE_SHARP;
+  for (double by = most; by >= fmin(most, ROUNDING_NARROW); by *= 0.5) {
     /* shrunk twice as far it must still be itself: so that the core has a width */
     if (!shrink(self->xy, corners, 2.0 * by, self->core) || !shrink(self->xy, corners, by, self->core)) continue;
     self->rounding = by;

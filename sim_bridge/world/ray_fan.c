@@ -1,174 +1,209 @@
-/* ray_fan.c: the nearest item along each of several rays from one point, see arena_fan in arena.h.
+/* ray_fan.c: the nearest item along each of several rays from one point, see arena_fans in arena.h.
  *
  * Four rays of one fan go against an edge at once. What depends on the point and the edge alone, the numerator of (3.6),
- * is computed once. Each lane does the operations of ray_edge in the same order, so its distance has the same bits; a
- * processor with wider registers does the same operations on more lanes and gives the same bits as well.
+ * is computed once. Each lane does the operations of ray_edge in the same order, so its distance has the same bits. First
+ * the lists of many fans are looked up, then asked: each is a chain of operations that wait for each other, and the
+ * processor works on several chains at once where they stand close together in the program.
  */
-#include <string.h>
-
 #include "arena_data.h"
+#include "lanes.h"
 
-#define LANES 4u
+#define AT_ONCE 4u  /* entries that are asked before the first look at whether the rest can be nearer */
+#define TOGETHER 16 /* groups of rays whose lists are looked up before the first is asked */
+#define FARTHEST 1e9
 
-/* `some` rays, 1 to LANES, and what their question is. */
-typedef struct {
-  double x, y;
-  const double *cosine, *sine;
-  size_t some;
-  double limit, height;
-} fan;
+void ray_fan_set(ray_fan *self, const double *cosine, const double *sine, size_t count) {
+  const double aside = 1e-10; /* lists know more than that beside their sectors */
+  *self = (ray_fan){.rays = (uint32_t)count};
+  for (size_t i = 0; i < RAY_FAN_MOST; i++) { /* the last ray fills the lanes that are left */
+    self->cosine[i] = cosine[i < count ? i : count - 1];
+    self->sine[i] = sine[i < count ? i : count - 1];
+  }
+  for (size_t first = 0; first < count; first += RAY_FAN_GROUP) {
+    const double c = self->cosine[first];
+    const double s = self->sine[first];
+    int alike = 1;
+    for (size_t i = first; i < first + RAY_FAN_GROUP; i++) {
+      const double square = self->cosine[i] * self->cosine[i] + self->sine[i] * self->sine[i];
+      alike &= fabs(square - 1.0) < 1e-9 && c * self->cosine[i] + s * self->sine[i] >= RAY_FAN_COSINE &&
+               c * self->sine[i] - s * self->cosine[i] >= -aside;
+    }
+    self->alike |= (uint32_t)alike << first / RAY_FAN_GROUP;
+  }
+}
+
+/* Four rays by themselves. */
+static void one_by_one(const fan_question *q, size_t first) {
+  for (size_t i = first; i < first + RAY_FAN_GROUP; i++) {
+    q->distances[i] = -1.0;
+    if (i >= q->rays->rays) continue;
+    const double cosine = q->cosine * q->rays->cosine[i] - q->sine * q->rays->sine[i];
+    const double sine = q->sine * q->rays->cosine[i] + q->cosine * q->rays->sine[i];
+    q->distances[i] = arena_ray(q->where, q->x, q->y, cosine, sine, q->reach, q->height, NULL);
+  }
+}
 
 #ifdef __GNUC__
 
-#define INLINE static inline __attribute__((always_inline))
-#define NOT_INLINE __attribute__((noinline))
+_Static_assert(LANES == RAY_FAN_GROUP, "a group fills the lanes");
 
-#define ASIDE \
-  1e-10 /* lists know more than that beside their sectors; the first ray's own cross product may be rounded */
+/* Directions of four rays. */
+typedef struct {
+  lanes cosine, sine;
+} directions;
 
-typedef double lanes __attribute__((vector_size(8 * LANES)));
-typedef int64_t masks __attribute__((vector_size(8 * LANES)));
+/* A group of rays, and the list that it asks. */
+typedef struct {
+  directions to;
+  const fan_question *from;
+  const ray_list_entry *list; /* NULL: one by one */
+  size_t first;               /* ray */
+} group;
 
-INLINE int any(const masks *m) { return ((*m)[0] | (*m)[1] | (*m)[2] | (*m)[3]) != 0; }
-
-INLINE double largest(const lanes *value) {
-  const double a = (*value)[0] > (*value)[1] ? (*value)[0] : (*value)[1];
-  const double b = (*value)[2] > (*value)[3] ? (*value)[2] : (*value)[3];
-  return a > b ? a : b;
+/* (3.10), (3.11) */
+LANES_INLINE void turn(const fan_question *q, size_t first, directions *out) {
+  lanes c, s;
+  lanes_load(&c, &q->rays->cosine[first]);
+  lanes_load(&s, &q->rays->sine[first]);
+  out->cosine = q->cosine * c - q->sine * s;
+  out->sine = q->sine * c + q->cosine * s;
 }
 
-/* The last ray fills the lanes that are left. */
-INLINE void load(const double *from, size_t some, lanes *to) {
-  const size_t second = some > 1 ? 1 : 0;
-  const size_t third = some > 2 ? 2 : second;
-  *to = (lanes){from[0], from[second], from[third], from[some - 1]};
-}
-
-/* ray_edge for LANES rays. Lanes along the edge, where no division can tell, are noted in `along`. */
-INLINE void ask_edge(const arena_edge *e, const fan *f, const lanes *cosine, const lanes *sine, lanes *nearest,
-                     masks *along) {
-  const double wx = f->x - e->ax;
-  const double wy = f->y - e->ay;
+/* ray_edge for four rays. Lanes along the edge, where no division can tell, are noted in `along`. */
+LANES_INLINE void ask_edge(const arena_edge *e, double x, double y, const directions *to, lanes *nearest,
+                           masks *along) {
+  const double wx = x - e->ax;
+  const double wy = y - e->ay;
   const double numerator = e->ex * wy - e->ey * wx;
   const double least = 1e-24 * e->length_squared;
-  const lanes signed_den = e->ey * *cosine - e->ex * *sine;
+  const lanes signed_den = e->ey * to->cosine - e->ex * to->sine;
   const masks sign = (masks)signed_den & INT64_MIN;
   const lanes den = (lanes)((masks)signed_den & INT64_MAX);
-  const lanes t = (lanes)((masks)(lanes){numerator, numerator, numerator, numerator} ^ sign);
-  const lanes u = (lanes)((masks)(*cosine * wy - *sine * wx) ^ sign);
+  const lanes t = (lanes)((masks)lanes_of(numerator) ^ sign);
+  const lanes u = (lanes)((masks)(to->cosine * wy - to->sine * wx) ^ sign);
   const lanes slack = RAY_CRACK * den;
   const lanes distance = t / den;
   const masks nearer =
       (t >= 0.0) & (u >= (lanes)((masks)slack ^ INT64_MIN)) & (u <= den + slack) & (distance < *nearest);
   *along |= den * den <= least;
-  *nearest = (lanes)(((masks)distance & nearer) | ((masks)*nearest & ~nearer));
+  *nearest = lanes_select(nearer, distance, *nearest);
 }
 
-NOT_INLINE static void ask_disc(const arena_disc *disc, const fan *f, double *nearest) {
+LANES_NOT_INLINE static void ask_disc(const arena_disc *disc, double x, double y, const directions *to,
+                                      lanes *nearest) {
   for (size_t i = 0; i < LANES; i++) {
-    const size_t from = i < f->some ? i : f->some - 1;
-    const ray r = {f->x, f->y, f->cosine[from], f->sine[from]};
+    const ray r = {x, y, to->cosine[i], to->sine[i]};
     const double d = ray_disc(disc, &r);
-    if (d < nearest[i]) nearest[i] = d;
+    if (d < (*nearest)[i]) (*nearest)[i] = d;
   }
 }
 
 /* Asks the list until the rest cannot be nearer to any ray. Returns 0 if that does not settle the answer. */
-INLINE int ask_list(const arena *self, const fan *f, const ray_list_entry *entry, const lanes *cosine,
-                    const lanes *sine, lanes *nearest) {
-  lanes best = *nearest;
+LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
+  const fan_question *q = g->from;
+  const arena *where = q->where;
+  const double x = q->x;
+  const double y = q->y;
+  const double height = q->height;
+  const directions to = g->to;
+  lanes best = lanes_of(limit);
   masks along = {0};
-  for (; (double)entry->bound <= largest(&best); entry++) {
-    if (entry->strip == RAY_LIST_END) return 0;
+  const ray_list_entry *entry = g->list;
+  for (unsigned asked = 0; (double)entry->bound <= limit; entry++, asked++) {
+    /* What was met is known late: looking at it for each entry costs more than the entries that it spares. */
+    if (asked >= AT_ONCE || entry->strip == RAY_LIST_END) {
+      const masks open = best >= (double)entry->bound;
+      if (!masks_any(&open)) break;
+      if (entry->strip == RAY_LIST_END) return 0;
+    }
     const uint32_t first = ray_strip_first(entry->strip);
-    if (first >= self->edge_count) {
-      const arena_disc *disc = &self->disc[first - self->edge_count];
-      if (!(disc->height >= f->height)) continue;
-      double values[LANES];
-      memcpy(values, &best, sizeof values);
-      ask_disc(disc, f, values);
-      memcpy(&best, values, sizeof values);
+    if (first >= where->edge_count) {
+      const arena_disc *disc = &where->disc[first - where->edge_count];
+      if (!(disc->height >= height)) continue;
+      lanes in_memory = best;
+      ask_disc(disc, x, y, &g->to, &in_memory);
+      best = in_memory;
       continue;
     }
-    const arena_edge *e = &self->edge[first];
-    for (uint32_t left = ray_strip_count(entry->strip); left > 0; left--, e++) {
-      if (e->height >= f->height) ask_edge(e, f, cosine, sine, &best, &along);
-    }
+    const arena_edge *e = &where->edge[first];
+    const arena_edge *end = e + ray_strip_count(entry->strip);
+    do {
+      if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
+    } while (++e < end);
   }
   *nearest = best;
-  return !any(&along);
+  return !masks_any(&along);
 }
 
-/* The list that serves all directions within the angle of RAY_FAN_COSINE to the left of the first. NULL: there is none,
- * as the cell has no lists, or some ray lies outside or is not of length 1. */
-INLINE const ray_list_entry *list_of(const ray_lists *lists, const fan *f, const lanes *cosine, const lanes *sine) {
+/* The list for a group of rays that point much the same way. */
+LANES_INLINE void find_list(group *g) {
+  const fan_question *q = g->from;
+  const ray_lists *lists = q->where->lists;
   size_t number;
-  const ray_list_cell *cell = ray_lists_at(lists, f->x, f->y, &number);
-  if (cell == NULL) return NULL;
-  const unsigned first = ray_sector(lists, f->cosine[0], f->sine[0]);
-  if (first >= RAY_SECTORS_MOST) return NULL;
-  const lanes square = *cosine * *cosine + *sine * *sine;
-  const lanes dot = f->cosine[0] * *cosine + f->sine[0] * *sine;
-  const lanes cross = f->cosine[0] * *sine - f->sine[0] * *cosine;
-  const masks outside = (cross < -ASIDE) | (dot < RAY_FAN_COSINE) | (square < 1.0 - 1e-9) | (square > 1.0 + 1e-9);
-  if (any(&outside)) return NULL;
-  return &cell->entry[cell->fan_start[first / RAY_FAN_STEP]];
+  g->list = NULL;
+  if (lists == NULL || q->where->grid.columns == 0 || !(q->reach > 0.0)) return;
+  if (!(q->rays->alike >> g->first / RAY_FAN_GROUP & 1u)) return;
+  if (!(fabs(q->cosine * q->cosine + q->sine * q->sine - 1.0) < 1e-9)) return;
+  const ray_list_cell *cell = ray_lists_at(lists, q->x, q->y, &number);
+  if (cell == NULL) return;
+  turn(q, g->first, &g->to);
+  const unsigned sector = ray_sector(lists, g->to.cosine[0], g->to.sine[0]);
+  if (sector < RAY_SECTORS_MOST) g->list = &cell->entry[cell->fan_start[sector / RAY_FAN_STEP]];
 }
 
-/* Returns 0 where the rays are to be asked one by one. */
-INLINE int few(const arena *self, const fan *f, double *distances) {
-  lanes cosine, sine;
-  load(f->cosine, f->some, &cosine);
-  load(f->sine, f->some, &sine);
-  const ray_list_entry *entry = list_of(self->lists, f, &cosine, &sine);
-  if (entry == NULL) return 0;
-  const lanes limit = {f->limit, f->limit, f->limit, f->limit};
-  lanes nearest = limit;
-  if (!ask_list(self, f, entry, &cosine, &sine, &nearest)) return 0;
-  const masks met = nearest < limit;
-  const lanes found = (lanes)(((masks)nearest & met) | ((masks)(lanes){-1.0, -1.0, -1.0, -1.0} & ~met));
-  distances[0] = found[0];
-  if (f->some > 1) distances[1] = found[1];
-  if (f->some > 2) distances[2] = found[2];
-  if (f->some > 3) distances[3] = found[3];
-  return 1;
+/* Writes four distances. */
+LANES_INLINE void ask_group(const group *g) {
+  const fan_question *q = g->from;
+  const double limit = q->reach < FARTHEST ? q->reach : FARTHEST;
+  lanes nearest;
+  if (g->list == NULL || !ask_list(g, limit, &nearest)) {
+    one_by_one(q, g->first);
+    return;
+  }
+  const lanes none = lanes_of(-1.0);
+  nearest = lanes_select(nearest < limit, nearest, none);
+  lanes_store(&q->distances[g->first], &nearest);
 }
 
-NOT_INLINE static int few_anywhere(const arena *self, const fan *f, double *distances) {
-  return few(self, f, distances);
+LANES_INLINE void ask(const fan_question *questions, size_t count) {
+  group groups[TOGETHER];
+  size_t waiting = 0;
+  for (size_t i = 0; i < count; i++) {
+    for (size_t first = 0; first < questions[i].rays->rays; first += RAY_FAN_GROUP) {
+      group *g = &groups[waiting++];
+      g->from = &questions[i];
+      g->first = first;
+      find_list(g);
+      if (waiting < TOGETHER) continue;
+      for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
+      waiting = 0;
+    }
+  }
+  for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
 }
 
-#if defined(__x86_64__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
-NOT_INLINE __attribute__((target("avx2"))) static int few_by_avx2(const arena *self, const fan *f, double *distances) {
-  return few(self, f, distances);
-}
+LANES_NOT_INLINE static void ask_anywhere(const fan_question *questions, size_t count) { ask(questions, count); }
+
+#ifdef LANES_AVX2
+LANES_AVX2 static void ask_by_avx2(const fan_question *questions, size_t count) { ask(questions, count); }
 #endif
 
-static int ask_few(const arena *self, const fan *f, double *distances) {
-#if defined(__x86_64__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
-  if (__builtin_cpu_supports("avx2")) return few_by_avx2(self, f, distances);
+void arena_fans(const fan_question *questions, size_t count) {
+#ifdef LANES_AVX2
+  if (LANES_HAVE_AVX2()) {
+    ask_by_avx2(questions, count);
+    return;
+  }
 #endif
-  return few_anywhere(self, f, distances);
+  ask_anywhere(questions, count);
 }
 
 #else
 
-static int ask_few(const arena *self, const fan *f, double *distances) {
-  (void)self, (void)f, (void)distances;
-  return 0;
+void arena_fans(const fan_question *questions, size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    for (size_t first = 0; first < questions[i].rays->rays; first += RAY_FAN_GROUP) one_by_one(&questions[i], first);
+  }
 }
 
 #endif
-
-void arena_fan(const arena *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, double *distances) {
-  const int usable = self->lists != NULL && self->grid.columns > 0 && reach > 0.0 && x * x + y * y < 1e18;
-  const double limit = reach < 1e9 ? reach : 1e9;
-  for (size_t first = 0; first < count; first += LANES) {
-    const size_t some = count - first < LANES ? count - first : LANES;
-    const fan f = {x, y, cosine + first, sine + first, some, limit, height};
-    if (usable && some > 1 && ask_few(self, &f, distances + first)) continue;
-    for (size_t i = first; i < first + some; i++)
-      distances[i] = arena_ray(self, x, y, cosine[i], sine[i], reach, height, NULL);
-  }
-}

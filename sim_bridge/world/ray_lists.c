@@ -10,7 +10,7 @@
 #define BORDER 1.0                 /* m around everything where rays may start */
 #define GATHER_ENOUGH 256u         /* strips that a cell looks at, if there are so many: about 20 us of work */
 #define PATIENCE 128u              /* rays from a cell before it gets lists: by then they cost less than they save */
-#define LIST_LONGEST 48u           /* entries; the grid does the rest */
+#define LIST_LONGEST 16u           /* entries; the grid does the rest */
 #define MEMORY_LARGEST (64u << 20) /* bytes */
 #define LEVELS 512                 /* of distance, by which entries are sorted */
 

@@ -114,31 +114,33 @@ double scene_ray(const scene *self, double x, double y, double c, double s, doub
   return best;
 }
 
-void scene_fan(const scene *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, uint32_t self_id, double *distances) {
-  arena_fan(self->arena, x, y, cosine, sine, count, reach, height, distances);
+void scene_fan_movers(const scene *self, const fan_question *q, uint32_t self_id) {
   for (size_t k = 0; k < self->movers_count; k++) {
     const mover *m = &self->movers[k];
-    if ((self_id != 0 && m->id == self_id) || !(m->height >= height)) continue;
-    for (size_t i = 0; i < count; i++) {
-      const double best = distances[i];
-      const double d = mover_ray(m, x, y, cosine[i], sine[i], best < 0.0 ? reach : best, NULL);
-      if (d >= 0.0) distances[i] = d;
+    if ((self_id != 0 && m->id == self_id) || !(m->height >= q->height)) continue;
+    for (size_t i = 0; i < q->rays->rays; i++) {
+      const double best = q->distances[i];
+      const double c = q->cosine * q->rays->cosine[i] - q->sine * q->rays->sine[i];
+      const double s = q->sine * q->rays->cosine[i] + q->cosine * q->rays->sine[i];
+      const double d = mover_ray(m, q->x, q->y, c, s, best < 0.0 ? q->reach : best, NULL);
+      if (d >= 0.0) q->distances[i] = d;
     }
   }
 }
 
-void scene_moving(const arena *where, double time, uint32_t first_id, mover *out) {
+void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out) {
   const arena_moving *moving = arena_movings(where);
   for (size_t i = 0; i < arena_moving_count(where); i++) {
-    path_state at;
-    path_at(&moving[i].path, time, &at);
+    path_state at, next;
+    const double waited = out[i].waited;
+    path_at(&moving[i].path, time - waited, &at);
+    path_at(&moving[i].path, time - waited + dt, &next);
     out[i] = (mover){
         .x = at.x,
         .y = at.y,
-        .vx = at.vx,
-        .vy = at.vy,
-        .turn_rate = at.turn_rate,
+        .vx = (next.x - at.x) / dt, /* over waypoints as well: no jump at the step's end */
+        .vy = (next.y - at.y) / dt,
+        .turn_rate = number_wrap(next.heading - at.heading) / dt, /* a loop may begin again at another count of turns */
         .radius = moving[i].radius,
         .outline = moving[i].outline,
         .corners = moving[i].corners,
@@ -146,6 +148,8 @@ void scene_moving(const arena *where, double time, uint32_t first_id, mover *out
         .infrared_reflectance = moving[i].surface.infrared_reflectance,
         .sound_reflectance = moving[i].surface.sound_reflectance,
         .id = first_id + (uint32_t)i,
+        .waited = waited,
+        .waits = out[i].waits,
     };
     number_sincos(at.heading, &out[i].sine, &out[i].cosine);
   }
@@ -178,7 +182,9 @@ int scene_is_free(const scene *self, double x, double y, double radius, uint32_t
   if (!arena_is_free(self->arena, x, y, radius)) return 0;
   for (size_t i = 0; i < self->movers_count; i++) {
     const mover *m = &self->movers[i];
-    if (!(self_id != 0 && m->id == self_id) && !(mover_distance(m, x, y) >= radius)) return 0;
+    if (self_id != 0 && m->id == self_id) continue;
+    const double apart = mover_distance(m, x, y);
+    if (!(apart > 0.0 && apart >= radius)) return 0; /* inside of it is not free for a point either */
   }
   return 1;
 }

@@ -12,6 +12,8 @@
 
 #include "arena.h"
 
+#define SCENE_FIRST_MOVER 0x80000000u /* id of an arena's first moving shape; robots have those below, from 1 on */
+
 /* python: begin */
 typedef struct {
   double x, y, cosine, sine; /* pose: its origin and the direction of its x axis */
@@ -22,12 +24,15 @@ typedef struct {
   double height;               /* of its top above the floor */
   double infrared_reflectance; /* 1: reflects as a white wall */
   double sound_reflectance;
-  uint32_t id; /* not 0 */
+  uint32_t id;   /* not 0 */
+  double waited; /* s by which its path's clock is behind the world's: it waits while it pinches a robot (contact.h) */
+  int waits;     /* 1: it waited when the last step ended */
+  double stops;  /* s into the step under way at which it stops to wait; only body_step uses it */
 } mover;
 
 typedef struct {
   const arena *arena;
-  const mover *movers;
+  mover *movers; /* body_step writes how long they waited; nothing else of them, and nobody else anything */
   size_t movers_count;
 } scene;
 
@@ -44,12 +49,13 @@ typedef struct {
 double scene_ray(const scene *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t self_id, ray_hit *hit);
 
-/* The same distances along `count` rays from one point. */
-void scene_fan(const scene *self, double x, double y, const double *cosine, const double *sine, size_t count,
-               double reach, double height, uint32_t self_id, double *distances);
+/* To distances in the arena, answered by arena_fans: what moves in the scene may be nearer. */
+void scene_fan_movers(const scene *self, const fan_question *question, uint32_t self_id);
 
-/* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. */
-void scene_moving(const arena *where, double time, uint32_t first_id, mover *out);
+/* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. Their
+ * velocities are those that take them evenly to where their paths lead within `dt`. `waited` and `waits` of each are kept:
+ * 0 for one whose path was never held up. */
+void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out);
 
 /* 1 if a disc of `radius` at (x, y) lies in free space of the arena and outside of all movers but `self_id`. */
 int scene_is_free(const scene *self, double x, double y, double radius, uint32_t self_id);

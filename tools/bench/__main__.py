@@ -1,87 +1,95 @@
 """Measures every figure, prints one table and writes build/bench.json: `make bench`.
 
-    python -m tools.bench [PART OF A NAME ...]
+    python -m tools.bench [--only PATTERN ...] [--json] [--page FILE] [--list]
 
-With arguments, only the figures whose names contain one of them. The exit code is 1 when a target is missed.
+--only measures the figures whose names contain a PATTERN; --json prints what build/bench.json holds instead of the
+table; --page writes the table as a page of the documentation; --list measures nothing and says which figures there are.
+Ctrl-C ends it with what was measured so far. The exit code is 1 when a target is missed or a measurement failed, 130
+after Ctrl-C.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import json
-import platform
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
+from tools.bench import report
 from tools.bench.figures import FIGURES, Figure
 
 RESULT = Path("build/bench.json")
 MODULES = ("codec", "board_link", "busy", "clock", "speed", "world", "precision", "setup_time")
 
 
-def number(value: float) -> str:
-    """Four significant digits at most, without an exponent."""
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
-
-
-def row(figure: Figure, value: float) -> dict[str, Any]:
-    """A figure as bench.json holds it."""
-    peer_value = figure.peer.measure() if figure.peer else None
-    return {
-        "name": figure.name,
-        "value": value,
-        "unit": figure.unit,
-        "target": figure.target,
-        "better": figure.better,
-        "met": figure.is_met_by(value),
-        "peer": figure.peer.name if figure.peer else None,
-        "peer_value": peer_value,
-        "ratio": value / peer_value if peer_value else None,
-    }
-
-
-def table(rows: list[dict[str, Any]]) -> Table:
-    """The rows as people read them."""
-    shown = Table("name", "value", "unit", "target", "peer", "ratio", title="boebot bench")
-    for entry in rows:
-        bound = "≥" if entry["better"] == "more" else "≤"
-        style = "" if entry["met"] else "bold red"
-        peer = f"{entry['peer']}: {number(entry['peer_value'])}" if entry["peer"] else "–"
-        ratio = f"{entry['ratio']:.2f}" if entry["ratio"] is not None else "–"
-        shown.add_row(
-            entry["name"],
-            f"[{style}]{number(entry['value'])}[/]" if style else number(entry["value"]),
-            entry["unit"],
-            f"{bound} {number(entry['target'])}",
-            peer,
-            ratio,
-        )
-    return shown
-
-
-def main(wanted: list[str]) -> int:
+def figures(only: list[str]) -> list[Figure]:
+    """All figures, or those whose names contain one of the patterns."""
     for module in MODULES:
         importlib.import_module(f"tools.bench.{module}")
-    console = Console(width=None if sys.stdout.isatty() else 150)
-    rows = []
-    for figure in FIGURES:
-        if wanted and not any(part in figure.name for part in wanted):
-            continue
-        with console.status(figure.name):
-            rows.append(row(figure, figure.measure()))
-    console.print(table(rows))
+    return [figure for figure in FIGURES if not only or any(part in figure.name for part in only)]
+
+
+def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]:
+    """Rows, one after the other, with a line of progress for each. A measurement that fails is a row with its error."""
+    for number, figure in enumerate(wanted, 1):
+        started = time.monotonic()
+        console.print(f"[{number}/{len(wanted)}] {figure.name} ...", end="", markup=False, highlight=False)
+        try:
+            row = report.measure(figure)
+        except Exception as error:  # the others are measured all the same
+            row = report.failed(figure, error)
+        took = time.monotonic() - started
+        console.print(f" {report.shown(row)} ({took:.0f} s)", markup=False, highlight=False)
+        yield row
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tools.bench", description="Measures every figure.")
+    parser.add_argument("--only", action="append", default=[], metavar="PATTERN", help="figures whose names contain it")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="write the table as a page of the documentation")
+    parser.add_argument("--list", action="store_true", help="which figures there are")
+    chosen = parser.parse_args(arguments)
+    wanted = figures(chosen.only)
+    if not wanted:
+        parser.error(
+            f"no figure's name contains {' or '.join(map(repr, chosen.only))}; without --only all are measured"
+        )
+    if chosen.list:
+        described = [report.description(figure) for figure in wanted]
+        print(json.dumps(described, indent=2) if chosen.json else "\n".join(figure.name for figure in wanted))
+        return 0
+    started, before = time.monotonic(), report.load()
+    rows: list[dict[str, Any]] = []
+    stopped = False
+    try:
+        for row in measured(wanted, Console(stderr=True, soft_wrap=True)):
+            rows.append(row)
+    except KeyboardInterrupt:
+        stopped = True
+    result = {
+        "computer": report.computer() | {"load_before": before, "load_after": report.load()},
+        "seconds": round(time.monotonic() - started, 1),
+        "complete": not stopped and not chosen.only,
+        "figures": rows,
+    }
     RESULT.parent.mkdir(exist_ok=True)
-    computer = {"system": platform.platform(), "python": platform.python_version()}
-    text = json.dumps({"computer": computer, "figures": rows}, indent=2)
-    RESULT.write_text(text + "\n", encoding="utf-8")
-    missed = [entry["name"] for entry in rows if not entry["met"]]
-    if missed:
-        console.print(f"missed: {'; '.join(missed)}")
-    return int(bool(missed))
+    RESULT.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    if chosen.json:
+        print(json.dumps(result, indent=2))
+    else:
+        console = Console(width=None if sys.stdout.isatty() else 160)
+        console.print(report.table(rows))
+        console.print(report.summary(result), markup=False, highlight=False, soft_wrap=True)
+    if chosen.page is not None:
+        chosen.page.write_text(report.page(result), encoding="utf-8")
+    return 130 if stopped else int(any(not row["met"] for row in rows))
 
 
 if __name__ == "__main__":

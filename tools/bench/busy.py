@@ -179,7 +179,7 @@ def _round_trips() -> NDArray[np.float64]:
     "receipt stamp beside a Python thread that computes, p99",
     "ms",
     at_most=1,
-    peer=Peer("calling thread reads, switch interval 5 ms", _plain_receipt),
+    peers=[Peer("calling thread reads, switch interval 5 ms", _plain_receipt)],
 )
 def receipt_stamp() -> float:
     return per_cent(_with_thread().receipt, 99)
@@ -189,7 +189,7 @@ def receipt_stamp() -> float:
     "brain's wake-up beside a Python thread that computes, p99",
     "ms",
     at_most=5,
-    peer=Peer("calling thread reads, switch interval 5 ms", _plain_wake_up),
+    peers=[Peer("calling thread reads, switch interval 5 ms", _plain_wake_up)],
 )
 def wake_up() -> float:
     return per_cent(_with_thread().wake_up, 99)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from itertools import cycle, islice
-
-from cobs import cobs
-from fastcrc import crc16
-from pymavlink.dialects.v20 import common as mavlink
+from types import ModuleType
 
 from boebot.link import messages
 from boebot.link.frame import Decoder, encode
@@ -75,90 +73,9 @@ def decoding(message: messages.Message, *, chunk: int, fields: bool = False) -> 
     return per_second(work)
 
 
-# ---- MAVLink 2: SERVO_OUTPUT_RAW has 37 bytes, as our telemetry -----------------------------------------------------
-
-
-def servo_outputs() -> mavlink.MAVLink_servo_output_raw_message:
-    return mavlink.MAVLink_servo_output_raw_message(0x01020304, 1, *range(1001, 1017))
-
-
-def mavlink_encoding() -> float:
-    """pymavlink: fields to frame."""
-    link, message = mavlink.MAVLink(None), servo_outputs()
-
-    def work() -> int:
-        for sequence in sequences():
-            link.seq = sequence
-            message.pack(link)
-        return COUNT
-
-    assert len(message.pack(link)) == 37 + 12
-    return per_second(work)
-
-
-def mavlink_decoding() -> float:
-    """pymavlink: frames to fields, 16 at a time."""
-    link, message = mavlink.MAVLink(None), servo_outputs()
-    frames = []
-    for sequence in range(256):
-        link.seq = sequence
-        frames.append(bytes(message.pack(link)))
-    chunks = [b"".join(frames[start : start + 16]) for start in range(0, 256, 16)]
-
-    def work() -> int:
-        receiver = mavlink.MAVLink(None)
-        done = 0
-        while done < COUNT:
-            for data in chunks:
-                done += len(receiver.parse_buffer(data))
-        return done
-
-    return per_second(work)
-
-
-# ---- COBS with a CRC-16 inside, both in C -------------------------------------------------------------------------
-
-
-def cobs_frame(number: int, sequence: int, payload: bytes) -> bytes:
-    body = bytes((number, sequence)) + payload
-    return bytes(cobs.encode(body + crc16.ibm_3740(body).to_bytes(2, "big"))) + b"\0"
-
-
-def cobs_messages(stream: bytes) -> list[tuple[int, int, bytes]]:
-    found = []
-    for block in stream.split(b"\0"):
-        if block:
-            body = cobs.decode(block)
-            if crc16.ibm_3740(body[:-2]) == int.from_bytes(body[-2:], "big"):
-                found.append((body[0], body[1], body[2:-2]))
-    return found
-
-
-def cobs_encoding(message: messages.Message) -> float:
-    """cobs and fastcrc: payloads to frames."""
-    payload = message.pack()
-
-    def work() -> int:
-        for sequence in sequences():
-            cobs_frame(message.ID, sequence, payload)
-        return COUNT
-
-    return per_second(work)
-
-
-def cobs_decoding(message: messages.Message, *, chunk: int) -> float:
-    """cobs and fastcrc: frames to payloads, `chunk` frames at a time."""
-    frames = [cobs_frame(message.ID, sequence, message.pack()) for sequence in range(256)]
-    chunks = [b"".join(frames[start : start + chunk]) for start in range(0, 256, chunk)]
-
-    def work() -> int:
-        done = 0
-        while done < COUNT:
-            for data in chunks:
-                done += len(cobs_messages(data))
-        return done
-
-    return per_second(work)
+def _peers() -> ModuleType:
+    """Looked for when a peer is measured: its packages are only installed for `make bench`."""
+    return import_module("tools.bench.frame_peers")
 
 
 # ---- figures ----------------------------------------------------------------------------------------------------
@@ -171,7 +88,7 @@ MAVLINK = "pymavlink, 37 B"
     "Python encodes telemetry of 37 B: payload to frame",
     "frames/s",
     at_least=300_000,
-    peer=Peer(COBS, lambda: cobs_encoding(TELEMETRY)),
+    peers=[Peer(COBS, lambda: _peers().cobs_encoding(TELEMETRY))],
 )
 def encode_telemetry() -> float:
     return encoding(TELEMETRY)
@@ -181,7 +98,7 @@ def encode_telemetry() -> float:
     "Python encodes set-points of 8 B: payload to frame",
     "frames/s",
     at_least=300_000,
-    peer=Peer(COBS, lambda: cobs_encoding(SETPOINT)),
+    peers=[Peer(COBS, lambda: _peers().cobs_encoding(SETPOINT))],
 )
 def encode_setpoints() -> float:
     return encoding(SETPOINT)
@@ -191,7 +108,7 @@ def encode_setpoints() -> float:
     "Python decodes telemetry of 37 B: 16 frames at a time to payloads",
     "frames/s",
     at_least=500_000,
-    peer=Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=16)),
+    peers=[Peer(COBS, lambda: _peers().cobs_decoding(TELEMETRY, chunk=16))],
 )
 def decode_telemetry() -> float:
     return decoding(TELEMETRY, chunk=16)
@@ -201,7 +118,7 @@ def decode_telemetry() -> float:
     "Python decodes telemetry of 37 B: one frame at a time to its payload",
     "frames/s",
     at_least=500_000,
-    peer=Peer(COBS, lambda: cobs_decoding(TELEMETRY, chunk=1)),
+    peers=[Peer(COBS, lambda: _peers().cobs_decoding(TELEMETRY, chunk=1))],
 )
 def decode_single_telemetry() -> float:
     return decoding(TELEMETRY, chunk=1)
@@ -211,7 +128,7 @@ def decode_single_telemetry() -> float:
     "Python encodes telemetry of 37 B: fields to frame",
     "frames/s",
     at_least=200_000,
-    peer=Peer(MAVLINK, mavlink_encoding),
+    peers=[Peer(MAVLINK, lambda: _peers().mavlink_encoding())],
 )
 def encode_fields() -> float:
     return encoding(TELEMETRY, fields=True)
@@ -221,7 +138,7 @@ def encode_fields() -> float:
     "Python decodes telemetry of 37 B: 16 frames at a time to fields",
     "frames/s",
     at_least=200_000,
-    peer=Peer(MAVLINK, mavlink_decoding),
+    peers=[Peer(MAVLINK, lambda: _peers().mavlink_decoding())],
 )
 def decode_fields() -> float:
     return decoding(TELEMETRY, chunk=16, fields=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,21 +24,27 @@ class Figure:
 
     Attributes:
         name: what is measured, and how.
-        unit: of the value, the target and the peer.
+        unit: of the value, the target and the peers.
         better: which way the target bounds the value.
-        target: the bound.
-        peer: somebody else's figure, or None.
+        target: the bound; None: the figure is shown and no more.
+        peers: somebody else's figures.
         measure: measures and returns the value.
+        rounds: how often; the peers take turns with it.
+        of: which of the rounds counts: the best, as other work on a machine only makes slower, or the median.
     """
 
     name: str
     unit: str
     better: Literal["more", "less"]
-    target: float
-    peer: Peer | None
+    target: float | None
+    peers: tuple[Peer, ...]
     measure: Callable[[], float]
+    rounds: int = 1
+    of: Literal["best", "median"] = "best"
 
     def is_met_by(self, value: float) -> bool:
+        if self.target is None:
+            return True
         return value >= self.target if self.better == "more" else value <= self.target
 
 
@@ -51,17 +57,18 @@ def figure(
     *,
     at_least: float | None = None,
     at_most: float | None = None,
-    peer: Peer | None = None,
+    peers: Sequence[Peer] = (),
+    rounds: int = 1,
+    of: Literal["best", "median"] = "best",
 ) -> Callable[[Callable[[], float]], Callable[[], float]]:
-    """Marks a function as the measurement of a figure with one bound, `at_least` or `at_most`."""
-    if (at_least is None) == (at_most is None):
-        raise ValueError(f"figure {name!r} needs either at_least or at_most")
-    better: Literal["more", "less"] = "more" if at_least is not None else "less"
+    """Marks a function as the measurement of a figure with one bound, `at_least` or `at_most`, or none."""
+    if at_least is not None and at_most is not None:
+        raise ValueError(f"figure {name!r} has two bounds; expected at_least, at_most or neither")
+    better: Literal["more", "less"] = "more" if at_most is None else "less"
     target = at_least if at_least is not None else at_most
-    assert target is not None
 
     def register(measure: Callable[[], float]) -> Callable[[], float]:
-        FIGURES.append(Figure(name, unit, better, target, peer, measure))
+        FIGURES.append(Figure(name, unit, better, target, tuple(peers), measure, rounds, of))
         return measure
 
     return register

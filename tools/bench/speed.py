@@ -25,7 +25,7 @@ def times_real_time(on: str, seconds: float, period: float) -> float:
     "AVR image in the closed loop, wander at 50 ms, IR at 20 Hz",
     "× real time",
     at_least=30,
-    peer=Peer("simavr as published, board alone", peers.plain_simavr),
+    peers=[Peer("simavr as published, board alone", peers.plain_simavr)],
 )
 def avr_closed_loop() -> float:
     return times_real_time("avr", 30.0, 0.05)
@@ -35,7 +35,8 @@ def avr_closed_loop() -> float:
     "native board and world, no brain",
     "× real time",
     at_least=1000,
-    peer=Peer("ir-sim, steps of 10 ms", peers.ir_sim),
+    peers=[Peer("ir-sim, steps of 10 ms", peers.ir_sim_room)],
+    rounds=3,
 )
 def native_without_a_brain() -> float:
     session = open_board("native", BoardRequest(robot=load_robot("shieldbot"), arena=ARENA, record=False))
@@ -52,7 +53,8 @@ def native_without_a_brain() -> float:
     "native board and world, wander at every 10 ms tick",
     "× real time",
     at_least=300,
-    peer=Peer("ir-sim without a brain, steps of 10 ms", peers.ir_sim),
+    peers=[Peer("ir-sim without a brain, steps of 10 ms", peers.ir_sim_room)],
+    rounds=3,
 )
 def native_with_wander() -> float:
     return times_real_time("native", 60.0, 0.01)

@@ -1,48 +1,163 @@
-"""The bench's table: bounds, ratios, what a missed target looks like."""
+"""The bench: bounds, rounds, peers in turns, what a missed target looks like, options, and Ctrl-C."""
 
 from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
 
-from tools.bench.__main__ import row, table
+from tools.bench import report, scene
 from tools.bench.figures import Figure, Peer, figure
 
+ROOT = Path(__file__).resolve().parents[2]
 
-def a_figure(better: str, target: float, peer: Peer | None = None) -> Figure:
-    return Figure("speed of a thing", "m/s", better, target, peer, lambda: 0.0)  # type: ignore[arg-type]
+
+def a_figure(better: str, target: float | None, *peers: Peer, measure: Any = lambda: 5.0, **more: Any) -> Figure:
+    return Figure("speed of a thing", "m/s", better, target, peers, measure, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("better", "value", "met"),
-    [("more", 3.0, True), ("more", 2.99, False), ("less", 3.0, True), ("less", 3.01, False)],
+    ("better", "target", "value", "met"),
+    [
+        ("more", 3.0, 3.0, True),
+        ("more", 3.0, 2.99, False),
+        ("less", 3.0, 3.0, True),
+        ("less", 3.0, 3.01, False),
+        ("more", None, 0.0, True),
+    ],
 )
-def test_a_target_is_met_at_its_bound_and_on_its_better_side(better: str, value: float, met: bool) -> None:
-    assert row(a_figure(better, 3.0), value)["met"] is met
+def test_a_target_is_met_at_its_bound_and_on_its_better_side(
+    better: str, target: float | None, value: float, met: bool
+) -> None:
+    assert report.row_of(a_figure(better, target), [value], [])["met"] is met
 
 
-def test_the_ratio_is_to_the_peer() -> None:
-    assert row(a_figure("more", 3.0, Peer("somebody", 2.0)), 5.0)["ratio"] == 2.5
-    assert row(a_figure("more", 3.0), 5.0)["ratio"] is None
+def test_peers_take_turns_and_the_best_or_the_median_of_the_rounds_counts() -> None:
+    order: list[str] = []
+
+    def taking_turns(who: str, values: list[float]) -> Any:
+        left = iter(values)
+
+        def measure() -> float:
+            order.append(who)
+            return next(left)
+
+        return measure
+
+    def rows(better: str, of: str) -> dict[str, Any]:
+        order.clear()
+        peer = Peer("somebody", taking_turns("peer", [1.0, 4.0, 2.0]))
+        ours = taking_turns("ours", [5.0, 8.0, 6.0])
+        return report.measure(a_figure(better, 3.0, peer, measure=ours, rounds=3, of=of))
+
+    best, least, median = rows("more", "best"), rows("less", "best"), rows("more", "median")
+    assert order == ["ours", "peer"] * 3
+    assert (best["value"], best["peers"][0]["value"], best["peers"][0]["ratio"]) == (8.0, 4.0, 2.0)
+    assert (least["value"], least["peers"][0]["value"]) == (5.0, 1.0)
+    assert (median["value"], median["peers"][0]["value"], median["peers"][0]["ratio"]) == (6.0, 2.0, 3.0)
+    assert median["rounds"] == [5.0, 8.0, 6.0] and report.spread(median) == "50 %"
 
 
-def test_a_figure_has_exactly_one_bound() -> None:
-    with pytest.raises(ValueError, match="either"):
-        figure("no bound", "s")
-    with pytest.raises(ValueError, match="either"):
+def test_a_figure_has_at_most_one_bound() -> None:
+    with pytest.raises(ValueError, match="two bounds"):
         figure("two bounds", "s", at_least=1.0, at_most=2.0)
 
 
-def test_the_table_shows_value_bound_peer_and_ratio() -> None:
-    console = Console(width=120)
-    with console.capture() as shown:
-        console.print(table([row(a_figure("less", 4.0, Peer("somebody", 2.0)), 5.0)]))
-    line = next(text for text in shown.get().splitlines() if "speed of a thing" in text)
-    assert [cell.strip() for cell in line.split("│")[1:-1]] == [
-        "speed of a thing",
-        "5",
-        "m/s",
-        "≤ 4",
-        "somebody: 2",
-        "2.50",
+def test_the_table_shows_value_spread_bound_and_peers() -> None:
+    rows = [
+        report.measure(a_figure("less", 4.0, Peer("somebody", 2.0), Peer("else", 10.0))),
+        report.failed(a_figure("more", None), RuntimeError("no such thing")),
     ]
+    console = Console(width=140)
+    with console.capture() as shown:
+        console.print(report.table(rows))
+    lines = [text for text in shown.get().splitlines() if "speed of a thing" in text]
+    found = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
+    assert found[0] == ["speed of a thing", "5", "–", "m/s", "≤ 4", "somebody: 2 (× 2.5); else: 10 (× 0.5)"]
+    assert found[1] == ["speed of a thing", "failed", "–", "m/s", "–", "–"]
+    result = {"computer": report.computer() | {"load_before": 1, "load_after": 2}, "seconds": 90, "complete": True}
+    text = report.summary(result | {"figures": rows})
+    assert "Took 1.5 minutes." in text and "Missed: speed of a thing." in text
+    assert "Failed: speed of a thing: RuntimeError: no such thing." in text
+
+
+def run(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "tools.bench", *options], cwd=ROOT, capture_output=True, text=True, timeout=300
+    )
+
+
+def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
+    names = run("--list").stdout.splitlines()
+    assert len(set(names)) == len(names) > 50
+    lasers = json.loads(run("--list", "--json", "--only", "laser of 683", "--only", "no such thing").stdout)
+    assert [row["name"] for row in lasers] == [name for name in names if "laser of 683" in name]
+    assert {(row["target"], row["unit"]) for row in lasers} == {
+        (target, "rays/s") for target in (100e6, 200e6, 20e6, 30e6)
+    }
+    (wandering,) = json.loads(run("--list", "--json", "--only", "native board and world, wander").stdout)
+    assert wandering["target"] == 300 and wandering["better"] == "more"
+
+
+def test_a_pattern_without_a_figure_is_one_sentence() -> None:
+    done = run("--only", "no such thing")
+    assert done.returncode == 2 and "no figure's name contains 'no such thing'" in done.stderr
+
+
+def test_json_page_and_progress(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    done = run("--only", "board's clock", "--json", "--page", str(page))
+    result = json.loads(done.stdout)
+    assert [row["unit"] for row in result["figures"]] == ["us", "us"] and result["complete"] is False
+    assert "[1/2] board's clock" in done.stderr and "[2/2]" in done.stderr
+    assert done.returncode == int(not all(row["met"] for row in result["figures"]))
+    assert "| board's clock, an observation's stamp |" in page.read_text()
+
+
+def test_ctrl_c_shows_what_was_measured_so_far() -> None:
+    """The board's clock is the first match, in a second; the run over 10 simulated minutes is the next one."""
+    command = [
+        sys.executable,
+        "-m",
+        "tools.bench",
+        "--only",
+        "board's clock",
+        "--only",
+        "10 simulated minutes",
+        "--json",
+    ]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None and process.stdout is not None
+        text = ""
+        while "[3/3]" not in text:
+            got = process.stderr.read(1)
+            assert got, text
+            text += got
+        process.send_signal(signal.SIGINT)
+        result = json.loads(process.stdout.read())
+    assert process.returncode == 130
+    assert len(result["figures"]) == 2 and result["complete"] is False
+
+
+# ---- the scene -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("edges", [48, 100, 1000, 4000])
+def test_the_scene_has_as_many_edges_and_the_robots_start_in_free_space(edges: int) -> None:
+    outline, pillars = scene.shapes(edges)
+    assert 4 + 4 * len(pillars) == edges
+    (left, low), (right, high) = outline[0], outline[2]
+    for corners in pillars:
+        x, y = (sum(values) / 4 for values in zip(*corners, strict=True))
+        assert left < x < right and low < y < high
+        assert math.dist((0, 0), (x, y)) > scene.RADIUS + 2 * scene.PILLAR
+        for a in (-0.5, 0.5, 1.5):
+            for b in (-0.5, 0.5, 1.5):
+                assert math.dist((a, b), (x, y)) > scene.RADIUS + 2 * scene.PILLAR

@@ -34,6 +34,7 @@ def main() -> NoReturn:
     except KeyboardInterrupt as error:
         code = EXIT_INTERRUPTED
         _say("interrupted", error)
+    exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import info, link, new, parameters, run, serve, teleop
+from boebot.cli import info, link, new, options, parameters, run, serve, teleop
 from boebot.link import messages
 
 app = typer.Typer(
@@ -20,10 +20,10 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run", cls=run.Command)(run.run)
-app.command("serve")(serve.serve)
+app.command("run", cls=options.Command)(run.run)
+app.command("serve", cls=options.Command)(serve.serve)
 app.command("info")(info.info)
-app.command("teleop")(teleop.teleop)
+app.command("teleop", cls=options.Command)(teleop.teleop)
 app.command("link")(link.link)
 app.add_typer(parameters.app, name="parameters")
 app.command("new")(new.new)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
+
+from boebot.boards import imperfections
 
 On = Annotated[
     str,
@@ -30,4 +33,22 @@ Period = Annotated[
     float | None,
     typer.Option("--period", metavar="MS", help="Milliseconds from step to step; a multiple of the 10 ms tick."),
 ]
+Without = Annotated[
+    str | None,
+    typer.Option("--without", metavar="NAME,...", help="Switch off imperfections of simulated robots, named below."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")]
+
+
+def names(text: str | None) -> tuple[str, ...]:
+    """Of "NAME,NAME"."""
+    return () if text is None else tuple(name.strip() for name in text.split(","))
+
+
+class Command(TyperCommand):
+    """A sub-command with `--without`, whose help ends with the imperfections that can be switched off."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Name and line of each; they are the simulator's to say."""
+        with formatter.section("Imperfections, and what is so --without them"):
+            formatter.write_dl(list(imperfections().items()))

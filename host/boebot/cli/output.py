@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import re
 import sys
 import textwrap
 import threading
@@ -13,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from boebot import figures
 from boebot.driving import Progress
 
 BAR_AFTER_S = 2.0
@@ -20,9 +20,6 @@ STEP_S = 5.0  # a step of a brain that takes longer is spoken of
 _GAP = 3  # between the columns of a table
 _INDENT = 4  # of a sentence below its row
 _SENTENCE_LEAST = 40  # columns that a sentence beside its row wants
-_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm)$")
-
-_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V"}
 
 
 def say(sentence: str) -> None:
@@ -51,12 +48,8 @@ def table(values: Mapping[str, Any]) -> Any:
     rows.add_column(style="dim")
     rows.add_column(justify="right", overflow="fold")
     rows.add_column(style="dim")
-    for name, value in values.items():
-        if value is None:
-            continue
-        match = _UNIT.search(name)
-        unit = _UNITS.get(match[1], match[1]) if match else ""
-        rows.add_row(_UNIT.sub("", name).replace("_", " "), _text(value), unit)
+    for row in figures.rows(values):
+        rows.add_row(*row)
     return rows
 
 
@@ -151,13 +144,3 @@ def step_watch(progress: Progress) -> Iterator[Progress]:
         yield report
     finally:
         ended.set()
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:,.10g}" if abs(value) >= 1000 else f"{value:.10g}"
-    if isinstance(value, int) and not isinstance(value, bool):
-        return f"{value:,}"
-    if isinstance(value, list):
-        return ", ".join(str(item) for item in value)
-    return str(value)

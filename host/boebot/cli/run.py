@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from boebot import report
-from boebot.boards import imperfections
 from boebot.cli import options, output
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
 from boebot.runner import execute
+from boebot.tasks import Member
+from boebot.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
 _HELP = """Let a brain drive a robot, and say what happened.
@@ -28,15 +28,6 @@ Several robots in one simulated world:
   boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
 
 What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on."""
-
-
-class Command(TyperCommand):
-    """`boebot run`, whose help ends with the imperfections that can be switched off."""
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """Name and line of each; they are the simulator's to say."""
-        with formatter.section("Imperfections, and what is so --without them"):
-            formatter.write_dl(list(imperfections().items()))
 
 
 def run(
@@ -65,12 +56,7 @@ def run(
     seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
     seed: options.Seed = 1,
     period: options.Period = None,
-    without: Annotated[
-        str | None,
-        typer.Option(
-            "--without", metavar="NAME,...", help="Switch off imperfections of simulated robots, named below."
-        ),
-    ] = None,
+    without: options.Without = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     out: Annotated[
         Path | None,
@@ -80,7 +66,7 @@ def run(
 ) -> None:
     """See `_HELP`."""
     period_s = None if period is None else period / 1000
-    ideal = () if without is None else tuple(name.strip() for name in without.split(","))
+    ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     if out is not None:
@@ -90,7 +76,7 @@ def run(
         output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
         output.step_watch(bar) as progress,
     ):
-        if count == 1 and not poses:
+        if count == 1:
             result = execute(
                 brain[0],
                 robot=kinds[0],
@@ -102,10 +88,9 @@ def run(
                 period=period_s,
                 progress=progress,
                 without=ideal,
+                pose=poses[0] if poses else None,
             )
         else:
-            from boebot.together import DEFAULT_KIND, Member, execute_together
-
             members = [
                 Member(
                     brain=brain[index % len(brain)],
@@ -116,10 +101,8 @@ def run(
                 )
                 for index in range(count)
             ]
-            together = execute_together(
-                members, arena, seconds, DEFAULT_KIND if on is None else on, seed, realtime, progress
-            )
-    if count == 1 and not poses:
+            together = execute_together(members, arena, seconds, on, seed, realtime, progress)
+    if count == 1:
         end(result, out, json)
     else:
         end_together(together, out, json)

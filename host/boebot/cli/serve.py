@@ -24,6 +24,7 @@ def serve(
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
+    without: options.Without = None,
     json: options.Json = False,
 ) -> None:
     """Offer the emulated robot to other programs, until Ctrl-C."""
@@ -37,7 +38,9 @@ def serve(
         )
     description = load_robot(robot)
     check_board(on, description)
-    request = BoardRequest(robot=description, arena=arena, seed=seed, realtime=True, record=False)
+    request = BoardRequest(
+        robot=description, arena=arena, seed=seed, realtime=True, record=False, without=options.names(without)
+    )
 
     def announce(url: str) -> None:
         if json:

@@ -102,6 +102,7 @@ def teleop(
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
+    without: options.Without = None,
     seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after so long.")] = float("inf"),
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
     json: options.Json = False,
@@ -115,7 +116,16 @@ def teleop(
     print(HELP, file=screen, flush=True)
     with raw_keyboard() as read_keys:
         brain = Keyboard(read_keys, functools.partial(_show, screen))
-        result = execute(brain, robot=robot, arena=arena, on=on, seconds=seconds, seed=seed, realtime=True)
+        result = execute(
+            brain,
+            robot=robot,
+            arena=arena,
+            on=on,
+            seconds=seconds,
+            seed=seed,
+            realtime=True,
+            without=options.names(without),
+        )
     with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
         print(file=screen, flush=True)
     end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)

@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+from boebot.devices.infrared import NEVER
 from boebot.link.messages import DevicesTelemetry
 
 SCALE_V_M = 0.339
@@ -39,9 +40,10 @@ class AnalogInfrared(NamedTuple):
 
 
 class AnalogInfraredReader:
-    """Reads the sensor."""
+    """Reads the sensor; `told_ticks`: from one message to the next."""
 
-    def __init__(self, tick_s: float) -> None:
+    def __init__(self, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
+        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
         self._tick_s = tick_s
 
     def __call__(self, devices: DevicesTelemetry, since: float = 0) -> AnalogInfrared:
@@ -51,4 +53,4 @@ class AnalogInfraredReader:
         at_pin = voltage(devices.analog_infrared, devices.supply)
         if told >= NEVER or at_pin is None:
             return AnalogInfrared(None, None, float("inf"), False)
-        return AnalogInfrared(distance(at_pin), at_pin, ticks * self._tick_s, ticks <= STALE_PERIODS * READ_TICKS)
+        return AnalogInfrared(distance(at_pin), at_pin, ticks * self._tick_s, ticks <= self._fresh)

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+from boebot.devices.infrared import NEVER
 from boebot.link.messages import DevicesTelemetry
 
 
@@ -24,9 +25,10 @@ class Battery(NamedTuple):
 
 
 class BatteryReader:
-    """Reads the pack; `ratio`: its voltage for each volt at the pin."""
+    """Reads the pack; `ratio`: its voltage for each volt at the pin; `told_ticks`: from one message to the next."""
 
-    def __init__(self, ratio: float, tick_s: float) -> None:
+    def __init__(self, ratio: float, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
+        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
         self._ratio = ratio
         self._tick_s = tick_s
 
@@ -37,4 +39,4 @@ class BatteryReader:
         at_pin = voltage(devices.battery, devices.supply)
         if told >= NEVER or at_pin is None:
             return Battery(None, float("inf"), False)
-        return Battery(at_pin * self._ratio, ticks * self._tick_s, ticks <= STALE_PERIODS * READ_TICKS)
+        return Battery(at_pin * self._ratio, ticks * self._tick_s, ticks <= self._fresh)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from boebot.devices.infrared import MESSAGE_TICKS, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
 
@@ -47,11 +47,12 @@ class Buzzer(NamedTuple):
 
 
 class BuzzerReader:
-    """Reads the buzzer."""
+    """Reads the buzzer; `told_ticks`: from one message to the next."""
 
-    def __init__(self, tick_s: float) -> None:
+    def __init__(self, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
+        self._fresh = fresh_ticks(1, told_ticks)
         self._tick_s = tick_s
 
     def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Buzzer:
         """The buzzer as that message had it, `since` ticks ago."""
-        return Buzzer(devices.buzzer_token, since * self._tick_s, since <= STALE_PERIODS * MESSAGE_TICKS)
+        return Buzzer(devices.buzzer_token, since * self._tick_s, since <= self._fresh)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+from boebot.devices.infrared import NEVER
 from boebot.link.messages import CompassStatus, DevicesTelemetry
 
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
@@ -33,9 +34,13 @@ class Compass(NamedTuple):
 
 
 class CompassReader:
-    """Reads the compass; `offset`: the robot's own field along x and y, in counts."""
+    """Reads the compass; `offset`: the robot's own field along x and y, in counts; `told_ticks`: from one message to
+    the next."""
 
-    def __init__(self, tick_s: float, offset: tuple[float, float] = (0.0, 0.0)) -> None:
+    def __init__(
+        self, tick_s: float, offset: tuple[float, float] = (0.0, 0.0), told_ticks: int = MESSAGE_TICKS
+    ) -> None:
+        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
         self._tick_s = tick_s
         self._offset = offset
 
@@ -50,5 +55,5 @@ class CompassReader:
         x, y, z = (count * TESLA_PER_COUNT for count in counts)
         ahead, aside = counts[0] - self._offset[0], counts[1] - self._offset[1]
         heading = math.atan2(-aside, ahead) if ahead or aside else None
-        fresh = status == CompassStatus.OK and ticks <= STALE_PERIODS * READ_TICKS
+        fresh = status == CompassStatus.OK and ticks <= self._fresh
         return Compass(heading, (x, y, z), status, age, fresh and heading is not None)

@@ -13,7 +13,7 @@ from boebot.link.messages import DevicesTelemetry, Telemetry
 
 NEVER = 255  # age in telemetry: never measured, or older
 STALE_PERIODS = 3  # a reading older than this many of its periods is not valid
-MESSAGE_TICKS = 2  # from one message of the slow devices to the next, where the line is fast
+MESSAGE_TICKS = 2  # from one message of the slow devices to the next: parameter devices_period, unless set otherwise
 
 
 class Infrared(NamedTuple):
@@ -62,11 +62,11 @@ class InfraredZone(NamedTuple):
 
 
 class InfraredZoneReader:
-    """Reads the zone of one pair; `period_ticks` as of the pairs."""
+    """Reads the zone of one pair; `period_ticks` as of the pairs, `told_ticks` of the messages that tell it."""
 
-    def __init__(self, left: bool, period_ticks: int, tick_s: float) -> None:
+    def __init__(self, left: bool, period_ticks: int, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
         self._left = left
-        self._fresh = min(STALE_PERIODS * max(period_ticks, SWEEP_TICKS), NEVER - 1)
+        self._fresh = STALE_PERIODS * max(period_ticks, SWEEP_TICKS, told_ticks)
         self._tick_s = tick_s
 
     def __call__(self, devices: DevicesTelemetry, since: float = 0) -> InfraredZone:

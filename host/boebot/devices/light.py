@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+from boebot.devices.infrared import NEVER
 from boebot.link.messages import DevicesTelemetry
 
 LONGEST_US = 14_000  # on the wire: so long or longer
@@ -31,10 +32,11 @@ class Light(NamedTuple):
 
 
 class LightReader:
-    """Reads one light sensor."""
+    """Reads one light sensor; `told_ticks`: from one message to the next."""
 
-    def __init__(self, left: bool, tick_s: float) -> None:
+    def __init__(self, left: bool, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
         self._left = left
+        self._fresh = fresh_ticks(FRAME_TICKS, told_ticks)
         self._tick_s = tick_s
 
     def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Light:
@@ -45,4 +47,4 @@ class LightReader:
         age = ticks * self._tick_s if told < NEVER else float("inf")
         if told >= NEVER or us == 0:
             return Light(None, None, False, age, False)
-        return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= STALE_PERIODS * FRAME_TICKS)
+        return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= self._fresh)

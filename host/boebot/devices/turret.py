@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from boebot.devices.infrared import MESSAGE_TICKS, STALE_PERIODS
+from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import DevicesTelemetry
 from boebot.link.messages import Turret as TurretMessage
@@ -52,16 +52,19 @@ class Turret(NamedTuple):
 
 
 class TurretReader:
-    """Reads the turret; centre and gain as its servo has them."""
+    """Reads the turret; centre and gain as its servo has them; `told_ticks`: from one message to the next."""
 
-    def __init__(self, centre_us: float, gain_us_per_rad: float, tick_s: float) -> None:
+    def __init__(
+        self, centre_us: float, gain_us_per_rad: float, tick_s: float, told_ticks: int = MESSAGE_TICKS
+    ) -> None:
+        self._fresh = fresh_ticks(1, told_ticks)
         self._tick_s = tick_s
         self._centre_us = centre_us
         self._gain_us_per_rad = gain_us_per_rad
 
     def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Turret:
         """The turret as that message had it, `since` ticks ago."""
-        age, valid = since * self._tick_s, since <= STALE_PERIODS * MESSAGE_TICKS
+        age, valid = since * self._tick_s, since <= self._fresh
         if devices.turret_pulse == 0:
             return Turret(None, None, age, valid)
         pulse_us = devices.turret_pulse * PULSE_SCALE_US

@@ -35,13 +35,8 @@ class Task:
     """may be infinite"""
     period_s: float
     progress: Progress | None = None
-    brain_seed: int | None = None
-    """of the brain's chance; None: the request's"""
-
-    @property
-    def chance(self) -> int:
-        """Seed of the brain's chance."""
-        return self.request.seed if self.brain_seed is None else self.brain_seed
+    brain_seed: int
+    """of the brain's chance"""
 
 
 class Driver(Protocol):

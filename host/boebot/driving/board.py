@@ -18,6 +18,7 @@ from struct import Struct
 from boebot import robots
 from boebot.boards import BoardSession
 from boebot.devices import turret
+from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, Told, told
 from boebot.driving import PROGRESS_S, Task, check_period, whole_ticks
 from boebot.errors import BoardError, BoebotError, ProtocolError
@@ -88,7 +89,7 @@ class BoardDriver:
             )
         self.description = request.robot
         self.equipment = Equipment(request.robot, self.tick_s)
-        self.robot = Robot(request.robot.name, self.period_s, task.chance)
+        self.robot = Robot(request.robot.name, self.period_s, task.brain_seed)
         self.record = Record()
         self.resets = 0
         self.late_steps = 0
@@ -128,12 +129,21 @@ class BoardDriver:
             session = link.sessions
             try:
                 self.description = configure(link, self.task.request.robot)
+                self.equipment = self._equipment()
                 if not self._halted:
                     self._arm()
             except SessionLostError:
                 continue
             self._session = session
-        self.equipment = Equipment(self.description, self.tick_s)
+
+    def _equipment(self) -> Equipment:
+        """The devices as the board has them; how often it tells of slow ones it says itself."""
+        equipment = Equipment(self.description, self.tick_s)
+        if not equipment.tells_slowly:
+            return equipment
+        period = int(self.link.get_parameter("devices_period"))
+        told_ticks = message_ticks(period, self.link.byte_s, self.tick_s)
+        return Equipment(self.description, self.tick_s, told_ticks=told_ticks)
 
     def _arm(self) -> None:
         for _ in range(_ARM_TRIES - 1):
@@ -318,7 +328,7 @@ class BoardDriver:
             board=self.task.on,
             description=self.session.description,
             arena=self.task.request.arena,
-            seed=self.task.chance,
+            seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.tick_s,
             error=error,

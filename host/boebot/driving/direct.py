@@ -32,7 +32,7 @@ class DirectDriver:
         self.period_s = self.period_ticks * session.tick_s
         self.equipment = Equipment(request.robot, session.tick_s, session.layout)
         self._speed_maximum = request.robot.body.wheel_speed_maximum_m_s
-        self.robot = Robot(request.robot.name, self.period_s, request.seed, self._speed_maximum)
+        self.robot = Robot(request.robot.name, self.period_s, task.brain_seed, self._speed_maximum)
         self.record = Record()
         self._periods = periods(request.robot, session.layout, len(session.readings()))
         self._sampled = any(period_s > session.tick_s for period_s in self._periods)
@@ -93,7 +93,8 @@ class DirectDriver:
         return 0.0, 0.0
 
     def end(self) -> None:
-        """Nothing moves any more: time has stopped."""
+        """No motor signals any more, should time go on for others."""
+        self.session.stop()
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.driving.Driver`."""
@@ -104,7 +105,7 @@ class DirectDriver:
             board=self.task.on,
             description=self.session.description,
             arena=request.arena,
-            seed=request.seed,
+            seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.session.tick_s,
             error=error,

@@ -1,7 +1,7 @@
 """Files that a run leaves behind:
 
 run.csv        one row per control tick: sensors, commands, estimated and, where known, true pose
-summary.json   the figures of the run
+summary.json   the figures of the run; `format` numbers the form of all these files
 to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
 wire.csv       when which stretch of those two files crossed the wire
 run.png        a picture of the run

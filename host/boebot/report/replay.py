@@ -1,5 +1,12 @@
 """replay.html: one page, offline, that plays and scrubs a run, of one robot or of several. The page itself is
-`replay_page.html` beside this file; the run's data are put into it as base64 arrays."""
+`replay_page.html` beside this file; the run's data are put into it as one JSON object with base64 arrays:
+
+format   number of the data's form, which page and data share
+plan     what stands and moves in the arena (boebot.floor_plan)
+runs     one per robot: title, table, paths, flags, readings, what the robot looks like
+
+Arrays are little-endian float32 (`flags`: uint8), one entry per frame.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +19,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boebot import robots, vehicle_devices
+from boebot import robots
 from boebot.link.messages import Status
-from boebot.report import scene
+from boebot.report import scene, sensors, style
 
 if TYPE_CHECKING:
+    from boebot.floor_plan import FloorPlan, Moving, Solid
     from boebot.result import RunResult
-    from boebot.series import Floats, Pose
+    from boebot.series import Floats, Pose, Readout
 
+FORMAT = 3
 FRAMES_AT_MOST = 20_000
 _PAGE = Path(__file__).with_name("replay_page.html")
-_PLACEHOLDER = "/*RUNS*/null"
+_PLACEHOLDER = "/*PAGE*/null"
 
 # bits of the page's `flags` array
 LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF = (1 << bit for bit in range(7))
@@ -30,19 +39,60 @@ LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF = 
 
 def write(results: Sequence[RunResult], path: Path) -> Path:
     """Writes the page of the robots of one run."""
-    robots = [page_data(result) | {"colour": scene.colour(number)} for number, result in enumerate(results, 1)]
-    data = json.dumps(robots, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    views = [scene.view(result) for result in results]
+    low, high = scene.bounds(*views)
+    content = {
+        "format": FORMAT,
+        "plan": plan_data(views[0].plan),
+        "bounds": [*low.tolist(), *high.tolist()],
+        "runs": [
+            run_data(result, view) | {"colour": style.colour(number)}
+            for number, (result, view) in enumerate(zip(results, views, strict=True), 1)
+        ],
+    }
+    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     page = _PAGE.read_text(encoding="utf-8")
     path.write_text(page.replace(_PLACEHOLDER, data), encoding="utf-8")
     return path
 
 
-def page_data(result: RunResult) -> dict[str, Any]:
-    """What the page shows of one robot. Arrays are base64 of little-endian float32 (`flags`: uint8), by frame."""
-    view = scene.view(result)
+def plan_data(plan: FloorPlan) -> dict[str, Any]:
+    """The plan as the page has it (m, rad)."""
+    charger = plan.charger
+    return {
+        "solids": [_solid(solid) for solid in plan.solids],
+        "patches": [
+            {"points": _points(patch.corners), "grip": patch.grip, "rough": patch.grip > plan.grip}
+            for patch in plan.patches
+        ],
+        "lamps": [[lamp.x, lamp.y] for lamp in plan.lamps],
+        "charger": None if charger is None else [charger.x, charger.y, charger.radius],
+        "moving": [_moving(moving) for moving in plan.moving],
+    }
+
+
+def _solid(solid: Solid) -> dict[str, Any]:
+    return {
+        "kind": solid.kind,
+        "points": _points(solid.points),
+        "radius": solid.radius,
+        "low": solid.is_low,
+        "dull": solid.is_dull,
+        "remarks": ", ".join(solid.remarks),
+        "top": [float(value) for value in ((solid.box[0][0] + solid.box[1][0]) / 2, solid.box[1][1])],
+    }
+
+
+def _moving(moving: Moving) -> dict[str, Any]:
+    """`time` on the clock of the truth, which begins `begin` before a run's own."""
+    pose = [_array(row) for row in (moving.x, moving.y, moving.heading)]
+    return {"solid": _solid(moving.solid), "time": _array(moving.time), "pose": pose}
+
+
+def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
+    """What the page shows of one robot."""
     series = result.series
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
-    low, high = scene.bounds(view)
     status = series.status
     flags = (
         series.left_whisker * LEFT_WHISKER
@@ -54,47 +104,47 @@ def page_data(result: RunResult) -> dict[str, Any]:
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
     )
     return {
-        "title": f"{result.brain} on {result.board}",
+        "title": f"{result.brain} on {result.robot.name} ({result.board})",
         "brain": result.brain,
         "begin": result.clock_offset,
         "known": view.known,
         "table": result.table(),
-        "bounds": [*low.tolist(), *high.tolist()],
-        "outlines": [np.round(outline, 4).tolist() for outline in view.outlines],
         "contacts": np.round(view.contacts, 4).tolist(),
         "touches": np.round(view.touches, 4).tolist(),
         "robot": _robot(result.robot),
         "time": _array(series.time[thin]),
         "path": _pose(view.path, thin),
         "estimate": None if view.estimate is None else _pose(view.estimate, thin),
+        "turret": _array(view.turret[thin]),
         "left": _array(series.left_signal[thin]),
         "right": _array(series.right_signal[thin]),
         "ping": _array(np.nan_to_num(series.ping_distance[thin], nan=-1.0)),
+        "readings": [_reading(readout, thin) for readout in series.readouts()],
         "flags": base64.b64encode(flags[thin].astype(np.uint8).tobytes()).decode("ascii"),
     }
 
 
+def _reading(readout: Readout, thin: slice) -> dict[str, Any]:
+    return {
+        "name": readout.device.replace("_ir", "_IR").replace("_", " "),
+        "unit": readout.unit,
+        "digits": readout.digits,
+        "values": _array(readout.values[thin]),
+        "ages": _array(readout.ages[thin]),
+    }
+
+
 def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
-    """What the page needs to draw the robot (m, rad)."""
-    drawn: dict[str, Any] = {
+    """What the page needs to draw the robot (m, rad): its body, and what it has."""
+    return {
         "radius": robot.body.radius_m,
+        "outline": _points(np.array(robot.body.outline_m).reshape(-1, 2)),  # none: the circle
+        "front": robot.body.front_m,
         "track": robot.body.track_width_m,
         "wheel": robot.body.wheel_radius_m,
+        "whiskers": {name: {"root": root, "tip": tip} for name, (root, tip) in sensors.whiskers(robot).items()},
+        "looks": [vars(look) for look in sensors.looks(robot)],
     }
-    for name, device in robot.device.items():
-        if not device.on:
-            continue
-        if isinstance(device, robots.Whisker | vehicle_devices.TouchWhisker):
-            drawn[name] = {"root": device.root_m, "tip": device.tip_m}
-        elif isinstance(device, scene.RANGING):
-            reach = scene.reach(device)
-            drawn[name] = {
-                "position": device.position_m,
-                "heading": device.heading_rad,
-                "beam": device.beam_rad,
-                "range": reach,
-            }
-    return drawn
 
 
 def _contact(result: RunResult) -> np.ndarray:
@@ -108,6 +158,11 @@ def _contact(result: RunResult) -> np.ndarray:
 
 def _pose(pose: Pose, thin: slice) -> list[str]:
     return [_array(values[thin]) for values in (pose.x, pose.y, pose.heading)]
+
+
+def _points(points: Floats) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(points, 4).tolist()
+    return rounded
 
 
 def _array(values: Floats) -> str:

@@ -12,6 +12,8 @@ import numpy as np
 if TYPE_CHECKING:
     from boebot.result import RunResult
 
+FORMAT = 2  # of a run's files; CHANGELOG.md says what is new in each
+
 
 def columns(result: RunResult) -> dict[str, list[str]]:
     """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
@@ -54,7 +56,7 @@ def write_run(result: RunResult, path: Path) -> Path:
 
 def write_summary(result: RunResult, path: Path) -> Path:
     """summary.json"""
-    summary = result.table() | {"counters": result.counters}
+    summary = {"format": FORMAT} | result.table() | {"counters": result.counters}
     path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     return path
 

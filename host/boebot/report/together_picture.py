@@ -1,64 +1,46 @@
-"""run.png of several robots: the arena from above, each robot's path in its own colour, and contacts."""
+"""run.png of several robots: the arena from above, each robot's path in its own colour, touches and contacts."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from boebot.report import picture, scene
+from boebot.report import scene, style
+from boebot.report.arena_drawing import draw_arena, legend_entries
+from boebot.report.picture import draw_marks
+from boebot.report.robot_drawing import draw_robot
+from boebot.report.sheet import Sheet, counted
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from pathlib import Path
 
-    from boebot.result import TogetherResult
+    from matplotlib.artist import Artist
 
-COLUMNS = 4  # of the legend
+    from boebot.result import RunResult, TogetherResult
+
+Shown = tuple[int, "RunResult", scene.View]
 
 
 def write(result: TogetherResult, path: Path) -> Path:
     """Draws all robots of a run into a PNG file."""
-    shown = [(number, robot, scene.view(robot)) for number, robot in enumerate(result.robots, 1) if robot.ticks]
-    corners = [scene.bounds(view) for _, _, view in shown]
-    low = np.min([low for low, _ in corners], axis=0)
-    high = np.max([high for _, high in corners], axis=0)
-    width, height = high - low
-    scale = 8.0 / max(width, height)
-    rows = -(-(len(shown) + 1) // COLUMNS)
-    below = 0.5 + 0.24 * rows
-    tall = height * scale + 0.88 + below
-    figure = Figure(figsize=(max(width * scale, 6.0) + 0.4, tall), dpi=130, facecolor=picture.PAPER)
-    FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.02, below / tall, 0.96, (tall - 0.8 - below) / tall))
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.axis("off")
-    picture.draw_arena(axes, shown[0][2].outlines)
+    shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(result.robots, 1) if robot.ticks]
+    plan = shown[0][2].plan
+    low, high = scene.bounds(*(view for _, _, view in shown))
+    sheet = Sheet(low, high, _title(result), _caption(result), _legend(shown))
+    axes = sheet.axes
+    draw_arena(axes, plan)
     for number, robot, view in shown:
-        colour = scene.colour(number)
-        axes.plot(view.path.x, view.path.y, color=colour, lw=1.8, alpha=0.85, zorder=5, solid_capstyle="round")
-        axes.plot(view.path.x[0], view.path.y[0], "o", mfc=picture.PAPER, mec=colour, mew=1.8, ms=6, zorder=6)
-        _draw_contacts(axes, view)
-        picture.draw_robot(axes, robot, view, -1, colour)
+        colour = style.colour(number)
+        axes.plot(view.path.x, view.path.y, color=colour, lw=1.9, ls=style.dashes(number), zorder=7)
+        axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
+        draw_marks(axes, view)
+        draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
         axes.annotate(
-            str(number), (view.path.x[-1], view.path.y[-1]), color=picture.INK, fontsize=8, weight="bold",
-            ha="center", va="center", zorder=13,
+            str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
+            zorder=13,
         )  # fmt: skip
-    picture.draw_scale(axes, low, high)
-    _draw_texts(figure, result, tall)
-    figure.savefig(path, facecolor=picture.PAPER, metadata={"Title": _title(result), "Description": _caption(result)})
-    return path
-
-
-def _draw_contacts(axes: Axes, view: scene.View) -> None:
-    if len(view.contacts):
-        x, y = view.contacts.T
-        axes.scatter(x, y, s=40, marker="x", color=picture.CONTACT, lw=1.6, zorder=8)
+    return sheet.save(path)
 
 
 def _title(result: TogetherResult) -> str:
@@ -66,27 +48,29 @@ def _title(result: TogetherResult) -> str:
     return f"{len(result.robots)} robots on {first.board} in {first.table()['arena']}"
 
 
-def _caption(result: TogetherResult) -> str:
-    contacts = sum(robot.contacts for robot in result.robots)
+def _caption(result: TogetherResult) -> list[str]:
     parts = [
         f"{max(robot.run_time for robot in result.robots):.1f} s",
         f"{sum(robot.distance for robot in result.robots):.2f} m in all",
-        picture.counted(contacts, "contact", "contacts"),
+        counted(sum(robot.contacts for robot in result.robots), "contact", "contacts"),
     ]
     if result.error is not None:
         parts.append("ended early")
-    return "   ·   ".join(parts)
+    return parts
 
 
-def _draw_texts(figure: Figure, result: TogetherResult, tall: float) -> None:
-    figure.text(0.03, 1 - 0.32 / tall, _title(result), fontsize=15, weight="bold", color=picture.INK, va="center")
-    figure.text(0.03, 1 - 0.62 / tall, _caption(result), fontsize=9.5, color=picture.FAINT, va="center")
-    handles = [
-        Line2D([], [], color=scene.colour(number), lw=2.2, label=f"{number}: {robot.brain}, {robot.robot.name}")
-        for number, robot in enumerate(result.robots, 1)
+def _legend(shown: list[Shown]) -> list[Artist]:
+    entries: list[Artist] = [
+        Line2D(
+            [], [], color=style.colour(n), lw=2.2, ls=style.dashes(n), label=f"{n}: {robot.brain}, {robot.robot.name}"
+        )
+        for n, robot, _ in shown
     ]
-    handles.append(Line2D([], [], ls="", marker="x", color=picture.CONTACT, mew=1.6, ms=7, label="body contact"))
-    figure.legend(
-        handles=handles, loc="lower center", ncols=min(COLUMNS, len(handles)), frameon=False, fontsize=8.5,
-        labelcolor=picture.INK, bbox_to_anchor=(0.5, 0.06 / tall), handletextpad=0.5, columnspacing=1.6,
-    )  # fmt: skip
+    entries.append(Line2D([], [], ls="", marker="o", mfc=style.PAPER, mec=style.INK, mew=1.6, ms=6, label="start"))
+    if any(len(view.touches) for _, _, view in shown):
+        entries.append(
+            Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
+        )
+    if any(len(view.contacts) for _, _, view in shown):
+        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="body contact"))
+    return entries + legend_entries(shown[0][2].plan)

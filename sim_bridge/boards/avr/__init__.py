@@ -26,15 +26,6 @@ def _extension() -> Any:
         ) from error
 
 
-def is_built() -> bool:
-    """Whether the emulator's extension is there."""
-    try:
-        _extension()
-    except BoardError:
-        return False
-    return True
-
-
 class AvrBoard:
     """An emulated Arduino Uno. `pointer` is its `board *` as an integer, valid until `close` or the end of this
     object: whoever uses the pointer keeps this object.

@@ -1,313 +1,17 @@
-/* avr_board.c: run loop, interrupts and resets of the emulated ATmega328P, and its place behind board.h.
- *
- * The loop keeps lockstep with the outside: it never waits for the host's clock, counts every cycle, and lets simavr's
- * core run exactly to the next event or to the end of the call. An instruction is never split: what is due while it
- * runs happens, at its own cycle, before the next one. Interrupts are taken between instructions: 4 cycles, 4 more from
- * sleep (12.7), and one instruction always runs after SEI, RETI and a write that sets I.
+/* avr_board.c: the emulated ATmega328P's place behind board.h: its registers, its construction, the operations.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_board.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "avr_parts.h"
-#include "sim_core.h"
-
-#define INTERRUPT_CYCLES 4u
-#define WAKE_UP_CYCLES 4u
-#define SLEEP_ENABLED 0x01u /* SMCR.SE */
 
 #define RESERVED_RAMPZ 0x5Bu /* where larger AVRs have RAMPZ */
 #define Z_RANGE 0x10000u
-
-enum { RESET_FLAG_POWER = 1, RESET_FLAG_EXTERNAL = 2, RESET_FLAG_BROWN_OUT = 4, RESET_FLAG_WATCHDOG = 8 }; /* MCUSR */
-
-/* ---- what is due ---- */
-
-/* Lets the core stop after the instruction that it executes. */
-static void stop_core(avr_board *b) { b->avr->run_cycle_count = 0; }
-
-void set_due(avr_board *b, due_source source, uint64_t cycle) {
-  uint64_t before = b->due[source];
-  b->due[source] = cycle;
-  if (cycle <= b->next_due) {
-    b->next_due = cycle;
-    avr_t *avr = b->avr;
-    uint64_t room = cycle > avr->cycle ? cycle - avr->cycle : 0;
-    if (room < avr->run_cycle_count) avr->run_cycle_count = room;
-  } else if (before == b->next_due) {
-    b->next_due = NEVER;
-    for (int i = 0; i < DUE_COUNT; i++) {
-      if (b->due[i] < b->next_due) b->next_due = b->due[i];
-    }
-  }
-}
-
-static void happen(avr_board *b, due_source source, uint64_t cycle) {
-  switch (source) {
-    case DUE_DRIVEN_EDGE:
-      pins_due_driven(b, cycle);
-      break;
-    case DUE_SEEN_EDGE:
-      pins_due_seen(b, cycle);
-      break;
-    case DUE_NOISE_FILTER:
-      pins_due_noise_filter(b, cycle);
-      break;
-    case DUE_TIMER0:
-    case DUE_TIMER1:
-    case DUE_TIMER2:
-      timer_due(&b->timer[source - DUE_TIMER0], cycle);
-      break;
-    case DUE_TRANSMITTER:
-      usart_due_transmitter(b, cycle);
-      break;
-    case DUE_OUTSIDE:
-      usart_due_outside(b, cycle);
-      break;
-    case DUE_RECEIVER:
-      usart_due_receiver(b, cycle);
-      break;
-    case DUE_CONVERTER:
-      converter_due(b, cycle);
-      break;
-    case DUE_WATCHDOG:
-      watchdog_due(b, cycle);
-      break;
-    case DUE_EEPROM:
-      eeprom_due(b);
-      break;
-    case DUE_TWI:
-      twi_due(b, cycle);
-      break;
-    case DUE_COUNT:
-      break;
-  }
-}
-
-/* Everything that is due until `cycle`, in the order of time. */
-static void catch_up(avr_board *b, uint64_t cycle) {
-  while (b->next_due <= cycle) {
-    due_source source = DUE_DRIVEN_EDGE;
-    while (b->due[source] != b->next_due) source++;
-    if (b->next_due > b->clock) b->clock = b->next_due;
-    happen(b, source, b->clock);
-  }
-  if (cycle > b->clock) b->clock = cycle;
-}
-
-uint64_t begin_access(avr_board *b) {
-  const avr_t *avr = b->avr;
-  unsigned opcode = avr->flash[avr->pc] | (unsigned)avr->flash[avr->pc + 1] << 8;
-  bool one_cycle = (opcode & 0xF000) == 0xB000 /* IN, OUT */ || (opcode & 0xFD00) == 0x9900 /* SBIC, SBIS */;
-  uint64_t cycle = avr->cycle + (one_cycle ? 0 : 1);
-  catch_up(b, cycle);
-  return cycle;
-}
-
-/* ---- interrupts ---- */
-
-void interrupts_changed(avr_board *b) {
-  if ((b->raised & b->enabled) && b->avr->sreg[S_I]) stop_core(b);
-}
-
-void raise_flag(avr_board *b, uint8_t vector) {
-  b->raised |= FLAG(vector);
-  interrupts_changed(b);
-}
-
-void clear_flag(avr_board *b, uint8_t vector) { b->raised &= ~FLAG(vector); }
-
-void enable_interrupt(avr_board *b, uint8_t vector, bool enabled) {
-  b->enabled = enabled ? b->enabled | FLAG(vector) : b->enabled & ~FLAG(vector);
-  interrupts_changed(b);
-}
-
-/* What the hardware does to the flag when the interrupt is executed. */
-static void acknowledge(avr_board *b, uint8_t vector) {
-  timer_state *timer = timer_of_vector(b, vector);
-  if (timer) timer_bring_up(timer, b->avr->cycle);
-  bool is_state =
-      vector == VECTOR_USART_RX || vector == VECTOR_USART_UDRE || vector == VECTOR_EE_READY || vector == VECTOR_TWI;
-  if (!is_state) clear_flag(b, vector);
-  if (timer) timer_plan(timer);
-  if (vector == VECTOR_WDT) watchdog_acknowledged(b);
-  if (vector == VECTOR_INT0 || vector == VECTOR_INT1) pins_acknowledged(b, vector);
-}
-
-/* Executes the most urgent pending interrupt, if there is one. */
-static bool enter_interrupt(avr_board *b) {
-  avr_t *avr = b->avr;
-  uint32_t pending = b->raised & b->enabled;
-  if (!pending && !avr_has_pending_interrupts(avr)) return false;
-  if (pending) {
-    uint8_t vector = (uint8_t)__builtin_ctz(pending);
-    acknowledge(b, vector);
-    _avr_push_addr(avr, avr->pc);
-    avr_sreg_set(avr, S_I, 0);
-    avr->pc = (avr_flashaddr_t)vector * avr->vector_size;
-  } else { /* one of simavr's own modules; they are less urgent than all of ours */
-    avr->interrupt_state = 1;
-    avr_service_interrupts(avr);
-    if (avr->sreg[S_I]) return false; /* it was masked meanwhile */
-  }
-  avr->cycle += INTERRUPT_CYCLES + (b->sleeping ? WAKE_UP_CYCLES : 0);
-  b->sleeping = false;
-  b->counters.executed_cycles += INTERRUPT_CYCLES;
-  b->counters.interrupts++;
-  return true;
-}
-
-/* simavr tells of RETI; the instruction after it runs even if I was set before. */
-static void on_reti(struct avr_irq_t *irq, uint32_t value, void *param) {
-  avr_board *b = param;
-  (void)irq;
-  (void)value;
-  if (b->avr->sreg[S_I]) b->avr->interrupt_state = -1;
-}
-
-/* ---- faults ---- */
-
-static void crash(avr_board *b, const char *format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  vsnprintf(b->fault, sizeof b->fault, format, arguments);
-  va_end(arguments);
-  b->crashed = true;
-}
-
-void refuse(avr_board *b, const char *what) {
-  crash(b, "the program uses %s, which is not built, in cycle %llu", what, (unsigned long long)b->avr->cycle);
-  stop_core(b);
-}
-
-static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
-  avr_board *b = param;
-  (void)irq;
-  crash(b, "the program reached the invalid instruction 0x%04X at address 0x%04X in cycle %llu", (unsigned)opcode,
-        (unsigned)b->avr->pc, (unsigned long long)b->avr->cycle);
-  b->avr->state = cpu_Crashed;
-}
-
-static void say_nothing(avr_t *avr, const int level, const char *format, va_list arguments) {
-  (void)avr;
-  (void)level;
-  (void)format;
-  (void)arguments;
-}
-
-/* ---- run loop ---- */
-
-static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
-
-static uint64_t next_of_simavr(const avr_t *avr) {
-  return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER;
-}
-
-static void execute(avr_board *b, uint64_t until) {
-  avr_t *avr = b->avr;
-  uint64_t start = avr->cycle;
-  if (avr->interrupt_state < 0) {
-    avr->interrupt_state = 0;
-    avr->run_cycle_count = 1; /* one instruction */
-  } else {
-    avr->run_cycle_count = until - start;
-  }
-  avr_flashaddr_t pc = avr_run_one(avr);
-  b->counters.executed_cycles += avr->cycle - start;
-  if (avr->state == cpu_Sleeping) {
-    b->sleeping = avr->data[REG_SMCR] & SLEEP_ENABLED;
-    avr->state = cpu_Running;
-  } else if (avr->state != cpu_Running) {
-    if (!b->crashed) crash(b, "the program ran off the end of the flash in cycle %llu", (unsigned long long)avr->cycle);
-    return;
-  }
-  avr->pc = pc;
-}
-
-static void restart(avr_board *b);
-
-static board_state advance(board *self, uint64_t until) {
-  avr_board *b = (avr_board *)self;
-  avr_t *avr = b->avr;
-  while (avr->cycle < until) {
-    catch_up(b, avr->cycle);
-    if (b->reset_wanted) restart(b);
-    if (b->held) {
-      avr->cycle = earlier(until, b->next_due);
-      continue;
-    }
-    if (b->crashed) return BOARD_CRASHED;
-    if (next_of_simavr(avr) <= avr->cycle) avr_cycle_timer_process(avr);
-    if (b->reset_wanted) continue;
-    if (avr->sreg[S_I] && avr->interrupt_state >= 0 && enter_interrupt(b)) continue;
-    uint64_t horizon = earlier(until, earlier(b->next_due, next_of_simavr(avr)));
-    if (b->sleeping) {
-      avr->cycle = horizon;
-    } else {
-      execute(b, horizon);
-    }
-  }
-  catch_up(b, avr->cycle); /* from here on "now" is what `now` says */
-  return b->crashed ? BOARD_CRASHED : BOARD_RUNNING;
-}
-
-/* ---- reset ---- */
-
-void want_reset(avr_board *b, board_reset_cause cause) {
-  b->reset_wanted |= (uint8_t)(1u << cause);
-  stop_core(b);
-}
-
-/* What is in RAM and registers when the power comes is anything: here another anything at each power-on of a run, the
- * same in each run. */
-static void scramble_memory(avr_board *b) {
-  uint32_t x = 0x328u + (uint32_t)b->counters.resets * 0x9E3779B9u;
-  for (size_t i = 0; i < BOARD_DATA_SIZE; i++) {
-    x = x * 1664525u + 1013904223u;
-    b->avr->data[i] = (uint8_t)(x >> 24);
-  }
-}
-
-void halt_cpu(avr_board *b, unsigned cycles) {
-  b->avr->cycle += cycles;
-  stop_core(b);
-}
-
-static void restart(avr_board *b) {
-  avr_t *avr = b->avr;
-  uint64_t cycle = avr->cycle;
-  uint8_t causes = b->reset_wanted;
-  uint8_t flags = avr->data[REG_MCUSR];
-  if (causes & (1u << BOARD_RESET_EXTERNAL)) flags |= RESET_FLAG_EXTERNAL;
-  if (causes & (1u << BOARD_RESET_BROWN_OUT)) flags |= RESET_FLAG_BROWN_OUT;
-  if (causes & (1u << BOARD_RESET_WATCHDOG)) flags |= RESET_FLAG_WATCHDOG;
-  if (causes & (1u << BOARD_RESET_POWER)) {
-    flags = RESET_FLAG_POWER;
-    scramble_memory(b);
-  }
-  b->reset_wanted = 0;
-  b->counters.resets++;
-  b->crashed = false;
-  b->sleeping = false;
-  b->raised = 0;
-  b->enabled = 0;
-  b->timer_base[0] = b->timer_base[1] = cycle;
-  avr_reset(avr); /* clears the I/O registers, and simavr's clock with its timers */
-  avr->cycle = cycle;
-  avr->data[REG_MCUSR] = flags;
-  timers_reset(b, cycle);
-  usart_reset(b);
-  twi_reset(b);
-  converter_reset(b);
-  watchdog_reset(b, cycle);
-  eeprom_reset(b, causes & (1u << BOARD_RESET_POWER | 1u << BOARD_RESET_BROWN_OUT));
-  pins_reset(b, cycle);
-}
 
 /* ---- registers ---- */
 
@@ -410,10 +114,7 @@ void mx8_init(struct avr_t *avr) {
   eeprom_init(b);
 }
 
-void mx8_reset(struct avr_t *avr) {
-  avr_irq_register_notify(avr->irq + AVR_CORE_BAD_OPCODE, on_bad_opcode, avr->custom.data);
-  avr_irq_register_notify(avr->interrupts.irq + AVR_INT_IRQ_RUNNING, on_reti, avr->custom.data);
-}
+void mx8_reset(struct avr_t *avr) { hear_core(avr->custom.data); }
 
 /* simavr follows a program that reads or writes program memory beyond its end: with room for every address that fits
  * into Z, and no RAMPZ, it stays within what is ours. */
@@ -443,9 +144,11 @@ static void destroy(board *self) {
   free(b);
 }
 
-/* ---- the other operations ---- */
+/* ---- operations ---- */
 
 static uint64_t now(const board *self) { return ((const avr_board *)self)->avr->cycle; }
+
+static board_state advance(board *self, uint64_t until) { return run_until((avr_board *)self, until); }
 
 static void drive(board *self, uint64_t at, uint8_t pin, uint8_t level) {
   pins_drive((avr_board *)self, at, pin, level);
@@ -510,6 +213,13 @@ static const board_operations OPERATIONS = {
     .fault = fault,
     .extension = extension,
 };
+
+static void say_nothing(avr_t *avr, const int level, const char *format, va_list arguments) {
+  (void)avr;
+  (void)level;
+  (void)format;
+  (void)arguments;
+}
 
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size) {
   avr_global_logger_set(say_nothing);

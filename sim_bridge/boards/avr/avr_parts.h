@@ -1,7 +1,8 @@
 /* avr_parts.h: what the files of the emulated ATmega328P know of each other.
  *
  * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
- * here: run loop and interrupts (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c), USART
+ * here: run loop and interrupts (avr_run.c), registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
+ * avr_timer_count.c), USART
  * (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c),
  * program image (avr_image.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
@@ -357,7 +358,10 @@ typedef struct avr_board {
   eeprom_state eeprom;
 } avr_board;
 
-/* avr_board.c */
+/* avr_run.c */
+board_state run_until(avr_board *b, uint64_t until);
+void restart(avr_board *b);   /* for the causes in `reset_wanted` */
+void hear_core(avr_board *b); /* what simavr's core tells, from each of its resets on */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
 void raise_flag(avr_board *b, uint8_t vector);
 void clear_flag(avr_board *b, uint8_t vector);
@@ -370,6 +374,8 @@ void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
 uint64_t begin_access(avr_board *b);
+
+/* avr_board.c */
 void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);
 void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param);
 void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param);
@@ -391,6 +397,8 @@ void pins_acknowledged(avr_board *b, uint8_t vector);
 /* avr_timers.c */
 void timers_init(avr_board *b);
 void timers_reset(avr_board *b, uint64_t cycle);
+
+/* avr_timer_count.c */
 void timer_due(timer_state *t, uint64_t cycle);
 void timer_bring_up(timer_state *t, uint64_t cycle);             /* computes flags and count until `cycle` */
 void timer_plan(timer_state *t);                                 /* computes when it is due next */

@@ -367,12 +367,6 @@ static void *board_extension(board *face, const char *name) {
   if (strcmp(name, BOARD_EEPROM) == 0) {
     return &self->eeprom;
   }
-  if (strcmp(name, "pin_map") == 0 && self->api != NULL) {
-    const char *const *pin_map = &self->api->pin_map;
-    void *result = NULL;
-    memcpy(&result, pin_map, sizeof result);
-    return result;
-  }
   return NULL;
 }
 

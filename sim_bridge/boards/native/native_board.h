@@ -10,9 +10,7 @@
 
 #include "boards/board.h"
 
-/* A board at cycle 0, just powered on. NULL and one sentence in `error` if the library cannot be used.
- *
- * Extensions: "pin_map" -> const char *, the name of the pin map that the library was built for. */
+/* A board at cycle 0, just powered on. NULL and one sentence in `error` if the library cannot be used. */
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 
 #endif

@@ -31,8 +31,8 @@ typedef struct {
 typedef struct {
   double x, y, height;
   int rays;
-  double cosine[32], sine[32]; /* of each ray in the body's frame */
-  double inward[32];           /* cosine of its angle to the beam's middle, (3.14) */
+  ray_fan fan;       /* of the rays in the body's frame */
+  double inward[32]; /* cosine of each ray's angle to the beam's middle, (3.14) */
   double middle_cosine, middle_sine;
 } beam;
 
@@ -52,8 +52,8 @@ static inline beam_origin beam_from(const beam *self, const viewpoint *from) {
 
 /* Direction of ray i in the world. */
 static inline void beam_direction(const beam *self, const viewpoint *from, int i, double *cosine, double *sine) {
-  *cosine = from->cosine * self->cosine[i] - from->sine * self->sine[i];
-  *sine = from->sine * self->cosine[i] + from->cosine * self->sine[i];
+  *cosine = from->cosine * self->fan.cosine[i] - from->sine * self->fan.sine[i];
+  *sine = from->sine * self->fan.cosine[i] + from->cosine * self->fan.sine[i];
 }
 
 /* Distance along ray i from the beam's origin, -1 if nothing is nearer than `reach`; `hit` may be NULL. */
@@ -64,11 +64,18 @@ static inline double beam_ray(const beam *self, const viewpoint *from, beam_orig
   return scene_ray(from->around, at.x, at.y, cosine, sine, reach, self->height, from->id, hit);
 }
 
-/* Distances along all rays, see beam_ray. */
-static inline void beam_fan(const beam *self, const viewpoint *from, beam_origin at, double reach, double *distances) {
-  double cosine[BEAM_RAYS], sine[BEAM_RAYS];
-  for (int i = 0; i < self->rays; i++) beam_direction(self, from, i, &cosine[i], &sine[i]);
-  scene_fan(from->around, at.x, at.y, cosine, sine, (size_t)self->rays, reach, self->height, from->id, distances);
+/* The question for the distances along all rays, see arena_fans. */
+static inline fan_question beam_question(const beam *self, const viewpoint *from, double reach, double *distances) {
+  const beam_origin at = beam_from(self, from);
+  return (fan_question){.where = from->around->arena,
+                        .rays = &self->fan,
+                        .x = at.x,
+                        .y = at.y,
+                        .cosine = from->cosine,
+                        .sine = from->sine,
+                        .reach = reach,
+                        .height = self->height,
+                        .distances = distances};
 }
 
 /* A source whose next draws are those of `step`, at most 1024 per step: a reading is a function of key and step alone. */

@@ -3,55 +3,105 @@
 
 #include <math.h>
 
+#include "../lanes.h"
+
 int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_parameters *p) {
   if (beam_init(&self->beam, &p->beam)) return -1;
   if (!(p->range >= 0.0 && p->c1 >= 0.0 && p->c2 >= 0.0 && p->sigma >= 0.0)) return -1;
   if (!isfinite(p->range + p->c1 + p->c2 + p->sigma)) return -1;
   self->range = p->range * (1.0 + 0x1p-52); /* a ray reads 0 only beyond D, scene_ray's reach itself is out */
-  self->c1 = p->c1;
+  for (int i = 0; i < BEAM_RAYS; i++) self->c1[i] = p->c1;
   self->c2 = p->c2;
   self->sigma = p->sigma;
   self->reflectance = p->reflectance;
   return 0;
 }
 
-/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0 */
-static double seen(double c1, double c2, double d, double inward) {
-  const double squared = d * d;
-  const double product = (c1 + c2 * squared) * inward;
-  return product < squared ? product / squared : 1.0;
+/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. */
+LANES_INLINE void see(const double *c1, double c2, const double *distances, const double *inward, double *readings) {
+  lanes gain, d, towards;
+  lanes_load(&gain, c1);
+  lanes_load(&d, distances);
+  lanes_load(&towards, inward);
+  const lanes none = lanes_of(0.0);
+  const lanes full = lanes_of(1.0);
+  const lanes squared = d * d;
+  const lanes product = (gain + c2 * squared) * towards;
+  const lanes quotient = product / squared;
+  const lanes limited = lanes_select(product < squared, quotient, full);
+  const lanes seen = lanes_select(d >= 0.0, limited, none);
+  lanes_store(readings, &seen);
 }
 
-/* The sum of all rays' readings where each surface reflects in its own way. */
-static double sum_by_reflectance(const infrared_proximity *self, const viewpoint *from, beam_origin at) {
+/* The sum of all rays' readings; `c1` and `distances` by ray. */
+LANES_INLINE double sum_of(const infrared_proximity *self, const double *c1, const double *distances) {
+  double readings[BEAM_RAYS];
   double sum = 0.0;
-  for (int i = 0; i < self->beam.rays; i++) {
-    ray_hit hit;
-    const double d = beam_ray(&self->beam, from, at, i, self->range, &hit);
-    if (d >= 0.0) sum += seen(self->c1 * hit.infrared, self->c2, d, self->beam.inward[i]);
-  }
+  int first = 0;
+  do {
+    see(&c1[first], self->c2, &distances[first], &self->beam.inward[first], &readings[first]);
+    first += (int)LANES;
+  } while (first < self->beam.rays);
+  for (int i = 0; i < self->beam.rays; i++) sum += readings[i];
   return sum;
 }
 
-static double sum_of_all(const infrared_proximity *self, const viewpoint *from, beam_origin at) {
-  double distances[BEAM_RAYS];
-  double sum = 0.0;
-  beam_fan(&self->beam, from, at, self->range, distances);
-  for (int i = 0; i < self->beam.rays; i++) {
-    if (distances[i] >= 0.0) sum += seen(self->c1, self->c2, distances[i], self->beam.inward[i]);
+LANES_INLINE void sum_each(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
+                           double sums[]) {
+  for (size_t i = 0; i < count; i++) sums[i] = sum_of(sensors[i], sensors[i]->c1, answered[i].distances);
+}
+
+LANES_NOT_INLINE static void sums_anywhere(const infrared_proximity *const sensors[], const fan_question answered[],
+                                           size_t count, double sums[]) {
+  sum_each(sensors, answered, count, sums);
+}
+
+#ifdef LANES_AVX2
+LANES_AVX2 static void sums_by_avx2(const infrared_proximity *const sensors[], const fan_question answered[],
+                                    size_t count, double sums[]) {
+  sum_each(sensors, answered, count, sums);
+}
+#endif
+
+void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
+                             double sums[]) {
+#ifdef LANES_AVX2
+  if (LANES_HAVE_AVX2()) {
+    sums_by_avx2(sensors, answered, count, sums);
+    return;
   }
-  return sum;
+#endif
+  sums_anywhere(sensors, answered, count, sums);
+}
+
+/* Where each surface reflects in its own way. */
+LANES_NOT_INLINE static double sum_by_reflectance(const infrared_proximity *self, const viewpoint *from) {
+  const beam_origin at = beam_from(&self->beam, from);
+  double distances[BEAM_RAYS] = {0.0};
+  double c1[BEAM_RAYS] = {0.0};
+  for (int i = 0; i < self->beam.rays; i++) {
+    ray_hit hit = {.infrared = 0.0};
+    distances[i] = beam_ray(&self->beam, from, at, i, self->range, &hit);
+    c1[i] = self->c1[i] * hit.infrared;
+  }
+  return sum_of(self, c1, distances);
 }
 
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise) {
-  const beam_origin at = beam_from(&self->beam, from);
-  const double sum = self->reflectance ? sum_by_reflectance(self, from, at) : sum_of_all(self, from, at);
-  double s = sum / (double)self->beam.rays;                                 /* (3.12) */
-  if (self->sigma > 0.0) s *= 1.0 + self->sigma * noise_next_normal(noise); /* (3.1) */
-  return s > 1.0 ? 1.0 : (s > 0.0 ? s : 0.0);
+  double sum;
+  if (self->reflectance) {
+    sum = sum_by_reflectance(self, from);
+  } else {
+    double distances[BEAM_RAYS];
+    const fan_question question = infrared_proximity_ask(self, from, distances);
+    arena_fans(&question, 1);
+    scene_fan_movers(from->around, &question, from->id);
+    infrared_proximity_sums(&self, &question, 1, &sum);
+  }
+  return infrared_proximity_finish(self, sum, noise);
 }
 
 double infrared_proximity_inverse(const infrared_proximity *self, double reading) {
   if (!(reading > self->c2 && reading < 1.0)) return -1.0;
-  return sqrt(self->c1 / (reading - self->c2));
+  return sqrt(self->c1[0] / (reading - self->c2));
 }

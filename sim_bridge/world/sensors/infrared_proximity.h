@@ -20,7 +20,8 @@ typedef struct {
 
 typedef struct {
   beam beam;
-  double range, c1, c2, sigma;
+  double range, c2, sigma;
+  double c1[32]; /* by ray */
   int reflectance;
 } infrared_proximity;
 
@@ -33,5 +34,22 @@ double infrared_proximity_read(const infrared_proximity *self, const viewpoint *
 /* Distance for which a centre ray alone reads `reading`: sqrt(c1 / (S - c2)), -1 unless c2 < S < 1. */
 double infrared_proximity_inverse(const infrared_proximity *self, double reading);
 /* python: end */
+
+/* The same in parts, for readings of many sensors at once, all without `reflectance`: the question that arena_fans is to
+ * answer, the sums of the rays' readings for `count` questions that were answered, and the reading. */
+static inline fan_question infrared_proximity_ask(const infrared_proximity *self, const viewpoint *from,
+                                                  double *distances) {
+  return beam_question(&self->beam, from, self->range, distances);
+}
+
+void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
+                             double sums[]);
+
+static inline double infrared_proximity_finish(const infrared_proximity *self, double sum, noise_source *noise) {
+  double s = sum / (double)self->beam.rays;                                 /* (3.12) */
+  if (self->sigma > 0.0) s *= 1.0 + self->sigma * noise_next_normal(noise); /* (3.1) */
+  s = s > 0.0 ? s : 0.0;                                                    /* each a single operation, no branch */
+  return s < 1.0 ? s : 1.0;
+}
 
 #endif

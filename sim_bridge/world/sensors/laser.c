@@ -4,7 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "../noise_block.h"
 #include "../numbers.h"
+
+#define DRAWS 256u /* at once */
 
 struct laser {
   laser_parameters parameters;
@@ -22,10 +25,10 @@ int laser_check(const laser_parameters *p) {
 laser *laser_new(const laser_parameters *p) {
   laser *self = laser_check(p) == 0 ? calloc(1, sizeof *self) : NULL;
   if (self == NULL) return NULL;
-  const double heading = p->rays > 1 ? p->heading : p->heading - p->first;
+  const double heading = p->rays > 1 ? p->heading : p->heading + p->first;
   const beam_parameters mount = {.x = p->x, .y = p->y, .heading = heading, .height = p->height, .rays = 1};
   self->parameters = *p;
-  if (p->rays > 1) self->fan = scan_fan_new(-p->first, (p->rays - 1) * p->step - p->first, (size_t)p->rays);
+  if (p->rays > 1) self->fan = scan_fan_new(p->first, p->first + (p->rays - 1) * p->step, (size_t)p->rays);
   if ((p->rays > 1 && self->fan == NULL) || beam_init(&self->mount, &mount)) {
     laser_destroy(self);
     return NULL;
@@ -41,6 +44,7 @@ void laser_destroy(laser *self) {
 
 void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double *distances) {
   const laser_parameters *p = &self->parameters;
+  const size_t rays = (size_t)p->rays;
   const beam_origin at = beam_from(&self->mount, from);
   if (self->fan == NULL) {
     distances[0] = beam_ray(&self->mount, from, at, 0, p->range, NULL);
@@ -50,10 +54,10 @@ void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double 
     scan_look(self->fan, from->around, at.x, at.y, cosine, sine, p->range, p->height, from->id, distances);
   }
   if (p->sigma <= 0.0 || !noise->on) return;
-  for (int i = 0; i < p->rays; i++) {
-    const double draw = noise_next_normal(noise); /* also where nothing is seen: each ray keeps its own sequence */
-    if (distances[i] < 0.0) continue;
-    const double d = distances[i] * (1.0 + p->sigma * draw); /* (3.1) */
-    distances[i] = d < 0.0 ? 0.0 : (d > p->range ? p->range : d);
+  double draws[DRAWS];
+  for (size_t i = 0; i < rays; i += DRAWS) {
+    const size_t some = rays - i < DRAWS ? rays - i : DRAWS;
+    noise_block_next(noise, draws, some); /* also where nothing is seen: each ray keeps its own sequence */
+    scan_spread(&distances[i], draws, some, p->sigma, p->range);
   }
 }

@@ -14,7 +14,7 @@
 /* python: begin */
 typedef struct {
   double x, y, heading, height; /* on the body: m, m, rad, m */
-  double first;                 /* rad to the middle's right, of ray 0; URG-04LX: 341 steps */
+  double first;                 /* rad from the middle, counter-clockwise, of ray 0; URG-04LX: -341 steps */
   double step;                  /* rad from ray to ray; URG-04LX: 2 pi / 1024 (data) */
   int rays;                     /* 1 to 4096; URG-04LX: 683 (notes) */
   double range;                 /* D, m; 4.0 (notes) */

@@ -1,0 +1,38 @@
+"""Figures by name as people read them: "distance_m" is "distance", in "m". For tables in terminals and in notebooks."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm)$")
+_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs"}
+
+
+def rows(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Name in words, value and unit of each; what is not known (None) is left out."""
+    for name, value in values.items():
+        if value is not None:
+            match = _UNIT.search(name)
+            unit = _UNITS.get(match[1], match[1]) if match else ""
+            yield _UNIT.sub("", name).replace("_", " "), text(value), unit
+
+
+def text(value: Any) -> str:
+    """A value in words: thousands apart, lists joined by commas."""
+    if isinstance(value, float):
+        return f"{value:,.10g}" if abs(value) >= 1000 else f"{value:.10g}"
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}"
+    if isinstance(value, list):
+        return ", ".join(str(item) for item in value)
+    return str(value)
+
+
+def html_table(values: Mapping[str, Any]) -> str:
+    """As a table of HTML."""
+    cells = (map(html.escape, row) for row in rows(values))
+    lines = (f"<tr><th>{name}</th><td>{value}</td><td>{unit}</td></tr>" for name, value, unit in cells)
+    return f"<table>{''.join(lines)}</table>"

@@ -1,0 +1,49 @@
+"""Colours and widths that all pictures share.
+
+Hues are those of Okabe and Ito, which the colour-blind tell apart; what matters also differs in form or lightness, so
+that it survives a grey printer.
+"""
+
+from __future__ import annotations
+
+PAPER = "#fbfaf7"
+FLOOR = "#ffffff"
+INK = "#2e3440"
+FAINT = "#6b7280"
+GRID = "#e3e5ea"
+
+EDGE = "#39415a"  # of what is solid
+SOLID = "#c3c9d6"
+DULL = "#8d93a1"  # solids that throw back little
+LOW = "#f1ead9"  # solids that some sensors look over; hatched
+ROUGH, SMOOTH = "#e3d3b0", "#cfe6f4"  # patches that grip more, and less, than the floor
+CHARGER = "#009e73"
+LAMP = "#f0e442"
+MOVING = "#e69f00"
+
+START, END = "#009e73", "#0072b2"
+ESTIMATE = "#d55e00"
+TOUCH = "#e69f00"
+CONTACT = "#111827"
+BODY = "#eef1f6"
+PATH = "viridis"  # dark to light in time
+PATH_SHARE = 0.9  # of its colours: the last ones are too light for paper
+
+ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#4b3f99", "#6b7280")
+"""Of the robots of a run of several, by number, over and over."""
+
+DASHES = ((0, ()), (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)))
+"""Of their paths: another one each time the colours begin anew, so that 32 robots differ."""
+
+WIDTH_IN = 8.4  # of a picture of a run; 1092 pixels
+DPI = 130
+
+
+def colour(number: int) -> str:
+    """Of the robot of that number, from 1."""
+    return ROBOTS[(number - 1) % len(ROBOTS)]
+
+
+def dashes(number: int) -> tuple[int, tuple[float, ...]]:
+    """Of the path of the robot of that number, from 1."""
+    return DASHES[(number - 1) // len(ROBOTS) % len(DASHES)]

@@ -1,0 +1,50 @@
+// Runs the script of a replay page without a browser: elements and canvases are stand-ins that keep what they are told.
+// node replay_page.js PAGE TIME... prints one JSON object per time: texts by id, readings, fills and shapes drawn.
+"use strict";
+const fs = require("fs"), vm = require("vm");
+const page = fs.readFileSync(process.argv[2], "utf-8"), script = /<script>([\s\S]*)<\/script>/.exec(page)[1];
+
+let drawn = [];
+function canvasContext() {
+  let path = [];
+  const state = {
+    beginPath() { path = []; },
+    arc(x, y, radius) { path.push([x, y, radius]); },
+    moveTo(x, y) { path.push([x, y]); },
+    lineTo(x, y) { path.push([x, y]); },
+    fill() { drawn.push({ fill: this.fillStyle, alpha: this.globalAlpha ?? 1, path }); },
+    fillText(text) { drawn.push({ text }); },
+  };
+  return new Proxy(state, { get: (target, key) => (key in target ? target[key] : () => {}), set: (target, key, value) => { target[key] = value; return true; } });
+}
+function element() {
+  const cells = [], it = {
+    style: {}, dataset: {}, children: [], cells, textContent: "", checked: true, value: "1", clientWidth: 800, clientHeight: 600,
+    classList: { toggle(name, on) { it.on = on; } },
+    append(...more) { it.children.push(...more); },
+    insertRow() { const row = element(); it.children.push(row); return row; },
+    insertCell() { const cell = element(); cells.push(cell); return cell; },
+    querySelector(name) { return (it[name] ??= element()); },
+    getContext() { return (it.context ??= canvasContext()); },
+    setPointerCapture() {},
+  };
+  return it;
+}
+const byId = {}, lamps = [...page.matchAll(/class="lamp" data-bit="(\d+)" data-device="(\w+)"/g)].map(([, bit, device]) => {
+  const lamp = element(); lamp.dataset = { bit, device, colour: "x" }; return lamp;
+});
+Object.assign(globalThis, {
+  document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => lamps },
+  location: { hash: "", reload() {} }, addEventListener() {}, requestAnimationFrame() {}, devicePixelRatio: 1,
+});
+vm.runInThisContext(script);
+const still = drawn;
+for (const time of process.argv.slice(3)) {
+  drawn = [];
+  vm.runInThisContext(`seek(${Number(time)})`);
+  const texts = Object.fromEntries(Object.entries(byId).map(([id, it]) => [id, it.textContent]));
+  const readings = (byId.readings?.table?.children ?? []).map(row => row.cells.map(cell => cell.textContent));
+  const hidden = Object.keys(byId).filter(id => byId[id].style.display === "none");
+  const shown = lamps.filter(lamp => lamp.style.display !== "none").map(lamp => [lamp.dataset.device, lamp.on]);
+  console.log(JSON.stringify({ texts, readings, hidden, lamps: shown, still, drawn, scale: vm.runInThisContext("[scale, shiftX, shiftY]") }));
+}

@@ -1,0 +1,215 @@
+/* vehicles_fuzzer.c: libFuzzer drives worlds without boards: it builds an arena out of any numbers, places vehicles, steps
+ * them, and saves, spoils and restores their states, also such whose checksum it makes good again. After every action all
+ * that a world shows is a finite number, and what was refused has changed nothing. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../vehicles/vehicle.h"
+#include "../vehicles/wander.h"
+#include "../world/hash.h"
+
+#define WORLDS 2
+#define STEPS 64        /* of an action */
+#define HEADING_WORDS 5 /* of a saved state, snapshot.c; the last is the checksum */
+
+#define CHECK(condition)                                              \
+  do {                                                                \
+    if (!(condition)) {                                               \
+      fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+      abort();                                                        \
+    }                                                                 \
+  } while (0)
+
+/* ---- what the input says ------------------------------------------------------------------------------------------ */
+
+typedef struct {
+  const uint8_t *at, *end;
+} input;
+
+static uint8_t byte(input *in) { return in->at < in->end ? *in->at++ : 0; }
+
+/* A number of the kinds that hurt: ordinary, special, or any bits. */
+static double number(input *in) {
+  static const double special[] = {NAN, INFINITY, -INFINITY, 0.0, -0.0, 1e300, -1e300, 1e-320, 1e6, -1e6, 1e9, 1e-9};
+  const uint8_t kind = byte(in);
+  if (kind < 180) return ((double)kind - 90.0) / 30.0;
+  if (kind < 240) return special[kind % (sizeof special / sizeof *special)];
+  uint64_t bits = 0;
+  for (int i = 0; i < 8; i++) bits = bits << 8 | byte(in);
+  double any;
+  memcpy(&any, &bits, sizeof any);
+  return any;
+}
+
+/* ---- what it is done to ------------------------------------------------------------------------------------------- */
+
+static void add_shapes(arena *where, input *in) {
+  double xy[10];
+  path_waypoint way[3];
+  for (uint8_t shapes = byte(in) % 6; shapes > 0; shapes--) {
+    const size_t count = byte(in) % 6;
+    for (size_t i = 0; i < 2 * count; i++) xy[i] = number(in);
+    const arena_surface surface = {.height = number(in), .infrared_reflectance = number(in), .sound_reflectance = 1.0};
+    const arena_surface *s = byte(in) % 2 ? &surface : NULL;
+    switch (byte(in) % 7) {
+      case 0:
+        (void)arena_add_polygon(where, xy, count, byte(in) % 4, s);
+        break;
+      case 1:
+        (void)arena_add_wall(where, xy, count, s);
+        break;
+      case 2:
+        (void)arena_add_disc(where, number(in), number(in), number(in), s);
+        break;
+      case 3:
+        (void)arena_add_patch(where, xy, count, number(in));
+        break;
+      case 4:
+        (void)arena_add_light(where, number(in), number(in), number(in), number(in));
+        break;
+      case 5:
+        (void)arena_set_charger(where, number(in), number(in), number(in));
+        break;
+      default:
+        for (size_t i = 0; i < 3; i++) way[i] = (path_waypoint){number(in), number(in), number(in), number(in)};
+        way[0].time = byte(in) % 4 ? 0.0 : way[0].time;
+        (void)arena_add_moving(where, byte(in) % 2 ? xy : NULL, count, number(in), s, way, 1 + byte(in) % 3,
+                               byte(in) % 4);
+    }
+  }
+  arena_build(where);
+}
+
+static arena *room(input *in) {
+  static const double walls[] = {-1.8, -1.8, 1.8, -1.8, 1.8, 1.8, -1.8, 1.8};
+  arena *where = arena_new();
+  if (byte(in) % 2) arena_add_polygon(where, walls, 4, ARENA_OUTLINE, NULL);
+  add_shapes(where, in);
+  return where;
+}
+
+static vehicle_model *model(void) {
+  const body_parameters chassis = {.mass = 3.0,
+                                   .inertia = 0.2,
+                                   .radius = 0.2,
+                                   .half_track = 0.2,
+                                   .wheel_radius = 0.1,
+                                   .linear_damping = 1.0,
+                                   .angular_damping = 0.1,
+                                   .grip = 0.7};
+  const beam_parameters look = {.x = 0.2, .opening = 0.5, .height = 0.06, .rays = 3};
+  const infrared_proximity_parameters eye = {.beam = look, .range = 1.0, .c1 = 0.03, .c2 = 0.1, .sigma = 0.01};
+  const sharp_infrared_parameters sharp = {.beam = look, .reach = 1.5, .gain = 1.0, .period = 0.04, .sigma = 0.01};
+  const laser_parameters finder = {.first = 1.0, .step = 0.25, .rays = 9, .range = 4.0, .sigma = 0.01};
+  const phototransistor_parameters light = {.near_distance = 0.05, .gain = 1.0, .sigma = 0.01};
+  const odometer_parameters wheels = {
+      .half_track = 0.2, .wheel_radius = 0.1, .factor_left = 1.0, .factor_right = 1.0, .sigma_step = 1e-4};
+  const accelerometer_parameters spring = {1e-3, 10.0, 0.1, 20.0, 0.05, 0.1};
+  const energy_parameters energy = {0.002, 0.004, 0.1};
+  motor_dc_parameters motor;
+  motor_dc_default(&motor);
+  vehicle_model *made = vehicle_model_new(&chassis, 0.01);
+  int bad = vehicle_model_drive_dc(made, &motor, &motor, 1) != VEHICLE_OK;
+  bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.0) < 0;
+  bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.03) < 0;
+  bad |= vehicle_model_add_sharp_infrared(made, &sharp) < 0 || vehicle_model_add_laser(made, &finder, 0.1) < 0;
+  bad |= vehicle_model_add_phototransistor(made, &light, 0.0) < 0 || vehicle_model_add_odometer(made, &wheels) < 0;
+  bad |= vehicle_model_add_accelerometer(made, &spring, 0.0) < 0 || vehicle_model_add_whisker(made, 0.2, 0, 0.3, 0) < 0;
+  bad |= vehicle_model_battery(made, &energy, 5.0, 7.75, 0.005) < 0;
+  vehicle_model_switch(made, 1, 0);
+  CHECK(!bad);
+  return made;
+}
+
+/* ---- what has to hold --------------------------------------------------------------------------------------------- */
+
+static int placed(const vehicles *all, size_t i) { return all->worlds[i].where != NULL; }
+
+static void check_world(vehicles *all, size_t i) {
+  double pose[3];
+  int8_t flag;
+  vehicles_poses(all, i, 1, pose);
+  vehicles_flags(all, i, 1, &flag);
+  CHECK(isfinite(pose[0]) && isfinite(pose[1]) && isfinite(pose[2]));
+  CHECK(flag >= VEHICLE_RUNS && flag <= VEHICLE_BRAIN_FAILED);
+  const size_t count = vehicles_reading_count(all);
+  for (size_t k = 0; k < count; k++) CHECK(isfinite(vehicles_readings(all)[i * count + k]));
+}
+
+/* Saves world `from`, spoils the bytes, restores world `to` from them. */
+static void exchange(vehicles *all, size_t from, size_t to, input *in) {
+  const size_t size = vehicles_snapshot_size(all, from);
+  uint64_t *words = malloc(size);
+  vehicles_save(all, from, words);
+  const uint64_t before = vehicles_hash(all, to);
+  const uint64_t saved = vehicles_hash(all, from);
+  const uint8_t spoilt = byte(in) % 4;
+  for (uint8_t i = 0; i < spoilt; i++) {
+    const double value = number(in);
+    memcpy(&words[byte(in) % (size / 8)], &value, sizeof value);
+  }
+  const size_t given = byte(in) % 8 ? size : size - byte(in);
+  if (byte(in) % 2) { /* on a computer whose lowest byte comes first */
+    uint64_t sum = words[0];
+    for (size_t i = HEADING_WORDS; i < given / 8; i++) sum = hash_word(sum, words[i]);
+    words[HEADING_WORDS - 1] = sum;
+  }
+  const int status = vehicles_restore(all, to, words, given);
+  if (!placed(all, to) || !placed(all, from)) {
+    CHECK(status != VEHICLE_OK);
+  } else if (status != VEHICLE_OK) {
+    CHECK(spoilt > 0 || given != size);
+    CHECK(vehicles_hash(all, to) == before);
+  } else {
+    CHECK(given == size);
+    CHECK(spoilt > 0 || vehicles_hash(all, to) == saved);
+  }
+  free(words);
+}
+
+static void act(vehicles *all, const arena *where, input *in) {
+  const uint8_t action = byte(in);
+  const size_t i = action / 8 % WORLDS;
+  const double signals[2] = {number(in), number(in)};
+  switch (action % 8) {
+    case 0:
+      (void)vehicles_place(all, i, where, byte(in), byte(in), number(in), number(in), number(in));
+      break;
+    case 1:
+      (void)vehicles_set_speeds(all, i, number(in), number(in));
+      break;
+    case 2:
+      exchange(all, i, byte(in) % WORLDS, in);
+      break;
+    case 3:
+      (void)vehicles_run(all, i, byte(in) % 4, vehicle_wander, byte(in) % STEPS);
+      break;
+    case 4:
+      (void)arena_ray(where, signals[0], signals[1], 1.0, 0.0, number(in), number(in), NULL);
+      CHECK(!isnan(arena_clearance(where, signals[0], signals[1], 5.0)));
+      break;
+    default:
+      (void)vehicles_step(all, i, byte(in) % 4, (const double[]){signals[0], signals[1], 0.5, 0.5, 0.1, 0.1},
+                          byte(in) % STEPS);
+  }
+  for (size_t k = 0; k < WORLDS; k++) {
+    if (placed(all, k)) check_world(all, k);
+  }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+  input in = {data, data + size};
+  arena *where = room(&in);
+  vehicle_model *made = model();
+  vehicles *all = vehicles_new(made, WORLDS, sizeof(vehicle_wander_state));
+  for (size_t i = 0; i < WORLDS; i++) (void)vehicles_place(all, i, where, i, 1 + (uint32_t)i, 0.0, 0.0, 0.3);
+  while (in.at < in.end) act(all, where, &in);
+  vehicles_destroy(all);
+  vehicle_model_destroy(made);
+  arena_destroy(where);
+  return 0;
+}

@@ -1,0 +1,164 @@
+"""Whatever a caller gives to a simulation is done, or refused by one sentence; what is closed stays closed."""
+
+from __future__ import annotations
+
+import copy
+import gc
+import math
+import resource
+import signal
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from boebot.errors import ArenaError, BoebotError
+from boebot.robots import load_robot
+from sim_bridge.arena import load_arena
+from sim_bridge.boards.emulated import EmulatedBoard, native_board, native_library
+from sim_bridge.pins import BoardPins
+from sim_bridge.sim import Sim
+
+ROBOT = load_robot("shieldbot")
+ROOM = load_arena("room")
+
+
+def board() -> EmulatedBoard:
+    return native_board(native_library("shieldbot"))
+
+
+def built() -> Sim:
+    sim = Sim(ROOM)
+    sim.add(board(), ROBOT)
+    return sim
+
+
+def refused(act: Callable[[], object], words: str) -> None:
+    with pytest.raises(BoebotError, match=words) as caught:
+        act()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_closed_simulation_says_so() -> None:
+    sim = built()
+    robot, state = sim.robot(0), sim.save()
+    pins = BoardPins(robot)
+    sim.close()
+    sim.close()
+    acts: list[Callable[[], object]] = [
+        lambda: sim.run(16_000),
+        sim.hash,
+        sim.save,
+        lambda: sim.restore(state),
+        lambda: sim.cycle,
+        robot.body,
+        robot.receive,
+        lambda: robot.send(b"x"),
+        lambda: pins.output(13),
+        lambda: pins.place(0, 0, 0),
+        lambda: sim.add(board(), ROBOT),
+    ]
+    for act in acts:
+        refused(act, "closed")
+
+
+def test_a_board_belongs_to_one_simulation() -> None:
+    one = board()
+    sim = Sim(ROOM)
+    sim.add(one, ROBOT)
+    refused(lambda: sim.add(one, ROBOT, pose=(0.9, -0.8, 0.0)), "in a simulation already")
+    refused(lambda: Sim(ROOM).add(one, ROBOT), "in a simulation already")
+    refused(one.close, r"is in a simulation; expected Sim.close\(\)")
+    sim.restore(sim.save())
+    refused(sim.robot(0).board.close, "is in a simulation")
+    sim.close()
+    one.close()
+    refused(lambda: Sim(ROOM).add(one, ROBOT), "closed")
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy])
+def test_a_simulation_is_not_copied(how: Callable[[Sim], Sim]) -> None:
+    refused(lambda: how(built()), r"cannot be copied; expected save\(\) and restore\(\)")
+
+
+def test_boards_that_are_dropped_are_freed() -> None:
+    """Alone, in a simulation, and with one that is part of a cycle of references."""
+
+    def drop(count: int) -> None:
+        for number in range(count):
+            board()
+            cycle: list[Any] = [built()]
+            if number % 5 == 0:
+                cycle.append(cycle)
+        gc.collect()
+
+    drop(20)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    drop(150)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000, "kB; a board has 270"
+
+
+def test_a_long_run_hears_ctrl_c() -> None:
+    sim = built()
+    timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        sim.run(16_000_000 * 3600 * 24)
+    timer.join()
+    cycle = sim.cycle
+    sim.run(16_000)
+    assert sim.cycle == cycle + 16_000
+
+
+@pytest.mark.parametrize("pose", [(0, 0), "abc", 5, (0, 0, 1e20), (math.nan, 0, 0), (0, math.inf, 0), (1e7, 0, 0)])
+def test_poses(pose: Any) -> None:
+    words = r"expected 3 finite numbers, x \(m\), y \(m\) and heading \(rad\), within"
+    refused(lambda: Sim(ROOM).add(board(), ROBOT, pose=pose), words)
+    refused(lambda: Sim(ROOM).add(None, load_robot("arsim"), pose=pose), words)
+    if isinstance(pose, tuple) and len(pose) == 3:
+        refused(lambda: BoardPins(built().robot(0)).place(*pose), words)
+
+
+def test_what_is_no_number_name_or_byte() -> None:
+    sim = built()
+    robot, pins = sim.robot(0), BoardPins(sim.robot(0))
+    anything: Any = "x"
+    acts: list[tuple[Callable[[], object], str]] = [
+        (lambda: Sim(anything), "expected an Arena"),
+        (lambda: Sim(ROOM, seed=anything), "the seed is 'x'; expected a whole number"),
+        (lambda: Sim(ROOM, seed=10**40), "the seed is .*; expected a whole number"),
+        (lambda: Sim(ROOM, noise=anything), "expected True or False"),
+        (lambda: Sim(ROOM, step_cycles=1), "step_cycles is 1; expected a whole number from 160"),
+        (lambda: Sim(ROOM, step_cycles=anything), "step_cycles is 'x'"),
+        (lambda: sim.add(anything, ROBOT), "expected a board or None, and a description"),
+        (lambda: sim.add(board(), anything), "expected a board or None, and a description"),
+        (lambda: sim.add(board(), ROBOT, number=anything), "robot number is 'x'"),
+        (lambda: sim.add(board(), ROBOT, number=10**12), "robot number is 1000000000000; expected"),
+        (lambda: sim.add(board(), ROBOT, without=anything), "without is 'x'; expected a list of names"),
+        (lambda: sim.run(anything), "cycles is 'x'"),
+        (lambda: sim.run(-1), "cycles is -1; expected a whole number from 0"),
+        (lambda: robot.send(anything), "send: got 'x'; expected bytes"),
+        (lambda: robot.listen(-1), "listen: the cycle is -1"),
+        (lambda: robot.line_rate(0), "the rate is 0; expected a whole number from 1"),
+        (lambda: robot.signals(0.1, 0.1), "is driven by its board"),
+        (lambda: pins.answer_ping(math.nan), "the pulse is nan; expected a finite number from 0"),
+        (lambda: pins.answer_ping(-5), "the pulse is -5"),
+        (lambda: pins.supply(1e300), r"the voltage is 1e\+300; expected a finite number from 0 to 30"),
+        (lambda: pins.brown_out(foo=1), "there is no 'foo'; expected one of reset_v"),
+        (lambda: pins.reset("nope"), "there is no cause 'nope'; expected one of power"),
+    ]
+    for act, words in acts:
+        refused(act, words)
+    robot.send(bytearray(b"x"))
+    vehicle = Sim(ROOM).add(None, load_robot("arsim"))
+    refused(lambda: vehicle.signals(anything, 0), "expected two finite numbers")
+    refused(lambda: vehicle.send(b"x"), "has no board, and so no bytes")
+    assert issubclass(ArenaError, BoebotError)
+
+
+def test_a_bodys_state_is_of_its_moment() -> None:
+    robot = built().robot(0)
+    before = robot.body()
+    BoardPins(robot).place(0.5, -0.2, 0.0)
+    assert before.x == ROOM.start[0] and robot.body().x == 0.5

@@ -1,0 +1,31 @@
+/* hash.h: hashes of numbers, the same on every machine: of values in a row, never of memory, which has padding and an order
+ * of bytes. They tell things apart that were not made to look alike. */
+#ifndef WORLD_HASH_H
+#define WORLD_HASH_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "noise.h"
+
+static inline uint64_t hash_word(uint64_t sum, uint64_t word) { return noise_mix(sum ^ word); }
+
+/* The bits of a number as a word. */
+static inline uint64_t hash_bits(double value) {
+  uint64_t bits;
+  memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
+
+static inline uint64_t hash_numbers(uint64_t sum, const double *values, size_t count) {
+  sum = hash_word(sum, count);
+  for (size_t i = 0; i < count; i++) sum = hash_word(sum, hash_bits(values[i]));
+  return sum;
+}
+
+/* Of the arguments after `sum`, doubles. */
+#define HASH_NUMBERS(sum, ...) \
+  hash_numbers((sum), (const double[]){__VA_ARGS__}, sizeof((const double[]){__VA_ARGS__}) / sizeof(double))
+
+#endif

@@ -1,0 +1,65 @@
+/* lanes.h: several numbers in one step of the processor, for loops that do the same with each.
+ *
+ * Each lane does what the scalar operation does, so results have the same bits, and a processor with wider registers
+ * gives them as well. Where the compiler has no vectors LANES is 1, a lane is a number and the same code is scalar.
+ * Vectors go to functions by their addresses: how they are passed by value depends on the processor.
+ */
+#ifndef WORLD_LANES_H
+#define WORLD_LANES_H
+
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __GNUC__
+
+#define LANES 4u
+#define LANES_INLINE static inline __attribute__((always_inline))
+#define LANES_NOT_INLINE __attribute__((noinline))
+
+/* What is built for AVX2 anyway need not ask. The macro: for tests. */
+#if defined(__x86_64__) && !defined(__AVX2__) && !defined(WORLD_PLAIN_LANES)
+#define LANES_AVX2 LANES_NOT_INLINE __attribute__((target("avx2")))
+#define LANES_HAVE_AVX2() __builtin_cpu_supports("avx2")
+#endif
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+typedef double lanes __attribute__((vector_size(8 * LANES)));
+typedef int64_t masks __attribute__((vector_size(8 * LANES)));
+
+/* Lanes of `yes` where the mask is set, else of `no`. */
+#define lanes_select(mask, yes, no) ((lanes)(((masks)(yes) & (mask)) | ((masks)(no) & ~(mask))))
+#define lanes_of(value) ((lanes){(value), (value), (value), (value)})
+
+LANES_INLINE int masks_any(const masks *m) {
+#ifdef __SSE2__
+  typedef int32_t half_masks __attribute__((vector_size(4 * LANES)));
+  return _mm_movemask_ps((__m128) __builtin_convertvector(*m, half_masks)) != 0;
+#else
+  return ((*m)[0] | (*m)[1] | (*m)[2] | (*m)[3]) != 0;
+#endif
+}
+
+#else
+
+#define LANES 1u
+#define LANES_INLINE static inline
+#define LANES_NOT_INLINE
+
+typedef double lanes;
+typedef int masks;
+
+#define lanes_select(mask, yes, no) ((mask) ? (yes) : (no))
+#define lanes_of(value) (value)
+
+LANES_INLINE int masks_any(const masks *m) { return *m; }
+
+#endif
+
+LANES_INLINE void lanes_load(lanes *to, const double *from) { memcpy(to, from, sizeof *to); }
+
+LANES_INLINE void lanes_store(double *to, const lanes *from) { memcpy(to, from, sizeof *from); }
+
+#endif

@@ -1,0 +1,170 @@
+"""A process that measures worlds of one build on demand: `python -m tools.bench.world_side [EXTENSION]`.
+
+Each line on standard input is a question in JSON, such as {"what": "compiled", "edges": 48}; each line on standard
+output its answer, {"value": ...} or {"error": ...}. Worlds are made once and go on where they were, so that questions
+to several builds can take turns and share what else happens on the machine. Rates are by the processor's time, where
+one thread works.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib.util
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from sim_bridge.batch import Batch, CompiledBrain
+    from sim_bridge.vehicle import Vehicle
+
+TAKES = 0.2  # s that a measurement takes, about
+
+
+def use(extension: Path) -> None:
+    """That file is `sim_bridge._core` from now on."""
+    spec = importlib.util.spec_from_file_location("sim_bridge._core", extension)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    sys.modules["sim_bridge._core"] = module
+
+
+class MallocInfo(ctypes.Structure):
+    """struct mallinfo2 of glibc 2.33 and later."""
+
+    _names = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")
+    _fields_ = [(name, ctypes.c_size_t) for name in _names]
+
+
+def allocated() -> int:
+    """Bytes that the C heap has given out."""
+    ask = ctypes.CDLL(None).mallinfo2
+    ask.restype = MallocInfo
+    info = ask()
+    return int(info.uordblks + info.hblkhd)
+
+
+def placed(worlds: int, threads: int, edges: int, laser: str | None) -> Batch:
+    """Worlds in the room, each with a seed of its own. Robots with a laser stand between pillars and turn there."""
+    from sim_bridge.batch import Batch
+    from tools.bench import scene
+
+    number = np.arange(worlds)
+    poses = np.zeros((worlds, 3))
+    poses[:, 2] = 0.7 * (number % 9)
+    if laser is not None:
+        poses[:, 0], poses[:, 1] = number % 3 - 0.5, number // 3 % 3 - 0.5
+    model = scene.robot() if laser is None else scene.laser_robot(laser == "noise")
+    batch = Batch(model, scene.room(edges), poses, number, threads=threads)
+    for i in range(worlds):
+        batch.state(i, "vehicle_wander_state *").seed = i
+    return batch
+
+
+@functools.cache
+def wander() -> CompiledBrain:
+    """The compiled brain, for whatever the first two readings of the scene's robots are."""
+    from sim_bridge import batch
+    from sim_bridge._core import ffi, lib
+
+    size = ffi.sizeof("vehicle_wander_state")
+    return batch.CompiledBrain(ffi.addressof(lib, "vehicle_wander"), readings=(), state_bytes=size, name="wander")
+
+
+@functools.cache
+def runner(worlds: int, threads: int, edges: int, laser: str | None) -> tuple[Callable[[int], Any], int]:
+    """Runs so many steps of all worlds with the compiled brain; and the steps that take long enough."""
+    batch = placed(worlds, threads, edges, laser)
+    run = functools.partial(batch.run, wander())
+    steps = 1
+    while True:  # caches and lists are made on the way
+        started = time.perf_counter()
+        run(steps)
+        took = time.perf_counter() - started
+        if took > 0.5 * TAKES:
+            return run, max(1, round(steps * TAKES / took))
+        steps *= 2
+
+
+def compiled(edges: int, worlds: int = 1, threads: int = 1, laser: str | None = None) -> float:
+    """Robot-steps/s of worlds with a compiled brain; by the clock on the wall with several threads."""
+    run, steps = runner(worlds, threads, edges, laser)
+    clock = time.process_time if threads == 1 else time.perf_counter
+    started = clock()
+    run(steps)
+    return steps * worlds / (clock() - started)
+
+
+def scan(edges: int, noise: bool) -> float:
+    """Rays/s of robots that make a scan of 683 in each step."""
+    from tools.bench.scene import BEAMS
+
+    return BEAMS * compiled(edges, worlds=16, laser="noise" if noise else "exact")
+
+
+@functools.cache
+def driven(edges: int) -> Vehicle:
+    from sim_bridge.vehicle import Vehicle
+    from tools.bench import scene
+
+    return Vehicle(scene.robot(), scene.room(edges), pose=(0.0, 0.0, 0.0))
+
+
+def python(edges: int, steps: int = 100_000) -> float:
+    """Robot-steps/s with a brain in Python that is asked in each step."""
+    from tools.bench.scene import wander
+
+    vehicle = driven(edges)
+    started = time.process_time()
+    done = vehicle.run(wander, steps)
+    return done / (time.process_time() - started)
+
+
+def memory(laser: bool = False, worlds: int = 200) -> float:
+    """Bytes that the C heap gives to a world and all that is its own, movers, fan, readings, brain; not the arena."""
+    kind = "noise" if laser else None
+    placed(16, 1, 48, kind).run(wander(), 1000)  # what all share is there
+    before = allocated()
+    batch = placed(worlds, 1, 48, kind)
+    batch.run(wander(), 10)
+    return (allocated() - before) / worlds
+
+
+def memory_of_edges(edges: int, steps: int) -> float:
+    """Bytes per edge of an arena with its index, and with the lists that so many steps of 16 robots make."""
+    from tools.bench import scene
+
+    of_a_world = memory()
+    scene.room.cache_clear()
+    before = allocated()
+    batch = placed(16, 1, edges, None)
+    batch.run(wander(), steps)
+    return (allocated() - before - 16 * of_a_world) / edges
+
+
+QUESTIONS: dict[str, Callable[..., float]] = {
+    function.__name__: function for function in (compiled, scan, python, memory, memory_of_edges)
+}
+
+
+def main() -> None:
+    if len(sys.argv) > 1:
+        use(Path(sys.argv[1]))
+    for line in sys.stdin:
+        question = json.loads(line)
+        try:
+            answer: dict[str, Any] = {"value": QUESTIONS[question.pop("what")](**question)}
+        except Exception as error:  # it belongs to one row of the table
+            answer = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()
