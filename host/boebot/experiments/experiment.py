@@ -86,7 +86,11 @@ class Experiment:
     caption: str
     """of its figure"""
     robot: str
-    """the robot that it runs on, or "none" """
+    """the robot that it runs on, and its board where it has one, such as "shieldbot (native)"; or "none" """
+    criterion: str
+    """where what is expected comes from; "" where the notes or their restored figures say it"""
+    slow: bool
+    """takes more than some two seconds"""
     run: Callable[[int, Progress], Outcome]
     """with a seed"""
     topic: str = field(default="")
@@ -97,9 +101,16 @@ EXPERIMENTS: dict[str, Experiment] = {}
 
 
 def experiment(
-    name: str, *, title: str, source: str, caption: str, robot: str = "none"
+    name: str,
+    *,
+    title: str,
+    source: str,
+    caption: str,
+    robot: str = "none",
+    criterion: str = "",
+    slow: bool = False,
 ) -> Callable[[Callable[[int, Progress], Outcome]], Callable[[int, Progress], Outcome]]:
-    """Marks a function of a seed and a progress function as an experiment."""
+    """Marks a function of a seed and a progress function as an experiment; see `Experiment` for what is to be said."""
 
     def register(run: Callable[[int, Progress], Outcome]) -> Callable[[int, Progress], Outcome]:
         if name in EXPERIMENTS:
@@ -110,6 +121,8 @@ def experiment(
             source=source,
             caption=caption,
             robot=robot,
+            criterion=criterion,
+            slow=slow,
             run=run,
             topic=run.__module__.rpartition(".")[2],
         )
