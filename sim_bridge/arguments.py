@@ -39,7 +39,8 @@ def switch(what: str, value: Any, error: type[BoebotError]) -> bool:
 
 def whole(what: str, value: Any, error: type[BoebotError], *, least: int, most: int) -> int:
     """A whole number from `least` to `most`, else raises `error`; `what` names it."""
-    if isinstance(value, Integral) and least <= (taken := int(value)) <= most:
+    # the first question is the quick one, and nearly always enough
+    if (type(value) is int or isinstance(value, Integral)) and least <= (taken := int(value)) <= most:
         return taken
     raise error(f"{what} is {shown(value)}; expected a whole number from {least:,} to {most:,}")
 

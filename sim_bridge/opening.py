@@ -59,8 +59,9 @@ def alone(sim: Sim, *, paced: bool = False) -> Wait:
     pace = Pace(sim) if paced else None
 
     def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        robot.listen(sim.cycle + max(quiet, 1))
-        sim.run_until(sim.cycle + cycles)
+        now = sim.cycle
+        robot.listen(now + max(quiet, 1))
+        sim.run_until(now + cycles)
         if pace is not None:
             pace.wait()
 

@@ -245,7 +245,8 @@ class Sim:
     @property
     def cycle(self) -> int:
         """Up to where the simulation has run."""
-        return int(lib.sim_now(self.handle))
+        cycle: int = lib.sim_now(self.handle)
+        return cycle
 
     def run(self, cycles: int) -> None:
         """Runs for so many cycles, whoever speaks.

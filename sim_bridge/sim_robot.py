@@ -24,6 +24,7 @@ TONE = ("time", "duration", "frequency")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 BAUD_MAXIMUM = 4_000_000
+ROOM = 1024  # bytes that are fetched at a time
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ class SimRobot:
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
         self._count = ffi.new("size_t *")
+        self._room = ffi.new("uint8_t[]", ROOM)
+        self._view = ffi.buffer(self._room)
 
     @property
     def board(self) -> EmulatedBoard:
@@ -58,12 +61,11 @@ class SimRobot:
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
-        waiting = lib.sim_waiting(self._handle, self.number)
-        if not waiting:
-            return b""
-        data = bytearray(waiting)
-        lib.sim_receive(self._handle, self.number, ffi.from_buffer("uint8_t[]", data, require_writable=True), waiting)
-        return bytes(data)
+        handle, number, room = self._handle, self.number, self._room
+        data: bytes = self._view[: lib.sim_receive(handle, number, room, ROOM)]
+        while waiting := lib.sim_waiting(handle, number):
+            data += self._view[: lib.sim_receive(handle, number, room, min(waiting, ROOM))]
+        return data
 
     def send(self, data: bytes | bytearray | memoryview) -> None:
         """Bytes to the board, from now on.

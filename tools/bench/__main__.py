@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -35,8 +36,27 @@ def figures(only: list[str]) -> list[Figure]:
     return [figure for figure in FIGURES if not only or any(part in figure.name for part in only)]
 
 
+class Interrupt:
+    """Ctrl-C. Python drops a KeyboardInterrupt that arises while an object is being freed; this one is remembered, so
+    that the next figure is not begun."""
+
+    def __init__(self) -> None:
+        self._came = False
+        signal.signal(signal.SIGINT, self._hear)
+
+    def _hear(self, *_: object) -> None:
+        self._came = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt if it came."""
+        if self._came:
+            raise KeyboardInterrupt
+
+
 def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]:
     """Rows, one after the other, with a line of progress for each. A measurement that fails is a row with its error."""
+    interrupt = Interrupt()
     for number, figure in enumerate(wanted, 1):
         started = time.monotonic()
         console.print(f"[{number}/{len(wanted)}] {figure.name} ...", end="", markup=False, highlight=False)
@@ -44,6 +64,7 @@ def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]
             row = report.measure(figure)
         except Exception as error:  # the others are measured all the same
             row = report.failed(figure, error)
+        interrupt.check()
         took = time.monotonic() - started
         console.print(f" {report.shown(row)} ({took:.0f} s)", markup=False, highlight=False)
         yield row
