@@ -113,6 +113,7 @@ class StepWatch:
         self._thrown = False
         self._lock = threading.Lock()  # held for each change of the last two
         self._ended = threading.Event()
+        self._watcher = threading.Thread(target=self._watch, name="step watch", daemon=True)
         self._wakes = False  # the thread can be woken from a wait
         self._handler: object = signal.SIG_DFL  # of that signal, before
 
@@ -126,7 +127,7 @@ class StepWatch:
         self._wakes = _WAKE is not None and threading.current_thread() is threading.main_thread()
         if self._wakes:
             self._handler = signal.signal(_WAKE, _nothing) or signal.SIG_DFL
-        threading.Thread(target=self._watch, name="step watch", daemon=True).start()
+        self._watcher.start()
         return self
 
     def __exit__(
@@ -135,6 +136,7 @@ class StepWatch:
         with interrupts.ignored():
             self._leave()
             self._ended.set()
+            self._watcher.join()
             if self._wakes:
                 signal.signal(_WAKE, self._handler)  # type: ignore[arg-type]
 

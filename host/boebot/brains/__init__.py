@@ -81,13 +81,15 @@ def load_brain(source: object) -> LoadedBrain:
     Raises:
         BrainError: it is not there, does not compile, fails while it is loaded, or is no brain.
     """
+    if isinstance(source, LoadedBrain):
+        return source
     if isinstance(source, str | Path):
         path = _find(source)
         if path.suffix == TOML:
             return _from_object(composition.load(path), path.stem, path)
         return _from_module(_execute(path), path)
     if isinstance(source, ModuleType):
-        return _from_module(source, Path(source.__file__) if source.__file__ else None)
+        return _from_module(source, Path(source.__file__) if getattr(source, "__file__", None) else None)
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
     step = getattr(source, "step", None)
