@@ -18,6 +18,7 @@ import pytest
 from steps import Stepped
 
 import boebot
+from boebot import cli
 from boebot.behaviors import Avoid, Stop, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brains import bundled, load_brain
@@ -249,7 +250,7 @@ def test_error_in_a_process_names_it_and_the_place(tmp_path: Path) -> None:
         (Brain([Clumsy(deed=lambda robot: 1 / 0)]), rf"{here}: process 'clumsy': ZeroDivisionError: division by zero$"),
         (Brain([Clumsy(name="a", deed=lambda r: r.drive(2, 0))]), rf"{here}: process 'a': drive\(2, 0\): motor sig"),
         (Brain([Clumsy(deed=lambda r: r.drive("x", 0))]), rf"{here}: process 'clumsy': drive\('x', 0\) expects two"),  # type: ignore[arg-type]
-        (Brain([Clumsy(deed=int)]), rf"{Path(__file__).name}, line {line}: process 'clumsy': TypeError"),
+        (Brain([Clumsy(deed=ord)]), rf"{Path(__file__).name}, line {line}: process 'clumsy': TypeError"),
         (Brain([Wander()], [StateVariable("z", lambda r: 1 / 0)]), rf"{here}: state variable 'z': ZeroDivisionError"),
         (Brain([Wander()], [StateVariable("z", lambda r: float("nan"))]), r"the brain: state variable 'z' is nan; ex"),
         (Brain([Wander(forward=2.0)]), r"the brain: process 'wander': drive\(2\.0, 2\.0\): motor signals go from -1"),
@@ -273,6 +274,7 @@ def test_error_in_a_file_beside_the_brain_has_its_place_there(tmp_path: Path) ->
 
 SCRIPT = """
 import boebot
+from boebot import cli
 from boebot.behaviors import Wander
 from boebot.brain import Brain, MotorBehavior
 
@@ -323,10 +325,16 @@ def test_brains_of_a_script_and_of_a_prompt(tmp_path: Path, way: str) -> None:
     assert done.stdout.splitlines() == said(str(path) if way == "script" else "<stdin>")
 
 
-def test_new_brain_of_several_behaviors_runs_and_turns_from_what_it_touches(tmp_path: Path) -> None:
-    boebot_new = [sys.executable, "-m", "boebot", "new", "several", "--brain"]
-    done = subprocess.run(boebot_new, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and done.stdout.startswith("wrote several.py; now: boebot run several.py")
+def test_new_brain_of_several_behaviors_backs_off_from_what_it_touches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["boebot", "new", "several", "--brain"])
+    monkeypatch.setattr("boebot.cli.SIGNALS", [])
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)  # restored afterwards
+    with pytest.raises(SystemExit, match="0"):
+        cli.main()
+    assert capsys.readouterr().out.startswith("wrote several.py; now: boebot run several.py")
     brain = load_brain(tmp_path / "several.py").brain
     assert brain is not None and brain.NEEDS == ("infrared", "whiskers")
     stepped = Stepped(brain.PERIOD)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import json
 import os
 import signal
 import subprocess
@@ -22,7 +23,7 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot import runner
+from boebot import cli, runner
 from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult
@@ -89,7 +90,8 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         session.close = look_and_close  # type: ignore[method-assign]
         return session
 
-    monkeypatch.setattr("boebot.report.picture.write", lambda result, path: path)  # others test it, and it takes long
+    for kind in ("picture", "replay"):  # tested elsewhere, and they take long
+        monkeypatch.setattr(f"boebot.report.{kind}.write", lambda result, path: path)
     monkeypatch.setattr(runner, "open_board", board)
     monkeypatch.setattr(runner, "open_vehicle", vehicle)
     return told
@@ -112,7 +114,7 @@ def complete(folder: Path) -> None:
         rows = list(csv.DictReader(file))
     assert [float(row["time_s"]) for row in rows] == pytest.approx([n / 100 for n in range(31)])
     assert {row["command"] for row in rows[1:]} == {"signal"}
-    assert (folder / "replay.html").exists() and (folder / "summary.json").exists()
+    assert (folder / "summary.json").exists()
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -282,11 +284,6 @@ def test_step_that_somebody_debugs_is_not_interrupted() -> None:
 # ---- at the command line ---------------------------------------------------------------------------------------------
 
 
-def command(path: Path, *arguments: str) -> list[str]:
-    out = ["--out", str(path.parent / "out"), "--json"]
-    return [sys.executable, "-m", "boebot", "run", str(path), "--seconds", "5", *out, *arguments]
-
-
 @pytest.mark.parametrize(
     ("on", "deed", "sentence"),
     [
@@ -294,15 +291,28 @@ def command(path: Path, *arguments: str) -> list[str]:
         ("direct", "raise KeyError('x')", "KeyError: 'x'"),
     ],
 )
-def test_bad_brain_at_the_command_line(tmp_path: Path, on: str, deed: str, sentence: str) -> None:
+def test_bad_brain_at_the_command_line(
+    tmp_path: Path,
+    stood_still: list[bool],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    on: str,
+    deed: str,
+    sentence: str,
+) -> None:
     path = tmp_path / "bad.py"
     path.write_text(PROCESS.format(deed=deed))
-    arguments = command(path, "--robot", ROBOTS[on], "--on", on, "--step-timeout", "0.3")
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"boebot: {path}, line 8: process 'naughty': {sentence}")
-    assert len(done.stderr.splitlines()) == 1
+    arguments = ["--robot", ROBOTS[on], "--on", on, "--step-timeout", "0.3", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", ["boebot", "run", str(path), *arguments])
+    monkeypatch.setattr(cli, "SIGNALS", [])  # this process keeps its own handlers
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    with pytest.raises(SystemExit, match="1"):
+        cli.main()
+    said = capsys.readouterr()
+    assert said.err.startswith(f"boebot: {path}, line 8: process 'naughty': {sentence}")
+    assert len(said.err.splitlines()) == 1 and "ended" in said.out
     complete(tmp_path / "out")
+    assert stood_still == [True]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
@@ -310,19 +320,18 @@ def test_ctrl_c_ends_a_brain_that_hangs(tmp_path: Path) -> None:
     path, begun = tmp_path / "bad.py", tmp_path / "begun"
     path.write_text(FUNCTION.format(deed=f"open({str(begun)!r}, 'w').close()\n        while True: pass"))
     process = subprocess.Popen(
-        command(path, "--step-timeout", "inf"),
-        stdout=subprocess.DEVNULL,
+        [sys.executable, "-m", "boebot", "run", str(path), "--step-timeout", "inf", "--json"],
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
     )
     while not begun.exists() and process.poll() is None:
         time.sleep(0.01)
-    time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
-    complete(tmp_path / "out")
+    assert json.loads(out)["run_time_s"] == pytest.approx(BAD_FROM_S)
 
 
 # ---- late, in real time ----------------------------------------------------------------------------------------------

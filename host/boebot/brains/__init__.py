@@ -89,7 +89,8 @@ def load_brain(source: object) -> LoadedBrain:
             return _from_object(composition.load(path), path.stem, path)
         return _from_module(_execute(path), path)
     if isinstance(source, ModuleType):
-        return _from_module(source, Path(source.__file__) if getattr(source, "__file__", None) else None)
+        file = getattr(source, "__file__", None)
+        return _from_module(source, Path(file) if file else None)
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
     step = getattr(source, "step", None)
