@@ -250,7 +250,7 @@ def test_error_in_a_process_names_it_and_the_place(tmp_path: Path) -> None:
         (Brain([Clumsy(deed=lambda robot: 1 / 0)]), rf"{here}: process 'clumsy': ZeroDivisionError: division by zero$"),
         (Brain([Clumsy(name="a", deed=lambda r: r.drive(2, 0))]), rf"{here}: process 'a': drive\(2, 0\): motor sig"),
         (Brain([Clumsy(deed=lambda r: r.drive("x", 0))]), rf"{here}: process 'clumsy': drive\('x', 0\) expects two"),  # type: ignore[arg-type]
-        (Brain([Clumsy(deed=ord)]), rf"{Path(__file__).name}, line {line}: process 'clumsy': TypeError"),
+        (Brain([Clumsy(deed=ord)]), rf"{Path(__file__).name}, line {line}: process 'clumsy': TypeError"),  # type: ignore[arg-type]
         (Brain([Wander()], [StateVariable("z", lambda r: 1 / 0)]), rf"{here}: state variable 'z': ZeroDivisionError"),
         (Brain([Wander()], [StateVariable("z", lambda r: float("nan"))]), r"the brain: state variable 'z' is nan; ex"),
         (Brain([Wander(forward=2.0)]), r"the brain: process 'wander': drive\(2\.0, 2\.0\): motor signals go from -1"),
