@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -69,6 +70,41 @@ def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_pat
         info = boebot("info", url, "--json")
         assert info.returncode == 0, info.stderr
         assert json.loads(info.stdout)["pin_map"] == "shieldbot"
+
+
+def late_run(folder: Path, *options: str) -> tuple[subprocess.CompletedProcess[str], list[dict[str, str]]]:
+    """Runs a brain, one of whose steps sleeps for 0.8 s, on a served board; what it said, and its record."""
+    path = folder / "late.py"
+    path.write_text(
+        "import time\nslept = []\ndef step(robot):\n    robot.drive(0.5, 0.5)\n"
+        "    if robot.time > 0.499 and not slept:\n        slept.append(robot.time)\n        time.sleep(0.8)\n"
+    )
+    with served("native", "--pty") as (url, _):
+        out = ["--out", str(folder), "--json"]
+        done = boebot("run", str(path), "--on", url, "--seconds", "2", *out, *options)
+    with (folder / "run.csv").open() as file:
+        return done, list(csv.DictReader(file))
+
+
+def test_dead_man_stops_the_motors_while_the_brain_thinks_and_the_run_goes_on(tmp_path: Path) -> None:
+    """Its last set-point came before 0.5 s and lives for 0.25 s; the step ends at 1.3 s at the earliest."""
+    done, rows = late_run(tmp_path, "--step-timeout", "60")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["dead_man_stops"] >= 1 and summary["late_steps"] >= 14
+    asleep = [row for row in rows if 0.85 < float(row["time_s"]) < 1.25]
+    assert len(asleep) > 30 and {float(row["pulse_left_us"]) for row in asleep} == {0.0}
+    assert float(rows[-1]["time_s"]) > 1.9 and float(rows[-1]["pulse_left_us"]) > 0
+
+
+def test_step_that_outlasts_its_set_points_ends_the_run_with_its_place(tmp_path: Path) -> None:
+    done, rows = late_run(tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith(
+        f"boebot: {tmp_path / 'late.py'}, line 7: a step of the brain has not ended after 0.25 s; the dead-man stops"
+    )
+    assert len(done.stderr.splitlines()) == 1
+    assert 0.49 < float(rows[-1]["time_s"]) < 0.6, "up to the step that did not end"
 
 
 def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp_path: Path) -> None:

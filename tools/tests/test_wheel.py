@@ -43,10 +43,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return environment
 
 
-@pytest.mark.parametrize("board", ["native", "avr"])
-def test_an_installed_wheel_runs_wander(installed: Path, tmp_path: Path, board: str) -> None:
+@pytest.mark.parametrize(("brain", "board"), [("wander", "native"), ("wander", "avr"), ("clearway", "native")])
+def test_an_installed_wheel_runs_bundled_brains(installed: Path, tmp_path: Path, brain: str, board: str) -> None:
     out = tmp_path / "out"
-    command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", board, "--seconds", "5"]
+    command = [str(installed / "bin" / "boebot"), "run", brain, "--on", board, "--seconds", "5"]
     command += ["--out", str(out)]
     bare = {"PATH": str(installed / "bin"), "HOME": str(tmp_path), "LANG": os.environ.get("LANG", "C.UTF-8")}
     done = subprocess.run(without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False)
