@@ -18,6 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from boebot.brain import Brain
 from boebot.errors import BrainError
 from boebot.robot import Robot
 
@@ -35,6 +36,8 @@ class LoadedBrain:
     needs: tuple[str, ...] = ()
     path: Path | None = None
     """The brain's file, if it came from one."""
+    brain: Brain | None = None
+    """The brain of processes, if it is one."""
 
 
 def bundled() -> list[str]:
@@ -153,7 +156,8 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
     if not callable(step):
         raise BrainError(f"{name}: class {type(brain).__name__} has no method step(self, robot)")
     _check_step(step, name)
-    return LoadedBrain(name, step, _period(brain, name), _needs(brain, name), path)
+    composed = brain if isinstance(brain, Brain) else None
+    return LoadedBrain(name, step, _period(brain, name), _needs(brain, name), path, composed)
 
 
 def _check_step(step: Callable[..., object], where: str) -> None:
