@@ -1,6 +1,7 @@
 """Motor behaviors, one per file: parameters are their fields, `Brain` chooses among them."""
 
 from boebot.behaviors.avoid import Avoid
+from boebot.behaviors.charge_battery import ChargeBattery
 from boebot.behaviors.follow_wall import FollowWall
 from boebot.behaviors.kinesis import Kinesis
 from boebot.behaviors.phototaxis import Klinotaxis, Phototaxis
@@ -12,6 +13,7 @@ from boebot.behaviors.withdraw import Withdraw
 
 __all__ = [
     "Avoid",
+    "ChargeBattery",
     "FollowWall",
     "Kinesis",
     "Klinotaxis",
