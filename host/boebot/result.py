@@ -220,13 +220,13 @@ class RunResult:
         known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
         return float(known.max()) if len(known) else None
 
-    def _behavior_figures(self) -> dict[str, float | int | None]:
+    def _behavior_figures(self) -> dict[str, float | int | str | None]:
         """Of a brain of processes: switches between motor behaviors, and the share of time of each."""
         record = self.brain_record
         if record is None:
             return {"behavior_switches": None}
         shares = {f"{name}_share": round(share, 4) for name, share in record.shares(self.run_time).items()}
-        return {"behavior_switches": len(record.behavior_switches)} | shares
+        return {"behavior_switches": len(record.behavior_switches), **shares}
 
     def table(self) -> dict[str, float | int | str | None]:
         """The run's figures by name, units in the names; None: not known, or nothing that this robot has."""
