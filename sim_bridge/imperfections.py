@@ -236,6 +236,7 @@ def battery_parameters(supply: robots.Supply, ratio: float = 2.0, draw: Draw = A
                 "capacity_as": supply.capacity_as,
                 "resistance_ohm": supply.resistance_ohm,
                 "drop_out_v": supply.drop_out_v,
+                "charger_a": supply.charger_a,
                 "board_a": draw["BOARD_A"],
                 "servo_idle_a": draw["SERVO_IDLE_A"],
                 "servo_run_a_s_m": draw["SERVO_RUN_A_S_M"],
@@ -244,6 +245,7 @@ def battery_parameters(supply: robots.Supply, ratio: float = 2.0, draw: Draw = A
             },
             "divider": 1.0 / ratio,
             "noise_v": draw["BATTERY_NOISE_V"],
+            "charge": supply.charge,
         },
     )
 
