@@ -183,7 +183,7 @@ setup(
             ],
         ),
     ],
-    package_data={"": ["py.typed", "*.html"]},
+    package_data={"": ["py.typed", "*.html"], "boebot.brains": ["*.toml"]},
     include_package_data=False,
     cffi_modules=CFFI_MODULES,
     options={"bdist_wheel": {"py_limited_api": "cp311"}},

@@ -35,7 +35,7 @@ class RunResult:
         tick: seconds from one control tick to the next.
         error: why the run ended before its time, or None.
         truth: what really happened, where somebody knows (simulated runs); no brain saw it.
-        steps: steps of the brain. late_steps: brain periods that passed without one (live boards only).
+        steps: steps of the brain. late_steps: brain periods that passed without one (in real time only).
         resets: times the board restarted during the run. sessions_lost: times it had to be opened and armed again,
             those included.
         lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
@@ -43,6 +43,8 @@ class RunResult:
         sent, received: (stamp in s on the transport's clock, bytes), oldest first.
         link: what the two ends of the link counted, "host" and "board".
         without: imperfections of the simulated robot that were switched off.
+        odometry_source: what the brain's own poses came from, where it kept any: "odometer", "encoders", or "commands"
+            where the robot has neither.
         notices: what the user should know, in sentences.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
@@ -78,6 +80,7 @@ class RunResult:
     layout: Layout | None = None
     without: Sequence[str] = ()
     brain_record: BrainRecord | None = None
+    odometry_source: str | None = None
 
     def __repr__(self) -> str:
         """One line; the figures are in `table()`, everything else in the attributes."""
@@ -243,6 +246,7 @@ class RunResult:
             "distance_m": round(self.distance, 3) if self.has_path else None,
             "contacts": self.contacts if self.truth is not None or self.has_whiskers else None,
             "whisker_touches": self.whisker_touches if self.has_whiskers else None,
+            "odometry": self.odometry_source,
             "odometry_error_m": None if self.odometry_error is None else round(self.odometry_error, 3),
             "period_ms": round(self.period * 1000, 3),
             "steps": self.steps,

@@ -380,6 +380,11 @@ class Robot:
 
     # ---- motors --------------------------------------------------------------------------------------------
 
+    @property
+    def speed_limit(self) -> float:
+        """Greatest wheel speed that `drive_speed` takes (m/s)."""
+        return self._speed_limit
+
     def drive(self, left: float, right: float) -> None:
         """Sets the motor signals, -1 (full backward) to 1 (full forward); they hold until the next command.
 

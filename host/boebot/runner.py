@@ -15,16 +15,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
 
-from boebot import brains, interrupts, report
+from boebot import interrupts, report
 from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
 from boebot.brains import LoadedBrain
 from boebot.driving import Driver, Progress, Task
 from boebot.driving.board import BoardDriver
 from boebot.driving.direct import DirectDriver
-from boebot.errors import BoebotError, BrainError
+from boebot.errors import BoebotError
 from boebot.result import RunResult, TogetherResult
-from boebot.robot import Robot
 from boebot.robots import RobotDescription
+from boebot.stepping import StepWatch, step_once
 from boebot.tasks import Member, Terms, expect, task_of
 
 Result = TypeVar("Result", RunResult, TogetherResult)
@@ -43,11 +43,13 @@ def run(
     progress: Progress | None = None,
     without: Sequence[str] = (),
     pose: tuple[float, float, float] | None = None,
+    step_timeout: float | None = None,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
     Args:
-        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with `step(robot)`.
+        brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)`, or object
+            or class with `step(robot)`.
         robot: bundled name, .toml file, or a description.
         arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
         on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot
@@ -61,13 +63,21 @@ def run(
         without: imperfections of a simulated robot that are switched off, such as ("slip", "bounce");
             docs/reference/imperfections.md names them.
         pose: where a simulated robot starts: x (m), y (m), heading (rad). None: where the arena says.
+        step_timeout: seconds by the wall clock after which a step of the brain that has not ended is an error, which
+            ends the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points,
+            after which its dead-man stops the motors.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
-    return keep(lambda: execute(brain, robot, arena, on, seconds, seed, realtime, period, progress, without, pose), out)
+    return keep(
+        lambda: execute(
+            brain, robot, arena, on, seconds, seed, realtime, period, progress, without, pose, step_timeout
+        ),
+        out,
+    )
 
 
 def execute(
@@ -82,6 +92,7 @@ def execute(
     progress: Progress | None = None,
     without: Sequence[str] = (),
     pose: tuple[float, float, float] | None = None,
+    step_timeout: float | None = None,
 ) -> RunResult:
     """As `run`, but once the run has begun every end of it, even by an error, is a result: see
     `RunResult.error`.
@@ -89,7 +100,15 @@ def execute(
     Raises:
         BoebotError: the run could not begin.
     """
-    terms = Terms(arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=progress)
+    terms = Terms(
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        progress=progress,
+        step_timeout=step_timeout,
+    )
     terms.check()
     task = task_of(Member(brain=brain, robot=robot, pose=pose, period=period, without=without), terms)
     task = replace(task, on=default_board([task.request.robot]) if on is None else on)
@@ -142,7 +161,9 @@ def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
     try:
         driver.begin()
         started = wall.perf_counter()
-        _loop(driver, brain)
+        with StepWatch(driver.step_limit) as watch:
+            for _ in driver.steps():
+                step_once(driver.robot, brain, watch)
     except (BoebotError, KeyboardInterrupt) as caught:
         error = caught
     finally:
@@ -150,21 +171,3 @@ def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
         with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
             driver.end()
     return driver.result(error, elapsed_s)
-
-
-def _loop(driver: Driver, brain: LoadedBrain) -> None:
-    robot = driver.robot
-    for _ in driver.steps():
-        step_once(robot, brain)
-
-
-def step_once(robot: Robot, brain: LoadedBrain) -> None:
-    """One step of the brain.
-
-    Raises:
-        BrainError: whatever goes wrong in it, with its place.
-    """
-    try:
-        brain.step(robot)
-    except (Exception, SystemExit) as error:
-        raise BrainError(brains.explain(error, brain.path)) from error

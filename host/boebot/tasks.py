@@ -24,7 +24,8 @@ class Member:
     """One robot of a run.
 
     Attributes:
-        brain: bundled name ("wander"), Python file, function `step(robot)`, or object or class with `step(robot)`.
+        brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)`, or object
+            or class with `step(robot)`.
         robot: bundled name, .toml file, or a description; with a board or without.
         pose: where it starts: x (m), y (m), heading (rad). None: the arena's start for the first such robot, then free
             places near it.
@@ -52,6 +53,7 @@ class Terms:
     seed: int
     realtime: bool
     progress: Progress | None
+    step_timeout: float | None = None
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -61,6 +63,9 @@ class Terms:
         expect("seed", self.seed, "a whole number", Integral)
         if not self.seconds > 0:
             raise BoebotError(f"a run cannot last {self.seconds:g} s; expected more than 0")
+        expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
+        if self.step_timeout is not None and not self.step_timeout > 0:
+            raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
 
 
 def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
@@ -86,6 +91,7 @@ def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
         seconds=terms.seconds,
         period_s=period_s,
         progress=terms.progress,
+        step_timeout_s=terms.step_timeout,
         brain_seed=terms.seed + number - 1 if member.seed is None else member.seed,
     )
 

@@ -17,11 +17,13 @@ from pathlib import Path
 
 from boebot import interrupts
 from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, default_board, open_together
+from boebot.brains import LoadedBrain
 from boebot.driving import PROGRESS_S, Driver, Progress, Task
 from boebot.driving.strand import PAUSED, Strand
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult, TogetherResult
-from boebot.runner import driver_of, keep, step_once
+from boebot.runner import driver_of, keep
+from boebot.stepping import AT_LEISURE, StepWatch, step_once
 from boebot.tasks import Member, Terms, expect, task_of
 
 __all__ = ["Member", "StoppedError", "execute_together", "run_together"]
@@ -42,6 +44,7 @@ def run_together(
     realtime: bool = False,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    step_timeout: float | None = None,
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
@@ -55,6 +58,7 @@ def run_together(
             direct.
         seed: of the world's noise and of the robots' imperfections.
         realtime: slow down to the wall clock.
+        step_timeout: as for `boebot.run`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the seconds that have passed, about ten times a second.
 
@@ -66,7 +70,7 @@ def run_together(
             place). The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    return keep(lambda: execute_together(members, arena, seconds, on, seed, realtime, progress), out)
+    return keep(lambda: execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout), out)
 
 
 def execute_together(
@@ -77,6 +81,7 @@ def execute_together(
     seed: int = 1,
     realtime: bool = False,
     progress: Progress | None = None,
+    step_timeout: float | None = None,
 ) -> TogetherResult:
     """As `run_together`, but once the run has begun every end of it, even by an error, is a result: see
     `TogetherResult.error`.
@@ -85,7 +90,9 @@ def execute_together(
         BoebotError: the run could not begin.
     """
     expect("members", members, "a list of boebot.Member", list, tuple)
-    terms = Terms(arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=None)
+    terms = Terms(
+        arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=None, step_timeout=step_timeout
+    )
     terms.check()
     if not members:
         raise BoebotError("there is no robot to run; expected at least one Member")
@@ -96,6 +103,7 @@ def execute_together(
             tasks.append(task_of(member, terms, number))
         except BoebotError as error:
             raise _of_robot(error, number, len(members)) from None
+    _check_own_brains([task.brain for task in tasks])
     kind = default_board([task.request.robot for task in tasks]) if on is None else on
     tasks = [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
     world = open_together(kind, [task.request for task in tasks])
@@ -103,6 +111,23 @@ def execute_together(
         return _Run(world, tasks, progress).run()
     finally:
         world.close()
+
+
+def _check_own_brains(loaded: Sequence[LoadedBrain]) -> None:
+    """A brain of processes remembers one robot's run; so does each process.
+
+    Raises:
+        BrainError: two robots share one.
+    """
+    owner: dict[int, int] = {}
+    for number, brain in enumerate((one.brain for one in loaded), 1):
+        for process in () if brain is None else brain.processes:
+            first = owner.setdefault(id(process), number)
+            if first != number:
+                raise BrainError(
+                    f"robots {first} and {number} share the brain of {process.name!r}; expected a Brain of its own for "
+                    "each (a file, or a function that makes one, gives that)"
+                )
 
 
 def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
@@ -140,7 +165,7 @@ class _Robot:
             driver.end()
             self.result = driver.result(None, 0.0)  # now: what comes later is the others' time
 
-    def turn(self, error: BaseException | None = None) -> None:
+    def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
         """Goes on until it waits for time to pass, or is done; the brain steps meanwhile.
 
         Raises:
@@ -150,7 +175,8 @@ class _Robot:
         while said == _STEP:
             assert self.driver is not None
             try:
-                step_once(self.driver.robot, self.task.brain)
+                watch.limit = self.driver.step_limit
+                step_once(self.driver.robot, self.task.brain, watch)
             except BaseException as caught:
                 self.error = caught
                 raise
@@ -180,7 +206,8 @@ class _Run:
         started = wall.perf_counter()
         error: BaseException | None = None
         try:
-            self._loop()
+            with StepWatch(AT_LEISURE) as watch:
+                self._loop(watch)
         except (BoebotError, KeyboardInterrupt) as caught:
             error = caught
         finally:
@@ -188,7 +215,7 @@ class _Run:
                 self._stop_all(error)
         return self._result(error, wall.perf_counter() - started)
 
-    def _loop(self) -> None:
+    def _loop(self, watch: StepWatch) -> None:
         """Turns the clock until all are done.
 
         Raises:
@@ -197,15 +224,15 @@ class _Run:
         awake = self._robots
         while True:
             for robot in awake:
-                self._turn(robot)
+                self._turn(robot, watch)
             if all(robot.strand.is_done for robot in self._robots):
                 return
             awake = [self._robots[index] for index in self._world.advance()]
             self._report()
 
-    def _turn(self, robot: _Robot) -> None:
+    def _turn(self, robot: _Robot, watch: StepWatch) -> None:
         try:
-            robot.turn()
+            robot.turn(watch)
         except BoebotError as error:
             raise _of_robot(error, robot.number, len(self._robots)) from error
         if (failure := robot.failure) is not None:

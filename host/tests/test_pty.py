@@ -61,7 +61,7 @@ def test_late_brain_skips_steps_and_says_so() -> None:
             time.sleep(0.25)
 
     with pty(Peer()) as served:
-        result = boebot.run(slow, on=served.path, seconds=0.8)
+        result = boebot.run(slow, on=served.path, seconds=0.8, step_timeout=10)
     assert result.late_steps >= 3
     assert result.steps + result.late_steps >= 14
 

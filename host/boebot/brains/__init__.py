@@ -1,8 +1,18 @@
 """Bundled brains, and how a brain is found and loaded.
 
-A brain is a Python file with a function `step(robot)`, or with a class `Brain` that has a method
-`step(self, robot)`. It may also say `PERIOD = 0.1` (seconds from step to step) and `NEEDS = ["whiskers", "ping"]`
-(devices without which it cannot work).
+A brain is a Python file with one of
+
+    def step(robot): ...                     # called every PERIOD
+    class Brain: ...                         # with a method step(self, robot); made afresh for each run
+    brain = Brain([Wander(), Avoid()])       # a boebot.brain.Brain: processes chosen by utility
+
+or a TOML file that composes such processes (boebot.brain.composition). A Python file may also say `PERIOD = 0.1`
+(seconds from step to step) and `NEEDS = ["whiskers", "ping"]` (devices without which it cannot work); a brain of
+processes knows both by itself.
+
+Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that whoever made
+it can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
+time.
 """
 
 from __future__ import annotations
@@ -10,19 +20,25 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import inspect
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from sysconfig import get_path
 from types import ModuleType
 from typing import Any
 
-from boebot.brain import Brain
+from boebot.brain import Brain, Process, StateVariable, composition
+from boebot.cognition import Odometry
 from boebot.errors import BrainError
 from boebot.robot import Robot
 
 FOLDER = Path(__file__).resolve().parent
+_OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages
+_NOBODYS = ("<frozen ", *(f"{folder}{os.sep}" for folder in _OTHERS))  # what files begin with that are not the user's
+PYTHON, TOML = ".py", ".toml"  # what brains are written in
 
 
 @dataclass(frozen=True)
@@ -37,71 +53,124 @@ class LoadedBrain:
     path: Path | None = None
     """The brain's file, if it came from one."""
     brain: Brain | None = None
-    """The brain of processes, if it is one."""
+    """The brain of processes behind `step`, if it is one: its `steps` and `switches` tell of the run."""
+
+    @property
+    def odometry(self) -> str | None:
+        """What the poses in the brain came from in this run: "odometer", "encoders", or "commands" where the robot
+        has neither; None: nothing in it kept a pose."""
+        if self.brain is None:
+            return None
+        begun = {switch.on for switch in self.brain.switches}
+        poses = [one for one in self.brain.processes if isinstance(one, Odometry) and one.name in begun]
+        return ", ".join(dict.fromkeys(one.source for one in poses)) or None
 
 
 def bundled() -> list[str]:
     """Names of the bundled brains."""
-    return sorted(path.stem for path in FOLDER.glob("*.py") if not path.stem.startswith("_"))
+    return sorted(_bundled_files())
+
+
+def _bundled_files() -> dict[str, Path]:
+    return {path.stem: path for path in FOLDER.iterdir() if path.suffix in (PYTHON, TOML) and path.stem[0] != "_"}
 
 
 def load_brain(source: object) -> LoadedBrain:
-    """The brain in a file, of a bundled name, or the function, class or object itself.
+    """The brain in a file, of a bundled name, or the function, class, object or module itself.
 
     Raises:
         BrainError: it is not there, does not compile, fails while it is loaded, or is no brain.
     """
     if isinstance(source, str | Path):
         path = _find(source)
-        module = _execute(path)
-        return _from_module(module, path)
+        if path.suffix == TOML:
+            return _from_object(composition.load(path), path.stem, path)
+        return _from_module(_execute(path), path)
     if isinstance(source, ModuleType):
         return _from_module(source, Path(source.__file__) if source.__file__ else None)
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
     step = getattr(source, "step", None)
+    if isinstance(source, Process):
+        raise BrainError(f"{source.name!r} is one process; expected a brain of it, Brain([{type(source).__name__}()])")
     if callable(step):
-        return _from_object(source, type(source).__name__, None)
+        return _from_object(source, "brain" if type(source) is Brain else type(source).__name__, None)
     if callable(source):
         name = getattr(source, "__name__", "brain")
         _check_step(source, name)
         return LoadedBrain(name, source, _period(source, name), _needs(source, name))
-    raise BrainError(f"{source!r} is no brain; expected a name, a Python file, or something with step(robot)")
+    raise BrainError(
+        f"{source!r} is no brain; expected a name, a Python or TOML file, a boebot.brain.Brain, or something with "
+        "step(robot)"
+    )
 
 
 def place(error: BaseException, path: Path | None) -> str:
-    """Where in the brain's own file the error arose: "wander.py, line 12", or "" if it cannot be told."""
+    """Where in the user's own files the error arose: "wander.py, line 12", or "" if it cannot be told.
+
+    The innermost line of the brain's file. Of a brain from a script or a notebook, or one whose fault is in a file that
+    it imports: of the first file that is the user's.
+    """
     if isinstance(error, SyntaxError) and error.filename and path is not None and Path(error.filename) == path:
         return f"{path}, line {error.lineno}"
-    frames = traceback.extract_tb(error.__traceback__)
-    inside = [frame for frame in frames if path is not None and frame.filename == str(path)]
-    if not inside and path is None:  # from a script or notebook: the outermost frame outside the kit
-        package = str(FOLDER.parent)
-        inside = [frame for frame in frames if not frame.filename.startswith(package)][:1]
-    return f"{inside[-1].filename}, line {inside[-1].lineno}" if inside else ""
+    frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    names = [name for name, _ in frames]
+    outside = [name for name in names if not name.startswith(_NOBODYS)]
+    theirs = str(path) if str(path) in names else next(iter(outside), None)
+    lines = [line for name, line in frames if name == theirs]
+    return f"{theirs}, line {lines[-1]}" if lines else ""
+
+
+def part(error: BaseException) -> str:
+    """The part of a brain of processes in which the error arose: "process 'avoid'", "state variable 'near'", or ""."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        code = frame.f_code
+        owner = frame.f_locals.get(code.co_varnames[0]) if code.co_argcount else None
+        if isinstance(owner, Process):
+            return f"process {owner.name!r}"
+        if isinstance(owner, StateVariable):
+            return f"state variable {owner.name!r}"
+    return ""
 
 
 def explain(error: BaseException, path: Path | None) -> str:
-    """One sentence: the place in the brain's file, what kind of error, and the first line of its text."""
-    where = place(error, path) or str(path or "the brain")
-    what = str(error.msg if isinstance(error, SyntaxError) else error).strip().partition("\n")[0]
-    if isinstance(error, SyntaxError | BrainError):
-        return f"{where}: {what}"
-    return f"{where}: {type(error).__name__}" + (f": {what}" if what else "")
+    """One sentence: the place in the brain's file, the process, what kind of error, and the first line of its text."""
+    what = _first_line(error)
+    if not isinstance(error, SyntaxError | BrainError):
+        what = type(error).__name__ + (f": {what}" if what else "")
+    return locate(error, path, what)
+
+
+def locate(error: BaseException, path: Path | None, sentence: str) -> str:
+    """The sentence with the error's place, and the process where it arose, before it."""
+    inside = part(error)
+    name = inside.partition(" '")[2].rstrip("'")
+    if inside and (repr(name) in sentence or sentence.startswith(f"{name}: ")):  # it says so itself
+        inside = ""
+    return ": ".join(filter(None, (place(error, path) or str(path or "the brain"), inside, sentence)))
+
+
+def _first_line(error: BaseException) -> str:
+    try:
+        return str(error.msg if isinstance(error, SyntaxError) else error).strip().partition("\n")[0]
+    except Exception:  # an exception class of the user's may have its own faults
+        return ""
 
 
 def _find(source: str | Path) -> Path:
     path = Path(source)
-    if path.suffix == ".py" or len(path.parts) > 1:
+    if path.suffix in (PYTHON, TOML) or len(path.parts) > 1:
         if path.is_file():
             return path.resolve()
         raise BrainError(f"there is no brain file {path}")
-    bundled_path = FOLDER / f"{source}.py"
-    if str(source) in bundled() and bundled_path.is_file():
-        return bundled_path
-    hint = f"; did you mean {path}.py?" if Path(f"{path}.py").is_file() else ""
+    files = _bundled_files()
+    if str(source) in files:
+        return files[str(source)]
+    meant = next((f"{path}{suffix}" for suffix in (PYTHON, TOML) if Path(f"{path}{suffix}").is_file()), None)
+    hint = f"; did you mean {meant}?" if meant else ""
     raise BrainError(
-        f"there is no brain {str(source)!r}; expected a bundled one ({', '.join(bundled())}) or a Python file{hint}"
+        f"there is no brain {str(source)!r}; expected a bundled one ({', '.join(bundled())}) or a Python or TOML "
+        f"file{hint}"
     )
 
 
@@ -110,7 +179,7 @@ def _execute(path: Path) -> ModuleType:
     name = f"boebot_brain_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise BrainError(f"{path} is no Python file; a brain's file ends in .py")
+        raise BrainError(f"{path} is no brain file; a brain's file ends in .py or .toml")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
@@ -140,15 +209,33 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
     name = path.stem if path is not None else module.__name__
     where = str(path or name)
     period, needs = _period(module, where), _needs(module, where)
-    kind = getattr(module, "Brain", None)
-    if isinstance(kind, type):
-        made = _from_object(_construct(kind, path), where, path)
-        return LoadedBrain(name, made.step, period or made.period, needs or made.needs, path)
+    made = _made(module, where, path)
+    if made is not None:
+        return replace(made, name=name, period=period or made.period, needs=tuple(dict.fromkeys(needs + made.needs)))
     step = getattr(module, "step", None)
     if callable(step):
         _check_step(step, where)
         return LoadedBrain(name, step, period, needs, path)
-    raise BrainError(f"{where} has neither a function step(robot) nor a class Brain with step(self, robot)")
+    other = next((key for key, value in vars(module).items() if isinstance(value, Brain)), None)
+    hint = f"; it has a Brain called {other}, expected the name brain" if other else ""
+    raise BrainError(
+        f"{where} has neither a function step(robot) nor a class Brain with step(self, robot) nor a "
+        f"brain = Brain([...]){hint}"
+    )
+
+
+def _made(module: ModuleType, where: str, path: Path | None) -> LoadedBrain | None:
+    """Of the module's `brain = Brain([...])`, or of its own class Brain."""
+    brain, kind = getattr(module, "brain", None), getattr(module, "Brain", None)
+    if isinstance(brain, Brain):
+        if callable(getattr(module, "step", None)):
+            raise BrainError(
+                f"{where} has both a function step(robot) and a brain = Brain([...]); expected one of them"
+            )
+        return _from_object(brain, where, path)
+    if isinstance(kind, type) and kind is not Brain:  # that one was imported
+        return _from_object(_construct(kind, path), where, path)
+    return None
 
 
 def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:

@@ -1,4 +1,4 @@
-"""`boebot new NAME`: writes a first brain to start from."""
+"""`boebot new NAME`: writes a brain to start from: a first one, or one of several behaviors."""
 
 from __future__ import annotations
 
@@ -37,11 +37,63 @@ def step(robot: Robot) -> None:
     # More to do:       robot.drive_speed(0.1, 0.1) (m/s)   robot.stop()                robot.chance(0.02)
 '''
 
+SEVERAL_BEHAVIORS = '''"""{name}: wanders, turns away from what is near, and backs off from what it touches.
+
+Of the motor behaviors, the one of the highest utility drives. A utility follows tanh(b + sum of w * state variable +
+gamma) with a lag of tau seconds; gamma is what `kick` sets, and decays.
+
+Run it:    boebot run {file} --out {stem}
+Watch it:  open {stem}/replay.html in a browser
+"""
+
+from dataclasses import dataclass
+
+from boebot import Robot
+from boebot.behaviors import Avoid, Wander
+from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
+from boebot.cognition import contact, near
+
+
+@dataclass(kw_only=True)
+class BackOff(MotorBehavior):
+    """A behavior of your own: back, turning a little."""
+
+    NEEDS = ("whiskers",)  # a robot without them is refused
+
+    signal: float = 0.6  # a parameter: a motor signal
+
+    def enter(self, robot: Robot) -> None:
+        """Called when it becomes the active one."""
+        self.until = robot.time + 0.8  # s
+
+    def step(self, robot: Robot) -> None:
+        """Called at each step while it is active: look at the sensors, drive the motors (-1 ... 1)."""
+        robot.drive(-self.signal, -0.3 * self.signal)
+        if robot.time < self.until:
+            self.kick(self, 5.0)  # keep going, even when nothing is touched any more
+
+
+# State variables: numbers from 0 to 1, made of what sensors say. More of them: StateVariable("late", read), where
+# read(robot) gives the number.
+variables: list[StateVariable] = [near(), contact()]
+
+brain = Brain(
+    [
+        Wander(turn_probability=0.002, utility=Utility(b=0.5)),
+        Avoid(utility=Utility(b=-1.0, w={{"near": 3.0}}, tau=0.1)),
+        BackOff(utility=Utility(b=-1.0, w={{"contact": 4.0}}, tau=0.05)),
+    ],
+    variables,
+    period=0.05,  # seconds from one step to the next
+)
+'''
+
 
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Letters, digits and underscores.")],
+    brain: Annotated[bool, typer.Option("--brain", help="A brain of several behaviors, chosen by utility.")] = False,
 ) -> None:
-    """Write a first brain, NAME.py, to start from."""
+    """Write a brain, NAME.py, to start from."""
     stem = name.removesuffix(".py")
     if not stem.isidentifier():
         raise BrainError(f"{stem!r} cannot be a brain's name; expected letters, digits and underscores")
@@ -50,7 +102,7 @@ def new(
     path = Path(f"{stem}.py")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(FIRST_BRAIN.format(name=stem, file=path, stem=stem))
+            file.write((SEVERAL_BEHAVIORS if brain else FIRST_BRAIN).format(name=stem, file=path, stem=stem))
     except FileExistsError:
         raise BrainError(f"{path} exists already; it was left as it is") from None
     except OSError as error:

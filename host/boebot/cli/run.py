@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from boebot import report
+from boebot.brains import bundled
 from boebot.cli import options, output
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
@@ -17,7 +18,7 @@ from boebot.tasks import Member
 from boebot.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
-_HELP = """Let a brain drive a robot, and say what happened.
+_HELP = f"""Let a brain drive a robot, and say what happened.
 
 Several robots in one simulated world:
 
@@ -27,13 +28,19 @@ Several robots in one simulated world:
 
   boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
 
-What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on."""
+What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on.
+
+Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --brain, one of several behaviors."""
 
 
 def run(
     brain: Annotated[
         list[str],
-        typer.Argument(metavar="BRAIN", help="Bundled brain (wander) or Python file; several: a robot for each."),
+        typer.Argument(
+            metavar="BRAIN",
+            help="What drives it: a bundled brain by its name, a Python file with step(robot), a class Brain or "
+            "brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
+        ),
     ],
     on: options.RunOn = None,
     robot: Annotated[
@@ -58,6 +65,14 @@ def run(
     period: options.Period = None,
     without: options.Without = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
+    step_timeout: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="Wall time after which a step of the brain that has not ended is an error. Else 10 s; in real time "
+            "the time after which the board's dead-man stops the motors.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),
@@ -89,6 +104,7 @@ def run(
                 progress=progress,
                 without=ideal,
                 pose=poses[0] if poses else None,
+                step_timeout=step_timeout,
             )
         else:
             members = [
@@ -101,7 +117,7 @@ def run(
                 )
                 for index in range(count)
             ]
-            together = execute_together(members, arena, seconds, on, seed, realtime, progress)
+            together = execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout)
     if count == 1:
         end(result, out, json)
     else:

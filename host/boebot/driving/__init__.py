@@ -16,6 +16,7 @@ from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
 from boebot.result import RunResult
 from boebot.robot import Robot
+from boebot.stepping import AT_LEISURE, StepLimit
 
 Progress = Callable[[float], None]
 """Called now and then with the seconds of the run that have passed."""
@@ -35,6 +36,8 @@ class Task:
     """may be infinite"""
     period_s: float
     progress: Progress | None = None
+    step_timeout_s: float | None = None
+    """how long a step of the brain may take by the wall clock; None: the driver's choice"""
     brain_seed: int
     """of the brain's chance"""
 
@@ -45,6 +48,10 @@ class Driver(Protocol):
     @property
     def robot(self) -> Robot:
         """What the brain meets."""
+
+    @property
+    def step_limit(self) -> StepLimit:
+        """How long a step of the brain may take."""
 
     def begin(self) -> None:
         """Makes the robot ready to move.
@@ -66,6 +73,11 @@ class Driver(Protocol):
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """What came of the run, which took so long by the wall clock; `error`: why it ended before its time."""
+
+
+def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:
+    """As the task says, or else."""
+    return otherwise if task.step_timeout_s is None else AT_LEISURE._replace(seconds=task.step_timeout_s)
 
 
 def check_period(period_s: float) -> None:

@@ -1,8 +1,9 @@
 """Drives a robot over the link to its board, emulated or real.
 
 The brain's period is a whole number n of the board's control ticks; the brain steps on the first telemetry whose tick
-has reached the next multiple of n, and its command goes out at once. On a board in this process time stands still while
-the brain thinks; on a live board the newest telemetry counts.
+has reached the next multiple of n, and its command goes out at once. On a live board the newest telemetry counts. On a
+board in this process time stands still while the brain thinks; but where such a run is paced, a step that took longer
+than the period was late, as it would be on a live board: that time passes before its command goes out.
 
 A board that was reset, or that has not heard the host for too long, is configured and armed again, and the run goes on.
 """
@@ -21,7 +22,7 @@ from boebot.brain_record import BrainRecord
 from boebot.devices import turret
 from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, Told, told
-from boebot.driving import PROGRESS_S, Task, check_period, whole_ticks
+from boebot.driving import PROGRESS_S, Task, check_period, step_limit, whole_ticks
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
 from boebot.link.delivery import LatchedAgainError, SessionLostError
@@ -31,6 +32,7 @@ from boebot.parameters import configure
 from boebot.record import Record
 from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
+from boebot.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
 TIME_TO_LIVE_LIMIT_MS = 2000
@@ -81,6 +83,7 @@ class BoardDriver:
         self.telemetry_ticks = hello.telemetry_period
         self.period_s = self.period_ticks * self.tick_s
         self.time_to_live_ms = check_time_to_live(self.period_s, self._time_to_live_least())
+        self.step_limit = step_limit(task, self._limit())
         self.identity = self.link.identity()
         pin_map = text(self.identity.pin_map)
         if pin_map != request.robot.pin_map:
@@ -121,6 +124,16 @@ class BoardDriver:
 
     def _time_to_live_least(self) -> float:
         return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.byte_s
+
+    def _limit(self) -> StepLimit:
+        """In real time the motors stop by the dead-man during a step that outlasts its set-points: that is an error of
+        the brain. Steps that are late by less are counted."""
+        if not (self.task.request.realtime or self.session.transport.realtime):
+            return AT_LEISURE
+        return StepLimit(
+            self.time_to_live_ms / 1000,
+            "the dead-man stops the motors then (step_timeout, --step-timeout: how long to wait all the same)",
+        )
 
     def _make_ready(self) -> None:
         """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile."""
@@ -230,8 +243,10 @@ class BoardDriver:
         started_s = heard_s = look_s = transport.now()
         wait_until_s = heard_s + (period + 1) * tick_s
         started = next_progress = wall.perf_counter()
+        meanwhile: list[Received] = []  # what came during a late step of a paced run
         while True:
-            received = poll(look_s, wait_until_s)
+            received = meanwhile + poll(look_s, wait_until_s)
+            meanwhile = []
             now_s = link.polled_s
             if link.sessions != self._session:
                 received = self._in_new_session(received)
@@ -280,7 +295,10 @@ class BoardDriver:
                 slow = self._slow(last) if equipment.tells_slowly else NOTHING_TOLD
                 sample = make(unpack(payload))
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
+                shown = wall.perf_counter()
                 yield time_s
+                if paced and (took_s := wall.perf_counter() - shown) > self.period_s:
+                    meanwhile = poll(heard_s + took_s, heard_s + took_s)
                 if robot.latched or self._halted:
                     self._heed_emergency_stop()
                 if robot.slow_command is not None:
@@ -338,6 +356,7 @@ class BoardDriver:
             clock_offset=self.clock_offset_s,
             steps=len(self.record.steps),
             late_steps=self.late_steps,
+            odometry_source=self.task.brain.odometry,
             resets=self.resets,
             sessions_lost=link.sessions_lost,
             lost_frames=link.decoder.lost,

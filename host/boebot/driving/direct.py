@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 from boebot.boards import VehicleSession
 from boebot.brain_record import BrainRecord
-from boebot.driving import PROGRESS_S, Task, whole_ticks
+from boebot.driving import PROGRESS_S, Task, step_limit, whole_ticks
 from boebot.errors import BoardError
 from boebot.link.messages import Status
 from boebot.readings import Readings, ages, periods
@@ -35,6 +35,8 @@ class DirectDriver:
         self._speed_maximum = request.robot.body.wheel_speed_maximum_m_s
         self.robot = Robot(request.robot.name, self.period_s, task.brain_seed, self._speed_maximum)
         self.record = Record()
+        self.step_limit = step_limit(task)
+        self.late_steps = 0
         self._periods = periods(request.robot, session.layout, len(session.readings()))
         self._sampled = any(period_s > session.tick_s for period_s in self._periods)
         self._ages = (0.0,) * len(self._periods)
@@ -62,7 +64,10 @@ class DirectDriver:
                 next_progress = wall.perf_counter() + PROGRESS_S
                 progress(time_s)
             robot.observation = Observation(sample, equipment, time_s, time_s, time_s, 0.0, sample)
+            shown = wall.perf_counter()
             yield time_s
+            if paced:
+                self.late_steps += int((wall.perf_counter() - shown) / self.period_s)
             command = robot.command
             steps.append((len(times) - 1, *command))
             left, right = (0.0, 0.0) if robot.latched else self._signals(command)
@@ -114,7 +119,8 @@ class DirectDriver:
             truth=self.session.truth(),
             clock_offset=0.0,
             steps=len(self.record.steps),
-            late_steps=0,
+            late_steps=self.late_steps,
+            odometry_source=self.task.brain.odometry,
             resets=0,
             lost_frames=0,
             bad_frames=0,
