@@ -182,7 +182,7 @@ def test_a_robots_file_says_how_full_it_begins_and_what_its_charger_gives(tmp_pa
 
 
 def test_without_contacts_nothing_is_charged(tmp_path: Path) -> None:
-    robot = described("capacity_as = 20.0", tmp_path, 1.0)
+    robot = described("capacity_as = 20.0\ncharger_a = 0", tmp_path, 1.0)
     robot.sim.run(CLOCK_HZ)
     assert robot.pack_voltage == pytest.approx(5.0 + 2.75 * (1 - 0.004) - 0.6 * 0.08, abs=0.01)
 

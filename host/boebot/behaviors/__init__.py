@@ -2,6 +2,9 @@
 
 from boebot.behaviors.avoid import Avoid
 from boebot.behaviors.charge_battery import ChargeBattery
+from boebot.behaviors.escalate import Escalate, LeakyChain
+from boebot.behaviors.escape import Escape
+from boebot.behaviors.evade import Evade
 from boebot.behaviors.follow_wall import FollowWall
 from boebot.behaviors.kinesis import Kinesis
 from boebot.behaviors.phototaxis import Klinotaxis, Phototaxis
@@ -14,9 +17,13 @@ from boebot.behaviors.withdraw import Withdraw
 __all__ = [
     "Avoid",
     "ChargeBattery",
+    "Escalate",
+    "Escape",
+    "Evade",
     "FollowWall",
     "Kinesis",
     "Klinotaxis",
+    "LeakyChain",
     "Phototaxis",
     "RunAndTumble",
     "Stop",

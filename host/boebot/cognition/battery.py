@@ -48,6 +48,8 @@ class BatteryLevel(CognitiveProcess):
     """volts of rise that tell of a charger; more than noise and than what `sag` leaves over"""
     fall: float = 0.05
     """volts of fall that tell of its end"""
+    lift: float = 0.0
+    """volts that the pack stands higher at once on a charger: the charging current times its internal resistance"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -68,7 +70,8 @@ class BatteryLevel(CognitiveProcess):
         """See the class."""
         if self.voltage is None:
             return None
-        return min(max((self.voltage - self.empty) / (self.full - self.empty), 0.0), 1.0)
+        rested = self.voltage - self.lift * self.charging
+        return min(max((rested - self.empty) / (self.full - self.empty), 0.0), 1.0)
 
     def enter(self, robot: Robot) -> None:
         self._forget()
