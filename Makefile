@@ -23,7 +23,7 @@ export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 .PHONY: help run test check bench soak fuzz wheel firmware pictures format setup clean lock compile_commands.json
 
 help:
-	@echo "make run       build everything, let the wander brain drive the emulated robot, write build/run"
+	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
@@ -40,7 +40,7 @@ help:
 
 run:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds 60 --out build/run
+	@$(VENV)/bin/boebot run demo --on avr --robot shieldbot-charging --arena station --seconds 60 --out build/run
 	@echo "Look at build/run/run.png, and open build/run/replay.html in a browser to watch the run."
 
 test:

@@ -121,7 +121,8 @@ class Equipment:
             found = _board_readers(robot, tick_s) | slow
         else:
             found.update(readers(robot, layout or {name: slice(0, 1) for name in robot.device if robot.has(name)}))
-        self._found = frozenset(found)
+        groups = [group for group, members in GROUPS.items() if found.keys() >= set(members)]
+        self._found = frozenset((*found, *groups))
         self.tells_slowly = bool(slow)
         """The board sends messages of slow devices."""
         for name in self.NAMES:
@@ -136,7 +137,7 @@ class Equipment:
         return refuse
 
     def has(self, name: str) -> bool:
-        """Whether the robot has the device, by the name that a brain uses ("ping", "left_ir", ...)."""
+        """Whether the robot has the device, by the name that a brain uses ("ping", "left_ir"), or all of a group."""
         return name in self._found
 
     def missing(self, needs: Iterable[str]) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from boebot import figures
 from boebot.boards import Truth
+from boebot.brain_record import BrainRecord
 from boebot.link.messages import Identity, Status
 from boebot.link.session import text
 from boebot.readings import Layout
@@ -47,6 +48,7 @@ class RunResult:
         notices: what the user should know, in sentences.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
+        brain_record: of a brain of processes: its steps and switches; None: a brain of another kind.
     """
 
     brain: str
@@ -77,6 +79,7 @@ class RunResult:
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
+    brain_record: BrainRecord | None = None
     odometry_source: str | None = None
 
     def __repr__(self) -> str:
@@ -220,6 +223,14 @@ class RunResult:
         known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
         return float(known.max()) if len(known) else None
 
+    def _behavior_figures(self) -> dict[str, float | int | str | None]:
+        """Of a brain of processes: switches between motor behaviors, and the share of time of each."""
+        record = self.brain_record
+        if record is None:
+            return {"behavior_switches": None}
+        shares = {f"{name}_share": round(share, 4) for name, share in record.shares(self.run_time).items()}
+        return {"behavior_switches": len(record.behavior_switches), **shares}
+
     def table(self) -> dict[str, float | int | str | None]:
         """The run's figures by name, units in the names; None: not known, or nothing that this robot has."""
         on_board = self.layout is None
@@ -240,6 +251,7 @@ class RunResult:
             "period_ms": round(self.period * 1000, 3),
             "steps": self.steps,
             "late_steps": self.late_steps,
+            **self._behavior_figures(),
             "ticks": self.ticks,
             "slow_readings": None if slow_age is None else len(self.record.devices),
             "slow_reading_age_ms": None if slow_age is None else round(slow_age * 1000, 3),
@@ -261,8 +273,8 @@ class RunResult:
     # ---- files ---------------------------------------------------------------------------------------------
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Writes run.csv, summary.json, to_board.bin, to_host.bin, wire.csv, run.png and replay.html; returns
-        their paths."""
+        """Writes run.csv, summary.json, to_board.bin, to_host.bin, wire.csv, run.png and replay.html, and of a brain
+        of processes brain.csv and switches.csv; returns their paths."""
         from boebot.report import save
 
         return save(self, Path(folder))

@@ -29,7 +29,7 @@ from boebot.devices.servo import Servo
 from boebot.devices.told import NOTHING_TOLD, Told
 from boebot.devices.turret import Turret
 from boebot.devices.whisker import Whisker
-from boebot.equipment import GROUPS, Dimensions
+from boebot.equipment import Dimensions
 from boebot.equipment import Equipment as Equipment
 from boebot.errors import BrainError
 from boebot.link.messages import Buzzer as BuzzerMessage
@@ -370,8 +370,7 @@ class Robot:
 
     def has(self, name: str) -> bool:
         """Whether the robot has that device ("ping", "left_ir"), or all of that group ("whiskers", "infrared")."""
-        equipment = self.observation.equipment
-        return all(equipment.has(one) for one in GROUPS.get(name, (name,)))
+        return self.observation.equipment.has(name)
 
     @property
     def dimensions(self) -> Dimensions:

@@ -66,6 +66,8 @@ class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     drop_out_v: NotNegative  # of the 5 V regulator
     servos: Literal["regulated", "pack"]  # what they run on
     minimum_v: Annotated[float, msgspec.Meta(ge=0, le=5.5)]  # of the board, below which its motors are off
+    charge: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0  # left as a simulated run begins, of the capacity
+    charger_a: NotNegative = 1.0  # flows into the pack at a charging station (chosen: C/2 of 2,000 mA h)
 
 
 _ANALOG = tuple(range(14, 20))

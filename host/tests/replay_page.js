@@ -14,6 +14,7 @@ function canvasContext() {
     lineTo(x, y) { path.push([x, y]); },
     fill() { drawn.push({ fill: this.fillStyle, alpha: this.globalAlpha ?? 1, path }); },
     fillText(text) { drawn.push({ text }); },
+    fillRect(x, y, width, height) { drawn.push({ bar: this.fillStyle, x, width }); },
   };
   return new Proxy(state, { get: (target, key) => (key in target ? target[key] : () => {}), set: (target, key, value) => { target[key] = value; return true; } });
 }

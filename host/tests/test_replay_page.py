@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.report import style
+from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
+from boebot.report import replay, style
 from boebot.result import RunResult
 
 NODE = shutil.which("node") or shutil.which("nodejs")
@@ -125,3 +126,87 @@ def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tm
     (moment,) = moments(run, tmp_path, 0.1)  # type: ignore[arg-type]
     bodies = [row["path"] for row in moment["drawn"] if row.get("fill") == BODY]
     assert bodies == [outline or [[0, 0, run.robots[0].robot.body.radius_m]]] * 2
+
+
+# ---- a brain of processes -----------------------------------------------------------------------------------------
+
+
+class Ahead(MotorBehavior):
+    def step(self, robot: boebot.Robot) -> None:
+        robot.drive(0.3, 0.3)
+
+
+class Spin(MotorBehavior):
+    def step(self, robot: boebot.Robot) -> None:
+        robot.drive(-0.3, 0.3)
+
+
+def composed() -> Brain:
+    """Turns in the second half of each second."""
+    late = StateVariable("late", lambda robot: float(robot.time % 1 >= 0.5))
+    return Brain([Ahead(utility=Utility(b=0.5)), Spin(utility=Utility(b=-1.0, w={"late": 3.0}, tau=0.05))], [late])
+
+
+@pytest.fixture(scope="module")
+def composed_run() -> RunResult:
+    return boebot.run(composed(), robot="arsim", arena="empty", seconds=6)
+
+
+def bars(moment: dict[str, Any], index: int) -> float:
+    """How wide all bars in the colour of a behavior are together (pixels)."""
+    return float(sum(row["width"] for row in moment["still"] if row.get("bar") == style.behavior(index)))
+
+
+@pytest.mark.parametrize("most", [6000, 40])
+def test_page_says_which_behavior_is_active_and_why(
+    most: int, composed_run: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At steps that the page keeps, also where it keeps one in three."""
+    monkeypatch.setattr(replay, "STEPS_AT_MOST", most)
+    record = composed_run.brain_record
+    assert record is not None and len(record.steps) == 120
+    every = 1 if most > 120 else 3
+    times = [record.steps[index].time for index in range(0, 120, 3 * every)]
+    for time, moment in zip(times, moments(composed_run, tmp_path, *times), strict=True):
+        last = [switch for switch in record.switches if switch.time <= time + 1e-9][-1]
+        texts = moment["texts"]
+        assert (texts["behavior"], texts["reason"]) == (last.on, last.reason)
+        assert texts["since"] == f"since {last.time:.2f} s"
+        wide = [bars(moment, index) for index in (0, 1)]
+        share = record.shares(float(composed_run.series.time[-1]))["spin"]
+        assert wide[1] / sum(wide) == pytest.approx(share, abs=0.01 * every)
+    assert {switch.on for switch in record.switches} == {"ahead", "spin"}
+
+
+def test_page_tells_of_the_brain_of_the_robot_that_is_chosen(composed_run: RunResult, tmp_path: Path) -> None:
+    """Robots 1 and 2 of three have one of processes, each its own; the third has nothing to tell."""
+    brains = [Brain([Spin(name="only")]), composed(), lambda robot: robot.drive(0.1, 0.1)]
+    members = [
+        boebot.Member(brain=brain, robot="arsim", pose=(x, 0.0, 0.0))
+        for x, brain in zip((0.0, 1.0, 2.0), brains, strict=True)
+    ]
+    run = boebot.run_together(members, arena="empty", seconds=1)
+    (moment,) = moments(run, tmp_path, 0.9)  # type: ignore[arg-type]
+    assert moment["texts"]["behavior"] == "only" and "mind" not in moment["hidden"]
+    page = (tmp_path / "replay.html").read_text()
+    for chosen, behavior in ((2, "spin"), (3, None)):
+        other = tmp_path / f"robot-{chosen}.html"
+        other.write_text(page.replace("exec(location.hash)", f'exec("#robot={chosen}")'))
+        assert NODE is not None
+        done = subprocess.run([NODE, str(STAND_INS), str(other), "0.9"], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        shown = json.loads(done.stdout)
+        assert shown["texts"].get("behavior") == behavior
+        assert ("mind" in shown["hidden"]) == (behavior is None)
+
+
+def test_page_stays_small(composed_run: RunResult, tmp_path: Path) -> None:
+    """A step adds a time and a utility for each process, four bytes each, in four characters for three bytes."""
+    with_brain = replay.write([composed_run], tmp_path / "with.html").stat().st_size
+    assert composed_run.brain_record is not None
+    record, composed_run.brain_record = composed_run.brain_record, None
+    try:
+        without = replay.write([composed_run], tmp_path / "without.html").stat().st_size
+    finally:
+        composed_run.brain_record = record
+    assert with_brain - without < 120 * 13 * 4 / 3 + 200 * len(record.switches) + 500

@@ -31,5 +31,5 @@ void battery_init(battery *self, const part_place *place, uint8_t channel, const
   const uint8_t pin = channel == PART_NO_PIN ? PART_NO_PIN : (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel);
   part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_ANALOG}, 1);
   self->parameters = *parameters;
-  supply_init(&parameters->supply, &self->supply, 1.0);
+  supply_init(&parameters->supply, &self->supply, parameters->charge);
 }

@@ -13,6 +13,7 @@ typedef struct {
   supply_parameters supply;
   double divider; /* pin voltage / pack voltage */
   double noise_v; /* standard deviation of one sample at the pin */
+  double charge;  /* left at the beginning, 0 to 1 */
 } battery_parameters;
 /* python: end */
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from boebot.errors import BoardError
+from boebot.errors import BoardError, RobotError
 from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import lib
@@ -157,3 +157,37 @@ def test_a_robot_at_the_charger_takes_charge() -> None:
     assert at.robot.pack_voltage > away.robot.pack_voltage + 0.1
     open_circuit = 7.75 - (7.75 - 5.0) * (22 * 0.08) / 10.0
     assert away.robot.pack_voltage == pytest.approx(open_circuit - 0.6 * 0.08, abs=0.01)
+
+
+def described(text: str, folder: Path, x: float) -> SimRobot:
+    """A shieldbot of that file's table `supply`, at x in an arena with a charger about 1 m, 0."""
+    (folder / "mine.toml").write_text(f"extends = 'shieldbot'\nname = 'mine'\n[supply]\n{text}\n")
+    description = load_robot(folder / "mine.toml")
+    arena = arena_of()
+    assert lib.arena_set_charger(arena.handle, 1.0, 0.0, 0.2) == 0
+    lib.arena_build(arena.handle)
+    robot = Sim(arena, noise=False).add(native_board(native_library("shieldbot")), description)
+    BoardPins(robot).place(x, 0.0, 0.0)
+    return robot
+
+
+def test_a_robots_file_says_how_full_it_begins_and_what_its_charger_gives(tmp_path: Path) -> None:
+    """The board's 0.08 A against 2.08 A from the charger, on 20 A s: a tenth more, or 0.004 less, in a second."""
+    text = "charge = 0.5\ncharger_a = 2.08\ncapacity_as = 20.0"
+    for x, change, current in ((0.0, -0.004, 0.08), (1.0, 0.1, -2.0)):
+        robot = described(text, tmp_path, x)
+        robot.sim.run(CLOCK_HZ)
+        open_circuit = 5.0 + 2.75 * (0.5 + change)
+        assert robot.pack_voltage == pytest.approx(open_circuit - 0.6 * current, abs=0.01)
+
+
+def test_without_contacts_nothing_is_charged(tmp_path: Path) -> None:
+    robot = described("capacity_as = 20.0\ncharger_a = 0", tmp_path, 1.0)
+    robot.sim.run(CLOCK_HZ)
+    assert robot.pack_voltage == pytest.approx(5.0 + 2.75 * (1 - 0.004) - 0.6 * 0.08, abs=0.01)
+
+
+@pytest.mark.parametrize("charge", [-0.1, 1.1])
+def test_charge_that_cannot_be_is_refused(charge: float, tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="charge"):
+        described(f"charge = {charge}", tmp_path, 0.0)

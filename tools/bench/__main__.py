@@ -26,7 +26,7 @@ from tools.bench import report
 from tools.bench.figures import FIGURES, Figure
 
 RESULT = Path("build/bench.json")
-MODULES = ("codec", "board_link", "busy", "clock", "speed", "world", "precision", "setup_time")
+MODULES = ("codec", "board_link", "busy", "clock", "speed", "demo_brain", "world", "precision", "setup_time")
 
 
 def figures(only: list[str]) -> list[Figure]:

@@ -149,6 +149,10 @@ class Brain:
         """Name of the active motor behavior."""
         return self.processes[self._driving].name if self._driving >= 0 else ""
 
+    def has_stepped(self, robot: Robot) -> bool:
+        """Whether `steps` and `switches` are those of that robot's run."""
+        return robot is self._robot
+
     def is_active(self, process: Process) -> bool:
         """Whether one of the brain's processes is active."""
         return bool(self._active) and self._active[self.processes.index(process)]

@@ -81,6 +81,7 @@ class Utilities:
         self._functions = tuple(functions)
         self._variables = tuple(variables)
         self._weights = [self._indexed(function) for function in functions]
+        self._arguments = [(one.b, one.c, weights) for one, weights in zip(functions, self._weights, strict=True)]
         self._elapsed = math.nan  # s; what the factors below are for
         self._factors: list[tuple[float, float]] = []
 
@@ -94,7 +95,7 @@ class Utilities:
     def start(self, z: Sequence[float]) -> None:
         """At rest in those state variables, without gamma: u_i = σ_i(Σ w z + b)."""
         self.gammas = [0.0] * len(self._functions)
-        self.values = [self._settled(index, z) for index in range(len(self._functions))]
+        self.values = [_settled(argument, 0.0, z) for argument in self._arguments]
 
     def advance(self, z: Sequence[float], elapsed: float) -> None:
         """By `elapsed` seconds, in which the state variables are `z`: first gamma parameters, then utilities."""
@@ -104,10 +105,11 @@ class Utilities:
                 (math.exp(-elapsed / function.tau), math.exp(-elapsed / function.tau_gamma))
                 for function in self._functions
             ]
+        values, gammas, arguments = self.values, self.gammas, self._arguments
         for index, (lag, decay) in enumerate(self._factors):
-            self.gammas[index] *= decay
-            settled = self._settled(index, z)
-            self.values[index] = settled + (self.values[index] - settled) * lag
+            gammas[index] = gamma = gammas[index] * decay
+            settled = _settled(arguments[index], gamma, z)
+            values[index] = settled + (values[index] - settled) * lag
 
     def shares(self, index: int, z: Sequence[float]) -> list[Share]:
         """What now drives the utility of a process, the strongest first."""
@@ -115,9 +117,11 @@ class Utilities:
         shares += [Share("b", self._functions[index].b), Share("gamma", self.gammas[index])]
         return sorted((share for share in shares if share.value), key=lambda share: -abs(share.value))
 
-    def _settled(self, index: int, z: Sequence[float]) -> float:
-        function = self._functions[index]
-        argument = function.b + self.gammas[index]
-        for k, weight in self._weights[index]:
-            argument += weight * z[k]
-        return math.tanh(function.c * argument)
+
+def _settled(of: tuple[float, float, tuple[tuple[int, float], ...]], gamma: float, z: Sequence[float]) -> float:
+    """σ(Σ w z + b + Γ), of b, c and the weights by index."""
+    b, c, weights = of
+    argument = b + gamma
+    for k, weight in weights:
+        argument += weight * z[k]
+    return math.tanh(c * argument)

@@ -40,6 +40,8 @@ class StateVariable:
             BrainError: `read` gave no number.
         """
         raw = self.read(robot)
+        if type(raw) is float and 0.0 <= raw <= 1.0:
+            return raw
         if raw is None:
             return 0.0
         try:

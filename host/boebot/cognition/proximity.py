@@ -75,7 +75,6 @@ def near() -> StateVariable:
 
 def _sided(robot: Robot, pair: str, zone: str) -> float | None:
     """An analog sensor's reading; of a pair its zone if it sweeps, else 1 for seen and 0 for not."""
-    found: list[float | None] = []
     if robot.has(zone):
         swept = getattr(robot, zone)
         if swept.valid:
@@ -83,5 +82,5 @@ def _sided(robot: Robot, pair: str, zone: str) -> float | None:
     if robot.has(pair):
         sensor = getattr(robot, pair)
         if sensor.valid:
-            found.append(float(getattr(sensor, "reading", sensor.detected)))
-    return maximum(found)
+            return float(getattr(sensor, "reading", sensor.detected))
+    return None

@@ -18,6 +18,7 @@ from struct import Struct
 
 from boebot import robots
 from boebot.boards import BoardSession
+from boebot.brain_record import BrainRecord
 from boebot.devices import turret
 from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, Told, told
@@ -369,4 +370,5 @@ class BoardDriver:
             notices=self.notices,
             counters=dict(self.session.counters()),
             without=self.task.request.without,
+            brain_record=BrainRecord.of(self.task.brain.brain, self.robot),
         )

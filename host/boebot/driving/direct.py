@@ -11,6 +11,7 @@ import time as wall
 from collections.abc import Iterator
 
 from boebot.boards import VehicleSession
+from boebot.brain_record import BrainRecord
 from boebot.driving import PROGRESS_S, Task, step_limit, whole_ticks
 from boebot.errors import BoardError
 from boebot.link.messages import Status
@@ -130,4 +131,5 @@ class DirectDriver:
             counters=dict(self.session.counters()),
             layout=self.session.layout,
             without=request.without,
+            brain_record=BrainRecord.of(self.task.brain.brain, self.robot),
         )

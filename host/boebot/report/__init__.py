@@ -1,6 +1,7 @@
 """Files that a run leaves behind:
 
 run.csv        one row per control tick: sensors, commands, estimated and, where known, true pose
+brain.csv      of a brain of processes: one row per step of it; switches.csv: what it switched, and why
 summary.json   the figures of the run; `format` numbers the form of all these files
 to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
 wire.csv       when which stretch of those two files crossed the wire
@@ -68,6 +69,8 @@ def save(result: RunResult, folder: Path) -> list[Path]:
             tables.write_run(result, folder / "run.csv"),
             *tables.write_wire(result, folder),
         ]
+        if result.brain_record is not None:
+            paths += tables.write_brain(result.brain_record, folder)
     except OSError as error:
         raise _unwritable(folder, error) from None
     if not result.ticks:

@@ -1,16 +1,18 @@
 """run.png: the run seen from above. Arena, true path, odometric estimate, contacts, the robot at start and end with
-what its sensors look at. What the robot does not have is neither drawn nor named."""
+what its sensors look at. What the robot does not have is neither drawn nor named. Of a brain of processes, the path has
+the colour of the active motor behavior, and its utilities stand below."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Affine2D
 
-from boebot.report import scene, style
+from boebot.report import scene, style, utility_panel
 from boebot.report.arena_drawing import draw_arena, legend_entries
 from boebot.report.robot_drawing import body_patch, draw_robot
 from boebot.report.sheet import Sheet, counted
@@ -21,21 +23,31 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from boebot.brain_record import BrainRecord
     from boebot.result import RunResult
     from boebot.robots import Body
     from boebot.series import Floats, Pose
 
 SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
+SPOT_M = 0.03  # a shorter stretch would hardly be seen
 
 
 def write(result: RunResult, path: Path) -> Path:
     """Draws the run into a PNG file."""
     view = scene.view(result)
     low, high = scene.bounds(view)
-    sheet = Sheet(low, high, _title(result, view), _caption(result, view), _legend(result, view))
+    record = result.brain_record if result.brain_record is not None and result.brain_record.steps else None
+    rows = utility_panel.legend_rows(record) if record is not None else 0
+    sheet = Sheet(low, high, _title(result, view), _caption(result, view), _legend(result, view), rows)
     axes = sheet.axes
     draw_arena(axes, view.plan)
-    _draw_path(axes, view.path, result.series.time)
+    if record is None:
+        _draw_path(axes, view.path, result.series.time)
+    else:
+        assert sheet.panel is not None
+        _draw_behaviors(axes, view.path, result.series.time, record)
+        with rc_context({"text.parse_math": False}):
+            utility_panel.draw(sheet.panel, record, result.run_time)
     if view.estimate is not None:
         axes.plot(view.estimate.x, view.estimate.y, color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
         _draw_ghost(axes, result.robot.body, view.estimate)
@@ -58,6 +70,17 @@ def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
     lines.set_clim(time[0], time[0] + (time[-1] - time[0]) / style.PATH_SHARE)
     lines.set_capstyle("round")
     axes.add_collection(lines)
+
+
+def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -> None:
+    """The path, each stretch in the colour of the motor behavior that was active; a turn on the spot as a dot."""
+    for behavior, begun, until in utility_panel.segments(record, float(time[-1])):
+        first, last = np.searchsorted(time, (begun, until))
+        there = slice(int(first), int(last) + 1)  # up to where the next one begins
+        x, y, colour = path.x[there], path.y[there], style.behavior(behavior)
+        axes.plot(x, y, color=colour, lw=2.4, solid_capstyle="round", zorder=7)
+        if len(x) and np.hypot(np.ptp(x), np.ptp(y)) < SPOT_M:
+            axes.plot(x[0], y[0], "o", ms=5.5, color=colour, mec=style.FLOOR, mew=0.6, zorder=8)
 
 
 def _draw_ghost(axes: Axes, body: Body, estimate: Pose) -> None:
@@ -107,10 +130,12 @@ def _caption(result: RunResult, view: scene.View) -> list[str]:
 
 
 def _legend(result: RunResult, view: scene.View) -> list[Artist]:
-    said = "true path, dark to light in time" if view.known else "path by odometry, dark to light in time"
+    composed = result.brain_record is not None and result.brain_record.steps
+    colours = "coloured by behavior" if composed else "dark to light in time"
+    said = f"true path, {colours}" if view.known else f"path by odometry, {colours}"
     entries: list[Artist] = []
     if view.path_is_seen:
-        entries.append(Line2D([], [], color="#3b8a8c", lw=2.4, label=said))
+        entries.append(Line2D([], [], color=style.behavior(0) if composed else "#3b8a8c", lw=2.4, label=said))
     if view.estimate is not None:
         entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate"))
     for label, colour in (("start", style.START), ("end", style.END)):

@@ -3,9 +3,11 @@
 
 format   number of the data's form, which page and data share
 plan     what stands and moves in the arena (boebot.floor_plan)
-runs     one per robot: title, table, paths, flags, readings, what the robot looks like
+runs     one per robot: title, table, paths, flags, readings, what the robot looks like; `mind`, what a brain of
+         processes did, or null: processes, utilities, the active motor behavior, the last switch to it
 
-Arrays are little-endian float32 (`flags`: uint8), one entry per frame.
+Arrays are little-endian float32 (`flags` and `motor`: uint8), one entry per frame; those of `mind` one per step of the
+brain, fewer where there are very many.
 """
 
 from __future__ import annotations
@@ -22,14 +24,17 @@ import numpy as np
 from boebot import robots
 from boebot.link.messages import Status
 from boebot.report import scene, sensors, style
+from boebot.report.utility_panel import shown_cognitive
 
 if TYPE_CHECKING:
+    from boebot.brain_record import BrainRecord
     from boebot.floor_plan import FloorPlan, Moving, Solid
     from boebot.result import RunResult
     from boebot.series import Floats, Pose, Readout
 
-FORMAT = 3
+FORMAT = 4
 FRAMES_AT_MOST = 20_000
+STEPS_AT_MOST = 6_000  # of a brain of processes
 _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
 
@@ -119,9 +124,36 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "left": _array(series.left_signal[thin]),
         "right": _array(series.right_signal[thin]),
         "ping": _array(np.nan_to_num(series.ping_distance[thin], nan=-1.0)),
+        "mind": None if result.brain_record is None else _mind(result.brain_record),
         "readings": [_reading(readout, thin) for readout in series.readouts()],
-        "flags": base64.b64encode(flags[thin].astype(np.uint8).tobytes()).decode("ascii"),
+        "flags": _flags(flags[thin]),
     }
+
+
+def _mind(record: BrainRecord) -> dict[str, Any] | None:
+    """A brain of processes: of each kept step its utilities, the active behavior, and why it was switched to."""
+    if not record.steps:
+        return None
+    thin = slice(None, None, max(1, math.ceil(len(record.steps) / STEPS_AT_MOST)))
+    time, chosen = record.time[thin], [switch for switch in record.switches if switch.on in record.behaviors]
+    last = np.searchsorted([switch.time for switch in chosen], time, side="right") - 1
+    kept = np.unique(last)  # switches that no kept step tells of are left out
+    return {
+        "behaviors": [
+            {"name": name, "colour": style.behavior(index), "utility": _array(record.utility_of(name)[thin])}
+            for index, name in enumerate(record.behaviors)
+        ],
+        "cognitive": [
+            {"name": name, "utility": _array(record.utility_of(name)[thin])} for name in shown_cognitive(record)
+        ],
+        "time": _array(time),
+        "motor": _flags(record.motor[thin]),
+        "switches": [[round(chosen[index].time, 3), chosen[index].on, chosen[index].reason] for index in kept],
+    }
+
+
+def _flags(values: np.ndarray) -> str:
+    return base64.b64encode(values.astype(np.uint8).tobytes()).decode("ascii")
 
 
 def _reading(readout: Readout, thin: slice) -> dict[str, Any]:

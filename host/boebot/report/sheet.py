@@ -1,4 +1,5 @@
-"""The sheet that pictures of runs are drawn on: a title, a line of figures, a field with axes in metres, a legend."""
+"""The sheet that pictures of runs are drawn on: a title, a line of figures, a field with axes in metres, a legend, and
+if wished a panel below the field."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
 
     from boebot.floor_plan import Floats
 
@@ -24,6 +26,7 @@ LEFT_IN, RIGHT_IN = 0.72, 0.18  # beside the field
 TALLEST_IN = 8.2  # of the field
 LINE_IN, ROW_IN = 0.22, 0.205  # of the caption, of the legend
 CAPTION_COLUMNS, TITLE_COLUMNS = 126, 68
+PANEL_IN, PANEL_BELOW_IN = 1.5, 0.5  # of the panel below the field, and for the words below it
 ENTRY_IN, LETTER_IN = 0.5, 0.062  # of the legend: handle and gaps, one letter
 PARTING = "   ·   "
 
@@ -33,10 +36,20 @@ class Sheet:
 
     Attributes:
         axes: of the field, to draw on.
+        panel: the axes below the field, where they were asked for.
     """
 
-    def __init__(self, low: Floats, high: Floats, title: str, caption: Sequence[str], legend: Sequence[Artist]) -> None:
-        """Field from `low` to `high` (m), two corners; parts of the caption; entries of the legend."""
+    def __init__(
+        self,
+        low: Floats,
+        high: Floats,
+        title: str,
+        caption: Sequence[str],
+        legend: Sequence[Artist],
+        panel_rows: int = 0,
+    ) -> None:
+        """Field from `low` to `high` (m), two corners; parts of the caption; entries of the legend; rows of the
+        legend above a panel below the field, 0: there is no panel."""
         self.title, self.caption = title, PARTING.join(caption)
         lines = _wrapped(caption)
         across = style.WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -46,7 +59,9 @@ class Sheet:
         columns = max(1, min(len(legend), int(across / (ENTRY_IN + LETTER_IN * longest))))
         rows = -(-len(legend) // columns)
         above = 0.62 + LINE_IN * len(lines)
-        below = 0.5 + ROW_IN * rows + 0.12
+        foot = ROW_IN * rows + 0.12
+        panel_in = PANEL_IN + ROW_IN * panel_rows + 0.15 + PANEL_BELOW_IN if panel_rows else 0.0
+        below = 0.5 + panel_in + foot
         tall = height * scale + above + below
         self._figure = Figure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
         FigureCanvasAgg(self._figure)
@@ -60,9 +75,16 @@ class Sheet:
             )
         )
         self.axes.set_facecolor(style.PAPER)
+        self.panel = self._panel(foot, across, tall) if panel_rows else None
         frame(self.axes, low, high)
         with rc_context({"text.parse_math": False}):  # a $ in a name is a $
             self._write(tall, lines, legend, columns)
+
+    def _panel(self, foot: float, across: float, tall: float) -> Axes:
+        """Axes as wide as the sheet, `foot` above its lower edge."""
+        return self._figure.add_axes(
+            (LEFT_IN / style.WIDTH_IN, (foot + PANEL_BELOW_IN) / tall, across / style.WIDTH_IN, PANEL_IN / tall)
+        )
 
     def _write(self, tall: float, lines: Sequence[str], legend: Sequence[Artist], columns: int) -> None:
         """Title, caption and legend on a sheet so many inches tall."""

@@ -35,6 +35,9 @@ ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#4b
 DASHES = ((0, ()), (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)))
 """Of their paths: another one each time the colours begin anew, so that 32 robots differ."""
 
+BEHAVIORS = ("#0072b2", "#cc79a7", "#009e73", "#e69f00", "#56b4e9", "#4b3f99", "#8a6d00", "#6b7280")
+"""Of the motor behaviors of a brain, in its order, over and over."""
+
 WIDTH_IN = 8.4  # of a picture of a run; 1092 pixels
 DPI = 130
 
@@ -42,6 +45,11 @@ DPI = 130
 def colour(number: int) -> str:
     """Of the robot of that number, from 1."""
     return ROBOTS[(number - 1) % len(ROBOTS)]
+
+
+def behavior(index: int) -> str:
+    """Colour of the motor behavior of that index, from 0."""
+    return BEHAVIORS[index % len(BEHAVIORS)]
 
 
 def dashes(number: int) -> tuple[int, tuple[float, ...]]:

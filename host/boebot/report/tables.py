@@ -1,4 +1,4 @@
-"""The record of a run as files for other programs: run.csv, summary.json, the raw bytes and their time stamps."""
+"""The record of a run as files for other programs: run.csv, brain.csv, summary.json, the raw bytes and their stamps."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from boebot.brain_record import BrainRecord
     from boebot.result import RunResult
 
 FORMAT = 2  # of a run's files; CHANGELOG.md says what is new in each
@@ -52,6 +53,31 @@ def write_run(result: RunResult, path: Path) -> Path:
         writer.writerow(table)
         writer.writerows(zip(*table.values(), strict=True))
     return path
+
+
+def brain_columns(record: BrainRecord) -> dict[str, list[str]]:
+    """The columns of brain.csv: heading -> cells, one per step of the brain."""
+    table = {"time_s": _cells(record.time, 4), "active": [step.motor for step in record.steps]}
+    table |= {f"z_{name}": _cells(record.values[:, k], 6) for k, name in enumerate(record.variables)}
+    table |= {f"u_{name}": _cells(record.utilities[:, i], 6) for i, name in enumerate(record.processes)}
+    table |= {f"gamma_{name}": _cells(record.gammas[:, i], 6) for i, name in enumerate(record.processes)}
+    table |= {f"active_{name}": _cells(record.active[:, record.processes.index(name)]) for name in record.cognitive}
+    return table
+
+
+def write_brain(record: BrainRecord, folder: Path) -> list[Path]:
+    """brain.csv and switches.csv"""
+    table = brain_columns(record)
+    steps, switches = folder / "brain.csv", folder / "switches.csv"
+    with steps.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    with switches.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("time_s", "off", "on", "reason"))
+        writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in record.switches)
+    return [steps, switches]
 
 
 def write_summary(result: RunResult, path: Path) -> Path:
