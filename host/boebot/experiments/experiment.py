@@ -33,10 +33,21 @@ class Measured:
         return self.least <= self.value <= self.most
 
     @property
+    def text(self) -> str:
+        """The value in as few digits, four or more, as are within the bounds just where the value is."""
+        if not math.isfinite(self.value) or self.value == round(self.value):
+            return f"{self.value + 0.0:.0f}"  # + 0.0: no negative zero
+        least = max(4, len(f"{abs(self.value):.0f}"))
+        texts = (f"{self.value:.{digits}g}" for digits in range(least, 18))
+        return next(text for text in texts if (self.least <= float(text) <= self.most) == self.is_met)
+
+    @property
     def expected(self) -> str:
         """The criterion in words."""
         if self.least == self.most:
             return f"{self.least:g}"
+        if f"{self.least:g}" == f"{self.most:g}":
+            return f"{(self.least + self.most) / 2:g} ± {(self.most - self.least) / 2:.1g}"
         if math.isinf(self.least):
             return f"at most {self.most:g}"
         if math.isinf(self.most):
@@ -70,8 +81,16 @@ class Outcome:
         return all(one.is_met for one in self.measured)
 
     def columns(self) -> dict[str, np.ndarray[Any, Any]]:
-        """The data as arrays."""
-        return {name: np.asarray(column) for name, column in self.data.items()}
+        """The data as arrays.
+
+        Raises:
+            ValueError: they are no columns of one length.
+        """
+        columns = {name: np.asarray(column) for name, column in self.data.items()}
+        if len({column.shape for column in columns.values()}) != 1 or any(c.ndim != 1 for c in columns.values()):
+            shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+            raise ValueError(f"the data are no columns of one length: {shapes or 'there are none'}")
+        return columns
 
 
 @dataclass(frozen=True, kw_only=True)
