@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boebot.brain.leaky import LeakyIntegrator
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
@@ -43,26 +42,23 @@ class Response:
 def respond(dose: float = X_1, seconds: float = 4.0, step: float = 0.001) -> Response:
     """Stentor under a disturbance of that strength, X_1.
 
-    Later starts follow from short returns to feeding, and feel the step: at 1 ms they are those of the specification,
-    with steps that go to nothing the last two come 0.06 s later.
+    Later starts follow from short returns to feeding, and feel the step and the scheme: with Euler steps of 1 ms, X
+    before U, they are those of the specification; with steps that go to nothing the last two come 0.06 s later.
     """
-    avoidance = [LeakyIntegrator(a, b) for a, b in zip(DECAYS, GAINS, strict=True)]
-    noxious, calmed = LeakyIntegrator(K_1, 1.0), LeakyIntegrator(K_2, 1.0)
+    avoidance = [0.0] * len(DECAYS)
     x = 0.0
     found = Response([], [], [], [])
     for index in range(round(seconds / step)):
-        utilities = (FEED, *(one.value for one in avoidance))
+        utilities = (FEED, *avoidance)
         active = max(range(5), key=utilities.__getitem__)
         if not found.starts or found.starts[-1][0] != active + 1:
             found.starts.append((active + 1, index * step))
         found.times.append(index * step)
         found.stimulus.append(x)
         found.utilities.append(utilities)
-        source, rate = (noxious, dose) if active == 0 else (calmed, X_2)
-        source.value = x
-        x = source.advance(rate, step)
-        for one in avoidance:
-            one.advance(x, step)
+        decay, rate = (K_1, dose) if active == 0 else (K_2, X_2)
+        x += step * (rate - decay * x)  # (7.14), (7.15)
+        avoidance = [u + step * (b * x - a * u) for u, a, b in zip(avoidance, DECAYS, GAINS, strict=True)]  # (7.12)
     return found
 
 
@@ -73,7 +69,8 @@ def _draw(found: Response) -> object:
             upper.plot(found.times, [utilities[index] for utilities in found.utilities], label=name)
         upper.set(ylabel="utility U")
         upper.legend(fontsize="small", ncols=3)
-        lower.step([time for _, time in found.starts], [which for which, _ in found.starts], where="post")
+        starts = [*found.starts, (found.starts[-1][0], found.times[-1])]
+        lower.step([time for _, time in starts], [which for which, _ in starts], where="post")
         lower.set(xlabel="time (s)", ylabel="active", yticks=range(1, 6))
 
     return draw
