@@ -134,8 +134,13 @@ def _collect(
     while left:
         done, left = wait(left, LOOK_S, FIRST_COMPLETED)
         for future in done:
-            with contextlib.suppress(BrokenProcessPool, CancelledError):
-                yield future.result()
+            try:
+                verdict = future.result()
+            except (BrokenProcessPool, CancelledError):
+                continue  # whoever asked for it sees that it is missing
+            except Exception as error:  # what came of it could not be handed over
+                verdict = Verdict(experiments[futures[future]].name, error=_place(error))
+            yield verdict
         places = (futures[future] for future in left)
         watch({experiments[place].name: shares[place] for place in places if not math.isnan(shares[place])})
 
