@@ -75,6 +75,10 @@ def listing(experiments: Iterable[Experiment]) -> str:
         "Each shows something that the lecture notes say, and is run by one command: `boebot experiment NAME` prints\n"
         "what was measured against what was expected, and writes the figure and its data; `make experiments` runs all\n"
         "and leaves one page of them, build/experiments/index.html. `make pictures` renews these pages.\n\n"
+        "A run leaves, in the folder experiments or where `--out` says, NAME.png and NAME.svg, the figure; NAME.csv,\n"
+        "its data, with units in the columns' names and an empty cell where there is no number; NAME.json, the\n"
+        "verdict. The same seed gives the same bytes, however many processes `--jobs` allows. The exit code is 0 when\n"
+        "everything is met.\n\n"
         f"| name | what it shows | robot | in the notes |\n|---|---|---|---|\n{rows}\n"
     )
 

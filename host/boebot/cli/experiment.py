@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 LIST = "list"
 FOLDER = Path("experiments")
-_HELP = """Run experiments of the notes, and say whether they come out as they should.
+_HELP = """Run experiments of the notes: figures, measured against expected.
 
   boebot experiment list          all of them
 
@@ -90,17 +90,17 @@ def _chosen(wanted: Sequence[str], known: Mapping[str, Experiment]) -> list[Expe
 
 def _list(experiments: Sequence[Experiment], as_json: bool) -> None:
     if as_json:
-        fields = ("name", "title", "robot", "source", "slow")
+        fields = ("name", "title", "robot", "section", "source", "slow")
         output.print_json({"experiments": [{key: getattr(one, key) for key in fields} for one in experiments]})
         return
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    rows = Table("name", "", "title", "robot", "in the notes", box=box.SIMPLE_HEAD, pad_edge=False)
+    rows = Table("name", "", "title", "robot", "section", box=box.SIMPLE_HEAD, pad_edge=False)
     rows.columns[0].no_wrap = rows.columns[1].no_wrap = True
     for one in experiments:
-        rows.add_row(one.name, "slow" if one.slow else "", one.title, one.robot, one.source)
+        rows.add_row(one.name, "slow" if one.slow else "", one.title, one.robot, one.section)
     Console().print(rows)
 
 

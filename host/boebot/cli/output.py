@@ -136,26 +136,24 @@ def share_bars(names: Sequence[str]) -> Iterator[Callable[[Mapping[str, float]],
     overall = bars.add_task(f"{len(names)} experiments", total=len(names), visible=len(names) > 1)
     tasks = {name: bars.add_task(name, total=1.0, visible=False, start=False) for name in names}
     done = dict.fromkeys(names, 0.0)
-    begun = time.monotonic()
-    shown = False
+    timer = threading.Timer(BAR_AFTER_S, bars.start)
+    timer.daemon = True
 
     def report(shares: Mapping[str, float]) -> None:
-        nonlocal shown
-        if not shown and time.monotonic() - begun > BAR_AFTER_S:
-            bars.start()
-            shown = True
         for name, share in shares.items():
-            if done[name] == 0.0:
+            if not bars.tasks[tasks[name]].started:
                 bars.start_task(tasks[name])
             done[name] = share
             bars.update(tasks[name], completed=share, visible=share < 1.0)
         bars.update(overall, completed=sum(done.values()))
 
+    timer.start()
     try:
         yield report
     finally:
-        if shown:
-            bars.stop()
+        timer.cancel()
+        timer.join()
+        bars.stop()
 
 
 @contextlib.contextmanager

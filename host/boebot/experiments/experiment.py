@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -114,6 +115,12 @@ class Experiment:
     """with a seed"""
     topic: str = field(default="")
     """the file that it stands in"""
+
+    @property
+    def section(self) -> str:
+        """The first section of the notes that `source` names; "" where it names none."""
+        found = re.search(r"\d+(\.\d+)+", self.source)
+        return found[0] if found else ""
 
 
 EXPERIMENTS: dict[str, Experiment] = {}

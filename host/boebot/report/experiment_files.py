@@ -61,6 +61,7 @@ def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) 
             target = io.BytesIO()
             figure.savefig(target, format=form, dpi=dpi, metadata=metadata)
             found.append(target.getvalue())
+            figure.set_layout_engine("none")  # it is laid out
     return found
 
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from cycler import cycler
-
 PAPER = "#fbfaf7"
 FLOOR = "#ffffff"
 INK = "#2e3440"
@@ -48,11 +46,13 @@ PLOTS: dict[Any, Any] = {
     "axes.facecolor": FLOOR,
     "axes.grid": True,
     "axes.labelcolor": INK,
-    "axes.prop_cycle": cycler(color=ROBOTS),
+    "axes.prop_cycle": f"cycler('color', {ROBOTS})",
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlecolor": INK,
     "axes.titlesize": "medium",
+    "figure.constrained_layout.h_pad": 0.08,  # inches
+    "figure.constrained_layout.w_pad": 0.1,
     "figure.facecolor": PAPER,
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture everywhere
     "font.size": 10.0,
