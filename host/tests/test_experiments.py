@@ -19,11 +19,6 @@ from tools import experiment_pages
 
 EXPERIMENTS = all_experiments()
 QUICK = [name for name, one in EXPERIMENTS.items() if not one.slow]
-MISSED = {
-    "E60": "by (7.11) to (7.15) with the specified parameters X stays near C a_4 / b_4 while B1 and B4 take turns, "
-    "which draws U_5 to 0.52, above C = 0.46: B5 begins at 2.64 s, whatever the step",
-    "dose-response": "expects of B5 what E60 expects",
-}
 SAME = 1e-3  # of a figure on a page: another computer's last digits may differ
 NOTHING = 1e-9  # and what is rounding alone
 
@@ -33,12 +28,7 @@ def outcome(name: str) -> Outcome:
     return EXPERIMENTS[name].run(experiment_pages.SEED, lambda share: None)
 
 
-def known_misses() -> list[object]:
-    marks = {name: pytest.mark.xfail(reason=reason, strict=True) for name, reason in MISSED.items()}
-    return [pytest.param(name, marks=marks.get(name, ())) for name in QUICK]
-
-
-@pytest.mark.parametrize("name", known_misses())
+@pytest.mark.parametrize("name", QUICK)
 def test_quick_experiment_is_met(name: str) -> None:
     found = outcome(name)
     assert found.measured and found.columns()
@@ -54,8 +44,9 @@ def test_experiment_says_what_it_is(name: str) -> None:
         assert text and text == text.strip() and "\n" not in text
     assert one.caption.endswith(".") and not one.title.endswith(".")
     assert one.section, "names no section of the notes"
-    if one.robot != "none":
-        load_robot(re.split(r"[ ,(]", one.robot)[0])
+    robot = re.split(r"[ ,(]", one.robot)[0]
+    if robot != "none":
+        load_robot(robot)
 
 
 def test_names_differ_as_names_of_files() -> None:

@@ -110,11 +110,6 @@ class Swarm:
         """Share of them within the attractant's width at the end."""
         return float((np.hypot(*self.ended.T) < SPREAD).mean())
 
-    def parts(self, count: int) -> list[Swarm]:
-        """As so many groups of equal size."""
-        pairs = zip(np.split(self.begun, count), np.split(self.ended, count), strict=True)
-        return [Swarm(begun, ended, self.running) for begun, ended in pairs]
-
 
 def swarm(
     draw: np.random.Generator, *, uniform: bool = False, jitter: bool = True, count: int = 100, seconds: float = 10.0
@@ -177,11 +172,14 @@ def _draw_swarm(group: Swarm, title: str) -> object:
     caption="100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.",
 )
 def accumulation(seed: int, progress: Progress) -> Outcome:
-    repeats = 10  # at once: none knows of any other
-    group = swarm(np.random.default_rng([seed, 0]), count=100 * repeats)
-    progress(0.5)
-    control = swarm(np.random.default_rng([seed, 100]), count=100 * repeats, uniform=True)
-    groups, controls = group.parts(repeats), control.parts(repeats)
+    groups = []
+    for number in range(10):
+        groups.append(swarm(np.random.default_rng([seed, number])))
+        progress(number / 20)
+    controls = []
+    for number in range(10):
+        controls.append(swarm(np.random.default_rng([seed, 100 + number]), uniform=True))
+        progress(0.5 + number / 20)
     measured = [
         Measured("mean distance against the beginning", float(np.mean([one.ratio for one in groups])), most=0.3),
         Measured("share within the width at the end", float(np.mean([one.share for one in groups])), least=0.85),

@@ -47,12 +47,12 @@ class Measured:
         """The criterion in words."""
         if self.least == self.most:
             return f"{self.least:g}"
-        if f"{self.least:g}" == f"{self.most:g}":
-            return f"{(self.least + self.most) / 2:g} ± {(self.most - self.least) / 2:.1g}"
         if math.isinf(self.least):
             return f"at most {self.most:g}"
         if math.isinf(self.most):
             return f"at least {self.least:g}"
+        if f"{self.least:g}" == f"{self.most:g}":
+            return f"{(self.least + self.most) / 2:g} ± {(self.most - self.least) / 2:.1g}"
         return f"{self.least:g} to {self.most:g}"
 
 
