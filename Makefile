@@ -20,18 +20,19 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench soak fuzz wheel firmware pictures format setup clean lock compile_commands.json
+.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures format setup clean lock compile_commands.json
 
 help:
 	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; all experiments"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
-	@echo "make pictures  the pictures of the documentation"
+	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.html"
+	@echo "make pictures  the pictures of the documentation, and the pages of experiments"
 	@echo "make format    format all sources"
 	@echo "make setup     only what run, test and check need; do no more"
 	@echo "make clean     remove everything that was built"
@@ -57,8 +58,12 @@ bench:
 	@$(SIDE_BY_SIDE) ready-bench
 	@$(PYTHON_VENV) -m tools.bench $(if $(ONLY),--only "$(ONLY)") $(if $(PAGE),--page $(PAGE))
 
+experiments:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(VENV)/bin/boebot experiment --all --out build/experiments
+
 SECONDS ?= 3600
-soak:
+soak: experiments
 	@$(SIDE_BY_SIDE) ready-bench
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 	@$(PYTHON_VENV) -m tools.bench.saturation 60
@@ -78,6 +83,7 @@ pictures:
 	@$(PYTHON_VENV) -m sim_bridge.arena_reference --pictures
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
+	@$(PYTHON_VENV) -m tools.experiment_pages
 
 firmware: ready-firmware
 

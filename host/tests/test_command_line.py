@@ -21,31 +21,11 @@ from boebot.boards import BoardRequest, board_kinds, imperfections
 from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
-from boebot.interrupts import SIGNALS
 from boebot.link import messages
 from boebot.link.session import Link
 from boebot.robot import Robot
+from command import boebot, heed_signals
 from peer import InProcess, Peer, Pty, pty
-
-
-def boebot(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Runs the command in this process; returns exit code, standard output and standard error."""
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    sys.argv = ["boebot", *arguments]
-    try:
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    captured = capsys.readouterr()
-    return int(end.value.code or 0), captured.out, captured.err
-
-
-def heed_signals() -> None:
-    """A shell may have told this process, and so its children, to ignore Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture

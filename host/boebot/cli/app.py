@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import info, link, new, options, parameters, run, serve, teleop
+from boebot.cli import experiment, info, link, new, options, parameters, run, serve, teleop
 from boebot.link import messages
 
 app = typer.Typer(
@@ -27,6 +27,7 @@ app.command("teleop", cls=options.Command)(teleop.teleop)
 app.command("link")(link.link)
 app.add_typer(parameters.app, name="parameters")
 app.command("new")(new.new)
+app.command("experiment")(experiment.experiment)
 
 
 def _version(wanted: bool) -> None:

@@ -9,7 +9,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from boebot import figures
@@ -119,6 +119,41 @@ def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
     finally:
         if shown:
             bar.stop()
+
+
+@contextlib.contextmanager
+def share_bars(names: Sequence[str]) -> Iterator[Callable[[Mapping[str, float]], None]]:
+    """Gives a function to call with the shares that are done, 0 to 1, by name. Shows a bar for each that is under way
+    and one for all, once 2 s of wall time have gone by."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    bars = Progress(*columns, console=Console(stderr=True), transient=True)
+    overall = bars.add_task(f"{len(names)} experiments", total=len(names), visible=len(names) > 1)
+    tasks = {name: bars.add_task(name, total=1.0, visible=False, start=False) for name in names}
+    done = dict.fromkeys(names, 0.0)
+    timer = threading.Timer(BAR_AFTER_S, bars.start)
+    timer.daemon = True
+
+    def report(shares: Mapping[str, float]) -> None:
+        for name, share in shares.items():
+            if not bars.tasks[tasks[name]].started:
+                bars.start_task(tasks[name])
+            done[name] = share
+            bars.update(tasks[name], completed=share, visible=share < 1.0)
+        bars.update(overall, completed=sum(done.values()))
+
+    timer.start()
+    try:
+        yield report
+    finally:
+        timer.cancel()
+        timer.join()
+        bars.stop()
 
 
 @contextlib.contextmanager

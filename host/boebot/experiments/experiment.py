@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,15 @@ class Measured:
         return self.least <= self.value <= self.most
 
     @property
+    def text(self) -> str:
+        """The value in as few digits, four or more, as are within the bounds just where the value is."""
+        if not math.isfinite(self.value) or self.value == round(self.value):
+            return f"{self.value + 0.0:.0f}"  # + 0.0: no negative zero
+        least = max(4, len(f"{abs(self.value):.0f}"))
+        texts = (f"{self.value:.{digits}g}" for digits in range(least, 18))
+        return next(text for text in texts if (self.least <= float(text) <= self.most) == self.is_met)
+
+    @property
     def expected(self) -> str:
         """The criterion in words."""
         if self.least == self.most:
@@ -41,6 +51,8 @@ class Measured:
             return f"at most {self.most:g}"
         if math.isinf(self.most):
             return f"at least {self.least:g}"
+        if f"{self.least:g}" == f"{self.most:g}":
+            return f"{(self.least + self.most) / 2:g} ± {(self.most - self.least) / 2:.1g}"
         return f"{self.least:g} to {self.most:g}"
 
 
@@ -70,8 +82,16 @@ class Outcome:
         return all(one.is_met for one in self.measured)
 
     def columns(self) -> dict[str, np.ndarray[Any, Any]]:
-        """The data as arrays."""
-        return {name: np.asarray(column) for name, column in self.data.items()}
+        """The data as arrays.
+
+        Raises:
+            ValueError: they are no columns of one length.
+        """
+        columns = {name: np.asarray(column) for name, column in self.data.items()}
+        if len({column.shape for column in columns.values()}) != 1 or any(c.ndim != 1 for c in columns.values()):
+            shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+            raise ValueError(f"the data are no columns of one length: {shapes or 'there are none'}")
+        return columns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +115,12 @@ class Experiment:
     """with a seed"""
     topic: str = field(default="")
     """the file that it stands in"""
+
+    @property
+    def section(self) -> str:
+        """The first section of the notes that `source` names; "" where it names none."""
+        found = re.search(r"\d+(\.\d+)+", self.source)
+        return found[0] if found else ""
 
 
 EXPERIMENTS: dict[str, Experiment] = {}

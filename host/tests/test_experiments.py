@@ -1,0 +1,93 @@
+"""Every experiment: what it says of itself, whether it is met, and whether its page still says what a run prints.
+
+Those that are slow are run by `make experiments`; of their pages only what needs no run is looked at.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from boebot.experiments import Outcome, all_experiments
+from boebot.report.experiment_files import stem
+from boebot.robots import load_robot
+from tools import experiment_pages
+
+EXPERIMENTS = all_experiments()
+QUICK = [name for name, one in EXPERIMENTS.items() if not one.slow]
+SAME = 1e-3  # of a figure on a page: another computer's last digits may differ
+NOTHING = 1e-9  # and what is rounding alone
+
+
+@cache
+def outcome(name: str) -> Outcome:
+    return EXPERIMENTS[name].run(experiment_pages.SEED, lambda share: None)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_quick_experiment_is_met(name: str) -> None:
+    found = outcome(name)
+    assert found.measured and found.columns()
+    assert not [f"{one.name}: {one.text}, expected {one.expected}" for one in found.measured if not one.is_met]
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_experiment_says_what_it_is(name: str) -> None:
+    one = EXPERIMENTS[name]
+    assert re.fullmatch(r"[\w.-]+", name) and stem(name) == name
+    assert name.lower() not in {"list", "readme", "index"}
+    for text in (one.title, one.source, one.caption):
+        assert text and text == text.strip() and "\n" not in text
+    assert one.caption.endswith(".") and not one.title.endswith(".")
+    assert one.section, "names no section of the notes"
+    robot = re.split(r"[ ,(]", one.robot)[0]
+    if robot != "none":
+        load_robot(robot)
+
+
+def test_names_differ_as_names_of_files() -> None:
+    assert len({name.lower() for name in EXPERIMENTS}) == len(EXPERIMENTS)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_page_begins_and_ends_as_the_kit_writes_it(name: str) -> None:
+    """All but its rows of figures."""
+    expected = experiment_pages.page(EXPERIMENTS[name], [])
+    head, tail = re.split(r"(?<=\|---\|--:\|---\|---\|---\|\n)", expected)
+    text = page(name)
+    assert text.startswith(head) and text.endswith(tail), "stale: make pictures"
+    rows = text[len(head) : len(text) - len(tail) or None].splitlines()
+    assert rows and all(row.startswith("| ") and row.endswith((" met |", " missed |")) for row in rows)
+    picture = experiment_pages.FOLDER / f"{name}.png"
+    assert picture.stat().st_size <= experiment_pages.LARGEST_BYTES and Image.open(picture).size[0] >= 500
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_page_says_what_a_run_prints(name: str) -> None:
+    shown, now = (rows(text) for text in (page(name), experiment_pages.page(EXPERIMENTS[name], outcome(name).measured)))
+    assert [(row[0], *row[2:]) for row in shown] == [(row[0], *row[2:]) for row in now], "stale: make pictures"
+    assert [float(row[1]) for row in shown] == pytest.approx(
+        [float(row[1]) for row in now], rel=SAME, abs=NOTHING, nan_ok=True
+    )
+
+
+def test_list_of_pages_is_complete_and_there_are_no_others() -> None:
+    listed = (experiment_pages.FOLDER / experiment_pages.LIST).read_text(encoding="utf-8")
+    assert listed == experiment_pages.listing(EXPERIMENTS.values()), "stale: make pictures"
+    wanted = {f"{name}{ending}" for name in EXPERIMENTS for ending in (".md", ".png")} | {experiment_pages.LIST}
+    assert {path.name for path in experiment_pages.FOLDER.iterdir()} == wanted
+
+
+def page(name: str) -> str:
+    path: Path = experiment_pages.FOLDER / f"{name}.md"
+    assert path.exists(), "there is no page: make pictures"
+    return path.read_text(encoding="utf-8")
+
+
+def rows(text: str) -> list[list[str]]:
+    """Cells of the table of figures."""
+    return [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")][1:]
