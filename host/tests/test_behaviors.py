@@ -363,7 +363,8 @@ def test_leaky_chain_is_the_solution_of_its_equations() -> None:
 def test_touches_that_do_not_end_are_answered_ever_more_drastically() -> None:
     escalate, stepped = Escalate(utility=Utility(b=-1.0, tau=0.02)), Stepped(0.05, description=FULL)
     brain = Brain([Wander(utility=REST), escalate])
-    answers, commands, beeps = [], [], 0
+    answers: list[str] = []
+    commands, beeps = [], 0
     for _ in range(200):
         commands.append(stepped.step(brain, whiskers=1))
         if brain.active == "escalate" and escalate.answer != (answers[-1] if answers else ""):
