@@ -3,7 +3,7 @@
 What these tests guarantee:
 
 * The modules that brains are made of import neither the simulator nor any module of the library that holds truth, runs
-  robots or talks to boards, not even by way of others: a process that has imported all of them has loaded none of those.
+  robots or talks to boards, not even by way of others: whoever has imported all of them has loaded none of those.
 * From the `Robot` that a brain gets, and from its `Observation`, no chain of attributes, private ones included, of
   properties, containers, bound methods, closures and defaults leads to anything but sensor values, the robot's lengths
   and the brain's own commands and chance. The walk follows what Python's garbage collector says that an object refers
@@ -93,7 +93,7 @@ def test_the_test_of_imports_sees_what_it_looks_for() -> None:
     assert "boebot.boards" in [name for name in found if is_within(name, FORBIDDEN)]
 
 
-# ---- at run time ------------------------------------------------------------------------------------------------------
+# ---- at run time ----------------------------------------------------------------------------------------------------
 
 
 def referents(thing: object) -> Iterator[tuple[str, object]]:
