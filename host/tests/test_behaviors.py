@@ -63,7 +63,7 @@ def test_e19_wander_keeps_its_statistics_whatever_the_period(period: float) -> N
     """
     wander, stepped = Wander(), Stepped(period)
     brain = alone(wander)
-    commands = driven(brain, stepped, round(1000 / period))
+    commands = driven(brain, stepped, round(400 / period))
     kinds = np.array([0 if left == right else 1 if left < right else -1 for left, right in commands])
     assert set(commands) == {(0.5, 0.5), (-0.7, 0.7), (0.7, -0.7)}
     changes = np.flatnonzero(np.diff(kinds)) + 1
