@@ -126,6 +126,14 @@ def where(table: dict[str, Any], file: str, place: str) -> str:
     return f"{file}:{line_of(sources[0][1], place)}" if sources else file
 
 
+def table_at(table: dict[str, Any], place: str) -> dict[str, Any]:
+    """The table at a place such as "process.wander", or an empty one."""
+    found: Any = table
+    for part in place.split(".") if place else ():
+        found = found.get(part) if isinstance(found, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
 def convert(table: dict[str, Any], kind: type[_T], file: str, error: type[BoebotError]) -> _T:
     """The table as a `kind`, all of its numbers finite.
 

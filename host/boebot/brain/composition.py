@@ -23,10 +23,12 @@ Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case wi
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import inspect
+import re
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -93,15 +95,38 @@ def load(path: Path) -> Brain:
             if isinstance(process, dict):
                 process.setdefault("kind", name)
     described: Any = toml_files.convert(table, _file_type(), path.name, BrainError)
-    try:
-        variables: dict[str, StateVariable] = {}
-        made = {name: _process(name, one, variables) for name, one in described.process.items()}
-        variables |= {name: _variable(name, one, made) for name, one in described.variable.items()}
-        for name, process in made.items():
-            _check_readings(name, process)
+    places = _Places(table, path.name)
+    variables: dict[str, StateVariable] = {}
+    made: dict[str, Process] = {}
+    for name, one in described.process.items():
+        with places.at(f"process.{name}"):
+            made[name] = _process(name, one, variables)
+    for name, one in described.variable.items():
+        with places.at(f"variable.{name}"):
+            variables[name] = _variable(name, one, made)
+    for name, process in made.items():
+        with places.at(f"process.{name}"):
+            _check_names(name, process, variables)
+    with places.at(""):
         return Brain(made.values(), variables.values(), period=described.period_s, margin=described.margin)
-    except BrainError as error:
-        raise BrainError(f"{path.name}: {error}") from None
+
+
+class _Places:
+    """Puts file and line before the sentences of what a file describes."""
+
+    def __init__(self, table: dict[str, Any], file: str) -> None:
+        self._table, self._file = table, file
+
+    @contextlib.contextmanager
+    def at(self, place: str) -> Iterator[None]:
+        """For what is made of the table of that place; the line is that of the key which the sentence names first."""
+        try:
+            yield
+        except BrainError as error:
+            keys = toml_files.table_at(self._table, place)
+            key = next((word for word in re.findall(r"[\w]+", str(error)) if word in keys), "")
+            found = ".".join(part for part in (place, key) if part) or "period_s"
+            raise BrainError(f"{toml_files.where(self._table, self._file, found)}: {error}") from None
 
 
 @cache
@@ -123,7 +148,7 @@ def _file_type() -> type[msgspec.Struct]:
 def _table_type(tag: str, process: type[Process]) -> type[msgspec.Struct]:
     """The type of the table of one process: its parameters with their types and defaults."""
     types = typing.get_type_hints(process, localns={"Robot": Robot})
-    fields: list[Any] = [("utility", _Utility | None, None)]
+    fields: list[Any] = [("utility", _Utility, msgspec.UNSET)]
     for field in dataclasses.fields(process):
         if field.init and field.name not in _NO_PARAMETERS:
             kind = str if _is_function(types[field.name]) else types[field.name]
@@ -143,7 +168,7 @@ def _process(name: str, table: msgspec.Struct, variables: dict[str, StateVariabl
     given = msgspec.structs.asdict(table)
     utility = given.pop("utility")
     given = {key: value for key, value in given.items() if value is not msgspec.UNSET}
-    if utility is not None:
+    if utility is not msgspec.UNSET:
         given["utility"] = Utility(**msgspec.structs.asdict(utility))
     process = process_kinds()[str(table.__struct_config__.tag)]
     for key, hint in typing.get_type_hints(process, localns={"Robot": Robot}).items():
@@ -163,13 +188,14 @@ class _Reading:
         return self.variables[self.variable].read(robot)
 
 
-def _check_readings(name: str, process: Process) -> None:
-    for key, value in vars(process).items():
-        if isinstance(value, _Reading) and value.variable not in value.variables:
-            known = ", ".join(value.variables) or "none"
-            raise BrainError(
-                f"process.{name}.{key} names the state variable {value.variable!r}; this brain has {known}"
-            )
+def _check_names(name: str, process: Process, variables: dict[str, StateVariable]) -> None:
+    """Refuses names of state variables that the file does not have."""
+    readings = {key: value.variable for key, value in vars(process).items() if isinstance(value, _Reading)}
+    named = readings | {f"utility.w.{weight}": weight for weight in process.utility.w}
+    for key, variable in named.items():
+        if variable not in variables:
+            known = ", ".join(variables) or "none"
+            raise BrainError(f"process.{name}.{key} names the state variable {variable!r}; this brain has {known}")
 
 
 def _variable(name: str, table: _Variable, processes: dict[str, Process]) -> StateVariable:
