@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,18 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import near
 from boebot.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
-from boebot.experiments.trials import PER_SEED, Trial, arena_file, at_angle, draw_paths, floor, try_once, varied
+from boebot.experiments.trials import (
+    PER_SEED,
+    Trial,
+    arena_file,
+    at_angle,
+    draw_paths,
+    end_of,
+    floor,
+    start_of,
+    try_once,
+    varied,
+)
 from boebot.link import messages
 from boebot.robot import Observation, Robot
 from boebot.robots import RobotDescription, load_robot
@@ -170,14 +182,14 @@ def _wander(setting: Setting) -> Wander:
 def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[Trial]:
     """The setting's runs, each with a brain and a seed of its own."""
     done = []
-    with arena_file("arsim", setting.arena()) as arena:
+    with nullcontext("arsim") if setting.scale == 1 else arena_file("arsim-small", setting.arena()) as arena:
         for number in range(setting.runs):
             done.append(_run(make(setting), setting, arena, PER_SEED * seed + number))
             progress((number + 1) / setting.runs)
     return done
 
 
-def _run(brain: Brain, setting: Setting, arena: Path, seed: int) -> Trial:
+def _run(brain: Brain, setting: Setting, arena: str | Path, seed: int) -> Trial:
     return try_once(brain, setting.robot, arena, setting.seconds, on=setting.on, seed=seed)
 
 
@@ -244,7 +256,6 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
     """One path, with the behavior that drove."""
     from boebot.report import style
     from boebot.report.robot_drawing import draw_robot
-    from boebot.experiments.trials import end_of, start_of
 
     floor(axes, trial)
     avoids: NDArray[np.bool_] = trial.when_active("avoid")
@@ -253,7 +264,7 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
         axes.plot(*shown.T, color=colour, lw=2.6 if name == "avoid" else 1.4, label=name, zorder=7)
     for pose, colour in ((start_of(trial), style.START), (end_of(trial), style.END)):
         draw_robot(axes, trial.result.robot, pose, colour, plan=trial.result.truth.plan if trial.result.truth else None)
-    axes.legend(fontsize="small", loc="upper right")
+    axes.legend(fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.13))
     axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
 
 
