@@ -1,6 +1,6 @@
 """Straight-line odometric navigation: section 5.2 of the notes, listings 5.3 and 5.4, (5.1); E22 to E24.
 
-    s = a (D - d) / D      (5.1)      until |D - d| < b D,   with D = 1 m, a = 0.90, b = 0.02
+s = a (D - d) / D      (5.1)      until |D - d| < b D,   with D = 1 m, a = 0.90, b = 0.02
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
-from boebot.experiments.trials import PER_SEED, Trial, floor, start_of, try_once, varied
+from boebot.experiments.trials import PER_SEED, Trial, try_once
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,9 +81,11 @@ class Straight(Trial):
         return float(np.ptp(self.distances[self.time > self.time[-1] - AT_REST_S]))
 
 
-def drive(brain: Brain, robot: str | RobotDescription, seconds: float, seed: int, on: str | None = None) -> Straight:
-    """One run in the open; of servos, those of a robot that has been centred."""
-    trial = try_once(brain, robot, "empty", seconds, seed=seed, on=on, without=("servo_centre",))
+def drive(
+    brain: Brain, robot: str | RobotDescription, seconds: float, seed: int, on: str | None = None, *without: str
+) -> Straight:
+    """One run in the open, of servos those of a robot that has been centred; without other imperfections too."""
+    trial = try_once(brain, robot, "empty", seconds, seed=seed, on=on, without=("servo_centre", *without))
     return Straight(trial.result, trial.brain)
 
 
@@ -116,7 +118,7 @@ def draw_runs(runs: Sequence[Straight]) -> Draw:
                 )
             series = one.result.series
             for side, signal, colour in (("left", series.left_signal, "C0"), ("right", series.right_signal, "C3")):
-                lower.plot(one.time, signal, color=colour, lw=0.9, label="" if number else side)
+                lower.plot(one.time, signal, color=colour, lw=0.8, alpha=0.7, label="" if number else side)
         upper.set(ylabel="distance (m)", ylim=(0, 1.08))
         lower.set(xlabel="time (s)", ylabel="motor signal")
         upper.legend(fontsize="small", loc="lower right")
@@ -151,24 +153,24 @@ def notes_run(seed: int, progress: Progress) -> Outcome:
 
 
 # The shieldbot. Its servos run at v(s) = 0.178 m/s tanh(k s), k = 200 / 78.5 = 2.55, and stand still within 9 us =
-# 0.045 of their centre: s_min = 0.06 as in E23. They are centred, as is done before a robot's first run: one that is not
-# creeps on at the signal 0. They differ by 2.9 % (1 σ), so it holds its heading, k = 0.5 (section 4.2 of the
+# 0.045 of their centre: s_min = 0.06 as in E23. They are centred, as is done before a robot's first run: one that is
+# not creeps on at the signal 0. They differ by 2.9 % (1 σ), so it holds its heading, k = 0.5 (section 4.2 of the
 # specification), yet by little at the beginning, where another signal hardly changes the speed.
 #   time     (5.1) down to s_min takes ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k) = 8.5 s, the last 0.047 m at
-#            v(0.06) = 0.027 m/s 1.7 s, the lag 0.1 s: 10.3 s. The mean of two servos differs by 2.1 %, three of those are
-#            0.65 s; headings off by up to 0.4 rad make the way 5 % longer, 0.5 s: together 1.2 s
+#            v(0.06) = 0.027 m/s 1.7 s, the lag 0.1 s: 10.3 s. The mean of two servos differs by 2.1 %, three of those
+#            are 0.65 s; headings off by up to 0.4 rad make the way 5 % longer, 0.5 s: together 1.2 s
 #   d̂        stop at the first step beyond 0.98 m; a step of 1.4 mm has at most one edge of each wheel: 3.3 mm more
-#   d        an edge, 3.3 mm, to both sides; edges missed and flickers, 0.0005 of 300 edges of two wheels, are 0.3 of each
-#            kind in a run, and each is 2 edges of one wheel, 3.3 mm: up to three of a kind (four in one run of 4000) are
-#            9.8 mm to both sides; while it comes to rest, in the frame and the lag, 75 ms, 2 mm more
+#   d        an edge, 3.3 mm, to both sides; edges missed and flickers, 0.0005 of 300 edges of two wheels, are 0.3 of
+#            each kind in a run, and each is 2 edges of one wheel, 3.3 mm: up to three of a kind (four in one run of
+#            4000) are 9.8 mm to both sides; while it comes to rest, in the frame and the lag, 75 ms, 2 mm more
 LEAST, HOLD = 0.06, 0.5
 RUN_S = 14.0
 _BY_SERVO = (
     "Servos, centred, run at v(s) = 0.178 m/s tanh(2.55 s) and stand still within 0.045: s_min = 0.06 as in E23; they "
-    "differ by 2.9 % (1 σ): heading hold k = 0.5. Time: 8.5 s by (5.1) down to s_min, 1.7 s at v(0.06), 0.1 s lag; 3 σ of "
-    "the mean of two servos are 0.65 s, a curved way 0.5 s. Believed d: 0.98 m and at most an edge (3.3 mm). "
-    "True d at rest: ± an edge (3.3 mm) and up to three misses or flickers of 2 edges of one wheel (9.8 mm; more in one "
-    "run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as the specification asks of 10 repeats"
+    "differ by 2.9 % (1 σ): heading hold k = 0.5. Time: 8.5 s by (5.1) down to s_min, 1.7 s at v(0.06), 0.1 s lag; 3 σ "
+    "of the mean of two servos are 0.65 s, a curved way 0.5 s. Believed d: 0.98 m and at most an edge (3.3 mm). "
+    "True d at rest: ± an edge (3.3 mm) and up to three misses or flickers of 2 edges of one wheel (9.8 mm; more in "
+    "one run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as the specification asks of 10 repeats"
 )
 
 
@@ -221,8 +223,8 @@ def shieldbot_run(seed: int, progress: Progress) -> Outcome:
     "E22-avr",
     title="A metre straight ahead by odometry: the AVR image",
     source="section 5.2, code listings 5.3 and 5.4, equation (5.1)",
-    caption="Distance and motor signals of three shieldbots with the image of their ATmega328P, each with servos of its "
-    "own, on their way to a destination 1 m ahead.",
+    caption="Distance and motor signals of three shieldbots with the image of their ATmega328P, each with servos of "
+    "its own, on their way to a destination 1 m ahead.",
     robot="shieldbot (avr)",
     criterion=f"{_BY_SERVO}; here 3.",
 )

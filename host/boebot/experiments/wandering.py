@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,9 +74,9 @@ def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], lis
 def judge_stays(forward: list[int], turning: list[int], lefts: list[bool]) -> list[Measured]:
     """What section 8 of the specification asks of them."""
     return [
-        about("mean steps in state 1, forward", np.mean(forward), 100, 5),
-        about("mean steps in state 2, turning", np.mean(turning), 33.3, 2),
-        about("share of turns to the left", np.mean(lefts), 0.5, 0.03),
+        about("mean steps in state 1, forward", float(np.mean(forward)), 100, 5),
+        about("mean steps in state 2, turning", float(np.mean(turning)), 33.3, 2),
+        about("share of turns to the left", float(np.mean(lefts)), 0.5, 0.03),
     ]
 
 
@@ -146,7 +146,6 @@ corners_m = [[{near_by}, {far_to}], [{far}, {far_to}], [{far}, {near_to}], [{nea
 # 0.178 m/s tanh(200 s / 78.5): 0.152 m/s at s = 0.5, so that 1 s of the notes' robot, 0.682 m/s, takes
 # 0.35 · 0.682 / 0.152 = 1.57 s: runs of 47 s, and turns begin with 0.01 / 1.57 = 0.0064. On the spot, at s = 0.7, it
 # turns with 2 · 0.168 / 0.105 = 3.19 rad/s instead of 4.447: turns of the same angle end with 0.03 · 3.19 / 4.447.
-_LIKE_ARSIM = {"scale": 0.35, "turn": 0.0064, "stop_turn": 0.0215, "period": 0.05, "seconds": 47.0}
 NOTES = Setting(robot="arsim")
 NARROW = Setting(
     robot=varied(
@@ -156,8 +155,10 @@ NARROW = Setting(
         infrared_right=at_angle(0.20, -0.3324),
     )
 )
-SHIELDBOT = Setting(robot="shieldbot", on="native", **_LIKE_ARSIM)  # type: ignore[arg-type]
-SHIELDBOT_AVR = Setting(robot="shieldbot", on="avr", runs=4, **_LIKE_ARSIM)  # type: ignore[arg-type]
+SHIELDBOT = Setting(
+    robot="shieldbot", on="native", scale=0.35, turn=0.0064, stop_turn=0.0215, period=0.05, seconds=47.0
+)
+SHIELDBOT_AVR = replace(SHIELDBOT, on="avr", runs=4)
 
 Make = Callable[[Setting], Brain]
 
@@ -282,10 +283,10 @@ def wandering(seed: int, progress: Progress) -> Outcome:
 
 
 _SCALED = (
-    "Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor signal 0.5 its servos run "
-    "at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything takes 0.35 · 0.682 / 0.152 = "
-    "1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against 4.447 rad/s, "
-    "stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
+    "Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor signal 0.5 its servos "
+    "run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything takes 0.35 · 0.682 / "
+    "0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against 4.447 "
+    "rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
 )
 
 
@@ -307,8 +308,8 @@ def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
     "E21",
     title="Wandering and avoiding",
     source="chapter 4; section 4.9 of the specification",
-    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.3: all paths, and the first "
-    "one with the behavior that was active.",
+    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.3: all paths, and the "
+    "first one with the behavior that was active.",
     robot="arsim",
     slow=True,
 )
@@ -316,10 +317,10 @@ def avoiding(seed: int, progress: Progress) -> Outcome:
     return _avoiding(NARROW, seed, progress)
 
 
-# Between seeing and turning the shieldbot needs up to 50 ms (IR schedule) + 50 ms (brain) + 50 ms (lag of the utility) +
-# 75 ms (servo frame and lag), in which it drives 0.225 s · 0.152 m/s = 3.4 cm; turning on the spot its round body goes
-# nowhere. What lies ahead within the body's width, |y| < 0.07 m, is in an IR beam (0.25 to 0.65 rad from (0.05, 0.04),
-# 0.20 m) or the Ping's (±0.35 rad, nearness 0.3 at 0.28 m) when the body's front is still 9 cm or more away.
+# Between seeing and turning the shieldbot needs up to 50 ms (IR schedule) + 50 ms (brain) + 50 ms (lag of the utility)
+# + 75 ms (servo frame and lag), in which it drives 0.225 s · 0.152 m/s = 3.4 cm; turning on the spot its round body
+# goes nowhere. What lies ahead within the body's width, |y| < 0.07 m, is in an IR beam (0.25 to 0.65 rad from (0.05,
+# 0.04), 0.20 m) or the Ping's (±0.35 rad, nearness 0.3 at 0.28 m) when the body's front is still 9 cm or more away.
 _SEEN = (
     "From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) + 75 ms (servo), 3.4 cm at "
     "0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least 9 cm to go; a round body "
