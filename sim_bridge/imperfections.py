@@ -240,6 +240,7 @@ def battery_parameters(supply: robots.Supply, ratio: float = 2.0, draw: Draw = A
                 "servo_idle_a": draw["SERVO_IDLE_A"],
                 "servo_run_a_s_m": draw["SERVO_RUN_A_S_M"],
                 "servo_a_per_n_m": draw["SERVO_A_PER_N_M"],
+                "charger_a": supply.charger_a,
                 "unregulated": float(supply.servos == "pack"),
             },
             "divider": 1.0 / ratio,

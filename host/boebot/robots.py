@@ -66,6 +66,7 @@ class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     drop_out_v: NotNegative  # of the 5 V regulator
     servos: Literal["regulated", "pack"]  # what they run on
     minimum_v: Annotated[float, msgspec.Meta(ge=0, le=5.5)]  # of the board, below which its motors are off
+    charger_a: NotNegative = 1.0  # flows into the pack at a charging station (chosen: C/2 of 2,000 mA h)
 
 
 _ANALOG = tuple(range(14, 20))

@@ -1,6 +1,10 @@
 """Motor behaviors, one per file: parameters are their fields, `Brain` chooses among them."""
 
 from boebot.behaviors.avoid import Avoid
+from boebot.behaviors.charge_battery import ChargeBattery
+from boebot.behaviors.escalate import Escalate, LeakyChain
+from boebot.behaviors.escape import Escape
+from boebot.behaviors.evade import Evade
 from boebot.behaviors.follow_wall import FollowWall
 from boebot.behaviors.kinesis import Kinesis
 from boebot.behaviors.phototaxis import Klinotaxis, Phototaxis
@@ -12,9 +16,14 @@ from boebot.behaviors.withdraw import Withdraw
 
 __all__ = [
     "Avoid",
+    "ChargeBattery",
+    "Escalate",
+    "Escape",
+    "Evade",
     "FollowWall",
     "Kinesis",
     "Klinotaxis",
+    "LeakyChain",
     "Phototaxis",
     "RunAndTumble",
     "Stop",

@@ -1,4 +1,16 @@
-"""Obstacle avoidance by infra-red sensors (chapter 4 of the notes; law of section 4.9 of the specification)."""
+"""Obstacle avoidance by infra-red sensors (chapter 4 of the notes; law of section 4.9 of the specification).
+
+Active while max(S_l, S_r) is above a limit; then (∓0.5, ±0.5), away from the stronger side, until both are clear, and
+a little longer. The limit is the utility's, against Wander's tanh(0.5) with "near" = max(S_l, S_r):
+
+    Utility(b=-1.0, w={"near": 10.0}, tau=0.1)        above tanh(0.5) where 10 S - 1 > 0.5, that is, S > 0.15
+
+The specification's figures, S > 0.3, clear below 0.15, 0.2 s longer, are too little for a body that is wider than its
+sensors' beams. A pillar's corner meets but one of a sensor's three rays, which makes S a third of a wall's: on the
+notes' robot S passes 0.3 where the corner is 0.2 m away at the beam's edge, a robot's radius beside its path. So it is
+heeded earlier, and turned away from for longer. The utility's lag costs distance as well: at 0.68 m/s and τ = 0.2 s
+0.18 m until a sudden S has called it.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +33,9 @@ class Avoid(MotorBehavior):
 
     turn: float = 0.5
     """motor signal of one wheel, and the other's reversed"""
-    clear: float = 0.15
+    clear: float = 0.08
     """nearness below which a side is clear"""
-    after: float = 0.2
+    after: float = 0.4
     """seconds to turn on once both are clear"""
 
     def enter(self, robot: Robot) -> None:

@@ -40,8 +40,7 @@ class Phototaxis(MotorBehavior):
                 robot.drive(-self.signal / 2, self.signal / 2)
             return
         gain = 0.6 * self.signal if self.gain is None else self.gain
-        steer = gain * (left - right) / (left + right) * (-1 if self.flee else 1)
-        robot.drive(within_signals(self.signal - steer), within_signals(self.signal + steer))
+        robot.drive(*steered(self.signal, -gain if self.flee else gain, left, right))
 
 
 @dataclass(kw_only=True)
@@ -80,6 +79,12 @@ class Klinotaxis(MotorBehavior):
             self._sum, self._count = 0.0, 0
         half = (self._side * self.swing + min(max(self._steer, -self.swing), self.swing)) / 2
         robot.drive(within_signals(self.signal - half), within_signals(self.signal + half))
+
+
+def steered(signal: float, gain: float, left: float, right: float) -> tuple[float, float]:
+    """The motor signals s_0 ∓ k a of crossed excitation, where left + right is above 0."""
+    steer = gain * ((left - right) / (left + right))
+    return within_signals(signal - steer), within_signals(signal + steer)
 
 
 def brightness(light: object) -> float:

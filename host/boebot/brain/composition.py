@@ -4,7 +4,11 @@
 
     [variable.near]                  # by its kind,
     [variable.tired]
-    of = "battery_level"             # or of a process that offers one
+    of = "battery_level"             # or of a process that offers one,
+
+    [variable.charging]
+    of = "battery_level"
+    kind = "charging"                # and which, where it offers several
 
     [process.wander]                 # kind = "wander" unless it says otherwise
     turn_probability = 0.002
@@ -52,7 +56,7 @@ class _Utility(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class _Variable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One state variable: of a kind, by default its name, or of a process."""
+    """One state variable: of a kind, by default its name, or of a process, which may offer others besides."""
 
     kind: str | None = None
     of: str | None = None
@@ -171,18 +175,35 @@ def _check_readings(name: str, process: Process) -> None:
 def _variable(name: str, table: _Variable, processes: dict[str, Process]) -> StateVariable:
     if table.of is not None:
         process = processes.get(table.of)
-        make = getattr(process, "variable", None)
-        if make is None:
-            offering = [each.name for each in processes.values() if hasattr(each, "variable")]
+        if process is None or not _offered(process):
+            offering = [each.name for each in processes.values() if _offered(each)]
             raise BrainError(
                 f"variable.{name}.of is {table.of!r}; expected a process that has a state variable: "
                 f"{', '.join(offering) or 'there is none'}"
             )
+        offered = _offered(process)
+        if table.kind not in offered:
+            known = ", ".join(repr(kind) for kind in offered if kind is not None)
+            raise BrainError(
+                f"variable.{name}.kind is {table.kind!r}; {table.of} has {known or 'one alone: expected no kind'}"
+            )
+        make = offered[table.kind]
     else:
         kind = table.kind or name
-        make = variable_kinds().get(kind)
-        if make is None:
+        if kind not in variable_kinds():
             raise BrainError(
                 f"variable.{name}: there is no kind {kind!r}; expected {', '.join(variable_kinds())}, or of ="
             )
+        make = variable_kinds()[kind]
     return dataclasses.replace(make(), name=name)
+
+
+def _offered(process: Process) -> dict[str | None, Callable[[], StateVariable]]:
+    """The state variables that a process offers: its `variable()`, which needs no kind, and each `KIND_variable()`."""
+    found: dict[str | None, Callable[[], StateVariable]] = {}
+    for method in dir(process):
+        if method == "variable":
+            found[None] = process.variable  # type: ignore[attr-defined]
+        elif method.endswith("_variable") and not method.startswith("_"):
+            found[method.removesuffix("_variable")] = getattr(process, method)
+    return found

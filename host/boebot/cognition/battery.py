@@ -1,4 +1,13 @@
-"""How much is left in the battery, by its voltage, which sags while motors run."""
+"""How much is left in the battery, by its voltage, which sags while motors run; and whether it is being charged.
+
+    τ dV/dt + V = v + sag (|s_L| + |s_R|) / 2       v: what is measured, s: the motor signals that make it sag
+
+No robot of the notes has a sensor for its charger: the voltage rises on it, and that is all. So it is charging from
+when V has risen by `rise` above its lowest value since it last left a charger, and no more from when V has fallen by
+`fall` below its highest value since. In between neither changes: on a charger that is full, or weak, it stays charging.
+The state variable "charging" is what keeps a robot there until it is full (section 6.3.8 of the specification:
+without it, it leaves as soon as it is a little less hungry, and comes back at once).
+"""
 
 from __future__ import annotations
 
@@ -6,8 +15,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain.leaky import LeakyIntegrator
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
+from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
@@ -15,10 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class BatteryLevel(CognitiveProcess):
-    """Filters the pack's voltage and makes a level of it.
+    """Filters the pack's voltage, makes a level of it, and notices the charger.
 
     Attributes:
+        voltage: V, filtered, as if no motor ran; None before the first reading.
         level: 0 (empty) to 1 (full), or None before the first reading.
+        charging: the robot seems to be on a charger.
     """
 
     NEEDS = ("battery",)
@@ -29,23 +42,78 @@ class BatteryLevel(CognitiveProcess):
     """volts of the full pack at rest"""
     tau: float = 2.0
     """time constant (s) of the filter: servos draw their current in pulses"""
+    sag: float = 0.0
+    """volts that the pack sags while both motors run at full signal"""
+    rise: float = 0.1
+    """volts of rise that tell of a charger; more than noise and than what `sag` leaves over"""
+    fall: float = 0.05
+    """volts of fall that tell of its end"""
+    lift: float = 0.0
+    """volts that the pack stands higher at once on a charger: the charging current times its internal resistance"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.level: float | None = None
+        if not self.full > self.empty:
+            raise BrainError(f"{self.name}: full is {self.full!r} V; expected more than empty, {self.empty!r} V")
+        for key in ("tau", "rise", "fall"):
+            if not getattr(self, key) > 0:
+                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected more than 0")
+        self._forget()
+
+    def _forget(self) -> None:
+        self.voltage: float | None = None
+        self.charging = False
+        self._turned = math.nan  # the lowest voltage since the charger was left, or the highest since it was reached
+
+    @property
+    def level(self) -> float | None:
+        """See the class."""
+        if self.voltage is None:
+            return None
+        rested = self.voltage - self.lift * self.charging
+        return min(max((rested - self.empty) / (self.full - self.empty), 0.0), 1.0)
 
     def enter(self, robot: Robot) -> None:
-        self.level = None
+        self._forget()
         self._time = robot.time
 
     def step(self, robot: Robot) -> None:
-        elapsed, self._time = robot.time - self._time, robot.time
         battery = robot.battery
-        if not battery.valid or battery.voltage is None:
+        if not battery.valid or battery.voltage is None or not math.isfinite(battery.voltage):
             return
-        now = min(max((battery.voltage - self.empty) / (self.full - self.empty), 0.0), 1.0)
-        self.level = now if self.level is None else now + (self.level - now) * math.exp(-elapsed / self.tau)
+        elapsed, self._time = robot.time - self._time, robot.time
+        unloaded = battery.voltage + self.sag * _effort(robot)
+        if self.voltage is None:
+            self.voltage = self._turned = unloaded
+            return
+        filtered = LeakyIntegrator(1 / self.tau, value=self.voltage)
+        self.voltage = filtered.advance(unloaded, elapsed)
+        self._notice_charger(self.voltage)
+
+    def _notice_charger(self, voltage: float) -> None:
+        self._turned = (max if self.charging else min)(self._turned, voltage)
+        changed = voltage < self._turned - self.fall if self.charging else voltage > self._turned + self.rise
+        if changed:
+            self.charging, self._turned = not self.charging, voltage
 
     def variable(self) -> StateVariable:
         """State variable "low": 1 - level, as of the last step; 0 before the first reading."""
-        return StateVariable("low", lambda robot: None if self.level is None else 1 - self.level, self.NEEDS)
+
+        def low(robot: Robot) -> float | None:
+            level = self.level
+            return None if level is None else 1 - level
+
+        return StateVariable("low", low, self.NEEDS)
+
+    def charging_variable(self) -> StateVariable:
+        """State variable "charging": 1 on a charger, as of the last step, else 0."""
+        return StateVariable("charging", lambda robot: float(self.charging), self.NEEDS)
+
+
+def _effort(robot: Robot) -> float:
+    """How hard both motors are told to run, 0 to 1."""
+    kind, left, right = robot.command
+    if kind == "stop":
+        return 0.0
+    full = robot.dimensions.speed if kind == "speed" else 1.0
+    return min((abs(left) + abs(right)) / 2 / full, 1.0)

@@ -1,0 +1,60 @@
+"""Escape from a touch: a fixed action pattern (sections 4.7 and 4.9 of the specification).
+
+Reverse 0.4 s, turn 120 degrees away from the touched side, forward 0.3 s; once begun it runs to its end, whatever the
+whiskers say meanwhile. How long the turn takes follows from the robot's lengths: rate = 2 s v / track width.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from boebot.brain.fixed_action import Action, FixedActionPattern
+from boebot.errors import BrainError
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+
+@dataclass(kw_only=True)
+class Escape(FixedActionPattern):
+    """Backs off from what a whisker has touched, turns away and goes on."""
+
+    NEEDS = ("whiskers",)
+
+    actions: Sequence[Action | tuple[float, float, float]] = field(default=(), init=False, repr=False)
+    releaser: Callable[[Robot], bool] = field(default=bool, init=False, repr=False)
+
+    back: float = 0.4
+    """seconds of reversing"""
+    angle: float = 2 * math.pi / 3
+    """rad of turning away"""
+    forward: float = 0.3
+    """seconds straight on"""
+    signal: float = 0.5
+    """motor signal of all of it"""
+
+    def __post_init__(self) -> None:
+        self.releaser = self._touched
+        self._left = False
+        super().__post_init__()
+        for key in ("back", "angle", "forward", "signal"):
+            if not 0 < getattr(self, key) < math.inf or self.signal > 1:
+                raise BrainError(
+                    f"{self.name}: {key} is {getattr(self, key)!r}; expected more than 0, a signal up to 1"
+                )
+
+    def enter(self, robot: Robot) -> None:
+        super().enter(robot)
+        s, size = self.signal, robot.dimensions
+        turn = -s if self._left else s
+        seconds = self.angle * size.track_width / (2 * s * size.speed)
+        self._actions = [Action(-s, -s, self.back), Action(turn, -turn, seconds), Action(s, s, self.forward)]
+
+    def _touched(self, robot: Robot) -> bool:
+        left, right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        if left or right:
+            self._left = self.chance(0.5) if left == right else right  # turns away from the touch
+        return left or right

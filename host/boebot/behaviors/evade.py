@@ -1,0 +1,135 @@
+"""The moth's two-threshold escape from bats (section 4.8 of the specification, last line).
+
+A weak signal, a bat far off, makes the moth steer away; a strong one, a bat that has found it, makes it fly erratically
+and then drop:
+
+    weak < S <= strong       a = (S_l - S_r) / (S_l + S_r),  s_L = s_0 + k a,  s_R = s_0 - k a; equal sides: straight on
+    S > strong               for `erratic` seconds a turn by chance every `beat` seconds, then `drop` seconds of nothing
+
+What was begun is done to its end, whatever the signal does meanwhile; then the moth hears anew. What a robot takes for
+the bat is what its `left` and `right` functions read: light, sound, or the nearness of things, the default.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.behaviors.phototaxis import steered
+from boebot.brain.machine import Machine, State
+from boebot.brain.process import CognitiveProcess, MotorBehavior
+from boebot.brain.utility import HOLD
+from boebot.cognition.proximity import left_nearness, right_nearness
+from boebot.errors import BrainError
+
+if TYPE_CHECKING:
+    from boebot.robot import Robot
+
+
+@dataclass(kw_only=True)
+class Evade(MotorBehavior):
+    """Steers away from what is weak, and becomes unpredictable before what is strong.
+
+    It brings along a cognitive process of its own, which listens whatever the robot does, and calls it.
+    """
+
+    left: Callable[[Robot], float | None] = left_nearness
+    """S_l, 0 or more; None: nothing is known, 0"""
+    right: Callable[[Robot], float | None] = right_nearness
+    """S_r"""
+    weak: float = 0.1
+    """max(S_l, S_r) above which it steers away"""
+    strong: float = 0.5
+    """max(S_l, S_r) above which it is found"""
+    signal: float = 0.5
+    """s_0 of steering away"""
+    gain: float = 0.5
+    """k"""
+    erratic: float = 1.0
+    """seconds of turns by chance"""
+    beat: float = 0.2
+    """seconds from one of them to the next"""
+    spread: float = 0.8
+    """motor signals of each wheel are drawn from -spread to spread"""
+    drop: float = 1.0
+    """seconds to lie still"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.weak < self.strong:
+            raise BrainError(
+                f"{self.name}: weak is {self.weak!r} and strong {self.strong!r}; expected 0 <= weak < strong"
+            )
+        for key in ("erratic", "beat", "drop"):
+            if not getattr(self, key) > 0:
+                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected seconds, more than 0")
+        for key in ("signal", "spread"):
+            if not 0 <= getattr(self, key) <= 1:
+                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected 0 to 1")
+
+    def companions(self) -> tuple[CognitiveProcess, ...]:
+        return (Hearing(moth=self, name=f"{self.name}_hearing"),)
+
+    def hear(self, robot: Robot) -> tuple[float, float]:
+        """S_l and S_r."""
+        left, right = (max(function(robot) or 0.0, 0.0) for function in (self.left, self.right))
+        return left, right
+
+    @property
+    def is_bound(self) -> bool:
+        """It is in the middle of its erratic flight or of its drop."""
+        return self._bound
+
+    def enter(self, robot: Robot) -> None:
+        self._bound = False
+        self.machine = Machine(robot, self.steer)
+
+    def step(self, robot: Robot) -> None:
+        if not self._bound and max(self.hear(robot)) > self.strong:
+            self._bound, self._next = True, robot.time
+            self.machine.go(robot, self.flutter)
+        self.machine.step(robot)
+
+    def exit(self, robot: Robot) -> None:
+        self._bound = False
+
+    def steer(self, robot: Robot) -> State | None:
+        left, right = self.hear(robot)
+        if left + right > 0:
+            robot.drive(*steered(self.signal, -self.gain, left, right))
+        else:
+            robot.drive(self.signal, self.signal)
+        return None
+
+    def flutter(self, robot: Robot) -> State | None:
+        if self.machine.time(robot) >= self.erratic - 1e-9:
+            robot.stop()
+            return self.lie
+        if robot.time >= self._next - 1e-9:
+            self._next = robot.time + self.beat
+            robot.drive(*(self.random.uniform(-self.spread, self.spread) for _ in range(2)))
+        return None
+
+    def lie(self, robot: Robot) -> State | None:
+        robot.stop()
+        if self.machine.time(robot) < self.drop - 1e-9:
+            return None
+        self._bound = False
+        return self.steer
+
+    _bound = False
+
+
+@dataclass(kw_only=True)
+class Hearing(CognitiveProcess):
+    """Calls the moth's escape while something is heard, and until what it began is done."""
+
+    moth: Evade
+
+    def step(self, robot: Robot) -> None:
+        heard = max(self.moth.hear(robot))
+        if not math.isfinite(heard):
+            raise BrainError(f"{self.moth.name}: a signal of {heard!r}; expected a finite number")
+        self.kick(self.moth, HOLD if heard > self.moth.weak or self.moth.is_bound else -HOLD)
