@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from boebot.brain import Brain, MotorBehavior, Process
+from boebot.devices.told import NOTHING_TOLD
 from boebot.link import messages
+from boebot.readings import Readings
 from boebot.robot import Command, Equipment, Observation, Robot
 from boebot.robots import RobotDescription, load_robot
+from boebot.vehicle_devices import Energy, Phototransistor
 
 SHIELDBOT = load_robot("shieldbot")
 TICK_S = 0.01
 NOTHING = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
+SLOW = set(messages.DevicesTelemetry._fields) - set(messages.Telemetry._fields)
+FULL = msgspec.structs.replace(  # every device of the shieldbot on
+    SHIELDBOT, device={name: msgspec.structs.replace(device, on=True) for name, device in SHIELDBOT.device.items()}
+)
+QUAD = load_robot("shieldbot-quad")
+_ARSIM = load_robot("arsim")
+VEHICLE = msgspec.structs.replace(  # no board: analog infra-red, odometer, compass, lights, battery
+    _ARSIM,
+    device=_ARSIM.device
+    | {
+        "light_left": Phototransistor(position_m=(0.17, 0.1), heading_rad=0.5),
+        "light_right": Phototransistor(position_m=(0.17, -0.1), heading_rad=-0.5),
+        "battery": Energy(),
+    },
+)
+LAYOUT = {
+    "infrared_left": slice(0, 1),
+    "infrared_right": slice(1, 2),
+    "odometer": slice(2, 5),
+    "compass": slice(5, 6),
+    "light_left": slice(6, 7),
+    "light_right": slice(7, 8),
+    "battery": slice(8, 9),
+}
 
 
 class Stepped:
@@ -24,16 +53,49 @@ class Stepped:
         self.robot = Robot(description.name, period, seed)
         self.steps = 0
         self._equipment = Equipment(description, TICK_S)
-        self.see()
+        if description.has_board:
+            self.see()
 
     def see(self, **fields: int) -> None:
-        """What the sensors say from now on: fields of telemetry."""
-        sample = NOTHING._replace(tick=self.steps, **fields)
-        self.robot.observation = Observation(sample, self._equipment, time=self.steps * self.robot.period)
+        """What the sensors say from now on: fields of telemetry, and of the slow devices'."""
+        slow = {name: value for name, value in fields.items() if name in SLOW}
+        fast = {name: value for name, value in fields.items() if name not in SLOW}
+        told = NOTHING_TOLD
+        if slow:
+            told = NOTHING_TOLD._replace(devices=NOTHING_TOLD.devices._replace(supply=5000, **slow), since=0)
+        sample = NOTHING._replace(tick=self.steps, **fast)
+        self.robot.observation = Observation(sample, self._equipment, time=self.time, slow=told)
+
+    @property
+    def time(self) -> float:
+        """s, of the next step."""
+        return self.steps * self.robot.period
 
     def step(self, brain: Brain, **fields: int) -> Command:
         """One step of the brain; its command."""
         self.see(**fields)
+        brain.step(self.robot)
+        self.steps += 1
+        return self.robot.command
+
+
+class SteppedVehicle(Stepped):
+    """The same for a robot without a board: its readings, in the order of LAYOUT; what is not given is 0."""
+
+    def __init__(self, period: float = 0.01, seed: int = 1) -> None:
+        super().__init__(period, seed, VEHICLE)
+        self._equipment = Equipment(VEHICLE, TICK_S, LAYOUT)
+        self.show()
+
+    def show(self, *values: float) -> None:
+        """What the sensors say from now on."""
+        self.values = values + (0.0,) * (9 - len(values))
+        sample = Readings(self.steps, 1, (0.0,) * 9, self.values)
+        self.robot.observation = Observation(sample, self._equipment, time=self.time, slow=sample)
+
+    def steer(self, brain: Brain, *values: float) -> Command:
+        """One step of the brain with these readings; its command."""
+        self.show(*values)
         brain.step(self.robot)
         self.steps += 1
         return self.robot.command

@@ -63,7 +63,7 @@ class Klinotaxis(MotorBehavior):
         self._side = 1  # +1: swings to the left
         self._until = robot.time + self.seconds / 2
         self._sum, self._count = 0.0, 0
-        self._seen = {1: 0.0, -1: 0.0}
+        self._seen: dict[int, float] = {}  # of the last swing to each side
         self._steer = 0.0
 
     def step(self, robot: Robot) -> None:
@@ -71,8 +71,8 @@ class Klinotaxis(MotorBehavior):
         self._count += 1
         if robot.time >= self._until - 1e-9:
             self._seen[self._side] = self._sum / self._count
-            both = self._seen[1] + self._seen[-1]
-            better = (self._seen[1] - self._seen[-1]) / both if both > 0 else 0.0
+            left, right = (self._seen.get(side, self._seen[self._side]) for side in (1, -1))
+            better = (left - right) / (left + right) if left + right > 0 else 0.0
             self._steer = self.gain * better * (-1 if self.flee else 1)
             self._side = -self._side
             self._until = robot.time + self.seconds

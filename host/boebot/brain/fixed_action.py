@@ -54,7 +54,6 @@ class FixedActionPattern(MotorBehavior):
     def forget(self) -> None:
         """As at the beginning of a run."""
         self.running = False
-        self._begun: float | None = None
         self._ended = float("-inf")
 
     @property
@@ -73,7 +72,6 @@ class FixedActionPattern(MotorBehavior):
         self._begun = robot.time
 
     def step(self, robot: Robot) -> None:
-        assert self._begun is not None
         since = robot.time - self._begun
         for left, right, seconds in self._actions:
             # robot.time is a sum of ticks: an action of 0.3 s has ended at 0.3 s, whatever its last digit is
@@ -86,7 +84,6 @@ class FixedActionPattern(MotorBehavior):
         self.kick(self, -HOLD)  # others take over at the next step
 
     def exit(self, robot: Robot) -> None:
-        self._begun = None
         self._end(robot)  # in case a stronger process took the motors
 
     def _end(self, robot: Robot) -> None:

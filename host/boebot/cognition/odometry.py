@@ -17,6 +17,7 @@ from boebot.odometry import Odometry as DeadReckoning
 from boebot.odometry import WheelDirection
 
 if TYPE_CHECKING:
+    from boebot.devices.encoder import Encoder
     from boebot.robot import Robot
 
 Source = Literal["odometer", "encoders", "commands"]
@@ -72,7 +73,7 @@ class Odometry(CognitiveProcess):
         self._reckoning = DeadReckoning(robot.dimensions.track_width, *self.start)
         self._directions = WheelDirection(), WheelDirection()
         if self.source == "encoders":
-            self._distances = robot.left_encoder.distance, robot.right_encoder.distance
+            self._encoders = robot.left_encoder, robot.right_encoder
         self._speeds = (0.0, 0.0)
 
     def step(self, robot: Robot) -> None:
@@ -109,14 +110,12 @@ class Odometry(CognitiveProcess):
 
     def _counted(self, robot: Robot, elapsed: float) -> tuple[float, float]:
         """What the wheels have rolled by their encoders (m)."""
-        before = self._distances
-        encoders = robot.left_encoder, robot.right_encoder
+        before, self._encoders = self._encoders, (robot.left_encoder, robot.right_encoder)
         signals = _signals(robot)
-        self._distances = encoders[0].distance, encoders[1].distance
         rolled = [0.0, 0.0]
         for side in (0, 1):
-            rolled[side] = self._distances[side] - before[side]
-            if not encoders[side].directed:
+            rolled[side] = _rolled(before[side], self._encoders[side])
+            if not self._encoders[side].directed:
                 rolled[side] *= self._directions[side].update(signals[side], elapsed)
         return rolled[0], rolled[1]
 
@@ -133,6 +132,13 @@ class Odometry(CognitiveProcess):
             speeds.append(aim + (speed - aim) * decay)
         self._speeds = speeds[0], speeds[1]
         return rolled[0], rolled[1]
+
+
+def _rolled(before: Encoder, now: Encoder) -> float:
+    """What a wheel has rolled between two readings (m): counters roll over at 2^31 edges."""
+    edges = (now.count - before.count + 2**31) % 2**32 - 2**31
+    known = now if now.count else before
+    return edges * known.distance / known.count if known.count else 0.0
 
 
 def _signals(robot: Robot) -> tuple[float, float]:
