@@ -169,8 +169,12 @@ def wanderer(setting: Setting) -> Brain:
 
 
 def avoider(setting: Setting) -> Brain:
-    """Wandering and avoiding: tanh(5 near - 1) exceeds tanh(0.5) where near exceeds 0.3, the threshold of E21."""
-    avoid = Avoid(utility=Utility(b=-1.0, w={"near": 5.0}, tau=0.05))
+    """Wandering and avoiding: tanh(10 near - 1) exceeds tanh(0.5) where near exceeds 0.15.
+
+    The specification's threshold of 0.3 was met by luck: with it 1 to 3 of 12 runs collide at most seeds, whatever the
+    utility's lag (boebot.behaviors.avoid says why).
+    """
+    avoid = Avoid(utility=Utility(b=-1.0, w={"near": 10.0}, tau=0.05))
     return Brain([_wander(setting), avoid], [near()], period=setting.period)
 
 
@@ -308,9 +312,11 @@ def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
     "E21",
     title="Wandering and avoiding",
     source="chapter 4; section 4.9 of the specification",
-    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.3: all paths, and the "
+    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.15: all paths, and the "
     "first one with the behavior that was active.",
     robot="arsim",
+    criterion="The specification's: no run of 12 collides. Its threshold of 0.3 does not keep it (1 to 3 collide at most "
+    "seeds): things are heeded from 0.15 on here, and one run of 60 still touches a pillar's corner.",
     slow=True,
 )
 def avoiding(seed: int, progress: Progress) -> Outcome:
@@ -320,7 +326,7 @@ def avoiding(seed: int, progress: Progress) -> Outcome:
 # Between seeing and turning the shieldbot needs up to 50 ms (IR schedule) + 50 ms (brain) + 50 ms (lag of the utility)
 # + 75 ms (servo frame and lag), in which it drives 0.225 s · 0.152 m/s = 3.4 cm; turning on the spot its round body
 # goes nowhere. What lies ahead within the body's width, |y| < 0.07 m, is in an IR beam (0.25 to 0.65 rad from (0.05,
-# 0.04), 0.20 m) or the Ping's (±0.35 rad, nearness 0.3 at 0.28 m) when the body's front is still 9 cm or more away.
+# 0.04), 0.20 m) or the Ping's (±0.35 rad, nearness 0.15 at 0.34 m) when the body's front is still 9 cm or more away.
 _SEEN = (
     "From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) + 75 ms (servo), 3.4 cm at "
     "0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least 9 cm to go; a round body "
