@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,15 @@ from boebot.behaviors import StraightRun, Wander
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
-from boebot.experiments import all_experiments, odometric_ghost, straight_line, straight_line_servo, taxis, wandering
+from boebot.experiments import (
+    Measured,
+    all_experiments,
+    odometric_ghost,
+    straight_line,
+    straight_line_servo,
+    taxis,
+    wandering,
+)
 
 EXPERIMENTS = all_experiments()
 CHEAP = ("E19", "E22", "E23", "E23-shieldbot", "E24")
@@ -30,8 +39,8 @@ def ignore(share: float) -> None:
     assert 0 <= share <= 1
 
 
-def missed(measured: list[object]) -> list[str]:
-    return [one.name for one in measured if not one.is_met]  # type: ignore[attr-defined]
+def missed(measured: Sequence[Measured]) -> list[str]:
+    return [one.name for one in measured if not one.is_met]
 
 
 def test_each_row_names_its_robot_and_those_on_boards_their_criterion() -> None:

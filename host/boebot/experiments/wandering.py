@@ -315,8 +315,8 @@ def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
     caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.15: all paths, and the "
     "first one with the behavior that was active.",
     robot="arsim",
-    criterion="The specification's: no run of 12 collides. Its threshold of 0.3 does not keep it (1 to 3 collide at most "
-    "seeds): things are heeded from 0.15 on here, and one run of 60 still touches a pillar's corner.",
+    criterion="The specification's: no run of 12 collides. Its threshold of 0.3 does not keep it (1 to 3 collide at "
+    "most seeds): things are heeded from 0.15 on here, and one run of 60 still touches a pillar's corner.",
     slow=True,
 )
 def avoiding(seed: int, progress: Progress) -> Outcome:
