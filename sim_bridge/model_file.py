@@ -158,7 +158,12 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 sigma=device.sigma,
             )
         case vehicle_devices.Odometer():
-            model.odometer(name, sigma_step=device.sigma_step_m)
+            model.odometer(
+                name,
+                sigma_step=device.sigma_step_m,
+                factor_left=device.factor_left,
+                factor_right=device.factor_right,
+            )
         case vehicle_devices.HeadingCompass():
             model.compass(name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
         case vehicle_devices.Accelerometer():

@@ -44,8 +44,15 @@ SWITCHES: Mapping[str, Switch] = {
         {"DcMotor.coulomb_friction_n_m": 0.0, "DcMotor.viscous_friction_n_m_s": 0.0, "DcMotor.efficiency": 1.0},
     ),
     "slip": _off("wheels roll, whatever the floor", "TYRE_SLIP", TYRE_GRIP=10.0),
-    "encoder_errors": _off(
-        "encoders see each edge once; odometers are exact", "ENCODER_MISSED", "ENCODER_EXTRA", "Odometer.sigma_step_m"
+    "encoder_errors": Switch(
+        "encoders see each edge once; odometers are exact",
+        {
+            "ENCODER_MISSED": 0.0,
+            "ENCODER_EXTRA": 0.0,
+            "Odometer.sigma_step_m": 0.0,
+            "Odometer.factor_left": 1.0,
+            "Odometer.factor_right": 1.0,
+        },
     ),
     "bounce": _off("whiskers close and open once", "WHISKER_BOUNCE_S"),
     "infrared_noise": _off(

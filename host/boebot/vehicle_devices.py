@@ -123,6 +123,8 @@ class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
     """The notes' odometer (sections 1.4, 2.2): a pose, calibrated once at the start."""
 
     sigma_step_m: NotNegative = 0.0  # per wheel in 10 ms
+    factor_left: Positive = 1.0  # k_w: what it takes the left wheel to travel for each metre
+    factor_right: Positive = 1.0
 
 
 class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):

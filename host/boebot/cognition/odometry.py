@@ -41,11 +41,15 @@ class Odometry(CognitiveProcess):
     """what to take; None: the best that the robot has"""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """pose at the beginning (m, m, rad); an odometer has its own"""
+    factors: tuple[float, float] = (1.0, 1.0)
+    """k_w: metres that the left and the right wheel really roll for each metre that encoders or commands tell"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.use not in (None, *SOURCES):
             raise BrainError(f"{self.name}: use is {self.use!r}; expected one of {', '.join(SOURCES)}")
+        if len(self.factors) != 2 or not all(0 < factor < math.inf for factor in self.factors):
+            raise BrainError(f"{self.name}: factors are {self.factors!r}; expected two numbers above 0")
         self._forget()
 
     def _forget(self) -> None:
@@ -82,7 +86,7 @@ class Odometry(CognitiveProcess):
             self.pose = self._told(robot)
         else:
             rolled = self._counted(robot, elapsed) if self.source == "encoders" else self._commanded(robot, elapsed)
-            self._reckoning.update(*rolled)
+            self._reckoning.update(self.factors[0] * rolled[0], self.factors[1] * rolled[1])
             self.pose = (self._reckoning.x, self._reckoning.y, self._reckoning.heading)
         along = (self.pose[0] - x) * math.cos(heading) + (self.pose[1] - y) * math.sin(heading)
         way = math.copysign(math.hypot(self.pose[0] - x, self.pose[1] - y), along)

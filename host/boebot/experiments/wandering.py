@@ -1,0 +1,362 @@
+"""Wandering, and wandering with avoidance of obstacles: section 5.2 of the notes, listings 5.1 and 5.2; E19 to E21."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.behaviors import Avoid, Wander
+from boebot.brain import Brain, Utility
+from boebot.cognition import near
+from boebot.equipment import Equipment
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.trials import (
+    PER_SEED,
+    Trial,
+    arena_file,
+    at_angle,
+    draw_paths,
+    end_of,
+    floor,
+    start_of,
+    try_once,
+    varied,
+)
+from boebot.link import messages
+from boebot.robot import Observation, Robot
+from boebot.robots import RobotDescription, load_robot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+STEP = 0.01  # s, the notes'
+STEPS = 400_000
+
+# ---- the machine by itself -------------------------------------------------------------------------------------------
+
+
+def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], list[int], list[bool]]:
+    """Steps that each stay in state 1 (forward) and in state 2 (turning) lasted, and whether each turn was to the left.
+
+    The behavior looks at nothing: a robot whose readings never change is enough.
+    """
+    robot = Robot("none", STEP, seed)
+    sample = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
+    robot.observation = Observation(sample, Equipment(load_robot("shieldbot"), STEP), time=0.0)
+    wander.join(STEP, robot.stream(wander.name), lambda kind: wander, lambda process, gamma: None)
+    wander.enter(robot)
+    lengths: dict[str, list[int]] = {"time_to_turn": [], "time_to_stop_turning": []}
+    lefts: list[bool] = []
+    state, length = wander.machine.state, 0
+    for step in range(STEPS):
+        wander.step(robot)
+        length += 1
+        if wander.machine.state != state:
+            if state in lengths:
+                lengths[state].append(length)
+            if state == "time_to_turn":
+                left, right = robot.command[1:]
+                lefts.append(left < right)  # by (2.19): the right wheel ahead turns counter-clockwise
+            state, length = wander.machine.state, 0
+        if step % 20_000 == 0:
+            progress(step / STEPS)
+    return lengths["time_to_turn"], lengths["time_to_stop_turning"], lefts
+
+
+def judge_stays(forward: list[int], turning: list[int], lefts: list[bool]) -> list[Measured]:
+    """What section 8 of the specification asks of them."""
+    return [
+        about("mean steps in state 1, forward", float(np.mean(forward)), 100, 5),
+        about("mean steps in state 2, turning", float(np.mean(turning)), 33.3, 2),
+        about("share of turns to the left", float(np.mean(lefts)), 0.5, 0.03),
+    ]
+
+
+@experiment(
+    "E19",
+    title="Wandering: stays in its states are geometric",
+    source="section 5.2, code listings 5.1 and 5.2",
+    caption="Steps that wandering drives ahead, and turns, before it changes: histograms of 400,000 steps of 0.01 s, "
+    "and the geometric law of the listing's probabilities.",
+)
+def stay_lengths(seed: int, progress: Progress) -> Outcome:
+    forward, turning, lefts = stays(Wander(), seed, progress)
+    count = min(len(forward), len(turning))
+
+    def draw(figure: Figure) -> None:
+        rows = (
+            ("state 1: forward", np.array(forward), 0.01, 500, 20),
+            ("state 2: turning", np.array(turning), 0.03, 170, 8),
+        )
+        for axes, (name, values, chance, longest, width) in zip(figure.subplots(1, 2), rows, strict=True):
+            axes.hist(values, bins=np.arange(0.5, longest, width), density=True, color="C0", alpha=0.55)
+            steps = np.arange(1, longest)
+            axes.plot(steps, chance * (1 - chance) ** (steps - 1), color="C1", label=f"{chance:g} (1 - {chance:g})ⁿ⁻¹")
+            axes.axvline(values.mean(), color="0.3", ls="--", lw=1, label=f"mean {values.mean():.1f}")
+            axes.set(title=f"{name}, {len(values):,} times", xlabel="length n (steps of 0.01 s)", ylabel="share a step")
+            axes.legend(fontsize="small")
+
+    data = {"forward_steps": forward[:count], "turning_steps": turning[:count], "left": lefts[:count]}
+    return Outcome(judge_stays(forward, turning, lefts), data, draw)
+
+
+# ---- on robots -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """A robot in an arena, and how its brain's chances and the run's length follow from how fast it is."""
+
+    robot: str | RobotDescription
+    on: str | None = None
+    scale: float = 1.0
+    """lengths of the arena against ARSim's"""
+    turn: float = 0.01
+    """probability to begin to turn in each 0.01 s"""
+    stop_turn: float = 0.03
+    """and to stop turning"""
+    period: float = STEP
+    """s, of the brain"""
+    seconds: float = 30.0
+    runs: int = 12
+
+    def arena(self) -> str:
+        """Keys of ARSim's arena in that scale: walls, two pillars."""
+        wall, near_by, far = (f"{self.scale * length:.6g}" for length in (1.8, 0.7, 0.9))
+        near_to, far_to = f"-{near_by}", f"-{far}"
+        return f"""
+[[outline]]
+corners_m = [[-{wall}, -{wall}], [{wall}, -{wall}], [{wall}, {wall}], [-{wall}, {wall}]]
+[[obstacle]]
+corners_m = [[{far_to}, {near_by}], [{near_to}, {near_by}], [{near_to}, {far}], [{far_to}, {far}]]
+[[obstacle]]
+corners_m = [[{near_by}, {far_to}], [{far}, {far_to}], [{far}, {near_to}], [{near_by}, {near_to}]]
+"""
+
+
+# The shieldbot in ARSim's arena. All lengths as its radius: 0.07 m / 0.20 m = 0.35. Its servo's wheel runs at
+# 0.178 m/s tanh(200 s / 78.5): 0.152 m/s at s = 0.5, so that 1 s of the notes' robot, 0.682 m/s, takes
+# 0.35 · 0.682 / 0.152 = 1.57 s: runs of 47 s, and turns begin with 0.01 / 1.57 = 0.0064. On the spot, at s = 0.7, it
+# turns with 2 · 0.168 / 0.105 = 3.19 rad/s instead of 4.447: turns of the same angle end with 0.03 · 3.19 / 4.447.
+NOTES = Setting(robot="arsim")
+NARROW = Setting(
+    robot=varied(
+        "arsim",
+        "arsim-narrow",
+        infrared_left=at_angle(0.20, 0.3324),
+        infrared_right=at_angle(0.20, -0.3324),
+    )
+)
+SHIELDBOT = Setting(
+    robot="shieldbot", on="native", scale=0.35, turn=0.0064, stop_turn=0.0215, period=0.05, seconds=47.0
+)
+SHIELDBOT_AVR = replace(SHIELDBOT, on="avr", runs=4)
+
+Make = Callable[[Setting], Brain]
+
+
+def wanderer(setting: Setting) -> Brain:
+    """Wandering alone."""
+    return Brain([_wander(setting)], period=setting.period)
+
+
+def avoider(setting: Setting) -> Brain:
+    """Wandering and avoiding: tanh(10 near - 1) exceeds tanh(0.5) where near exceeds 0.15.
+
+    The specification's threshold of 0.3 was met by luck: with it 1 to 3 of 12 runs collide at most seeds, whatever the
+    utility's lag (boebot.behaviors.avoid says why).
+    """
+    avoid = Avoid(utility=Utility(b=-1.0, w={"near": 10.0}, tau=0.05))
+    return Brain([_wander(setting), avoid], [near()], period=setting.period)
+
+
+def _wander(setting: Setting) -> Wander:
+    return Wander(
+        turn_probability=setting.turn, stop_turn_probability=setting.stop_turn, utility=Utility(b=0.5, tau=0.2)
+    )
+
+
+def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[Trial]:
+    """The setting's runs, each with a brain and a seed of its own."""
+    done = []
+    with nullcontext("arsim") if setting.scale == 1 else arena_file("arsim-small", setting.arena()) as arena:
+        for number in range(setting.runs):
+            done.append(_run(make(setting), setting, arena, PER_SEED * seed + number))
+            progress((number + 1) / setting.runs)
+    return done
+
+
+def _run(brain: Brain, setting: Setting, arena: str | Path, seed: int) -> Trial:
+    return try_once(brain, setting.robot, arena, setting.seconds, on=setting.on, seed=seed)
+
+
+def judge_alone(done: list[Trial]) -> list[Measured]:
+    """Without avoidance it is for empty space only: of 12 runs at least 10 end at something."""
+    return [Measured("runs that collide", sum(trial.has_collided for trial in done), least=round(10 / 12 * len(done)))]
+
+
+def judge_avoiding(done: list[Trial]) -> list[Measured]:
+    """No run collides. In most of them avoidance had something to do, as wandering alone collides in most."""
+    needed = sum(trial.times_on("avoid") > 0 for trial in done)
+    return [
+        exactly("runs that collide", sum(trial.has_collided for trial in done), 0),
+        Measured("runs in which it avoided something", needed, least=round(10 / 12 * len(done))),
+    ]
+
+
+def _data(done: list[Trial], seed: int) -> dict[str, object]:
+    return {
+        "seed": [PER_SEED * seed + number for number in range(len(done))],
+        "first_contact_s": [trial.first_contact for trial in done],
+        "way_m": [trial.way for trial in done],
+        "times_avoided": [trial.times_on("avoid") for trial in done],
+    }
+
+
+def _alone(setting: Setting, seed: int, progress: Progress) -> Outcome:
+    done = trials(wanderer, setting, seed, progress)
+
+    def draw(figure: Figure) -> None:
+        left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+        draw_paths(left, done)
+        left.set_title(f"{len(done)} paths up to the first contact")
+        _draw_survivors(right, done, setting.seconds)
+
+    return Outcome(judge_alone(done), _data(done, seed), draw)
+
+
+def _draw_survivors(axes: Axes, done: list[Trial], seconds: float) -> None:
+    """Share of runs without a contact so far, against time."""
+    times = np.sort([trial.first_contact for trial in done if trial.has_collided])
+    left = 1 - np.arange(len(times) + 1) / len(done)
+    axes.step([0, *times, seconds], [*left, left[-1]], where="post")
+    if len(times) > len(done) / 2:
+        middle = float(np.median([trial.first_contact if trial.has_collided else math.inf for trial in done]))
+        axes.axvline(middle, color="0.5", ls="--", lw=1, label=f"median {middle:.1f} s")
+        axes.legend(fontsize="small")
+    axes.set(xlabel="time (s)", ylabel="share of runs without contact", ylim=(0, 1.02), xlim=(0, seconds))
+
+
+def _avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
+    done = trials(avoider, setting, seed, progress)
+
+    def draw(figure: Figure) -> None:
+        left, right = figure.subplots(1, 2)
+        draw_paths(left, done)
+        left.set_title(f"{len(done)} paths of {setting.seconds:g} s, contacts ×")
+        _draw_activity(right, done[0])
+
+    return Outcome(judge_avoiding(done), _data(done, seed), draw)
+
+
+def _draw_activity(axes: Axes, trial: Trial) -> None:
+    """One path, with the behavior that drove."""
+    from boebot.report import style
+    from boebot.report.robot_drawing import draw_robot
+
+    floor(axes, trial)
+    avoids: NDArray[np.bool_] = trial.when_active("avoid")
+    for name, active, colour in (("wander", ~avoids, style.END), ("avoid", avoids, style.ESTIMATE)):
+        shown = np.where(active[:, None], trial.path, np.nan)
+        axes.plot(*shown.T, color=colour, lw=2.6 if name == "avoid" else 1.4, label=name, zorder=7)
+    for pose, colour in ((start_of(trial), style.START), (end_of(trial), style.END)):
+        draw_robot(axes, trial.result.robot, pose, colour, plan=trial.result.truth.plan if trial.result.truth else None)
+    axes.legend(fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.13))
+    axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
+
+
+@experiment(
+    "E20",
+    title="Wandering alone ends at a wall",
+    source="section 5.2, code listing 5.2",
+    caption="Wandering in ARSim's arena without avoidance: paths up to the first contact, and how many runs are free "
+    "of contact yet.",
+    robot="arsim",
+    slow=True,
+)
+def wandering(seed: int, progress: Progress) -> Outcome:
+    return _alone(NOTES, seed, progress)
+
+
+_SCALED = (
+    "Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor signal 0.5 its servos "
+    "run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything takes 0.35 · 0.682 / "
+    "0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against 4.447 "
+    "rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
+)
+
+
+@experiment(
+    "E20-shieldbot",
+    title="Wandering alone ends at a wall: the same brain on a board",
+    source="section 5.2, code listing 5.2",
+    caption="The shieldbot wandering without avoidance in ARSim's arena at its own scale: paths up to the first "
+    "contact, and how many runs are free of contact yet.",
+    robot="shieldbot (native)",
+    criterion=f"{_SCALED}, and so is the criterion of E20: at least 10 of 12 runs collide.",
+    slow=True,
+)
+def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
+    return _alone(SHIELDBOT, seed, progress)
+
+
+@experiment(
+    "E21",
+    title="Wandering and avoiding",
+    source="chapter 4; section 4.9 of the specification",
+    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.15: all paths, and the "
+    "first one with the behavior that was active.",
+    robot="arsim",
+    criterion="The specification's: no run of 12 collides. Its threshold of 0.3 does not keep it (1 to 3 collide at "
+    "most seeds): things are heeded from 0.15 on here, and one run of 60 still touches a pillar's corner.",
+    slow=True,
+)
+def avoiding(seed: int, progress: Progress) -> Outcome:
+    return _avoiding(NARROW, seed, progress)
+
+
+# Between seeing and turning the shieldbot needs up to 50 ms (IR schedule) + 50 ms (brain) + 50 ms (lag of the utility)
+# + 75 ms (servo frame and lag), in which it drives 0.225 s · 0.152 m/s = 3.4 cm; turning on the spot its round body
+# goes nowhere. What lies ahead within the body's width, |y| < 0.07 m, is in an IR beam (0.25 to 0.65 rad from (0.05,
+# 0.04), 0.20 m) or the Ping's (±0.35 rad, nearness 0.15 at 0.34 m) when the body's front is still 9 cm or more away.
+_SEEN = (
+    "From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) + 75 ms (servo), 3.4 cm at "
+    "0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least 9 cm to go; a round body "
+    "that turns on the spot touches nothing. So no run may collide, as in E21"
+)
+
+
+@experiment(
+    "E21-shieldbot",
+    title="Wandering and avoiding: the same brain on a board",
+    source="chapter 4; section 4.9 of the specification",
+    caption="The shieldbot wandering and avoiding in ARSim's arena at its own scale: all paths, and the first one with "
+    "the behavior that was active.",
+    robot="shieldbot (native)",
+    criterion=f"{_SEEN}. {_SCALED}.",
+    slow=True,
+)
+def avoiding_shieldbot(seed: int, progress: Progress) -> Outcome:
+    return _avoiding(SHIELDBOT, seed, progress)
+
+
+@experiment(
+    "E21-avr",
+    title="Wandering and avoiding: the same brain on the AVR image",
+    source="chapter 4; section 4.9 of the specification",
+    caption="The shieldbot with the image of its ATmega328P, wandering and avoiding in ARSim's arena at its own scale: "
+    "all paths, and the first one with the behavior that was active.",
+    robot="shieldbot (avr)",
+    criterion=f"{_SEEN}. 4 runs. {_SCALED}.",
+    slow=True,
+)
+def avoiding_avr(seed: int, progress: Progress) -> Outcome:
+    return _avoiding(SHIELDBOT_AVR, seed, progress)
