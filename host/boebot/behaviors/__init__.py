@@ -2,6 +2,7 @@
 
 from boebot.behaviors.avoid import Avoid
 from boebot.behaviors.follow_wall import FollowWall
+from boebot.behaviors.homing import Homing
 from boebot.behaviors.kinesis import Kinesis
 from boebot.behaviors.phototaxis import Klinotaxis, Phototaxis
 from boebot.behaviors.run_and_tumble import RunAndTumble
@@ -13,6 +14,7 @@ from boebot.behaviors.withdraw import Withdraw
 __all__ = [
     "Avoid",
     "FollowWall",
+    "Homing",
     "Kinesis",
     "Klinotaxis",
     "Phototaxis",
