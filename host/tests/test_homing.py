@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -224,7 +225,7 @@ def test_the_spirals_corners_are_its_legs_in_a_row(legs: int, pitch: float, firs
 def test_parallel_legs_lie_one_pitch_apart(side: int) -> None:
     across = 1 if side % 2 == 0 else 0  # legs along x lie apart in y
     places = [corner(side + 4 * ring, 0.1)[across] for ring in range(1, 10)]
-    assert [abs(b - a) for a, b in zip(places, places[1:], strict=False)] == pytest.approx([0.1] * 8)
+    assert [abs(b - a) for a, b in pairwise(places)] == pytest.approx([0.1] * 8)
 
 
 def homed(homing: Homing, away: tuple[float, float], seconds: float) -> tuple[Walked, list[tuple[float, float]]]:
@@ -243,7 +244,7 @@ def homed(homing: Homing, away: tuple[float, float], seconds: float) -> tuple[Wa
 def test_it_goes_straight_home(away: tuple[float, float]) -> None:
     """Along the line to home but for turning to it, at full signal but for that: |away| / speed and the turn."""
     homing = Homing(signal=0.5)
-    one, places = homed(homing, away, 8.0)
+    _, places = homed(homing, away, 8.0)
     assert homing.arrived is not None
     length = math.hypot(*away)
     speed = 0.5 * ARSIM.body.wheel_speed_maximum_m_s
@@ -341,7 +342,7 @@ def test_a_file_may_say_what_home_is_known_by(tmp_path: Path) -> None:
     path.write_text(HOME)
     assert next(one for one in load(path).processes if isinstance(one, Homing)).found is None
     path.write_text(HOME + 'found = "beacon"\n')
-    with pytest.raises(BrainError, match="process.homing.found names the state variable 'beacon'"):
+    with pytest.raises(BrainError, match=r"process\.homing\.found names the state variable 'beacon'"):
         load(path)
     path.write_text(HOME + "found = 3\n")
     with pytest.raises(BrainError, match="found"):

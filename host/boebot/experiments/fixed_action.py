@@ -110,7 +110,7 @@ def _arena(direction: float, far: float, near: float, stays: bool) -> str:
 def differing(one: Floats, other: Floats) -> int:
     """Rows in which two sequences differ, and those that only one of them has."""
     both = min(len(one), len(other))
-    differ = (one[:both] != other[:both]).reshape(both, -1).any(axis=1)
+    differ = np.any(one[:both] != other[:both], axis=1)
     return int(differ.sum()) + abs(len(one) - len(other))
 
 

@@ -29,6 +29,16 @@ def intensity_under_a_step(reflex: ReflexIntensity, seconds: float) -> tuple[Flo
     return times, np.array(values, dtype=np.float64)
 
 
+def judge_step(times: Floats, values: Floats) -> list[Measured]:
+    """What is expected of ρ under a step."""
+    at_nine = float(values[np.searchsorted(times, 9.0 - STEP / 2)])
+    return [
+        about("greatest intensity", values.max(), 0.73, 0.02),
+        about("reached at", times[values.argmax()], 0.70, 0.05, "s"),
+        Measured("intensity after 9 s", at_nine, most=0.13),
+    ]
+
+
 @experiment(
     "E25",
     title="A reflex warms up and tires",
@@ -37,12 +47,7 @@ def intensity_under_a_step(reflex: ReflexIntensity, seconds: float) -> tuple[Flo
 )
 def step_response(seed: int, progress: Progress) -> Outcome:
     times, values = intensity_under_a_step(ReflexIntensity(), 15.0)
-    at_nine = float(values[np.searchsorted(times, 9.0 - STEP / 2)])
-    measured = [
-        about("greatest intensity", values.max(), 0.73, 0.02),
-        about("reached at", times[values.argmax()], 0.70, 0.05, "s"),
-        Measured("intensity after 9 s", at_nine, most=0.13),
-    ]
+    measured = judge_step(times, values)
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
