@@ -91,14 +91,12 @@ class Homing(MotorBehavior):
     def search(self, robot: Robot) -> State | None:
         """Along the spiral's legs, one after the other."""
         path = self.other(PathIntegration)
-        while True:
-            heading = self._first + self._leg * math.pi / 2
-            ahead = math.cos(heading), math.sin(heading)
-            (x, y), begin = path.position, corner(self._leg, self.pitch, self._first)
-            x, y = x - begin[0], y - begin[1]
-            if x * ahead[0] + y * ahead[1] < leg_length(self._leg, self.pitch):
-                break
-            self._leg += 1
+        heading = self._first + self._leg * math.pi / 2
+        ahead = math.cos(heading), math.sin(heading)
+        (x, y), begin = path.position, corner(self._leg, self.pitch, self._first)
+        x, y = x - begin[0], y - begin[1]
+        if x * ahead[0] + y * ahead[1] >= leg_length(self._leg, self.pitch):
+            self._leg += 1  # from the next step on
         left = y * ahead[0] - x * ahead[1]  # m that it is left of the leg
         self._steer(robot, heading - math.atan2(left, self.pitch), self.search_signal)
         return self.search

@@ -79,8 +79,6 @@ class PathIntegration(CognitiveProcess):
 
     def step(self, robot: Robot) -> None:
         (x, y, heading), now = self._pose, self.other(Odometry).pose
-        if not all(math.isfinite(value) for value in now):
-            return  # what it has moved meanwhile is in the next pose that is one
         self._pose = now
         turned = wrapped(now[2] - heading)
         along = (now[0] - x) * math.cos(heading + turned / 2) + (now[1] - y) * math.sin(heading + turned / 2)

@@ -58,8 +58,14 @@ def lure(seed: int, progress: Progress) -> Outcome:
             strict=True,
         ):
             axes.plot(*at.T, ".", color="#0072b2", markersize=3, label="prey")
-            axes.plot(*source, "s", color="#d55e00", markersize=5, label="predator")
-            axes.plot(source[0] + REACH * np.cos(turn), source[1] + REACH * np.sin(turn), color="#d55e00", linewidth=1)
+            axes.plot(*source, "s", color="#d55e00", markersize=6, label="predator", zorder=4)
+            axes.plot(
+                source[0] + REACH * np.cos(turn),
+                source[1] + REACH * np.sin(turn),
+                color="#d55e00",
+                linewidth=1.5,
+                zorder=4,
+            )
             axes.set(title=name, xlabel="x", ylabel="y", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
         axes.legend(loc="upper right", fontsize=9)
 
