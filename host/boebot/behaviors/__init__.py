@@ -6,6 +6,7 @@ from boebot.behaviors.escalate import Escalate, LeakyChain
 from boebot.behaviors.escape import Escape
 from boebot.behaviors.evade import Evade
 from boebot.behaviors.follow_wall import FollowWall
+from boebot.behaviors.homing import Homing
 from boebot.behaviors.kinesis import Kinesis
 from boebot.behaviors.phototaxis import Klinotaxis, Phototaxis
 from boebot.behaviors.run_and_tumble import RunAndTumble
@@ -21,6 +22,7 @@ __all__ = [
     "Escape",
     "Evade",
     "FollowWall",
+    "Homing",
     "Kinesis",
     "Klinotaxis",
     "LeakyChain",

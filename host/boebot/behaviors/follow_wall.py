@@ -4,20 +4,31 @@
 
 The nearer, the larger S: too close to a wall on the right (e > 0), it turns left. Something ahead: it turns on the
 spot, away from the wall.
+
+What measures S_side is the IR sensor of that side, while Ping or an analog IR sensor looks ahead. IR pairs of a board
+say yes or no, with which no distance can be kept: where the robot has a turret, it turns its Ping to the wall instead,
+and the IR pairs look ahead.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING, Literal
 
 from boebot.behaviors.straight_run import within_signals
 from boebot.brain.process import MotorBehavior
-from boebot.cognition.proximity import left_nearness, nearness_ahead, right_nearness
+from boebot.cognition.proximity import left_nearness, nearness_ahead, ping_nearness, right_nearness
 from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
+
+LOOK_RAD = 1.047  # 60 degrees: obliquely ahead, so that the robot also notices when it heads for the wall or from it
+SETTLING_S = 0.4  # the turret's way there, and a new echo
+HELD = 0.05  # rad; the turret has been told to look elsewhere, or has been released
+ECHOES = 3  # Ping misses some: the median of the last ones counts (section 1.6 of the specification)
 
 
 @dataclass(kw_only=True)
@@ -33,7 +44,7 @@ class FollowWall(MotorBehavior):
     gain: float = 0.5
     """k, for each unit of nearness"""
     reference: float = 0.25
-    """S_ref: nearness of the wall that is kept"""
+    """S_ref: nearness of the wall that is kept; by Ping 0.25 stands for 0.30 m from it"""
     ahead: float = 0.25
     """nearness of something ahead, or on the other side, from which on it turns on the spot"""
     turn: float = 0.3
@@ -44,12 +55,43 @@ class FollowWall(MotorBehavior):
         if self.side not in ("left", "right"):
             raise BrainError(f"{self.name}: side is {self.side!r}; expected 'left' or 'right'")
 
+    def enter(self, robot: Robot) -> None:
+        self._by_turret = robot.has("turret") and robot.has("ping")
+        self._echoes: deque[float] = deque(maxlen=ECHOES)
+        self._settled = robot.time
+
     def step(self, robot: Robot) -> None:
+        away = 1.0 if self.side == "right" else -1.0  # counter-clockwise
+        beside, ahead = self._look_by_turret(robot, away) if self._by_turret else self._look(robot)
+        if beside is None:
+            robot.drive(0.0, 0.0)
+        elif ahead > self.ahead:
+            robot.drive(-away * self.turn, away * self.turn)
+        else:
+            correction = away * self.gain * (beside - self.reference)
+            robot.drive(within_signals(self.signal - correction), within_signals(self.signal + correction))
+
+    def exit(self, robot: Robot) -> None:
+        if self._by_turret:
+            robot.turn_turret(0.0)  # others take Ping for what is ahead
+
+    def _look(self, robot: Robot) -> tuple[float | None, float]:
+        """Nearness beside it, and ahead or on the other side."""
         left, right = left_nearness(robot) or 0.0, right_nearness(robot) or 0.0
         beside, other = (right, left) if self.side == "right" else (left, right)
-        away = 1.0 if self.side == "right" else -1.0  # counter-clockwise
-        if max(nearness_ahead(robot) or 0.0, other) > self.ahead:
-            robot.drive(-away * self.turn, away * self.turn)
-            return
-        correction = away * self.gain * (beside - self.reference)
-        robot.drive(within_signals(self.signal - correction), within_signals(self.signal + correction))
+        return beside, max(nearness_ahead(robot) or 0.0, other)
+
+    def _look_by_turret(self, robot: Robot, away: float) -> tuple[float | None, float]:
+        """The same by Ping on its turret and both IR pairs; beside it None while the turret is on its way."""
+        angle = robot.turret.angle if robot.turret.valid else None
+        if angle is None or abs(angle + away * LOOK_RAD) > HELD:
+            robot.turn_turret(-away * LOOK_RAD)
+            self._settled = robot.time + SETTLING_S
+        if robot.time < self._settled - 1e-9:
+            self._echoes.clear()
+            return None, 0.0
+        echo = ping_nearness(robot)
+        if echo is not None:
+            self._echoes.append(echo)
+        beside = median(self._echoes) if self._echoes else None
+        return beside, max(left_nearness(robot) or 0.0, right_nearness(robot) or 0.0)

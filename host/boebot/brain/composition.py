@@ -31,7 +31,7 @@ import typing
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, UnionType
 from typing import Any
 
 import msgspec
@@ -151,7 +151,7 @@ def _table_type(tag: str, process: type[Process]) -> type[msgspec.Struct]:
     fields: list[Any] = [("utility", _Utility, msgspec.UNSET)]
     for field in dataclasses.fields(process):
         if field.init and field.name not in _NO_PARAMETERS:
-            kind = str if _is_function(types[field.name]) else types[field.name]
+            kind = _named(types[field.name])
             required = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
             fields.append((field.name, kind) if required else (field.name, kind, msgspec.UNSET))
     return msgspec.defstruct(
@@ -161,7 +161,19 @@ def _table_type(tag: str, process: type[Process]) -> type[msgspec.Struct]:
 
 def _is_function(kind: Any) -> bool:
     """Parameters that are functions of the robot: a file names a state variable there."""
-    return typing.get_origin(kind) is Callable
+    return typing.get_origin(kind) is Callable or any(typing.get_origin(one) is Callable for one in _choices(kind))
+
+
+def _choices(kind: Any) -> tuple[Any, ...]:
+    """The types that a parameter may have, if there are several."""
+    return typing.get_args(kind) if typing.get_origin(kind) in (typing.Union, UnionType) else ()
+
+
+def _named(kind: Any) -> Any:
+    """The type that a parameter has in a file."""
+    if not _is_function(kind):
+        return kind
+    return str | None if type(None) in _choices(kind) else str
 
 
 def _process(name: str, table: msgspec.Struct, variables: dict[str, StateVariable]) -> Process:
@@ -172,7 +184,7 @@ def _process(name: str, table: msgspec.Struct, variables: dict[str, StateVariabl
         given["utility"] = Utility(**msgspec.structs.asdict(utility))
     process = process_kinds()[str(table.__struct_config__.tag)]
     for key, hint in typing.get_type_hints(process, localns={"Robot": Robot}).items():
-        if key in given and _is_function(hint):
+        if given.get(key) is not None and _is_function(hint):
             given[key] = _Reading(given[key], variables)
     return process(name=name, **given)
 

@@ -5,6 +5,7 @@ from boebot.cognition.contact import Contact, contact
 from boebot.cognition.drift import Drift
 from boebot.cognition.light import LightSense
 from boebot.cognition.odometry import Odometry, wrapped
+from boebot.cognition.path_integration import PathIntegration
 from boebot.cognition.proximity import Proximity, left_nearness, near, nearness_ahead, right_nearness
 from boebot.cognition.stuck import StuckDetector
 from boebot.cognition.sun_compass import SunCompass, sun_azimuth
@@ -15,6 +16,7 @@ __all__ = [
     "Drift",
     "LightSense",
     "Odometry",
+    "PathIntegration",
     "Proximity",
     "StuckDetector",
     "SunCompass",

@@ -105,8 +105,10 @@ class Odometry(CognitiveProcess):
         return self.pose[2]
 
     def _told(self, robot: Robot) -> tuple[float, float, float]:
+        """What the odometer says; where that is no pose, the last one."""
         odometer = robot.odometer
-        return odometer.x, odometer.y, odometer.heading
+        told = odometer.x, odometer.y, odometer.heading
+        return told if odometer.valid and all(math.isfinite(value) for value in told) else self.pose
 
     def _counted(self, robot: Robot, elapsed: float) -> tuple[float, float]:
         """What the wheels have rolled by their encoders (m)."""

@@ -9,10 +9,13 @@ from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable, maximum
 
 if TYPE_CHECKING:
+    from boebot.devices.analog_infrared import AnalogInfrared
+    from boebot.devices.ping import Ping
     from boebot.robot import Robot
 
 REACH_M = 0.4  # distances become nearness: 1 at the sensor, 0 from here on
 ZONES = 5
+AHEAD_RAD = 0.35  # a turret that is turned farther looks aside: Ping's beam is about 0.35 rad to either side
 
 
 @dataclass(kw_only=True)
@@ -56,14 +59,31 @@ def right_nearness(robot: Robot) -> float | None:
 
 
 def nearness_ahead(robot: Robot) -> float | None:
-    """Nearness of what Ping or analog IR sees straight ahead: 1 - distance / 0.4 m, 0 where there is nothing."""
+    """Nearness of what Ping or analog IR sees straight ahead: 1 - distance / 0.4 m, 0 where there is nothing.
+
+    A Ping that its turret has turned aside sees nothing ahead.
+    """
     found = []
-    for name in ("ping", "analog_ir"):
-        if robot.has(name):
-            device = getattr(robot, name)
-            if device.valid:
-                found.append(0.0 if device.distance is None else max(0.0, 1 - device.distance / REACH_M))
+    if robot.has("ping") and not _looks_aside(robot):
+        found.append(ping_nearness(robot))
+    if robot.has("analog_ir"):
+        found.append(_of_distance(robot.analog_ir))
     return maximum(found)
+
+
+def ping_nearness(robot: Robot) -> float | None:
+    """The same of what Ping sees, wherever it looks; None: no fresh reading."""
+    return _of_distance(robot.ping)
+
+
+def _of_distance(device: Ping | AnalogInfrared) -> float | None:
+    if not device.valid:
+        return None
+    return 0.0 if device.distance is None else max(0.0, 1 - device.distance / REACH_M)
+
+
+def _looks_aside(robot: Robot) -> bool:
+    return robot.has("turret") and abs(robot.turret.angle or 0.0) > AHEAD_RAD
 
 
 def near() -> StateVariable:

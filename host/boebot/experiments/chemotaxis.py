@@ -99,6 +99,8 @@ class Swarm:
     """and at the end"""
     running: float
     """share of steps that were runs"""
+    source: tuple[float, float] = (0.0, 0.0)
+    """where the attractant's middle was at the end"""
 
     @property
     def ratio(self) -> float:
@@ -112,35 +114,42 @@ class Swarm:
 
 
 def swarm(
-    draw: np.random.Generator, *, uniform: bool = False, jitter: bool = True, count: int = 100, seconds: float = 10.0
+    draw: np.random.Generator,
+    *,
+    uniform: bool = False,
+    jitter: bool = True,
+    count: int = 100,
+    seconds: float = 10.0,
+    drift: float = 0.0,
 ) -> Swarm:
     """Bacteria that run and tumble by (4.1), a = b = 1, T = 0, in a Gaussian of attractant.
 
     Args:
         uniform: the same attractant everywhere: a control.
         jitter: a tumble also moves by one step, which sets a bacterium free from where U has fallen to just below 0.
+        drift: speed of the attractant's middle, along x.
     """
 
-    def attractant(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    def attractant(at: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         if uniform:
             return np.full(len(at), 0.5)
-        return np.asarray(np.exp(-(at**2).sum(axis=1) / (2 * SPREAD**2)))
+        return np.asarray(np.exp(-((at - (drift * time, 0.0)) ** 2).sum(axis=1) / (2 * SPREAD**2)))
 
     at = draw.uniform(-SIZE / 2, SIZE / 2, (count, 2))
     begun = at.copy()
     heading = draw.uniform(-np.pi, np.pi, count)
-    memory = attractant(at)
+    memory = attractant(at, 0.0)
     lag = math.exp(-STEP)
     runs = 0
-    for _ in range(round(seconds / STEP)):
-        x = attractant(at)
+    for step in range(round(seconds / STEP)):
+        x = attractant(at, step * STEP)
         run = x - memory > 0
         heading = np.where(run, heading, draw.uniform(-np.pi, np.pi, count))
         moves = run | jitter
         at += np.where(moves, SPEED * STEP, 0.0)[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=1)
         memory = x + (memory - x) * lag
         runs += int(run.sum())
-    return Swarm(begun, at, runs / (count * round(seconds / STEP)))
+    return Swarm(begun, at, runs / (count * round(seconds / STEP)), (drift * seconds, 0.0))
 
 
 def _positions(group: Swarm) -> dict[str, Any]:
