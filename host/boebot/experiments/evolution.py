@@ -146,8 +146,8 @@ def evolve(seed: int, progress: Progress = lambda share: None, generations: int 
     "E65",
     title="Evolution finds when to charge",
     source="section 8.2 and Wahde (2003)",
-    caption="Left: performance of the best individual over the generations of three restarts; dashed: never charging. "
-    "Right: utilities of the best of all over time, its battery, and where it is.",
+    caption="Left: performance of the best individual over the generations of three restarts; dashed: never "
+    "charging. Right: utilities of the best of all over time, its battery, and where it is.",
     criterion="The specification's toy and figures. What it leaves open is chosen: patrol counts only in its place, "
     "5 s from the charger, where the robot starts; going there and back costs energy; a charging robot loses none.",
     slow=True,
@@ -213,8 +213,8 @@ def planned_work(low: float, high: float, times: Sequence[float]) -> Floats:
     "robot-economics",
     title="Charging earns nothing, and yet who charges earns most",
     source="opening of chapter 8",
-    caption="Performance (time of patrol) until each instant of three robots: one that never charges, one that always "
-    "does, and one that schedules it by utility; grey: when that one charges. Dotted: its closed form.",
+    caption="Performance (time of patrol) until each instant of three robots: one that never charges, one that "
+    "always does, and one that schedules it by utility; grey: when that one charges. Dotted: its closed form.",
     criterion="Patrolling alone empties the battery in 1 / 0.02 per s = 50 s. Utility by hand goes to charge where "
     "1.5 - 3.2 E = 0.5 and leaves where 1.5 - 3.2 E + 1.9 = 0.5: while E goes evenly, a utility lags by its 0.3 s, "
     "so that E goes on by 0.02 per s and 0.1 per s · 0.3 s. From these two levels follow cycle and performance; 2 % "

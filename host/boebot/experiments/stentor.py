@@ -159,9 +159,10 @@ def _data(found: Response) -> dict[str, Any]:
     source="section 7.2, equations (7.11)-(7.15), Fig. 7.4",
     caption="Left: utilities of Stentor's five behaviors under a lasting disturbance, and which of them is active. "
     "Right: concentration X of the noxious substance.",
-    criterion="The specification's order and times, which it measured by Euler's method with steps of 1 ms, X first: "
-    "so is it done here. Later starts follow from short returns to feeding and feel the step; the last two of the "
-    "exact solution, which come 0.06 s later, stand beside them with the times that an independent integrator gives.",
+    criterion="The specification's order and times, which it measured by Euler's method with steps of 1 ms, X "
+    "first: so is it done here. Later starts follow from short returns to feeding and feel the step; the last two "
+    "of the exact solution, which come 0.06 s later, stand beside them with the times that an independent "
+    "integrator gives.",
 )
 def sequence(seed: int, progress: Progress) -> Outcome:
     found, limit = by_euler(), exact()

@@ -212,8 +212,8 @@ def _of_time(name: str, value: Callable[[float], float]) -> StateVariable:
     "E64",
     title="One motor behavior, and every cognitive process above zero",
     source="section 8.2",
-    caption="Utilities of three motor behaviors and three cognitive processes while a state variable is 1 from "
-    "1 s to 4 s; thick: active.",
+    caption="Utilities of three motor behaviors and three cognitive processes while a state variable is 1 from 1 s "
+    "to 4 s; thick: active.",
     robot="arsim",
 )
 def activation(seed: int, progress: Progress, tau: float = 0.3) -> Outcome:
