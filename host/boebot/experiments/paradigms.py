@@ -216,7 +216,7 @@ def _worst(crossings: list[Crossing], of: Callable[[list[float]], float]) -> flo
 
 def _draw(serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> Draw:
     def draw(figure: Figure) -> None:
-        left, middle, right = figure.subplots(1, 3, width_ratios=(3, 3, 2))
+        left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1))
         for axes, name, crossings in ((left, "plans for 0.5 s", serial), (middle, "behavior-based", parallel)):
             for x, y in ((-0.9, 0.7), (0.7, -0.9)):
                 axes.fill((x, x + 0.2, x + 0.2, x), (y, y, y + 0.2, y + 0.2), color="0.6")
@@ -229,6 +229,7 @@ def _draw(serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> 
         right.plot(PLANNINGS, hits, "o-", label="serial")
         right.axhline(sum(len(one.touched) for one in parallel), linestyle="--", color="C1", label="behavior-based")
         right.set(xlabel="time for a plan (s)", ylabel=f"collisions in {len(serial)} crossings")
+        right.set_box_aspect(1.0)
         right.legend(fontsize="small")
 
     return draw
