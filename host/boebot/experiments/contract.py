@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import boebot
-from boebot.errors import BoebotError
 from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment
 
 if TYPE_CHECKING:
@@ -78,6 +77,8 @@ def reachable(start: object) -> list[object]:
 
 
 def _parts(thing: object) -> Iterator[object]:
+    if isinstance(thing, np.ndarray | np.generic):
+        return  # numbers; their attributes are new views of them without end
     if isinstance(thing, dict):
         yield from thing.keys()
         yield from thing.values()
@@ -91,9 +92,10 @@ def _parts(thing: object) -> Iterator[object]:
     for name in dir(thing):
         if not name.startswith("__"):
             try:
-                yield getattr(thing, name)
-            except (AttributeError, BoebotError):  # a device that the robot does not have
+                part = getattr(thing, name)
+            except Exception:  # a property may have any reason not to answer, such as a device that is not there
                 continue
+            yield part
 
 
 def belongs_to(thing: object) -> str:

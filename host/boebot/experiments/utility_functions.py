@@ -41,7 +41,10 @@ def advanced(functions: list[Utility], variables: dict[str, Floats], step: float
     return np.array(values)
 
 
+TAU = 0.3  # s
 LOSS, LOST_AT = 0.15, 5.0  # s; of Fig. 8.2
+WEIGHT = 2.0  # of z_2 in u_3, Fig. 8.3
+KICK = 3.0  # of E63
 
 
 @experiment(
@@ -51,11 +54,11 @@ LOSS, LOST_AT = 0.15, 5.0  # s; of Fig. 8.2
     caption="Left: a state variable z that is lost for 0.15 s. Right: a utility function of it, with time constant "
     "0.3 s; dotted: without.",
 )
-def loss(seed: int, progress: Progress, tau: float = 0.3) -> Outcome:
+def loss(seed: int, progress: Progress) -> Outcome:
     step = 0.005
     times = np.arange(0, 10, step)
     z = np.where((times >= LOST_AT - 1e-9) & (times < LOST_AT + LOSS - 1e-9), 0.0, 1.0)
-    utility = advanced([Utility(b=1.0, w={"z": 0.5}, tau=tau)], {"z": z}, step)[:, 0]
+    utility = advanced([Utility(b=1.0, w={"z": 0.5}, tau=TAU)], {"z": z}, step)[:, 0]
     times_after = times + step  # the state variables hold until then
     settled, direct = math.tanh(1.5), np.tanh(1.0 + 0.5 * z)
     dip = settled - utility.min()
@@ -94,7 +97,7 @@ def intervals(active: NDArray[np.bool_], times: Floats) -> list[tuple[float, flo
     caption="Utilities of three behaviors: u1 (red) is constant, u2 (green) and u3 (blue) follow state variables. "
     "Below: the active one.",
 )
-def three_behaviors(seed: int, progress: Progress, weight: float = 2.0) -> Outcome:
+def three_behaviors(seed: int, progress: Progress) -> Outcome:
     step = 0.01
     times = np.arange(0, 50, step)
     z_1 = 0.5 + 0.4 * np.sin(0.35 * times) + 0.03 * np.sin(9 * times)
@@ -103,7 +106,7 @@ def three_behaviors(seed: int, progress: Progress, weight: float = 2.0) -> Outco
     functions = [
         Utility(b=0.5, tau=0.2),
         Utility(b=-0.8, w={"z1": 0.6}, tau=0.3),
-        Utility(b=-0.9, w={"z2": weight}, tau=0.3),
+        Utility(b=-0.9, w={"z2": WEIGHT}, tau=0.3),
     ]
     utilities = advanced(functions, {"z1": z_1, "z2": z_2}, step)
     active = utilities.argmax(axis=1)
@@ -145,11 +148,11 @@ def three_behaviors(seed: int, progress: Progress, weight: float = 2.0) -> Outco
     source="section 8.2, equation (8.6)",
     caption="A process at rest at tanh(-0.5) whose gamma parameter is set to 3: gamma and utility; grey: active.",
 )
-def gamma(seed: int, progress: Progress, kick: float = 3.0) -> Outcome:
+def gamma(seed: int, progress: Progress) -> Outcome:
     step, decay = 0.001, 0.5
-    utilities = Utilities([Utility(b=-0.5, tau=0.3, tau_gamma=decay)], [])
+    utilities = Utilities([Utility(b=-0.5, tau=TAU, tau_gamma=decay)], [])
     utilities.start([])
-    utilities.gammas[0] = kick
+    utilities.gammas[0] = KICK
     times: Floats = np.arange(1, 2001, dtype=np.float64) * step
     gammas, values = [], []
     for _ in times:
@@ -216,9 +219,9 @@ def _of_time(name: str, value: Callable[[float], float]) -> StateVariable:
     "to 4 s; thick: active.",
     robot="arsim",
 )
-def activation(seed: int, progress: Progress, tau: float = 0.3) -> Outcome:
+def activation(seed: int, progress: Progress) -> Outcome:
     motor = [Hold(name=f"m{i}", signal=i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5})) for i in range(3)]
-    delayed = Note(name="delayed", utility=Utility(b=-0.5, w={"z": 1.5}, tau=tau))
+    delayed = Note(name="delayed", utility=Utility(b=-0.5, w={"z": 1.5}, tau=TAU))
     notes = [delayed, Note(name="always"), Note(name="never", utility=Utility(b=-0.2))]
     z = _of_time("z", lambda time: float(RISE - 1e-9 <= time < FALL - 1e-9))
     brain = Brain([*motor, *notes], [z], period=0.01)
