@@ -252,6 +252,18 @@ def test_declared_periods_hold() -> None:
     assert drive.told.count("step") == 20
 
 
+def test_a_step_that_comes_late_costs_none() -> None:
+    """A board's telemetry may reach the brain a tick late, at 0.06 s in place of 0.05 s: all steps are carried out."""
+    each, second, drive = Think(name="each"), Think(name="second", period=0.1), Drive()
+    brain, stepped = Brain([drive, each, second]), Stepped(0.05)
+    late = [0.0, 0.06, 0.1, 0.16, 0.21, 0.25, 0.3, 0.36]
+    for time in late:
+        stepped.robot.observation = stepped.robot.observation._replace(time=time)
+        brain.step(stepped.robot)
+    assert each.times == late and drive.told.count("step") == len(late)
+    assert second.times == late[::2]
+
+
 @pytest.mark.parametrize("period", [0.03, 0.07])
 def test_periods_must_fit(period: float) -> None:
     with pytest.raises(BrainError, match=rf"drive: a period of {period} s; expected a multiple of the brain's, 0.05 s"):

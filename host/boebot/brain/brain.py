@@ -93,7 +93,8 @@ class Brain:
         self._motor = [index for index, each in enumerate(self.processes) if isinstance(each, MotorBehavior)]
         self._cognitive = [index for index, each in enumerate(self.processes) if isinstance(each, CognitiveProcess)]
         self._active: list[bool] = []
-        self._due: list[float] = []
+        self._every: list[int] = []  # of the brain's steps, how many to one of each process
+        self._wait: list[int] = []  # steps of the brain until its next one
         self._driving = -1
         self._robot: Robot | None = None
         self._time = 0.0
@@ -169,7 +170,7 @@ class Brain:
         self._robot = robot
         self.steps, self.switches = [], []
         count = len(self.processes)
-        self._active, self._due = [False] * count, [-math.inf] * count
+        self._active, self._every, self._wait = [False] * count, [], [0] * count
         self._driving = -1
         for process in self.processes:
             period = process.period or robot.period
@@ -178,6 +179,7 @@ class Brain:
                 raise BrainError(
                     f"{process.name}: a period of {period:g} s; expected a multiple of the brain's, {robot.period:g} s"
                 )
+            self._every.append(round(ratio))
             process.join(period, robot.stream(process.name), self._find, self._kick)
         self._utilities.start(self._read(robot))
 
@@ -213,16 +215,17 @@ class Brain:
     def _turn(self, robot: Robot, index: int, on: bool) -> None:
         self._active[index] = on
         if on:
-            self._due[index] = -math.inf
+            self._wait[index] = 0
             self.processes[index].enter(robot)
         else:
             self.processes[index].exit(robot)
 
     def _step_if_due(self, index: int, robot: Robot) -> None:
-        process = self.processes[index]
-        if robot.time >= self._due[index] - _ON_TIME:
-            self._due[index] = robot.time + process.step_time
-            process.step(robot)
+        # counted, not timed: a board's telemetry may come a tick late, and the step after that is none too many
+        if self._wait[index] == 0:
+            self._wait[index] = self._every[index]
+            self.processes[index].step(robot)
+        self._wait[index] -= 1
 
     # ---- what processes ask ---------------------------------------------------------------------------------------
 

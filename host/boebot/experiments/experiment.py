@@ -47,6 +47,8 @@ class Measured:
         """The criterion in words."""
         if self.least == self.most:
             return f"{self.least:g}"
+        if math.isinf(self.least) and math.isinf(self.most):
+            return "no criterion"
         if math.isinf(self.least):
             return f"at most {self.most:g}"
         if math.isinf(self.most):

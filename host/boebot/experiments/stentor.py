@@ -215,7 +215,7 @@ def dose(seed: int, progress: Progress) -> Outcome:
     "stronger disturbance also stops feeding and with it X sooner: nine of ten are asked for.",
 )
 def dose_response(seed: int, progress: Progress) -> Outcome:
-    doses = np.linspace(0.2, 4.0, 77)
+    doses = np.linspace(0.2, 4.0, 39)
     highest, stopping, detaching = np.zeros(len(doses), dtype=int), np.full(len(doses), np.nan), np.zeros(len(doses))
     for index, strength in enumerate(doses):
         found = exact(float(strength))
