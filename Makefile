@@ -78,8 +78,8 @@ fuzz:
 
 pictures:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(VENV)/bin/boebot run wander --on native --seconds 90 --out build/pictures
-	@cp build/pictures/run.png docs/images/wander.png
+	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures
+	@cp build/pictures/run.png docs/images/demo.png
 	@$(PYTHON_VENV) -m sim_bridge.arena_reference --pictures
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png

@@ -94,7 +94,7 @@ def test_picture_is_of_this_kit(tmp_path: Path) -> None:
     recipe = next(line for line in (ROOT / "Makefile").read_text().splitlines() if "--out build/pictures" in line)
     command = shlex.split(recipe.split("boebot", 1)[1].replace("build/pictures", str(tmp_path)))
     assert run([*BOEBOT, *command], ROOT).returncode == 0
-    shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / "wander.png", tmp_path / "run.png"))
+    shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / "demo.png", tmp_path / "run.png"))
     assert (shown["Title"], shown["Description"]) == (now["Title"], now["Description"])
 
 
