@@ -4,7 +4,7 @@
 # alone, the tests that look at the wall clock (pytest's mark wall_clock). At the end, a table of what each folder took.
 set -eu
 cd "$(dirname "$0")/.."
-parts="sanitized units hil_tests sim_bridge tools host docs protocol"
+parts="sanitized tools hil_tests sim_bridge host docs protocol"
 export BOEBOT_TEST_TIMES="$PWD/build/test-times"
 rm -f "$BOEBOT_TEST_TIMES"
 
