@@ -18,6 +18,9 @@ IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf build/image
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
+# pip compiles nothing (--no-compile): each module is compiled when it is first needed, and that is kept. Hundreds of
+# processes that start Python, matplotlib or PlatformIO would compile it all again each time.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
 .PHONY: help run test check bench soak fuzz experiments wheel firmware pictures format setup clean lock compile_commands.json

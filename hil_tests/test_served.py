@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.emulated
+pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 
 BOEBOT = [sys.executable, "-m", "boebot"]
 

@@ -13,7 +13,10 @@ from boebot.link.ports.descriptor import HAS_THREAD
 from boebot.link.ports.switch_interval import INTERVAL_S
 from tools.bench.busy import DEFAULT_INTERVAL_S, measure, measure_round_trips, per_cent
 
-pytestmark = pytest.mark.skipif(not HAS_THREAD, reason="there is no C thread on this system")
+pytestmark = [
+    pytest.mark.wall_clock,
+    pytest.mark.skipif(not HAS_THREAD, reason="there is no C thread on this system"),
+]
 
 COUNT = 150
 TRIES = 4

@@ -209,6 +209,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
 
 
+@pytest.mark.wall_clock
 def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
     with pty(Peer()) as served:
         code, out, _ = boebot(capsys, "info", served.path, "--json")
@@ -220,6 +221,7 @@ def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
         assert code == 0 and "compiler" in out and "servo left centre" in out
 
 
+@pytest.mark.wall_clock
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals, tmp_path: Path) -> None:
     with pty(Peer()) as served:
@@ -332,6 +334,7 @@ def test_hang_up_that_was_to_be_ignored_stays_ignored(
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.wall_clock
 @pytest.mark.parametrize(("pause_s", "spoken"), [(0.6, 1), (0.01, 0)])
 def test_step_that_does_not_return_is_spoken_of_once(
     peer: Peer,
@@ -413,6 +416,7 @@ def test_files_are_written_even_if_nobody_reads_the_table(
     assert code == 1 and (tmp_path / "replay.html").is_file()
 
 
+@pytest.mark.wall_clock
 def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     served = Pty(Peer())
 
@@ -562,6 +566,7 @@ def served() -> Iterator[str]:
         server.communicate(timeout=10)
 
 
+@pytest.mark.wall_clock
 @pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
 def test_parameter_outlasts_the_reset_at_opening_only_if_it_is_saved_with_it(
     capsys: pytest.CaptureFixture[str],
@@ -588,6 +593,7 @@ def test_parameter_outlasts_the_reset_at_opening_only_if_it_is_saved_with_it(
         assert value(url) == default
 
 
+@pytest.mark.wall_clock
 def test_board_that_the_opening_does_not_reset_is_not_said_to_be(capsys: pytest.CaptureFixture[str]) -> None:
     with pty(Peer()) as port:
         time.sleep(0.7)
@@ -671,6 +677,7 @@ def teleop_at(served: Pty, *arguments: str) -> Iterator[tuple[int, subprocess.Po
         os.close(slave)
 
 
+@pytest.mark.wall_clock
 def test_teleop_in_a_terminal(tmp_path: Path) -> None:
     """Over two pseudo-terminals: one for the keyboard, one for the robot."""
     with pty(Peer()) as served, teleop_at(served, "--out", str(tmp_path)) as (keyboard, process):
@@ -684,6 +691,7 @@ def test_teleop_in_a_terminal(tmp_path: Path) -> None:
     assert f"files in {tmp_path}: " in out and (tmp_path / "replay.html").is_file()
 
 
+@pytest.mark.wall_clock
 def test_teleop_prints_json_alone(tmp_path: Path) -> None:
     with pty(Peer()) as served, teleop_at(served, "--json", "--out", str(tmp_path)) as (keyboard, process):
         os.write(keyboard, b"q")
@@ -694,6 +702,7 @@ def test_teleop_prints_json_alone(tmp_path: Path) -> None:
     assert teleop.HELP in err and "whiskers" in err
 
 
+@pytest.mark.wall_clock
 def test_teleop_that_is_interrupted_says_so() -> None:
     with pty(Peer()) as served, teleop_at(served, "--json") as (_, process):
         process.send_signal(signal.SIGINT)

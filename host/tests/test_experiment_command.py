@@ -29,7 +29,7 @@ from boebot.report import experiment_files
 from command import boebot, heed_signals
 
 QUICK = ("E29", "E57", "E58")  # of no robot, some milliseconds each
-AGAIN_S = 10.0  # after which somebody presses Ctrl-C again
+AGAIN_S = 2.0  # after which somebody presses Ctrl-C again
 ENDS_S = 30.0  # a process that should end has ended by then, however busy the computer is
 
 

@@ -30,7 +30,10 @@ from boebot.link.ports.serial_port import SerialTransport
 from boebot.link.transport import BaudSelectable, CountsOverruns, Stamping
 from lines import Line, line, rfc2217_server
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
+pytestmark = [
+    pytest.mark.wall_clock,
+    pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals"),
+]
 
 RATES = [9600, 19200, 38400, 57600, 115200, 250000, 500000, 1000000]
 DEAD = 2**22 + 1  # beyond the highest process number of Linux

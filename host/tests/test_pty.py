@@ -21,7 +21,10 @@ from boebot.runner import execute
 from lines import line
 from peer import Peer, Pty, pty
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
+pytestmark = [
+    pytest.mark.wall_clock,
+    pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals"),
+]
 
 
 def straight(robot: Robot) -> None:

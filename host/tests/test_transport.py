@@ -23,7 +23,10 @@ from boebot.link.ports.tcp import SocketTransport
 from boebot.link.transport import BaudSelectable, Stamping, stamped
 from lines import Line, line
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
+pytestmark = [
+    pytest.mark.wall_clock,
+    pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals"),
+]
 
 THREADS = [
     pytest.param(True, id="C thread", marks=pytest.mark.skipif(not HAS_THREAD, reason="not built on this system")),

@@ -1,0 +1,30 @@
+#!/bin/sh
+# One part of all tests: tools/test_part.sh PART [ARGUMENT OF PYTEST...]. PART is a folder or `sanitized`
+# (tools/test_sanitized.sh). Before those of `tools` run the firmware's units on this computer, plain and with sanitizers:
+# both use PlatformIO, which has one folder. Says how the part ended; more only if it failed.
+set -eu
+cd "$(dirname "$0")/.."
+part=$1
+shift
+log=build/test-$part.log units=build/test-units.log
+
+of_folder() { build/venv/bin/python -m pytest "$part" -m "not wall_clock" "$@"; }
+
+run() {
+  case $part in
+    sanitized) tools/test_sanitized.sh ;;
+    tools)
+      tools/pio test -e native -e native_quad -e native_sanitized >"$units" 2>&1 || { cat "$units" && return 1; }
+      grep ' test cases: ' "$units" && of_folder "$@"
+      ;;
+    *) of_folder "$@" ;;
+  esac
+}
+
+if run "$@" >"$log" 2>&1; then
+  grep -E ' test cases: | passed' "$log" | tr -d '=' | sed "s/^ */$part: /"
+else
+  tail -n 200 "$log"
+  echo "$part failed; all of its output: $log" >&2
+  exit 1
+fi
