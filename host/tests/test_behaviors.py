@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from steps import FULL, Stepped, SteppedVehicle, alone
-from test_cognition import ANYTHING
 
 from boebot.behaviors import (
     Avoid,
@@ -33,10 +31,10 @@ from boebot.behaviors import (
 )
 from boebot.behaviors.escalate import STENTOR
 from boebot.behaviors.withdraw import ReflexIntensity
-from boebot.brain import Brain, CognitiveProcess, MotorBehavior, Utility
+from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, Odometry, near
 from boebot.errors import BrainError
-from boebot.robot import Command, Robot
+from boebot.robot import Command
 
 REST = Utility(b=-0.5)  # below whatever is called
 
@@ -405,69 +403,7 @@ def test_the_longer_a_touch_the_more_drastic_the_answer() -> None:
     assert found == sorted(found) and found[0] == 0 and found[-1] == 4 and len(set(found)) >= 3
 
 
-# ---- all of them ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Case:
-    """A behavior and what it works with."""
-
-    make: Callable[[], MotorBehavior]
-    with_: Callable[[], list[CognitiveProcess]] = list
-
-
-def half(robot: Robot) -> float | None:
-    return 0.5
-
-
-CASES = {
-    "avoid": Case(Avoid),
-    "charge": Case(ChargeBattery, lambda: [BatteryLevel(empty=5.0, full=7.75)]),
-    "escalate": Case(Escalate),
-    "escape": Case(Escape),
-    "evade": Case(Evade),
-    "follow": Case(FollowWall),
-    "kinesis": Case(lambda: Kinesis(stimulus=half, spread=20.0)),
-    "klinotaxis": Case(Klinotaxis),
-    "phototaxis": Case(lambda: Phototaxis(signal=1.0, gain=1.0)),
-    "run and tumble": Case(lambda: RunAndTumble(stimulus=lambda robot: robot.left_light.brightness)),
-    "stop": Case(Stop),
-    "straight": Case(lambda: StraightRun(heading_gain=5.0), lambda: [Odometry()]),
-    "wander": Case(Wander),
-    "withdraw": Case(Withdraw),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-@given(told=st.lists(ANYTHING, min_size=1, max_size=6), seed=st.integers(0, 9))
-@settings(max_examples=6)
-def test_commands_stay_within_bounds_whatever_is_told(name: str, told: list[dict[str, int]], seed: int) -> None:
-    """Stale, missing and extreme values included; the robot itself refuses NaN and signals beyond 1."""
-    case = CASES[name]
-    brain, stepped = Brain([case.make(), *case.with_()]), Stepped(0.05, seed, FULL)
-    for fields in told:
-        for _ in range(3):
-            kind, left, right = stepped.step(brain, **fields)
-            assert kind in ("signal", "stop") and -1 <= left <= 1 and -1 <= right <= 1
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_the_same_seed_gives_the_same_commands_and_others_change_none_of_its_chance(name: str) -> None:
-    def commands(seed: int, *more: CognitiveProcess) -> list[Command]:
-        case = CASES[name]
-        brain, stepped = Brain([case.make(), *case.with_(), *more]), Stepped(0.05, seed, FULL)
-        told = {"light_left": 900, "light_right": 1100, "light_age": 0, "battery": 700, "battery_age": 0}
-        return [stepped.step(brain, whiskers=step // 30 % 4, infrared=step // 20 % 4, **told) for step in range(200)]
-
-    @dataclass(kw_only=True)
-    class Gambler(CognitiveProcess):
-        def step(self, robot: Robot) -> None:
-            self.chance(0.5)
-
-    first = commands(3)
-    assert commands(3) == first == commands(3, Gambler())
-    if name in ("kinesis", "wander", "run and tumble"):
-        assert commands(4) != first
+# ---- parameters ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -58,10 +58,12 @@ class ChargeBattery(MotorBehavior):
         for key in ("signal", "creep"):
             if not 0 < getattr(self, key) <= 1:
                 raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected a motor signal above 0, to 1")
+
+    def forget(self) -> None:
         self.charging = False
 
     def enter(self, robot: Robot) -> None:
-        self.charging = False
+        self.forget()
         self._brightest = 0.0
         self.machine = Machine(robot, self.seek)
 

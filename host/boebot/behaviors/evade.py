@@ -82,8 +82,11 @@ class Evade(MotorBehavior):
         """It is in the middle of its erratic flight or of its drop."""
         return self._bound
 
-    def enter(self, robot: Robot) -> None:
+    def forget(self) -> None:
         self._bound = False
+
+    def enter(self, robot: Robot) -> None:
+        self.forget()
         self.machine = Machine(robot, self.steer)
 
     def step(self, robot: Robot) -> None:
@@ -93,7 +96,7 @@ class Evade(MotorBehavior):
         self.machine.step(robot)
 
     def exit(self, robot: Robot) -> None:
-        self._bound = False
+        self.forget()
 
     def steer(self, robot: Robot) -> State | None:
         left, right = self.hear(robot)
@@ -118,8 +121,6 @@ class Evade(MotorBehavior):
             return None
         self._bound = False
         return self.steer
-
-    _bound = False
 
 
 @dataclass(kw_only=True)

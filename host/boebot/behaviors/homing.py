@@ -63,11 +63,13 @@ class Homing(MotorBehavior):
         for key in ("signal", "search_signal", "turn"):
             if getattr(self, key) > 1:
                 raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; motor signals go up to 1")
+
+    def forget(self) -> None:
         self.arrived: float | None = None
         self.home: float | None = None
 
     def enter(self, robot: Robot) -> None:
-        self.arrived = self.home = None
+        self.forget()
         self.machine = Machine(robot, self.inbound)
 
     def step(self, robot: Robot) -> None:

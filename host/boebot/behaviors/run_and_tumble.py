@@ -43,8 +43,7 @@ class RunAndTumble(MotorBehavior):
     run_on: float = 0.3
     """seconds that it runs after each tumble, or it would never leave a place that has become bad"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.value = 0.0
 
     def enter(self, robot: Robot) -> None:

@@ -39,13 +39,12 @@ class StraightRun(MotorBehavior):
     heading_gain: float = 0.0
     """k (1/rad): s ∓ k times the heading error holds the heading; the notes' listing has none"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.distance = 0.0
         self.arrived = False
 
     def enter(self, robot: Robot) -> None:
-        self.distance, self.arrived = 0.0, False
+        self.forget()
         self.machine = Machine(robot, self.begin)
 
     def step(self, robot: Robot) -> None:

@@ -36,8 +36,7 @@ class Wander(MotorBehavior):
     """to stop turning, in each 0.01 s"""
     left_turn_probability: float = 0.5
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.left = False
 
     def enter(self, robot: Robot) -> None:

@@ -68,8 +68,10 @@ class Withdraw(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.fresh()  # refuses times that are none
+
+    def forget(self) -> None:
         self.intensity = 0.0
-        self._reflex = self.fresh()
 
     def fresh(self) -> ReflexIntensity:
         """The reflex, neither warm nor tired."""

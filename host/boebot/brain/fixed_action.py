@@ -49,10 +49,8 @@ class FixedActionPattern(MotorBehavior):
         for action in self._actions:
             if not (abs(action.left) <= 1 and abs(action.right) <= 1 and action.seconds > 0):
                 raise BrainError(f"{self.name}: action {tuple(action)}; expected signals from -1 to 1, and seconds > 0")
-        self.forget()
 
     def forget(self) -> None:
-        """As at the beginning of a run."""
         self.running = False
         self._ended = float("-inf")
 

@@ -1,7 +1,7 @@
 """What a brain is made of: processes (section 8.2 of the notes), motor behaviors and cognitive ones, in one form.
 
 A process is a dataclass: its fields are *parameters*, which stay as they are throughout a run; its *state* is set in
-`enter` and changed in `step`.
+`enter` and changed in `step`; what others may ask of it is set in `forget`, too.
 
     @dataclass(kw_only=True)
     class Spin(MotorBehavior):
@@ -64,6 +64,14 @@ class Process:
         self._others: Callable[[object], Process] = _alone
         self._kick: Callable[[Process, float], None] = _unheard
         self._chances: dict[tuple[float, float], float] = {}
+        self.forget()
+
+    def forget(self) -> None:
+        """Called when it is made, and when a run begins: sets what others may ask of it before it was ever active.
+
+        State variables are read before the first process is entered, and a process may sleep through a whole run: what
+        an earlier run left behind must not be found here.
+        """
 
     def enter(self, robot: Robot) -> None:
         """Called when it becomes active, before its first step: sets its state."""
@@ -130,6 +138,7 @@ class Process:
         kick: Callable[[Process, float], None],
     ) -> None:
         """A run begins."""
+        self.forget()
         self.step_time, self.random = step_time, source
         self._others, self._kick = others, kick
         self._chances.clear()

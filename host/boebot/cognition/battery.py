@@ -58,9 +58,8 @@ class BatteryLevel(CognitiveProcess):
         for key in ("tau", "rise", "fall"):
             if not getattr(self, key) > 0:
                 raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected more than 0")
-        self._forget()
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.voltage: float | None = None
         self.charging = False
         self._turned = math.nan  # the lowest voltage since the charger was left, or the highest since it was reached
@@ -74,7 +73,7 @@ class BatteryLevel(CognitiveProcess):
         return min(max((rested - self.empty) / (self.full - self.empty), 0.0), 1.0)
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
         self._time = robot.time
 
     def step(self, robot: Robot) -> None:

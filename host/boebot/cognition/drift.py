@@ -25,12 +25,11 @@ class Drift(CognitiveProcess):
     distance: float = 10.0
     """s_0 (m)"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.value = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self.value = 0.0
+        self.forget()
         self._from = self.other(Odometry).travelled
 
     def step(self, robot: Robot) -> None:

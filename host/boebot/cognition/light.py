@@ -27,17 +27,13 @@ class LightSense(CognitiveProcess):
     scale: float = 1.0
     """brightness that counts as half of full light in the state variable"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._forget()
-
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.left: float | None = None
         self.right: float | None = None
         self.asymmetry = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
 
     def step(self, robot: Robot) -> None:
         left, right = robot.left_light, robot.right_light

@@ -50,9 +50,8 @@ class Odometry(CognitiveProcess):
             raise BrainError(f"{self.name}: use is {self.use!r}; expected one of {', '.join(SOURCES)}")
         if len(self.factors) != 2 or not all(0 < factor < math.inf for factor in self.factors):
             raise BrainError(f"{self.name}: factors are {self.factors!r}; expected two numbers above 0")
-        self._forget()
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.pose = self.start
         self.speed = self.turn_rate = self.travelled = 0.0
         self.source: Source = self.use or "commands"
@@ -60,7 +59,7 @@ class Odometry(CognitiveProcess):
         self._time = math.nan
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
         if self.use is None:
             kinds: dict[str, Source] = {"odometer": "odometer", "encoders": "encoders"}
             self.source = next((source for device, source in kinds.items() if robot.has(device)), "commands")

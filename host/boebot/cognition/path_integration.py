@@ -46,6 +46,8 @@ class PathIntegration(CognitiveProcess):
         super().__post_init__()
         if not (isinstance(self.scale, int | float) and 0 < self.scale < math.inf):
             raise BrainError(f"{self.name}: scale is {self.scale!r}; expected more than 0")
+
+    def forget(self) -> None:
         self.set_home()
         self.heading = 0.0
 
@@ -70,7 +72,7 @@ class PathIntegration(CognitiveProcess):
         return -self.vector[0], -self.vector[1]
 
     def enter(self, robot: Robot) -> None:
-        self.set_home()
+        self.forget()
         odometry = self.other(Odometry)
         self._pose = odometry.pose
         read = self._read(robot)

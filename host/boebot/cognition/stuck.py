@@ -29,12 +29,11 @@ class StuckDetector(CognitiveProcess):
     least: float = 0.1
     """share of the robot's full speed below which nothing is asked of it"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.share = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self.share = 0.0
+        self.forget()
         self._past: deque[tuple[float, float, float]] = deque()  # time, asked and made so far (m)
         self._asked = self._made = 0.0
         self._time = robot.time
