@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from steps import FULL, Stepped, SteppedVehicle, alone
 
 from boebot.behaviors import (
-    Avoid,
     ChargeBattery,
     Escalate,
     Escape,
@@ -32,7 +31,7 @@ from boebot.behaviors import (
 from boebot.behaviors.escalate import STENTOR
 from boebot.behaviors.withdraw import ReflexIntensity
 from boebot.brain import Brain, Utility
-from boebot.cognition import BatteryLevel, Odometry, near
+from boebot.cognition import BatteryLevel, Odometry
 from boebot.errors import BrainError
 from boebot.robot import Command
 
@@ -103,22 +102,6 @@ def test_straight_run_heeds_dead_band_and_heading_and_stays_where_it_arrived() -
 
 
 # ---- things in the way ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("left", "right", "turn"), [(0.5, 0.2, -0.5), (0.2, 0.5, 0.5)])
-def test_avoid_turns_away_from_the_stronger_side_until_clear_and_a_little_longer(
-    left: float, right: float, turn: float
-) -> None:
-    avoid, vehicle = Avoid(utility=Utility(b=-1.0, w={"near": 10.0}, tau=0.02)), SteppedVehicle()
-    brain = Brain([Stop(utility=Utility(b=0.5)), avoid], [near()], period=0.01)
-    assert {vehicle.steer(brain, 0.14, 0.14).kind for _ in range(20)} == {"stop"}, "10 · 0.14 - 1 < 0.5"
-    for _ in range(5):
-        vehicle.steer(brain, left, right)
-    for _ in range(20):
-        assert vehicle.steer(brain, left, right) == signals(-turn, turn)
-        left, right = right, left  # the side is chosen once
-    clear = [vehicle.steer(brain, 0.07, 0.07) == signals(-turn, turn) for _ in range(60)]
-    assert all(clear[:39]) and not any(clear[42:]), "0.4 s, and the utility's lag"
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.sampled_from(["left", "right"]))

@@ -127,7 +127,7 @@ def test_module_object_and_a_class_of_ones_own(tmp_path: Path) -> None:
         ("a.py", "from boebot.brain import Brain\n", r"a\.py has neither a function step"),
         ("a.py", COMPOSED.replace('"near"', '"far"'), r"a\.py, line 6: utility: w names the state variable 'far'"),
         ("a.toml", TOML + "hue = 3\n", r"a\.toml.*hue"),
-        ("a.toml", TOML.replace("near = 3.0", "far = 3.0"), r"a\.toml: .*names the state variable 'far'"),
+        ("a.toml", TOML.replace("near = 3.0", "far = 3.0"), r"a\.toml:7: .*names the state variable 'far'"),
         ("a.toml", "= 1", r"a\.toml"),
         ("a.txt", TOML, r"a\.txt is no brain file; a brain's file ends in \.py or \.toml"),
     ],
