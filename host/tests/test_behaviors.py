@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -32,7 +31,6 @@ from boebot.behaviors.escalate import STENTOR
 from boebot.behaviors.withdraw import ReflexIntensity
 from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, Odometry
-from boebot.errors import BrainError
 from boebot.robot import Command
 
 REST = Utility(b=-0.5)  # below whatever is called
@@ -384,40 +382,3 @@ def test_the_longer_a_touch_the_more_drastic_the_answer() -> None:
     # faded before the slow ones come near that
     found = [strongest(seconds) for seconds in (0.1, 0.2, 0.4, 1.0, 10.0)]
     assert found == sorted(found) and found[0] == 0 and found[-1] == 4 and len(set(found)) >= 3
-
-
-# ---- parameters ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (
-            lambda: FollowWall(side="up"),  # type: ignore[arg-type]
-            "follow_wall: side is 'up'; expected 'left' or 'right'",
-        ),
-        (lambda: Evade(weak=0.5, strong=0.5), "evade: weak is 0.5 and strong 0.5; expected 0 <= weak < strong"),
-        (lambda: Evade(beat=0), "evade: beat is 0; expected seconds, more than 0"),
-        (lambda: Evade(spread=1.5), "evade: spread is 1.5; expected 0 to 1"),
-        (
-            lambda: Escalate(links=((1.0, 1.0),)),
-            "escalate: 1 links; expected one for each of turn, reverse, stop, call",
-        ),
-        (lambda: Escalate(fade=(0.9, 3.0)), "escalate: X_1 is 2.6; expected more than X_2, 3.0"),
-        (lambda: Escalate(signal=2), "escalate: signal is 2; expected a motor signal above 0, to 1"),
-        (lambda: LeakyChain([(0.0, 1.0)]), r"a chain of \[\(0.0, 1.0\)\]; expected pairs \(a, b\) of numbers above 0"),
-        (lambda: Escape(back=0), "escape: back is 0; expected more than 0"),
-        (lambda: ChargeBattery(passed=1.0), "charge_battery: passed is 1.0; expected a share between 0 and 1"),
-        (lambda: ChargeBattery(creep=0.0), "charge_battery: creep is 0.0; expected a motor signal above 0, to 1"),
-        (lambda: ReflexIntensity(1.0, 1.0), "expected two different times above 0"),
-    ],
-)
-def test_parameters_that_do_not_fit_get_one_sentence(make: Callable[[], object], sentence: str) -> None:
-    with pytest.raises(BrainError, match=sentence):
-        make()
-
-
-def test_a_moth_that_hears_no_number_says_so() -> None:
-    brain = alone(Evade(left=lambda robot: math.nan))
-    with pytest.raises(BrainError, match="evade: a signal of nan; expected a finite number"):
-        Stepped().step(brain)

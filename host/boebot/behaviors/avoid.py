@@ -21,10 +21,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import MotorBehavior
 from boebot.brain.utility import HOLD
 from boebot.cognition.proximity import left_nearness, right_nearness
-from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
@@ -45,11 +45,9 @@ class Avoid(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 < self.turn <= 1:
-            raise BrainError(f"{self.name}: turn is {self.turn!r}; expected a motor signal above 0, to 1")
-        for key in ("clear", "after"):
-            if not 0 <= getattr(self, key) < math.inf:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected 0 or more")
+        parameters.positive(self, "turn")
+        parameters.signals(self, "turn")
+        parameters.not_negative(self, "clear", "after")
 
     def enter(self, robot: Robot) -> None:
         left, right = left_nearness(robot) or 0.0, right_nearness(robot) or 0.0

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.odometry import Odometry, wrapped
@@ -38,6 +39,12 @@ class StraightRun(MotorBehavior):
     """smallest motor signal: a servo does not turn within its dead band of about 0.05"""
     heading_gain: float = 0.0
     """k (1/rad): s ∓ k times the heading error holds the heading; the notes' listing has none"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.positive(self, "goal", "threshold")
+        parameters.signals(self, "signal")
+        parameters.shares(self, "least")
 
     def forget(self) -> None:
         self.distance = 0.0

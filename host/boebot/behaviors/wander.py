@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 
@@ -35,6 +36,11 @@ class Wander(MotorBehavior):
     stop_turn_probability: float = 0.03
     """to stop turning, in each 0.01 s"""
     left_turn_probability: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.signals(self, "forward", "turn")
+        parameters.shares(self, "turn_probability", "stop_turn_probability", "left_turn_probability")
 
     def forget(self) -> None:
         self.left = False

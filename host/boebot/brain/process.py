@@ -27,6 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+from boebot.brain import parameters
 from boebot.brain.utility import Utility
 from boebot.errors import BrainError
 
@@ -57,6 +58,11 @@ class Process:
 
     def __post_init__(self) -> None:
         self.name = self.name or snake_case(type(self).__name__)
+        if not isinstance(self.name, str):
+            raise BrainError(f"a process is called {self.name!r}; expected a text")
+        if not isinstance(self.utility, Utility):
+            raise BrainError(f"{self.name}: utility is {self.utility!r}; expected a Utility(...)")
+        parameters.check_numbers(self)
         if self.period is not None and not (isinstance(self.period, int | float) and 0 < self.period < math.inf):
             raise BrainError(f"{self.name}: period is {self.period!r}; expected seconds from step to step")
         self.random = random.Random()
@@ -73,6 +79,11 @@ class Process:
         an earlier run left behind must not be found here.
         """
 
+    @property
+    def is_made(self) -> bool:
+        """A class of somebody's own has not kept it from being set up."""
+        return "step_time" in vars(self)
+
     def enter(self, robot: Robot) -> None:
         """Called when it becomes active, before its first step: sets its state."""
 
@@ -81,7 +92,7 @@ class Process:
 
         A motor behavior drives the robot here; what it does not say anew holds on.
         """
-        raise NotImplementedError
+        raise BrainError(f"{self.name}: class {type(self).__name__} has no step(self, robot)")
 
     def exit(self, robot: Robot) -> None:
         """Called when it is active no more."""

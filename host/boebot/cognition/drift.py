@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry
@@ -24,6 +25,10 @@ class Drift(CognitiveProcess):
 
     distance: float = 10.0
     """s_0 (m)"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.positive(self, "distance")
 
     def forget(self) -> None:
         self.value = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 
@@ -26,6 +27,10 @@ class LightSense(CognitiveProcess):
 
     scale: float = 1.0
     """brightness that counts as half of full light in the state variable"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.positive(self, "scale")
 
     def forget(self) -> None:
         self.left: float | None = None

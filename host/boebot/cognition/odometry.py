@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Literal
 
 from boebot.brain.process import CognitiveProcess
@@ -48,6 +49,8 @@ class Odometry(CognitiveProcess):
         super().__post_init__()
         if self.use not in (None, *SOURCES):
             raise BrainError(f"{self.name}: use is {self.use!r}; expected one of {', '.join(SOURCES)}")
+        if not (isinstance(self.start, tuple | list) and len(self.start) == 3 and all(map(_is_finite, self.start))):
+            raise BrainError(f"{self.name}: start is {self.start!r}; expected x (m), y (m), heading (rad)")
         if len(self.factors) != 2 or not all(0 < factor < math.inf for factor in self.factors):
             raise BrainError(f"{self.name}: factors are {self.factors!r}; expected two numbers above 0")
 
@@ -150,6 +153,10 @@ def _signals(robot: Robot) -> tuple[float, float]:
     if kind == "speed":
         return left / robot.dimensions.speed, right / robot.dimensions.speed
     return (left, right) if kind == "signal" else (0.0, 0.0)
+
+
+def _is_finite(number: object) -> bool:
+    return isinstance(number, Real) and math.isfinite(number)
 
 
 def wrapped(angle: float) -> float:

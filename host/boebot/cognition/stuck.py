@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry, wrapped
@@ -28,6 +29,10 @@ class StuckDetector(CognitiveProcess):
     """seconds over which motion is compared"""
     least: float = 0.1
     """share of the robot's full speed below which nothing is asked of it"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.positive(self, "window", "least")
 
     def forget(self) -> None:
         self.share = 0.0
