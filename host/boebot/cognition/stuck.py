@@ -20,6 +20,7 @@ class StuckDetector(CognitiveProcess):
     """Compares what was asked of the wheels over some time with what odometry says came of it.
 
     Wheels that spin without the robot moving are only seen where odometry comes from something else than wheels.
+    Odometry that comes from commands (`Odometry.source`) believes what was asked: with it, nothing is ever missing.
 
     Attributes:
         share: how much of the asked motion is missing over the time, 0 (moves as told) to 1 (stands still).
