@@ -30,6 +30,7 @@ class Readings(NamedTuple):
     ages: tuple[float, ...]
     """s since each was taken"""
     values: tuple[float, ...]
+    """SI units; which stands where says the layout"""
 
 
 class Proximity(NamedTuple):
@@ -40,6 +41,7 @@ class Proximity(NamedTuple):
     age: float
     """Seconds since it was taken."""
     valid: bool
+    """Whether the value may be trusted."""
     reading: float
     """0 (nothing within range) to 1 (close by)."""
 
@@ -54,16 +56,20 @@ class OdometerPose(NamedTuple):
     heading: float
     """rad, counter-clockwise from the x axis"""
     age: float
+    """Seconds since it was taken."""
     valid: bool
+    """Whether the value may be trusted."""
 
 
 class Heading(NamedTuple):
-    """A compass."""
+    """A compass, of a robot without a board."""
 
     heading: float
     """rad in (-pi, pi], counter-clockwise from the x axis"""
     age: float
+    """Seconds since it was taken."""
     valid: bool
+    """Whether the value may be trusted."""
 
 
 class Scan(NamedTuple):
@@ -74,15 +80,20 @@ class Scan(NamedTuple):
     angles: tuple[float, ...]
     """rad from straight ahead, counter-clockwise"""
     age: float
+    """Seconds since it was taken."""
     valid: bool
+    """Whether the value may be trusted."""
 
 
 class Reading(NamedTuple):
     """One number: an acceleration along the heading (m/s^2)."""
 
     value: float
+    """m/s^2, forward positive"""
     age: float
+    """Seconds since it was taken."""
     valid: bool
+    """Whether the value may be trusted."""
 
 
 Reader = Callable[[Readings], object]

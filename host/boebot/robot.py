@@ -41,13 +41,15 @@ SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol
 
 
 class Command(NamedTuple):
-    """What the brain wants of the motors."""
+    """What the brain wants of the motors; it never changes."""
 
     kind: str
     """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (no pulses: the wheels
     turn freely)."""
     left: float
+    """Of the left wheel: motor signal, -1 to 1, or m/s, as `kind` says; 0 with "stop"."""
     right: float
+    """Of the right wheel, the same."""
 
 
 STOP: Final = Command("stop", 0.0, 0.0)

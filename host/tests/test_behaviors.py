@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -12,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from steps import FULL, Stepped, SteppedVehicle, alone
-from test_cognition import ANYTHING
 
 from boebot.behaviors import (
-    Avoid,
     ChargeBattery,
     Escalate,
     Escape,
@@ -33,10 +29,9 @@ from boebot.behaviors import (
 )
 from boebot.behaviors.escalate import STENTOR
 from boebot.behaviors.withdraw import ReflexIntensity
-from boebot.brain import Brain, CognitiveProcess, MotorBehavior, Utility
-from boebot.cognition import BatteryLevel, Odometry, near
-from boebot.errors import BrainError
-from boebot.robot import Command, Robot
+from boebot.brain import Brain, Utility
+from boebot.cognition import BatteryLevel, Odometry
+from boebot.robot import Command
 
 REST = Utility(b=-0.5)  # below whatever is called
 
@@ -105,22 +100,6 @@ def test_straight_run_heeds_dead_band_and_heading_and_stays_where_it_arrived() -
 
 
 # ---- things in the way ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("left", "right", "turn"), [(0.5, 0.2, -0.5), (0.2, 0.5, 0.5)])
-def test_avoid_turns_away_from_the_stronger_side_until_clear_and_a_little_longer(
-    left: float, right: float, turn: float
-) -> None:
-    avoid, vehicle = Avoid(utility=Utility(b=-1.0, w={"near": 10.0}, tau=0.02)), SteppedVehicle()
-    brain = Brain([Stop(utility=Utility(b=0.5)), avoid], [near()], period=0.01)
-    assert {vehicle.steer(brain, 0.14, 0.14).kind for _ in range(20)} == {"stop"}, "10 · 0.14 - 1 < 0.5"
-    for _ in range(5):
-        vehicle.steer(brain, left, right)
-    for _ in range(20):
-        assert vehicle.steer(brain, left, right) == signals(-turn, turn)
-        left, right = right, left  # the side is chosen once
-    clear = [vehicle.steer(brain, 0.07, 0.07) == signals(-turn, turn) for _ in range(60)]
-    assert all(clear[:39]) and not any(clear[42:]), "0.4 s, and the utility's lag"
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.sampled_from(["left", "right"]))
@@ -403,102 +382,3 @@ def test_the_longer_a_touch_the_more_drastic_the_answer() -> None:
     # faded before the slow ones come near that
     found = [strongest(seconds) for seconds in (0.1, 0.2, 0.4, 1.0, 10.0)]
     assert found == sorted(found) and found[0] == 0 and found[-1] == 4 and len(set(found)) >= 3
-
-
-# ---- all of them ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Case:
-    """A behavior and what it works with."""
-
-    make: Callable[[], MotorBehavior]
-    with_: Callable[[], list[CognitiveProcess]] = list
-
-
-def half(robot: Robot) -> float | None:
-    return 0.5
-
-
-CASES = {
-    "avoid": Case(Avoid),
-    "charge": Case(ChargeBattery, lambda: [BatteryLevel(empty=5.0, full=7.75)]),
-    "escalate": Case(Escalate),
-    "escape": Case(Escape),
-    "evade": Case(Evade),
-    "follow": Case(FollowWall),
-    "kinesis": Case(lambda: Kinesis(stimulus=half, spread=20.0)),
-    "klinotaxis": Case(Klinotaxis),
-    "phototaxis": Case(lambda: Phototaxis(signal=1.0, gain=1.0)),
-    "run and tumble": Case(lambda: RunAndTumble(stimulus=lambda robot: robot.left_light.brightness)),
-    "stop": Case(Stop),
-    "straight": Case(lambda: StraightRun(heading_gain=5.0), lambda: [Odometry()]),
-    "wander": Case(Wander),
-    "withdraw": Case(Withdraw),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-@given(told=st.lists(ANYTHING, min_size=1, max_size=6), seed=st.integers(0, 9))
-@settings(max_examples=6)
-def test_commands_stay_within_bounds_whatever_is_told(name: str, told: list[dict[str, int]], seed: int) -> None:
-    """Stale, missing and extreme values included; the robot itself refuses NaN and signals beyond 1."""
-    case = CASES[name]
-    brain, stepped = Brain([case.make(), *case.with_()]), Stepped(0.05, seed, FULL)
-    for fields in told:
-        for _ in range(3):
-            kind, left, right = stepped.step(brain, **fields)
-            assert kind in ("signal", "stop") and -1 <= left <= 1 and -1 <= right <= 1
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_the_same_seed_gives_the_same_commands_and_others_change_none_of_its_chance(name: str) -> None:
-    def commands(seed: int, *more: CognitiveProcess) -> list[Command]:
-        case = CASES[name]
-        brain, stepped = Brain([case.make(), *case.with_(), *more]), Stepped(0.05, seed, FULL)
-        told = {"light_left": 900, "light_right": 1100, "light_age": 0, "battery": 700, "battery_age": 0}
-        return [stepped.step(brain, whiskers=step // 30 % 4, infrared=step // 20 % 4, **told) for step in range(200)]
-
-    @dataclass(kw_only=True)
-    class Gambler(CognitiveProcess):
-        def step(self, robot: Robot) -> None:
-            self.chance(0.5)
-
-    first = commands(3)
-    assert commands(3) == first == commands(3, Gambler())
-    if name in ("kinesis", "wander", "run and tumble"):
-        assert commands(4) != first
-
-
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (
-            lambda: FollowWall(side="up"),  # type: ignore[arg-type]
-            "follow_wall: side is 'up'; expected 'left' or 'right'",
-        ),
-        (lambda: Evade(weak=0.5, strong=0.5), "evade: weak is 0.5 and strong 0.5; expected 0 <= weak < strong"),
-        (lambda: Evade(beat=0), "evade: beat is 0; expected seconds, more than 0"),
-        (lambda: Evade(spread=1.5), "evade: spread is 1.5; expected 0 to 1"),
-        (
-            lambda: Escalate(links=((1.0, 1.0),)),
-            "escalate: 1 links; expected one for each of turn, reverse, stop, call",
-        ),
-        (lambda: Escalate(fade=(0.9, 3.0)), "escalate: X_1 is 2.6; expected more than X_2, 3.0"),
-        (lambda: Escalate(signal=2), "escalate: signal is 2; expected a motor signal above 0, to 1"),
-        (lambda: LeakyChain([(0.0, 1.0)]), r"a chain of \[\(0.0, 1.0\)\]; expected pairs \(a, b\) of numbers above 0"),
-        (lambda: Escape(back=0), "escape: back is 0; expected more than 0"),
-        (lambda: ChargeBattery(passed=1.0), "charge_battery: passed is 1.0; expected a share between 0 and 1"),
-        (lambda: ChargeBattery(creep=0.0), "charge_battery: creep is 0.0; expected a motor signal above 0, to 1"),
-        (lambda: ReflexIntensity(1.0, 1.0), "expected two different times above 0"),
-    ],
-)
-def test_parameters_that_do_not_fit_get_one_sentence(make: Callable[[], object], sentence: str) -> None:
-    with pytest.raises(BrainError, match=sentence):
-        make()
-
-
-def test_a_moth_that_hears_no_number_says_so() -> None:
-    brain = alone(Evade(left=lambda robot: math.nan))
-    with pytest.raises(BrainError, match="evade: a signal of nan; expected a finite number"):
-        Stepped().step(brain)

@@ -419,46 +419,6 @@ def test_state_variables_stay_within_zero_and_one(raw: float | None) -> None:
 # ---- what is refused -----------------------------------------------------------------------------------------------
 
 
-@dataclass(kw_only=True)
-class Meddler(CognitiveProcess):
-    def step(self, robot: Robot) -> None:
-        robot.drive(1.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (lambda: Brain([]), "a brain needs at least one motor behavior"),
-        (lambda: Brain([Think()]), "a brain needs at least one motor behavior"),
-        (lambda: Brain([Drive(), Drive()]), "two processes are called 'drive'; expected a name= of its own for each"),
-        (lambda: Brain([Drive()], [variable("z", lambda t: 0)] * 2), "two state variables are called 'z'"),
-        (
-            lambda: Brain([Drive(utility=Utility(w={"near": 1}))]),
-            "names the state variable 'near'; this brain has none",
-        ),
-        (lambda: Brain([Drive()], period=0), "a brain's period of 0; expected seconds"),
-        (lambda: Brain([Drive()], margin=-1), "a margin of -1; expected 0 or more"),
-        (lambda: Utility(tau=0), "utility: tau is 0; expected more than 0"),
-        (lambda: Utility(b=math.nan), "utility: b is nan; expected a finite number"),
-        (lambda: Utility(w={"near": "much"}), r"utility: w\['near'\] is 'much'; expected a finite number"),  # type: ignore[dict-item]
-        (lambda: Drive(period=-1), "drive: period is -1; expected seconds"),
-        (lambda: Drive().kick("x", 1), "belongs to no brain yet"),
-        (lambda: Stepped().step(alone(Drive(), Meddler())), "cognitive process 'meddler' drives the motors"),
-        (
-            lambda: Stepped().step(Brain([Drive()], [variable("z", lambda t: math.nan)])),
-            "state variable 'z' is nan; expected a number from 0 to 1",
-        ),
-        (
-            lambda: FixedActionPattern(actions=[(2, 0, 1)], releaser=bool),
-            r"fixed_action_pattern: action \(2, 0, 1\); expected signals from -1 to 1, and seconds > 0",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_refused_in_one_sentence(make: Callable[[], object], sentence: str) -> None:
-    with pytest.raises(BrainError, match=sentence):
-        make()
-
-
 def test_kicks_and_questions_name_what_is_not_there() -> None:
     @dataclass(kw_only=True)
     class Asking(CognitiveProcess):

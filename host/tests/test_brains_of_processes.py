@@ -19,7 +19,7 @@ from steps import Stepped
 
 import boebot
 from boebot import cli
-from boebot.behaviors import Avoid, Stop, Wander
+from boebot.behaviors import Avoid, Stop, StraightRun, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brains import bundled, load_brain
 from boebot.cognition import Odometry, contact, near
@@ -127,7 +127,7 @@ def test_module_object_and_a_class_of_ones_own(tmp_path: Path) -> None:
         ("a.py", "from boebot.brain import Brain\n", r"a\.py has neither a function step"),
         ("a.py", COMPOSED.replace('"near"', '"far"'), r"a\.py, line 6: utility: w names the state variable 'far'"),
         ("a.toml", TOML + "hue = 3\n", r"a\.toml.*hue"),
-        ("a.toml", TOML.replace("near = 3.0", "far = 3.0"), r"a\.toml: .*names the state variable 'far'"),
+        ("a.toml", TOML.replace("near = 3.0", "far = 3.0"), r"a\.toml:7: .*names the state variable 'far'"),
         ("a.toml", "= 1", r"a\.toml"),
         ("a.txt", TOML, r"a\.txt is no brain file; a brain's file ends in \.py or \.toml"),
     ],
@@ -253,12 +253,20 @@ def test_error_in_a_process_names_it_and_the_place(tmp_path: Path) -> None:
         (Brain([Clumsy(deed=ord)]), rf"{Path(__file__).name}, line {line}: process 'clumsy': TypeError"),  # type: ignore[arg-type]
         (Brain([Wander()], [StateVariable("z", lambda r: 1 / 0)]), rf"{here}: state variable 'z': ZeroDivisionError"),
         (Brain([Wander()], [StateVariable("z", lambda r: float("nan"))]), r"the brain: state variable 'z' is nan; ex"),
-        (Brain([Wander(forward=2.0)]), r"the brain: process 'wander': drive\(2\.0, 2\.0\): motor signals go from -1"),
+        (
+            Brain([StraightRun()]),
+            r"the brain: process 'straight_run': no process Odometry; this brain has straight_run",
+        ),
     ):
         with pytest.raises(BrainError, match=sentence):
             boebot.run(brain, robot="arsim", seconds=1)
+    path = write(tmp_path, "[process.straight_run]\n", "lost.toml")
+    with pytest.raises(BrainError, match=r"lost\.toml: process 'straight_run': no process Odometry; this brain has"):
+        boebot.run(path, robot="arsim", seconds=1)
     path = write(tmp_path, "[process.wander]\nforward = 2.0\n", "fast.toml")
-    with pytest.raises(BrainError, match=r"fast\.toml: process 'wander': drive\(2\.0, 2\.0\): motor signals go from"):
+    with pytest.raises(
+        BrainError, match=r"fast\.toml:2: wander: forward is 2\.0; expected a motor signal from -1 to 1"
+    ):
         boebot.run(path, robot="arsim", seconds=1)
 
 

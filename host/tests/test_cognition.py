@@ -267,7 +267,7 @@ def test_a_pack_that_recovers_from_its_load_is_not_charged() -> None:
     [
         ({"empty": 12.0, "full": 12.0}, "full is 12.0 V; expected more than empty, 12.0 V"),
         ({"empty": 10.0, "full": 12.0, "tau": 0.0}, "tau is 0.0; expected more than 0"),
-        ({"empty": 10.0, "full": 12.0, "rise": math.nan}, "rise is nan; expected more than 0"),
+        ({"empty": 10.0, "full": 12.0, "rise": math.nan}, "rise is nan; expected a number"),
     ],
 )
 def test_batteries_that_are_none(parameters: dict[str, float], sentence: str) -> None:

@@ -300,6 +300,25 @@ cli.main()
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 
 
+PRESSES_TWICE = """
+import atexit, os, signal
+from boebot import cli
+atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))
+cli._ONE_PRESS_S = 0.0
+def run():
+    os.kill(os.getpid(), signal.SIGINT)
+cli._run = run
+signal.signal(signal.SIGINT, signal.default_int_handler)
+cli.main()
+"""
+
+
+def test_second_interrupt_while_the_program_ends_is_no_traceback() -> None:
+    """A program that has much to put away takes its time, and people press again."""
+    done = subprocess.run([sys.executable, "-c", PRESSES_TWICE], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
+
+
 def test_interrupt_within_an_exec_ends_with_the_same_code(tmp_path: Path) -> None:
     """CPython's -m remembers that one left an exec of a text, and ends by the signal even if it was caught since."""
     (tmp_path / "again.py").write_text("""

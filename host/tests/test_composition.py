@@ -22,6 +22,16 @@ REQUIRED = {
 }
 
 
+WITH = {  # what a kind asks, or takes its figures from
+    "charge_battery": ["battery_level"],
+    "drift": ["odometry"],
+    "homing": ["odometry", "path_integration"],
+    "path_integration": ["odometry"],
+    "straight_run": ["odometry"],
+    "stuck_detector": ["odometry"],
+}
+
+
 def write(folder: Path, text: str) -> Path:
     path = folder / "brain.toml"
     path.write_text(text)
@@ -30,9 +40,7 @@ def write(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("kind", sorted(process_kinds()))
 def test_every_kind_of_process_can_be_made_and_stepped(kind: str, tmp_path: Path) -> None:
-    companions = {"charge_battery": "battery_level", "drift": "odometry", "straight_run": "odometry"}
-    companions["stuck_detector"] = "odometry"
-    kinds = ["stop"] * (kind != "stop") + [kind] + [companions[one] for one in (kind,) if one in companions]
+    kinds = ["stop"] * (kind != "stop") + [*WITH.get(kind, ()), kind]
     tables = [f"[process.{one}]\n{REQUIRED.get(one, '')}\nutility = {{ b = {0.1 * (one != 'stop')} }}" for one in kinds]
     brain = load(write(tmp_path, "[variable.near]\n\n" + "\n\n".join(tables)))
     stepped = Stepped(0.05, description=FULL)

@@ -308,8 +308,8 @@ def test_no_reading_makes_a_command_that_is_none(readings: list[tuple[float, flo
     ("make", "sentence"),
     [
         (lambda: Homing(pitch=0.0), "homing: pitch is 0.0; expected more than 0"),
-        (lambda: Homing(arrival=math.nan), "homing: arrival is nan; expected more than 0"),
-        (lambda: Homing(signal=1.5), "homing: signal is 1.5; motor signals go up to 1"),
+        (lambda: Homing(arrival=math.nan), "homing: arrival is nan; expected a number"),
+        (lambda: Homing(signal=1.5), "homing: signal is 1.5; expected a motor signal from -1 to 1"),
         (lambda: PathIntegration(scale=-1.0), "path_integration: scale is -1.0; expected more than 0"),
     ],
 )

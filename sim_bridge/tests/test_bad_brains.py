@@ -337,13 +337,37 @@ def test_ctrl_c_ends_a_brain_that_hangs(tmp_path: Path) -> None:
 # ---- late, in real time ----------------------------------------------------------------------------------------------
 
 
-def late(seconds: float) -> Callable[[Robot], None]:
+class Clock:
+    """A wall clock that goes on only while somebody sleeps: paced runs are then the same on every machine."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+    monotonic = perf_counter
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """What runs are held to in place of the machine's."""
+    clock = Clock()
+    for name in ("boebot.driving.board.wall", "boebot.driving.direct.wall", "sim_bridge.opening.time"):
+        monkeypatch.setattr(name, clock)
+    return clock
+
+
+def late(clock: Clock, seconds: float) -> Callable[[Robot], None]:
     """Takes that long for its step at 0.30 s."""
 
     def step(robot: Robot) -> None:
         robot.drive(0.5, 0.5)
         if 0.299 < robot.time < 0.301:
-            time.sleep(seconds)
+            clock.sleep(seconds)
 
     return step
 
@@ -352,16 +376,23 @@ def paced(brain: object, **options: float) -> RunResult:
     return execute(brain, arena="empty", seconds=1.0, realtime=True, **options)  # type: ignore[arg-type]
 
 
-def test_late_step_of_a_paced_run_is_counted_and_the_run_goes_on() -> None:
-    result = paced(late(0.12), step_timeout=60)
+def test_run_in_real_time_takes_its_time(clock: Clock) -> None:
+    result = paced(late(clock, 0.0))
+    assert 1.0 <= clock.now < 1.2, "and what it takes to greet the board and to stop it"
+    assert (result.steps, result.late_steps, result.dead_man_stops) == (20, 0, 0)
+
+
+def test_late_step_of_a_paced_run_is_counted_and_the_run_goes_on(clock: Clock) -> None:
+    """What was due at 0.35 s comes after 0.42 s, and what was due at 0.40 s does not come."""
+    result = paced(late(clock, 0.12), step_timeout=60)
     assert result.error is None and result.run_time == pytest.approx(1.0)
-    assert result.late_steps >= 1, "0.12 s are two periods and more"
-    assert result.steps + result.late_steps == 20
+    assert (result.steps, result.late_steps) == (19, 1)
+    assert result.dead_man_stops == 0, "two periods may be missed"
 
 
-def test_dead_man_stops_the_motors_in_a_step_that_outlasts_its_set_points() -> None:
+def test_dead_man_stops_the_motors_in_a_step_that_outlasts_its_set_points(clock: Clock) -> None:
     """The last set-point came at 0.25 s and lives for 0.25 s: pulses end with the next servo frames."""
-    result = paced(late(0.6), step_timeout=60)
+    result = paced(late(clock, 0.6), step_timeout=60)
     assert result.error is None and result.dead_man_stops == 1
     assert result.late_steps >= 11 and result.steps + result.late_steps == 20
     time_s, pulses = result.series.time, result.telemetry.left_pulse_us
@@ -372,7 +403,7 @@ def test_dead_man_stops_the_motors_in_a_step_that_outlasts_its_set_points() -> N
 
 @pytest.mark.parametrize("deed", ["time.sleep(1000)", "while True: pass"])
 def test_step_that_outlasts_its_set_points_ends_a_run_in_real_time(
-    tmp_path: Path, stood_still: list[bool], deed: str
+    tmp_path: Path, stood_still: list[bool], clock: Clock, deed: str
 ) -> None:
     path = tmp_path / "bad.py"
     path.write_text(FUNCTION.format(deed=deed))
@@ -385,6 +416,6 @@ def test_step_that_outlasts_its_set_points_ends_a_run_in_real_time(
     assert stood_still == [True]
 
 
-def test_late_step_without_a_board_is_counted() -> None:
-    result = execute(late(0.12), robot="arsim", seconds=0.5, realtime=True)
-    assert result.error is None and result.late_steps >= 2
+def test_late_step_without_a_board_is_counted(clock: Clock) -> None:
+    result = execute(late(clock, 0.12), robot="arsim", seconds=0.5, realtime=True)
+    assert result.error is None and result.late_steps == 2, "those that were due at 0.35 and at 0.40 s"

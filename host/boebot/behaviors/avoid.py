@@ -10,13 +10,18 @@ sensors' beams. Of a pillar's corner at the beam's edge one ray of three tells, 
 (3.13). On the notes' robot with sensors at ±0.3324 rad that is 0.3 at d = 0.19 m, where the corner lies 0.17 m beside
 the path of a body with a radius of 0.20 m: those from 0.17 to 0.20 m are grazed. S = 0.15 is at 0.29 m, 0.22 m beside.
 The utility's lag costs way as well: at 0.68 m/s and τ = 0.2 s some 0.17 m until a sudden S has called it.
+
+In a nook the way out may be narrower than that, and it would turn for ever: so with each whole turn that has brought
+nothing, half the time longer and twice the nearness are enough.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import MotorBehavior
 from boebot.brain.utility import HOLD
 from boebot.cognition.proximity import left_nearness, right_nearness
@@ -38,16 +43,25 @@ class Avoid(MotorBehavior):
     after: float = 0.4
     """seconds to turn on once both are clear"""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.positive(self, "turn")
+        parameters.signals(self, "turn")
+        parameters.not_negative(self, "clear", "after")
+
     def enter(self, robot: Robot) -> None:
         left, right = left_nearness(robot) or 0.0, right_nearness(robot) or 0.0
         self.turns_left = self.chance(0.5) if left == right else right > left
-        self._until = robot.time + self.after
+        self._begun = self._seen = robot.time
+        # 2π over the rate 2 s v / track width
+        self._a_turn = math.pi * robot.dimensions.track_width / (self.turn * robot.dimensions.speed)
 
     def step(self, robot: Robot) -> None:
+        patience = 0.5 ** math.floor((robot.time - self._begun) / self._a_turn)
         left, right = left_nearness(robot) or 0.0, right_nearness(robot) or 0.0
-        if max(left, right) >= self.clear:
-            self._until = robot.time + self.after
+        if max(left, right) * patience >= self.clear:
+            self._seen = robot.time
         # its utility falls as soon as things are out of sight: gamma holds it until the turn is done
-        self.kick(self, HOLD if robot.time < self._until else 0.0)
+        self.kick(self, HOLD if robot.time < self._seen + self.after * patience else 0.0)
         turn = -self.turn if self.turns_left else self.turn
         robot.drive(turn, -turn)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.phototaxis import brightness, steered
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.battery import BatteryLevel
@@ -55,13 +56,15 @@ class ChargeBattery(MotorBehavior):
         super().__post_init__()
         if not 0 < self.passed < 1:
             raise BrainError(f"{self.name}: passed is {self.passed!r}; expected a share between 0 and 1")
-        for key in ("signal", "creep"):
-            if not 0 < getattr(self, key) <= 1:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected a motor signal above 0, to 1")
+        parameters.positive(self, "signal", "creep")
+        parameters.signals(self, "signal", "creep")
+        parameters.not_negative(self, "patience", "dark", "straight")
+
+    def forget(self) -> None:
         self.charging = False
 
     def enter(self, robot: Robot) -> None:
-        self.charging = False
+        self.forget()
         self._brightest = 0.0
         self.machine = Machine(robot, self.seek)
 

@@ -124,8 +124,10 @@ class Escalate(MotorBehavior):
             raise BrainError(f"{self.name}: signal is {self.signal!r}; expected a motor signal above 0, to 1")
         if not self.every > 0:
             raise BrainError(f"{self.name}: every is {self.every!r}; expected seconds, more than 0")
-        self.answer = ""
         self.chain()  # refuses links that are none
+
+    def forget(self) -> None:
+        self.answer = ""
 
     def chain(self) -> LeakyChain:
         """The chain, calm."""
@@ -177,12 +179,15 @@ class Touchiness(CognitiveProcess):
 
     escalation: Escalate
 
-    def enter(self, robot: Robot) -> None:
+    def forget(self) -> None:
         self._chain = self.escalation.chain()
         self.stimulus = 0.0
         self._touched = False
+
+    def enter(self, robot: Robot) -> None:
+        self.forget()
+        self.escalation.forget()
         self._time = robot.time
-        self.escalation.answer = ""
 
     def step(self, robot: Robot) -> None:
         elapsed, self._time = robot.time - self._time, robot.time

@@ -38,13 +38,16 @@ class Escape(FixedActionPattern):
 
     def __post_init__(self) -> None:
         self.releaser = self._touched
-        self._left = False
         super().__post_init__()
         for key in ("back", "angle", "forward", "signal"):
             if not 0 < getattr(self, key) < math.inf or self.signal > 1:
                 raise BrainError(
                     f"{self.name}: {key} is {getattr(self, key)!r}; expected more than 0, a signal up to 1"
                 )
+
+    def forget(self) -> None:
+        super().forget()
+        self._left = False  # it turns, or turned last, to the left
 
     def enter(self, robot: Robot) -> None:
         super().enter(robot)

@@ -12,12 +12,12 @@ the bat is what its `left` and `right` functions read: light, sound, or the near
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.phototaxis import steered
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import CognitiveProcess, MotorBehavior
 from boebot.brain.utility import HOLD
@@ -62,28 +62,27 @@ class Evade(MotorBehavior):
             raise BrainError(
                 f"{self.name}: weak is {self.weak!r} and strong {self.strong!r}; expected 0 <= weak < strong"
             )
-        for key in ("erratic", "beat", "drop"):
-            if not getattr(self, key) > 0:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected seconds, more than 0")
-        for key in ("signal", "spread"):
-            if not 0 <= getattr(self, key) <= 1:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected 0 to 1")
+        parameters.positive(self, "erratic", "beat", "drop")
+        parameters.shares(self, "signal", "spread")
 
     def companions(self) -> tuple[CognitiveProcess, ...]:
         return (Hearing(moth=self, name=f"{self.name}_hearing"),)
 
     def hear(self, robot: Robot) -> tuple[float, float]:
         """S_l and S_r."""
-        left, right = (max(function(robot) or 0.0, 0.0) for function in (self.left, self.right))
-        return left, right
+        left, right = (parameters.reading(self, function, robot) or 0.0 for function in (self.left, self.right))
+        return max(left, 0.0), max(right, 0.0)
 
     @property
     def is_bound(self) -> bool:
         """It is in the middle of its erratic flight or of its drop."""
         return self._bound
 
-    def enter(self, robot: Robot) -> None:
+    def forget(self) -> None:
         self._bound = False
+
+    def enter(self, robot: Robot) -> None:
+        self.forget()
         self.machine = Machine(robot, self.steer)
 
     def step(self, robot: Robot) -> None:
@@ -93,7 +92,7 @@ class Evade(MotorBehavior):
         self.machine.step(robot)
 
     def exit(self, robot: Robot) -> None:
-        self._bound = False
+        self.forget()
 
     def steer(self, robot: Robot) -> State | None:
         left, right = self.hear(robot)
@@ -119,8 +118,6 @@ class Evade(MotorBehavior):
         self._bound = False
         return self.steer
 
-    _bound = False
-
 
 @dataclass(kw_only=True)
 class Hearing(CognitiveProcess):
@@ -130,6 +127,4 @@ class Hearing(CognitiveProcess):
 
     def step(self, robot: Robot) -> None:
         heard = max(self.moth.hear(robot))
-        if not math.isfinite(heard):
-            raise BrainError(f"{self.moth.name}: a signal of {heard!r}; expected a finite number")
         self.kick(self.moth, HOLD if heard > self.moth.weak or self.moth.is_bound else -HOLD)

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.straight_run import within_signals
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.odometry import wrapped
 from boebot.cognition.path_integration import PathIntegration
-from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
@@ -56,22 +56,19 @@ class Homing(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("arrival", "pitch", "signal", "search_signal", "turn", "gain"):
-            value = getattr(self, key)
-            if not (isinstance(value, int | float) and 0 < value < math.inf):
-                raise BrainError(f"{self.name}: {key} is {value!r}; expected more than 0")
-        for key in ("signal", "search_signal", "turn"):
-            if getattr(self, key) > 1:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; motor signals go up to 1")
+        parameters.positive(self, "arrival", "pitch", "signal", "search_signal", "turn", "gain")
+        parameters.signals(self, "signal", "search_signal", "turn")
+
+    def forget(self) -> None:
         self.arrived: float | None = None
         self.home: float | None = None
 
     def enter(self, robot: Robot) -> None:
-        self.arrived = self.home = None
+        self.forget()
         self.machine = Machine(robot, self.inbound)
 
     def step(self, robot: Robot) -> None:
-        if self.home is None and self.found is not None and (self.found(robot) or 0.0) >= 0.5:
+        if self.home is None and self.found is not None and (parameters.reading(self, self.found, robot) or 0.0) >= 0.5:
             self.home = robot.time
             self.machine.go(robot, self.stay)
         self.machine.step(robot)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.straight_run import within_signals
+from boebot.brain import parameters
 from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ class Phototaxis(MotorBehavior):
     """away from the light"""
     dark: float = 0.0
     """brightness of both together up to which it is dark"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.signals(self, "signal")
+        parameters.not_negative(self, "dark")
 
     def step(self, robot: Robot) -> None:
         left, right = brightness(robot.left_light), brightness(robot.right_light)
@@ -58,6 +64,12 @@ class Klinotaxis(MotorBehavior):
     gain: float = 3.0
     """difference of the motor signals for each unit of (I_left - I_right) / (I_left + I_right)"""
     flee: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parameters.signals(self, "signal")
+        parameters.positive(self, "seconds")
+        parameters.not_negative(self, "swing")
 
     def enter(self, robot: Robot) -> None:
         self._side = 1  # +1: swings to the left

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.odometry import Odometry, wrapped
@@ -41,11 +42,16 @@ class StraightRun(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        parameters.positive(self, "goal", "threshold")
+        parameters.signals(self, "signal")
+        parameters.shares(self, "least")
+
+    def forget(self) -> None:
         self.distance = 0.0
         self.arrived = False
 
     def enter(self, robot: Robot) -> None:
-        self.distance, self.arrived = 0.0, False
+        self.forget()
         self.machine = Machine(robot, self.begin)
 
     def step(self, robot: Robot) -> None:

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess, MotorBehavior
 from boebot.brain.utility import HOLD
 from boebot.errors import BrainError
@@ -68,8 +69,12 @@ class Withdraw(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        parameters.positive(self, "back", "turn")
+        parameters.shares(self, "signal")
+        self.fresh()  # refuses times that are none
+
+    def forget(self) -> None:
         self.intensity = 0.0
-        self._reflex = self.fresh()
 
     def fresh(self) -> ReflexIntensity:
         """The reflex, neither warm nor tired."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
 from boebot.brain.utility import Utilities
@@ -16,8 +16,9 @@ from boebot.brain.variables import StateVariable
 from boebot.errors import BrainError
 
 if TYPE_CHECKING:
-    from boebot.robot import Robot
+    from boebot.robot import Command, Robot
 
+P = TypeVar("P")
 _ON_TIME = 1e-9  # s; times are sums of ticks
 
 
@@ -78,9 +79,9 @@ class Brain:
         Raises:
             BrainError: the parts do not fit together.
         """
-        given = list(processes)
+        given = _checked(processes, Process, "processes")
         self.processes: tuple[Process, ...] = tuple(given + [one for each in given for one in each.companions()])
-        self.variables = tuple(variables)
+        self.variables = tuple(_checked(variables, StateVariable, "state variables"))
         self.steps: list[BrainStep] = []
         self.switches: list[Switch] = []
         self.PERIOD = period
@@ -98,6 +99,12 @@ class Brain:
         self._driving = -1
         self._robot: Robot | None = None
         self._time = 0.0
+
+    def __repr__(self) -> str:
+        """What it is made of."""
+        variables = ", ".join(variable.name for variable in self.variables)
+        made_of = ", ".join(process.name for process in self.processes)
+        return f"<Brain: {made_of}{f'; by {variables}' if variables else ''}>"
 
     def _check(self) -> None:
         if not self.processes or not any(isinstance(each, MotorBehavior) for each in self.processes):
@@ -126,13 +133,11 @@ class Brain:
         self._time = robot.time
         z = self._z
         self._activate(robot, z)
-        before = robot.command
         for index in self._cognitive:
             if self._active[index]:
+                before = robot.command
                 self._step_if_due(index, robot)
-                if robot.command != before:
-                    name = self.processes[index].name
-                    raise BrainError(f"cognitive process {name!r} drives the motors; only motor behaviors may")
+                self._check_hands_off(index, robot, before)
         self._step_if_due(self._driving, robot)
         utilities = self._utilities
         self.steps.append(
@@ -198,7 +203,14 @@ class Brain:
             if wanted != self._active[index]:
                 name = self.processes[index].name
                 self._note(robot, "" if wanted else name, name if wanted else "", self._reason(index, z))
+                before = robot.command
                 self._turn(robot, index, wanted)
+                self._check_hands_off(index, robot, before)
+
+    def _check_hands_off(self, index: int, robot: Robot, before: Command) -> None:
+        if robot.command != before:
+            name = self.processes[index].name
+            raise BrainError(f"cognitive process {name!r} drives the motors; only motor behaviors may")
 
     def _switch_motor(self, robot: Robot, index: int, z: Sequence[float]) -> None:
         last = self._driving
@@ -257,6 +269,22 @@ class Brain:
         shares = self._utilities.shares(index, z)[:2]
         text = ", ".join(f"{share.cause} {share.value:+.2f}" for share in shares)
         return f"{self._named(index)} ({text or 'no input'})"
+
+
+def _checked(given: Iterable[P], kind: type[P], what: str) -> list[P]:
+    """As a list, in which nothing else is."""
+    try:
+        parts = list(given)
+    except TypeError:
+        raise BrainError(f"a brain's {what} are {given!r}; expected a list of them") from None
+    for part in parts:
+        if isinstance(part, type) and issubclass(part, kind):
+            raise BrainError(f"among a brain's {what} is the class {part.__name__}; expected {part.__name__}()")
+        if not isinstance(part, kind):
+            raise BrainError(f"among a brain's {what} is {part!r}; expected a {kind.__name__}")
+        if isinstance(part, Process) and not part.is_made:
+            raise BrainError(f"{type(part).__name__} is not ready; expected super().__init__() in its __init__")
+    return parts
 
 
 def _united(lists: Iterable[Sequence[str]]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
 from boebot.brain.utility import HOLD, Utility
 from boebot.errors import BrainError
@@ -45,14 +46,23 @@ class FixedActionPattern(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._actions = [Action(*action) for action in self.actions]
-        for action in self._actions:
-            if not (abs(action.left) <= 1 and abs(action.right) <= 1 and action.seconds > 0):
-                raise BrainError(f"{self.name}: action {tuple(action)}; expected signals from -1 to 1, and seconds > 0")
-        self.forget()
+        parameters.not_negative(self, "refractory")
+        if not callable(self.releaser):
+            raise parameters.refused(self, "releaser", "a function of the robot")
+        self._actions = [self._checked(action) for action in self.actions]
+
+    def _checked(self, action: Action | tuple[float, float, float]) -> Action:
+        try:
+            checked = Action(*action)
+            fits = bool(abs(checked.left) <= 1 and abs(checked.right) <= 1 and 0 < checked.seconds < float("inf"))
+        except TypeError:
+            fits = False
+        if not fits:
+            shown = tuple(action) if isinstance(action, tuple) else action
+            raise BrainError(f"{self.name}: action {shown!r}; expected signals from -1 to 1, and seconds > 0")
+        return checked
 
     def forget(self) -> None:
-        """As at the beginning of a run."""
         self.running = False
         self._ended = float("-inf")
 

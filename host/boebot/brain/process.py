@@ -1,7 +1,7 @@
 """What a brain is made of: processes (section 8.2 of the notes), motor behaviors and cognitive ones, in one form.
 
 A process is a dataclass: its fields are *parameters*, which stay as they are throughout a run; its *state* is set in
-`enter` and changed in `step`.
+`enter` and changed in `step`; what others may ask of it is set in `forget`, too.
 
     @dataclass(kw_only=True)
     class Spin(MotorBehavior):
@@ -27,6 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+from boebot.brain import parameters
 from boebot.brain.utility import Utility
 from boebot.errors import BrainError
 
@@ -57,6 +58,11 @@ class Process:
 
     def __post_init__(self) -> None:
         self.name = self.name or snake_case(type(self).__name__)
+        if not isinstance(self.name, str):
+            raise BrainError(f"a process is called {self.name!r}; expected a text")
+        if not isinstance(self.utility, Utility):
+            raise BrainError(f"{self.name}: utility is {self.utility!r}; expected a Utility(...)")
+        parameters.check_numbers(self)
         if self.period is not None and not (isinstance(self.period, int | float) and 0 < self.period < math.inf):
             raise BrainError(f"{self.name}: period is {self.period!r}; expected seconds from step to step")
         self.random = random.Random()
@@ -64,6 +70,19 @@ class Process:
         self._others: Callable[[object], Process] = _alone
         self._kick: Callable[[Process, float], None] = _unheard
         self._chances: dict[tuple[float, float], float] = {}
+        self.forget()
+
+    def forget(self) -> None:
+        """Called when it is made, and when a run begins: sets what others may ask of it before it was ever active.
+
+        State variables are read before the first process is entered, and a process may sleep through a whole run: what
+        an earlier run left behind must not be found here.
+        """
+
+    @property
+    def is_made(self) -> bool:
+        """A class of somebody's own has not kept it from being set up."""
+        return "step_time" in vars(self)
 
     def enter(self, robot: Robot) -> None:
         """Called when it becomes active, before its first step: sets its state."""
@@ -73,7 +92,7 @@ class Process:
 
         A motor behavior drives the robot here; what it does not say anew holds on.
         """
-        raise NotImplementedError
+        raise BrainError(f"{self.name}: class {type(self).__name__} has no step(self, robot)")
 
     def exit(self, robot: Robot) -> None:
         """Called when it is active no more."""
@@ -130,6 +149,7 @@ class Process:
         kick: Callable[[Process, float], None],
     ) -> None:
         """A run begins."""
+        self.forget()
         self.step_time, self.random = step_time, source
         self._others, self._kick = others, kick
         self._chances.clear()

@@ -45,6 +45,8 @@ class Utility:
     """time constant (s) with which the gamma parameter decays"""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.w, Mapping):
+            raise BrainError(f"utility: w is {self.w!r}; expected weights by names, as in {{'near': 3.0}}")
         numbers = {"b": self.b, "tau": self.tau, "c": self.c, "tau_gamma": self.tau_gamma}
         numbers |= {f"w[{name!r}]": weight for name, weight in self.w.items()}
         for name, number in numbers.items():

@@ -32,8 +32,7 @@ def main() -> NoReturn:
         sys.unraisablehook = _ask_again
         code = _run()
     except KeyboardInterrupt as error:
-        code = EXIT_INTERRUPTED
-        _say("interrupted", error)
+        code = _interrupted("interrupted", error)
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
 
@@ -49,8 +48,7 @@ def _run() -> object:
     try:
         code = app(standalone_mode=False)
     except InterruptedRunError as error:
-        _say(str(error), error)
-        return EXIT_INTERRUPTED
+        return _interrupted(str(error), error)
     except BoebotError as error:
         _say(str(error), error)
         return EXIT_ERROR
@@ -71,6 +69,14 @@ def _run() -> object:
     if code == EXIT_INTERRUPTED:  # some releases of typer make this of a KeyboardInterrupt
         raise KeyboardInterrupt
     return code
+
+
+def _interrupted(sentence: str, error: BaseException) -> int:
+    """Says so; who presses again while the program ends, as people do where that takes a while, has been heard."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    _say(sentence, error)
+    return EXIT_INTERRUPTED
 
 
 def _say(sentence: str, error: BaseException) -> None:

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.leaky import LeakyIntegrator
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
@@ -55,12 +56,9 @@ class BatteryLevel(CognitiveProcess):
         super().__post_init__()
         if not self.full > self.empty:
             raise BrainError(f"{self.name}: full is {self.full!r} V; expected more than empty, {self.empty!r} V")
-        for key in ("tau", "rise", "fall"):
-            if not getattr(self, key) > 0:
-                raise BrainError(f"{self.name}: {key} is {getattr(self, key)!r}; expected more than 0")
-        self._forget()
+        parameters.positive(self, "tau", "rise", "fall")
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.voltage: float | None = None
         self.charging = False
         self._turned = math.nan  # the lowest voltage since the charger was left, or the highest since it was reached
@@ -74,7 +72,7 @@ class BatteryLevel(CognitiveProcess):
         return min(max((rested - self.empty) / (self.full - self.empty), 0.0), 1.0)
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
         self._time = robot.time
 
     def step(self, robot: Robot) -> None:

@@ -25,10 +25,13 @@ class Contact(CognitiveProcess):
 
     NEEDS = ("whiskers",)
 
-    def enter(self, robot: Robot) -> None:
+    def forget(self) -> None:
         self.touches = 0
         self.left = self.right = False
         self.last: float | None = None
+
+    def enter(self, robot: Robot) -> None:
+        self.forget()
 
     def step(self, robot: Robot) -> None:
         left, right = robot.left_whisker.pressed, robot.right_whisker.pressed

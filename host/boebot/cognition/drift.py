@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry
@@ -27,10 +28,13 @@ class Drift(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        parameters.positive(self, "distance")
+
+    def forget(self) -> None:
         self.value = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self.value = 0.0
+        self.forget()
         self._from = self.other(Odometry).travelled
 
     def step(self, robot: Robot) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 
@@ -29,15 +30,15 @@ class LightSense(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._forget()
+        parameters.positive(self, "scale")
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.left: float | None = None
         self.right: float | None = None
         self.asymmetry = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
 
     def step(self, robot: Robot) -> None:
         left, right = robot.left_light, robot.right_light

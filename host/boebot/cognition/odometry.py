@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Literal
 
 from boebot.brain.process import CognitiveProcess
@@ -48,11 +49,12 @@ class Odometry(CognitiveProcess):
         super().__post_init__()
         if self.use not in (None, *SOURCES):
             raise BrainError(f"{self.name}: use is {self.use!r}; expected one of {', '.join(SOURCES)}")
+        if not (isinstance(self.start, tuple | list) and len(self.start) == 3 and all(map(_is_finite, self.start))):
+            raise BrainError(f"{self.name}: start is {self.start!r}; expected x (m), y (m), heading (rad)")
         if len(self.factors) != 2 or not all(0 < factor < math.inf for factor in self.factors):
             raise BrainError(f"{self.name}: factors are {self.factors!r}; expected two numbers above 0")
-        self._forget()
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         self.pose = self.start
         self.speed = self.turn_rate = self.travelled = 0.0
         self.source: Source = self.use or "commands"
@@ -60,7 +62,7 @@ class Odometry(CognitiveProcess):
         self._time = math.nan
 
     def enter(self, robot: Robot) -> None:
-        self._forget()
+        self.forget()
         if self.use is None:
             kinds: dict[str, Source] = {"odometer": "odometer", "encoders": "encoders"}
             self.source = next((source for device, source in kinds.items() if robot.has(device)), "commands")
@@ -151,6 +153,10 @@ def _signals(robot: Robot) -> tuple[float, float]:
     if kind == "speed":
         return left / robot.dimensions.speed, right / robot.dimensions.speed
     return (left, right) if kind == "signal" else (0.0, 0.0)
+
+
+def _is_finite(number: object) -> bool:
+    return isinstance(number, Real) and math.isfinite(number)
 
 
 def wrapped(angle: float) -> float:

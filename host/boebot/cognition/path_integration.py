@@ -13,11 +13,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry, wrapped
 from boebot.cognition.sun_compass import SunCompass
-from boebot.errors import BrainError
 
 if TYPE_CHECKING:
     from boebot.robot import Robot
@@ -44,8 +44,9 @@ class PathIntegration(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (isinstance(self.scale, int | float) and 0 < self.scale < math.inf):
-            raise BrainError(f"{self.name}: scale is {self.scale!r}; expected more than 0")
+        parameters.positive(self, "scale")
+
+    def forget(self) -> None:
         self.set_home()
         self.heading = 0.0
 
@@ -70,7 +71,7 @@ class PathIntegration(CognitiveProcess):
         return -self.vector[0], -self.vector[1]
 
     def enter(self, robot: Robot) -> None:
-        self.set_home()
+        self.forget()
         odometry = self.other(Odometry)
         self._pose = odometry.pose
         read = self._read(robot)

@@ -33,12 +33,15 @@ class Proximity(CognitiveProcess):
     threshold: float = 0.3
     """nearness from which on something is seen"""
 
-    def enter(self, robot: Robot) -> None:
+    def forget(self) -> None:
         self.left: float | None = None
         self.right: float | None = None
         self.ahead: float | None = None
         self.last_left: float | None = None
         self.last_right: float | None = None
+
+    def enter(self, robot: Robot) -> None:
+        self.forget()
 
     def step(self, robot: Robot) -> None:
         self.left, self.right, self.ahead = left_nearness(robot), right_nearness(robot), nearness_ahead(robot)

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.brain import parameters
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry, wrapped
@@ -19,6 +20,7 @@ class StuckDetector(CognitiveProcess):
     """Compares what was asked of the wheels over some time with what odometry says came of it.
 
     Wheels that spin without the robot moving are only seen where odometry comes from something else than wheels.
+    Odometry that comes from commands (`Odometry.source`) believes what was asked: with it, nothing is ever missing.
 
     Attributes:
         share: how much of the asked motion is missing over the time, 0 (moves as told) to 1 (stands still).
@@ -31,10 +33,13 @@ class StuckDetector(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        parameters.positive(self, "window", "least")
+
+    def forget(self) -> None:
         self.share = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self.share = 0.0
+        self.forget()
         self._past: deque[tuple[float, float, float]] = deque()  # time, asked and made so far (m)
         self._asked = self._made = 0.0
         self._time = robot.time

@@ -41,12 +41,11 @@ class SunCompass(CognitiveProcess):
     turning: bool = False
     """the compass shows a pattern that turns with the sun; False: it shows the heading itself"""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def forget(self) -> None:
         self.heading: float | None = None
 
     def enter(self, robot: Robot) -> None:
-        self.heading = None
+        self.forget()
 
     def step(self, robot: Robot) -> None:
         compass = robot.compass

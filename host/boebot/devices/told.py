@@ -13,6 +13,7 @@ class Told(NamedTuple):
     """The newest message of the slow devices, as an observation has it."""
 
     devices: DevicesTelemetry
+    """As the board sent it."""
     since: float
     """Ticks from that message to the observation; infinite if none has come."""
 
