@@ -33,7 +33,8 @@ def utility_of(stimulus: NDArray[np.float64], a: float, b: float, step: float) -
     "E29",
     title="E. coli's utility follows a rise and a fall",
     source="section 4.4.2, equation (4.1), Fig. 4.1",
-    caption="Attractant X (a triangle) and the utility U of running.",
+    caption="Left: concentration X of the attractant, a triangle. Right: utility U of running (B1), which is active "
+    "while U > 0: between 1 s and 3 s (shaded).",
 )
 def triangle(seed: int, progress: Progress) -> Outcome:
     step, peak, top = 0.001, 2.433, 0.4
@@ -51,12 +52,14 @@ def triangle(seed: int, progress: Progress) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
-        upper, lower = figure.subplots(2, sharex=True)
-        upper.plot(times, stimulus)
-        upper.set(ylabel="attractant X")
-        lower.plot(times, values)
-        lower.axhline(0, color="0.6", linewidth=0.8)
-        lower.set(xlabel="time (s)", ylabel="utility U of running")
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        left.plot(times, stimulus)
+        left.set(xlabel="time (s)", ylabel="attractant X")
+        right.plot(times, values)
+        right.axhline(0, color="0.6", linewidth=0.8)
+        right.axvspan(above[0], above[-1], color="0.9", zorder=0, label="B1 is active")
+        right.set(xlabel="time (s)", ylabel="utility U of running")
+        right.legend()
 
     return Outcome(measured, {"time_s": times[::10], "x": stimulus[::10], "u": values[::10]}, draw)
 

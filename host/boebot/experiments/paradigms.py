@@ -215,10 +215,12 @@ def _draw(serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> 
                 axes.plot(one.x[one.touched], one.y[one.touched], "x", color="red", markersize=5)
             axes.plot(*GOAL, "*", color="black")
             axes.set(title=name)
+            axes.locator_params(nbins=5)
         right.plot(PLANNINGS, hits, "o-", label="serial")
         right.axhline(sum(len(one.touched) for one in parallel), linestyle="--", color="C1", label="behavior-based")
         right.set(xlabel="time for a plan (s)", ylabel=f"collisions in {len(serial)} crossings")
         right.set_box_aspect(1.0)
-        right.legend(fontsize="small")
+        right.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        middle.set(ylabel="")
 
     return draw

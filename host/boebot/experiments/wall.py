@@ -32,7 +32,6 @@ SECONDS = 80.0
 RADIUS = 0.07  # m
 SPEED = 0.12  # v_0 (m/s)
 FULL_SPEED = 0.17  # m/s at motor signal 1, of both robots
-FOUND_S = 5.0  # within which it has to have found its distance
 
 
 def follower() -> Brain:
@@ -87,12 +86,11 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
     assert truth is not None
     time, x, y = truth.time - result.clock_offset, truth.x, truth.y
     distance = np.minimum(np.minimum(x, LENGTH - x), np.minimum(y, WIDTH - y))
-    following = time >= FOUND_S
     turns = (np.unwrap(truth.heading) - truth.heading[0]) / (2 * np.pi)
     measured = [
         Measured("turns about the room", float(turns[-1]), least=1.0),
-        Measured("least distance from a wall", float(distance[following].min()), "m", least=least),
-        Measured("greatest distance", float(distance[following].max()), "m", most=most),
+        Measured("least distance from a wall", float(distance.min()), "m", least=least),
+        Measured("greatest distance", float(distance.max()), "m", most=most),
         Measured("contacts", float(truth.contact.sum()), most=0.0),
     ]
     shown = slice(None, None, max(1, len(time) // 2000))
