@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -72,7 +73,21 @@ def test_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = boebot(capsys, "experiment", "LIST", "--json")
     listed = {one["name"]: one for one in json.loads(out)["experiments"]}
     assert list(listed) == list(all_experiments())
-    assert listed["E29"]["robot"] == "none" and listed["E29"]["section"] == "4.2"
+    assert listed["E29"]["robot"] == "none" and listed["E29"]["section"] == "4.4.2"
+
+
+@pytest.mark.parametrize(
+    ("source", "section"),
+    [
+        ("section 4.4.2, Fig. 4.2", "4.4.2"),
+        ("sections 5.1 and 5.2", "5.1"),
+        ("chapter 8, opening", "8"),
+        ("Fig. 5.1; section 4.9 of the specification", ""),
+        ("section 4.9 of the specification; section 5.3.2", "5.3.2"),
+    ],
+)
+def test_section_is_the_first_of_the_notes_and_not_of_the_specification(source: str, section: str) -> None:
+    assert replace(all_experiments()["E57"], source=source).section == section
 
 
 def test_one_run_prints_its_figures_and_writes_its_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -84,6 +99,12 @@ def test_one_run_prints_its_figures_and_writes_its_files(capsys: pytest.CaptureF
     assert verdict["met"] and verdict["seed"] == 1 and verdict["measured"][0]["value"] == -7.0
     assert Image.open(tmp_path / "E57.png").size[0] > 1000
     assert "<svg" in (tmp_path / "E57.svg").read_text()
+
+
+def test_figures_of_numpy_are_written_as_others() -> None:
+    """numpy's bool is none that JSON knows, and comparisons of its numbers give one."""
+    one = Measured("share", np.float64(0.5), least=np.float64(0.25), most=1)
+    assert json.loads(json.dumps([one.is_met, one.value, one.least, one.most])) == [True, 0.5, 0.25, 1.0]
 
 
 def test_csv_is_read_back_as_the_data() -> None:

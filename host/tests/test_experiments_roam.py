@@ -29,7 +29,7 @@ CHEAP = ("E19", "E22", "E23", "E23-shieldbot", "E24")
 ROWS = {
     "E19": "none",
     **dict.fromkeys(("E20", "E21", "E22", "E24", "E27"), "arsim"),
-    "E23": "servo model",
+    "E23": "shieldbot (16 edges, as a model of its servos)",
     **dict.fromkeys((f"E{number}-shieldbot" for number in (20, 21, 22, 23, 24, 27)), "shieldbot (native)"),
     **dict.fromkeys(("E21-avr", "E22-avr"), "shieldbot (avr)"),
 }
@@ -47,7 +47,7 @@ def test_each_row_names_its_robot_and_those_on_boards_their_criterion() -> None:
     for name, robot in ROWS.items():
         row = EXPERIMENTS[name]
         assert row.robot == robot
-        assert bool(row.criterion) == ("shieldbot" in robot or name == "E21")
+        assert bool(row.criterion) == (robot.endswith(("(native)", "(avr)")) or name == "E21")
 
 
 @pytest.mark.parametrize("name", CHEAP)

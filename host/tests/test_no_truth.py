@@ -4,50 +4,24 @@ What these tests guarantee:
 
 * The modules that brains are made of import neither the simulator nor any module of the library that holds truth, runs
   robots or talks to boards, not even by way of others: whoever has imported all of them has loaded none of those.
-* From the `Robot` that a brain gets, and from its `Observation`, no chain of attributes, private ones included, of
-  properties, containers, bound methods, closures and defaults leads to anything but sensor values, the robot's lengths
-  and the brain's own commands and chance. The walk follows what Python's garbage collector says that an object refers
-  to, so that nothing is too private for it, and knows by name the few kinds of objects that may be met.
-
-What nobody can guarantee in Python: a brain that imports the simulator itself, walks the interpreter's frames or lists
-all objects of the process finds the world. It then does so in so many words, and would find nothing on a robot.
+* From the `Robot` that a brain gets, and from its `Observation`, nothing leads to the world: what is walked, and what
+  may be met, stands in boebot.experiments.contract.
 """
 
 from __future__ import annotations
 
-import functools
-import gc
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
+from collections.abc import Callable
 
 import pytest
 
 import boebot
 from boebot.boards import Truth
+from boebot.experiments.contract import FORBIDDEN, ROOMS, Met, imported, imports, is_within, walk
 from boebot.robot import Robot
 
-PARTS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.brains")
-FORBIDDEN = (
-    "sim_bridge",
-    "boebot.boards",
-    "boebot.driving",
-    "boebot.experiments",
-    "boebot.floor_plan",
-    "boebot.record",
-    "boebot.report",
-    "boebot.result",
-    "boebot.runner",
-    "boebot.series",
-    "boebot.tasks",
-    "boebot.together",
-    "boebot.link.session",
-    "boebot.link.transport",
-    "boebot.link.traffic",
-    "serial",
-)
 IMPORTS = """
 import importlib, json, pkgutil, sys
 for part in sys.argv[1:]:
@@ -58,23 +32,6 @@ from boebot import Command, Observation, Robot
 print(json.dumps(sorted(sys.modules)))
 """
 
-# where the classes come from whose objects a brain may meet; each holds readings, lengths, commands or chance
-ALLOWED = (
-    "builtins",
-    "random",
-    "types",
-    "functools",
-    "boebot.robot",
-    "boebot.equipment",
-    "boebot.readings",
-    "boebot.devices",
-    "boebot.link.messages",
-)
-
-
-def is_within(module: str, names: tuple[str, ...]) -> bool:
-    return any(module == name or module.startswith(f"{name}.") for name in names)
-
 
 def loaded(*imports: str) -> list[str]:
     """All modules of a fresh interpreter that has imported these and all below them."""
@@ -83,74 +40,50 @@ def loaded(*imports: str) -> list[str]:
 
 
 def test_what_brains_are_made_of_loads_no_simulator_and_nothing_that_holds_truth() -> None:
-    found = loaded(*PARTS)
+    found = loaded(*ROOMS)
     assert {"boebot.behaviors.avoid", "boebot.cognition.odometry", "boebot.brains.wander"} <= set(found)
     assert [name for name in found if is_within(name, FORBIDDEN)] == []
 
 
 def test_the_test_of_imports_sees_what_it_looks_for() -> None:
-    found = loaded(*PARTS, "boebot.driving")
+    found = loaded(*ROOMS, "boebot.driving")
     assert "boebot.boards" in [name for name in found if is_within(name, FORBIDDEN)]
+
+
+def test_no_module_of_brains_imports_what_is_forbidden_even_when_called() -> None:
+    found = imports()
+    assert "boebot.behaviors.avoid" in found
+    assert [name for names in found.values() for name in names if is_within(name, FORBIDDEN)] == []
+
+
+def test_imports_for_type_checkers_do_not_count() -> None:
+    source = "import a\nif TYPE_CHECKING:\n    import b\nelse:\n    from c import d\ndef f():\n    import e.g\n"
+    assert set(imported(source)) == {"a", "c", "c.d", "e.g"}
 
 
 # ---- at run time ----------------------------------------------------------------------------------------------------
 
 
-def referents(thing: object) -> Iterator[tuple[str, object]]:
-    """What an object leads to, but for modules and classes, which whoever may import has anyway."""
-    if isinstance(thing, FunctionType):  # its globals are its module
-        for name, cell in zip(thing.__code__.co_freevars, thing.__closure__ or (), strict=True):
-            yield f"closure {name}", cell.cell_contents
-        yield "defaults", (thing.__defaults__, thing.__kwdefaults__, vars(thing))
-        return
-    if isinstance(thing, BuiltinFunctionType | MethodType):
-        yield "__self__", thing.__self__
-        yield "__func__", getattr(thing, "__func__", None)
-        return
-    for index, one in enumerate(gc.get_referents(thing)):
-        yield f"referent {index}", one
-    for name in dir(type(thing)):  # properties give what is made only when it is asked for
-        if isinstance(getattr(type(thing), name, None), property | functools.cached_property):
-            try:
-                yield name, getattr(thing, name)
-            except boebot.BoebotError:  # a device that the robot lacks
-                continue
-
-
-def foreign(start: object, limit: int = 200_000) -> tuple[list[str], set[str]]:
-    """Ways to objects that no brain should meet, and the classes of all that was met."""
-    seen: dict[int, object] = {}
-    ways, kinds = [], set()
-    waiting: list[tuple[str, object]] = [("robot", start)]
-    while waiting:
-        way, thing = waiting.pop()
-        if id(thing) in seen or isinstance(thing, type | ModuleType):
-            continue
-        seen[id(thing)] = thing  # kept, so that no other object gets its id
-        assert len(seen) < limit, "the walk does not end"
-        kind = type(thing)
-        kinds.add(f"{kind.__module__}.{kind.__qualname__}")
-        if not is_within(kind.__module__, ALLOWED):
-            ways.append(f"{way}: {kind.__module__}.{kind.__qualname__}")
-            continue
-        waiting += [(f"{way}.{name}", one) for name, one in referents(thing)]
-    return ways, kinds
+def foreign(start: object) -> list[str]:
+    """Ways to objects that no brain should meet."""
+    return [f"{one.way}: {one.kind}" for one in walk(start) if one.is_foreign]
 
 
 @pytest.mark.parametrize("robot", ["shieldbot", "shieldbot-quad", "arsim"])
 def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     """The boards are the native one and direct; what the AVR image runs on is driven as the native one is."""
-    met: list[tuple[list[str], set[str]]] = []
+    met: list[Met] = []
 
     def step(seen: Robot) -> None:
         if seen.tick > 20 and not met:
-            met.append(foreign(seen))
+            met.extend(walk(seen))
         seen.drive(0.2, 0.2)
 
     result = boebot.run(step, robot, arena="arsim", seconds=0.6)
-    (ways, kinds), truth = met[0], result.truth
+    truth = result.truth
     assert truth is not None and len(truth.time), "there was a truth to find"
-    assert ways == []
+    assert [one for one in met if one.is_foreign] == []
+    kinds = {one.kind for one in met}
     assert {"boebot.robot.Robot", "boebot.robot.Observation", "boebot.equipment.Equipment"} <= kinds
 
 
@@ -174,7 +107,7 @@ def test_the_walk_finds_what_is_hidden(plant: Callable[[Robot, Truth], None]) ->
         if not found:
             command = robot.command
             plant(robot, truth)
-            found.append(foreign(robot)[0])
+            found.append(foreign(robot))
             robot.command, robot.slow_command = command, None
 
     boebot.run(step, "arsim", arena="arsim", seconds=0.1)

@@ -1,4 +1,4 @@
-"""Two needs and one animal: the isocline and the lethal boundary of Fig. 7.2 of the notes (section 7.1).
+"""Two needs and one animal: the isocline and the lethal boundary of Fig. 7.2 of the notes (section 7.2).
 
 An animal's state is a point: how well it is off for water and for nutrients, 1 all it can hold. Living uses both up;
 beyond the lethal boundary it dies. The rule of section 6.1 of the specification:
@@ -19,12 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 USE = 0.02  # 1/s, of each
 INTAKE = 0.10  # 1/s at cue 1, of what it takes in, times its cue
@@ -90,7 +89,7 @@ CUES = (1.0, 0.6)  # of water and nutrients
 @experiment(
     "isocline",
     title="An animal with two needs keeps away from the lethal boundary",
-    source="section 7.1, Fig. 7.2",
+    source="section 7.2, Fig. 7.2",
     caption="Water availability and nutrient level: the motivational isocline (dashed), the lethal boundary (grey "
     "beyond it), and animals that do what the larger tendency asks for. Red: one that only ever drinks.",
     criterion="Derived from the rule: beside the isocline the animal does one thing until it is there, after a time "

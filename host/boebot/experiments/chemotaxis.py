@@ -1,4 +1,4 @@
-"""E. coli: running and tumbling by equation (4.1), Figs. 4.1 and 4.2 of the notes; E29 to E32."""
+"""E. coli: running and tumbling by equation (4.1), Figs. 4.1 and 4.2, section 4.4.2 of the notes; E29 to E32."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ def utility_of(stimulus: NDArray[np.float64], a: float, b: float, step: float) -
 @experiment(
     "E29",
     title="E. coli's utility follows a rise and a fall",
-    source="section 4.2, equation (4.1), Fig. 4.1",
-    caption="Attractant X (a triangle) and the utility U of running.",
+    source="section 4.4.2, equation (4.1), Fig. 4.1",
+    caption="Left: concentration X of the attractant, a triangle. Right: utility U of running (B1), which is active "
+    "while U > 0: between 1 s and 3 s (shaded).",
 )
 def triangle(seed: int, progress: Progress) -> Outcome:
     step, peak, top = 0.001, 2.433, 0.4
@@ -51,12 +52,14 @@ def triangle(seed: int, progress: Progress) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
-        upper, lower = figure.subplots(2, sharex=True)
-        upper.plot(times, stimulus)
-        upper.set(ylabel="attractant X")
-        lower.plot(times, values)
-        lower.axhline(0, color="0.6", linewidth=0.8)
-        lower.set(xlabel="time (s)", ylabel="utility U of running")
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        left.plot(times, stimulus)
+        left.set(xlabel="time (s)", ylabel="attractant X")
+        right.plot(times, values)
+        right.axhline(0, color="0.6", linewidth=0.8)
+        right.axvspan(above[0], above[-1], color="0.9", zorder=0, label="B1 is active")
+        right.set(xlabel="time (s)", ylabel="utility U of running")
+        right.legend()
 
     return Outcome(measured, {"time_s": times[::10], "x": stimulus[::10], "u": values[::10]}, draw)
 
@@ -64,7 +67,7 @@ def triangle(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E30",
     title="With b > a a constant attractant ends in tumbling",
-    source="section 4.2, equation (4.1)",
+    source="section 4.4.2, equation (4.1)",
     caption="Utility after a step of the attractant to 0.4 with a = 1, b = 1.5; dashed: its limit X (1 - b/a).",
 )
 def sign(seed: int, progress: Progress) -> Outcome:
@@ -177,7 +180,7 @@ def _draw_swarm(group: Swarm, title: str) -> object:
 @experiment(
     "E31",
     title="A hundred bacteria find the attractant",
-    source="section 4.2, Fig. 4.2",
+    source="section 4.4.2, Fig. 4.2",
     caption="100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.",
 )
 def accumulation(seed: int, progress: Progress) -> Outcome:
@@ -200,7 +203,7 @@ def accumulation(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E32",
     title="Bacteria that tumble on the spot do not gather",
-    source="section 4.2, Fig. 4.2",
+    source="section 4.4.2, Fig. 4.2",
     caption="The same bacteria, but a tumble does not move them: those whose utility has fallen to zero stay for ever.",
 )
 def trap(seed: int, progress: Progress) -> Outcome:

@@ -19,13 +19,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 PATROL = math.tanh(0.5)  # u_1
 DRAIN, CHARGE = 0.02, 0.1  # 1/s
@@ -214,7 +213,7 @@ def planned_work(low: float, high: float, times: Sequence[float]) -> Floats:
 @experiment(
     "robot-economics",
     title="Charging earns nothing, and yet who charges earns most",
-    source="opening of chapter 8",
+    source="chapter 8, opening",
     caption="Performance (time of patrol) until each instant of three robots: one that never charges, one that "
     "always does, and one that schedules it by utility; grey: when that one charges. Dotted: its closed form.",
     criterion="Patrolling alone empties the battery in 1 / 0.02 per s = 50 s. Utility by hand goes to charge where "

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 """Called now and then with the share that is done, 0 to 1."""
 Draw = Callable[["Figure"], None]
@@ -27,6 +29,10 @@ class Measured:
     unit: str = ""
     least: float = -math.inf
     most: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("value", "least", "most"):  # numpy's numbers compare to numpy's truths, which JSON does not know
+            object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def is_met(self) -> bool:
@@ -60,12 +66,12 @@ class Measured:
 
 def about(name: str, value: float, expected: float, tolerance: float, unit: str = "") -> Measured:
     """A figure that should be `expected`, plus or minus `tolerance`."""
-    return Measured(name, float(value), unit, expected - tolerance, expected + tolerance)
+    return Measured(name, value, unit, expected - tolerance, expected + tolerance)
 
 
 def exactly(name: str, value: float, expected: float, unit: str = "") -> Measured:
     """A figure that should be just that."""
-    return Measured(name, float(value), unit, expected, expected)
+    return Measured(name, value, unit, expected, expected)
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ class Outcome:
         """All criteria are met."""
         return all(one.is_met for one in self.measured)
 
-    def columns(self) -> dict[str, np.ndarray[Any, Any]]:
+    def columns(self) -> dict[str, NDArray[Any]]:
         """The data as arrays.
 
         Raises:
@@ -120,9 +126,9 @@ class Experiment:
 
     @property
     def section(self) -> str:
-        """The first section of the notes that `source` names; "" where it names none."""
-        found = re.search(r"\d+(\.\d+)+", self.source)
-        return found[0] if found else ""
+        """The first section or chapter of the notes that `source` names; "" where it names none."""
+        found = re.search(r"(?:sections?|chapter) (\d+(?:\.\d+)*)\b(?!\.\d| of the specification)", self.source)
+        return found[1] if found else ""
 
 
 EXPERIMENTS: dict[str, Experiment] = {}

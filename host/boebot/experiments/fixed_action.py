@@ -1,4 +1,4 @@
-"""Fixed action patterns: released by a sign stimulus, they run to their end without it. Chapter 4 of the notes (egg
+"""Fixed action patterns: released by a sign stimulus, they run to their end without it. Section 4.4.3 of the notes (egg
 rolling of the goose); section 4.7 of the specification, E34.
 
 The robot stands still until something comes near; then it escapes: back for 0.4 s, a turn of 120 degrees, ahead for
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from boebot import run
 from boebot.behaviors import Stop
 from boebot.brain import Action, Brain, FixedActionPattern
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
-from boebot.experiments.runs import Floats, arena_file, true_pose
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.trials import true_pose
+from boebot.experiments.variants import arena_file
 from boebot.robots import load_robot
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def run_escape(robot: str, at: tuple[float, float, float], stays: bool, seed: in
     description = load_robot(robot)
     pattern = escape(robot)
     brain = Brain([Stop(), pattern], period=PERIOD)
-    with arena_file(_arena(*at, stays)) as arena:
+    with arena_file("stimulus", _arena(*at, stays)) as arena:
         result = run(brain, robot=description, arena=arena, seconds=4.0, seed=seed, pose=(0.0, 0.0, 0.0))
     begin = [switch.time for switch in brain.switches if switch.on == "escape"]
     end = [switch.time for switch in brain.switches if switch.off == "escape"]
@@ -104,7 +105,7 @@ def _arena(direction: float, far: float, near: float, stays: bool) -> str:
     points = ", ".join(
         f"{{ time_s = {time}, x_m = {r * math.cos(direction)}, y_m = {r * math.sin(direction)} }}" for time, r in there
     )
-    return f'name = "stimulus"\n[[moving]]\nname = "stimulus"\nradius_m = 0.1\nrepeat = "once"\npath = [{points}]\n'
+    return f'[[moving]]\nname = "stimulus"\nradius_m = 0.1\nrepeat = "once"\npath = [{points}]\n'
 
 
 def differing(one: Floats, other: Floats) -> int:
@@ -127,7 +128,7 @@ def compare(stays: Escape, gone: Escape, duration: float) -> list[Measured]:
 @experiment(
     "E34",
     title="A fixed action pattern runs to its end without its stimulus",
-    source="section 4.1, fixed action patterns",
+    source="section 4.4.3, fixed action patterns",
     caption="Stimulus as a sensor sees it and motor signals asked for, with a stimulus that stays and with one that "
     "has gone before the pattern is through.",
     robot="arsim",
@@ -141,7 +142,7 @@ def pattern(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E34-shieldbot",
     title="A fixed action pattern on shieldbot's servos",
-    source="section 4.1, fixed action patterns",
+    source="section 4.4.3, fixed action patterns",
     caption="The same on shieldbot: what its infra-red pairs see, and the signals with which its servos are driven.",
     robot="shieldbot (native)",
     criterion="The turn lasts as long as 120 degrees take on shieldbot, at 3.20 rad/s by its servos' curve. "

@@ -1,4 +1,4 @@
-"""Cataglyphis, the desert ant that runs straight home from wherever it has strayed: chapter 4 of the notes, E33.
+"""Cataglyphis, the desert ant that runs straight home from wherever it has strayed: section 4.4.4 of the notes, E33.
 
 The brain wanders until it has found food, which here lies at the end of a way of given length; then it goes home by its
 home vector and searches there (section 4.8 of the specification).
@@ -17,8 +17,9 @@ from boebot.behaviors import Homing, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.cognition import Odometry, PathIntegration
 from boebot.devices.compass import TESLA_PER_COUNT
-from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
-from boebot.experiments.runs import Floats, device, true_pose, variant
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, experiment
+from boebot.experiments.trials import PER_SEED, true_pose
+from boebot.experiments.variants import varied
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 PERIOD = 0.02  # s
 SIGNAL = 0.9  # motor signal out and home
 SECONDS = 285.0  # 200 m out take some 225 s, the way home 30 s at most
-APART = 1000  # between the seeds of an experiment's runs
 
 
 @dataclass(kw_only=True)
@@ -107,19 +107,13 @@ def ant(compass: float, way: float) -> RobotDescription:
     """arsim with these errors: of the compass (rad), and of the way in each step of the brain (share of it)."""
     # Δs = (Δs_L + Δs_R) / 2 over n = 2 steps of the odometer: its noise is σ_step √(n / 2) = σ_step
     step = way * SIGNAL * 1.381 * PERIOD
-    return variant(
-        "arsim",
-        {
-            "compass": device("arsim", "compass", sigma_rad=compass),
-            "odometer": device("arsim", "odometer", sigma_step_m=step),
-        },
-    )
+    return varied("arsim", "ant", compass={"sigma_rad": compass}, odometer={"sigma_step_m": step})
 
 
 @experiment(
     "E33",
     title="Cataglyphis finds home by path integration",
-    source="section 4.1, Cataglyphis",
+    source="section 4.4.4, Cataglyphis",
     caption="A random way of 200 m out, the way home by the home vector, and the search about the place where it ends.",
     robot="arsim (compass 0.05 rad, odometer 2 % of each step; and without noise)",
     slow=True,
@@ -127,10 +121,10 @@ def ant(compass: float, way: float) -> RobotDescription:
 def cataglyphis(seed: int, progress: Progress) -> Outcome:
     noisy, exact = [], []
     for number in range(4):
-        noisy.append(journey(ant(0.05, 0.02), 200.0, SECONDS, seed + APART * number))
+        noisy.append(journey(ant(0.05, 0.02), 200.0, SECONDS, seed + PER_SEED * number))
         progress((number + 1) / 6)
     for number in range(2):
-        exact.append(journey(ant(0.0, 0.0), 200.0, SECONDS, seed + APART * number))
+        exact.append(journey(ant(0.0, 0.0), 200.0, SECONDS, seed + PER_SEED * number))
         progress((number + 5) / 6)
     measured = [
         Measured("home vector's error, mean of 4", float(np.mean([one.error for one in noisy])), "m", most=0.4),
@@ -143,7 +137,7 @@ def cataglyphis(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E33-shieldbot",
     title="A shieldbot finds home by path integration",
-    source="section 4.1, Cataglyphis",
+    source="section 4.4.4, Cataglyphis",
     caption="The same brain on shieldbot with encoders and a magnetic compass, after a random way of 20 m.",
     robot="shieldbot with its compass (native)",
     criterion="The way is 20 m, a tenth of the notes' as its speed is. Iron, 0.3 of the earth's field, would bend "
@@ -157,7 +151,7 @@ def cataglyphis(seed: int, progress: Progress) -> Outcome:
 def cataglyphis_shieldbot(seed: int, progress: Progress) -> Outcome:
     found = []
     for number in range(2):
-        its_seed = seed + APART * number
+        its_seed = seed + PER_SEED * number
         found.append(journey(calibrated(its_seed), 20.0, 210.0, its_seed))
         progress((number + 1) / 2)
     measured = [
@@ -191,10 +185,10 @@ class Spin(MotorBehavior):
 def calibrated(seed: int) -> RobotDescription:
     """shieldbot with a compass, whose own iron has been measured by turning it on the spot: the circle's middle."""
     spin = Spin()
-    raw = variant("shieldbot", {"compass": device("shieldbot", "compass", on=True)})
+    raw = varied("shieldbot", "shieldbot-compass", compass={"on": True})
     run(Brain([spin], period=PERIOD), robot=raw, arena="empty", seconds=5.0, seed=seed)
     offset = middle(np.array(spin.fields) / TESLA_PER_COUNT)
-    return variant("shieldbot", {"compass": device("shieldbot", "compass", on=True, offset_counts=offset)})
+    return varied("shieldbot", "shieldbot-compass", compass={"on": True, "offset_counts": offset})
 
 
 def middle(points: Floats) -> tuple[float, float]:

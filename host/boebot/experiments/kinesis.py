@@ -1,4 +1,4 @@
-"""Kinesis: wood lice are where it is humid because they are slow there. Chapter 4 of the notes; section 4.5 of the
+"""Kinesis: wood lice are where it is humid because they are slow there. Section 4.4.2 of the notes; section 4.5 of the
 specification, E28.
 
 Density is proportional to 1/V: with speeds of 0.2 and 1 m/s the humid half of the floor has a share of 1/(1 + 0.2).
@@ -14,8 +14,8 @@ import numpy as np
 from boebot import run
 from boebot.behaviors import Kinesis
 from boebot.brain import Brain
-from boebot.experiments.experiment import Outcome, Progress, about, experiment
-from boebot.experiments.runs import Floats, variant
+from boebot.experiments.experiment import Floats, Outcome, Progress, about, experiment
+from boebot.experiments.variants import varied
 from boebot.vehicle_devices import RegulatedMotor
 
 if TYPE_CHECKING:
@@ -51,13 +51,15 @@ def humid_share(x: Floats, y: Floats) -> float:
 @experiment(
     "E28",
     title="Wood lice linger where it is humid",
-    source="section 4.1, kinesis",
+    source="section 4.4.2, kinesis",
     caption="Path of 10 min over a floor whose shaded squares are humid, and the share of time spent there.",
     robot="arsim with velocity-regulated motors (3.15) of 10 N m",
     slow=True,
 )
 def wood_louse(seed: int, progress: Progress) -> Outcome:
-    robot = variant("arsim", {"motor_left": MOTOR, "motor_right": MOTOR}, wheel_speed_maximum_m_s=FULL_SPEED)
+    robot = varied(
+        "arsim", "wood louse", body={"wheel_speed_maximum_m_s": FULL_SPEED}, motor_left=MOTOR, motor_right=MOTOR
+    )
     louse = Kinesis(stimulus=feel, fast=FAST / FULL_SPEED, slow=SLOW / FULL_SPEED)
     result = run(
         Brain([louse], period=PERIOD),

@@ -16,8 +16,10 @@ import numpy as np
 
 from boebot.cognition import Odometry
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
-from boebot.experiments.trials import PER_SEED, end_of, floor, start_of, varied
+from boebot.experiments.trials import PER_SEED, end_of, start_of
+from boebot.experiments.variants import varied
 from boebot.robots import Encoder
 
 if TYPE_CHECKING:
@@ -74,7 +76,7 @@ def _draw(trials: Sequence[Straight]) -> Draw:
         first = trials[0]
         reach = first.result.robot.body.radius_m
         ends = np.array([(x - reach, y - reach) for x, y in ((0, 0), (1, 0))])
-        floor(axes, first, *(trial.path for trial in trials), *map(ghost_path, trials), ends, ends + 2 * reach)
+        floor(axes, first.plan, *(trial.path for trial in trials), *map(ghost_path, trials), ends, ends + 2 * reach)
         for number, trial in enumerate(trials):
             axes.plot(*trial.path.T, color=style.END, lw=1.4, zorder=7, label="" if number else "robot")
             axes.plot(
@@ -128,7 +130,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
 @experiment(
     "E24",
     title="The odometric ghost",
-    source="section 5.2, code listing 5.4; section 3.2",
+    source="section 5.4, code listing 5.4",
     caption="Robot and ghost on a metre straight ahead by an odometer that takes the left wheel for 2 % larger than it "
     "is.",
     robot="arsim",
@@ -162,7 +164,7 @@ def judge_shieldbots(trials: Sequence[Straight]) -> list[Measured]:
 @experiment(
     "E24-shieldbot",
     title="The odometric ghost of a shieldbot",
-    source="section 5.2, code listing 5.4; section 3.2",
+    source="section 5.4, code listing 5.4",
     caption="Five shieldbots, and their ghosts, on a metre straight ahead with a brain that takes the left wheel for 2 "
     "% larger than it is; it holds the ghost's heading.",
     robot="shieldbot (native)",

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,23 +22,24 @@ import boebot
 from boebot.behaviors import Avoid
 from boebot.brain import Brain, MotorBehavior, Utility
 from boebot.cognition import near, wrapped
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.paths import floor
+from boebot.experiments.variants import narrow_arsim
 from boebot.readings_series import ReadingsSeries
-from boebot.robots import RobotDescription
 from boebot.series import touch_indices
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from boebot.floor_plan import FloorPlan
     from boebot.result import RunResult
     from boebot.robot import Command, Robot
 
-Floats = NDArray[np.float64]
 
 PERIOD, PLANNING = 0.05, 0.5  # s
 GOAL, NEAR_GOAL = (1.3, -1.3), 0.3  # m
 SIGNAL, TURN, GAIN = 0.4, 0.4, 0.3  # motor signals; GAIN for each rad
-SEEN = 0.3  # nearness from which on it avoids
+SEEN, CLEAR, AFTER = 0.3, 0.15, 0.2  # nearness from which on it avoids, and below which for how long (s) no more
 SECONDS = 20.0
 STARTS = ((-1.3, 1.3), (-1.3, 1.0), (-1.5, 0.8), (-1.4, 0.4), (-0.2, 1.3), (-1.4, -0.5), (0.2, 1.2), (-0.9, 0.3))
 PLANNINGS = (0.05, 0.1, 0.2, 0.3, 0.5)  # s; to see what it is that matters
@@ -66,9 +66,9 @@ class Approach(MotorBehavior):
 
 
 def behavior_based() -> Brain:
-    """Approach, and Avoid where 3 near - 0.4 > 0.5: from nearness 0.3 on."""
+    """Approach, and Avoid with the figures of section 4.9 of the specification; 3 near - 0.4 > 0.5 where near > 0.3."""
     approach = Approach(utility=Utility(b=0.5, tau=PERIOD))
-    avoid = Avoid(turn=TURN, utility=Utility(b=-0.4, w={"near": 0.9 / SEEN}, tau=PERIOD / 10))
+    avoid = Avoid(turn=TURN, clear=CLEAR, after=AFTER, utility=Utility(b=-0.4, w={"near": 0.9 / SEEN}, tau=PERIOD / 10))
     return Brain([approach, avoid], [near()], period=PERIOD)
 
 
@@ -95,20 +95,11 @@ class Serial:
         self._ready = robot.time + self._planning
 
 
-def robot_with_sensors_ahead() -> RobotDescription:
-    """arsim with its infra-red sensors at ±0.3324 rad: at ±0.7854 rad it does not see what is right ahead."""
-    arsim = boebot.load_robot("arsim")
-    devices = dict(arsim.device)
-    for name, angle in (("infrared_left", 0.3324), ("infrared_right", -0.3324)):
-        place = (arsim.body.radius_m * math.cos(angle), arsim.body.radius_m * math.sin(angle))
-        devices[name] = msgspec.structs.replace(devices[name], position_m=place, heading_rad=angle)
-    return msgspec.structs.replace(arsim, device=devices)
-
-
 @dataclass(frozen=True)
 class Crossing:
     """One run, until the goal or the end."""
 
+    plan: FloorPlan
     x: Floats
     """m"""
     y: Floats
@@ -123,13 +114,13 @@ class Crossing:
 def cross(brain: object, start: tuple[float, float], seed: int) -> Crossing:
     """From that place, heading for the goal."""
     pose = (*start, math.atan2(GOAL[1] - start[1], GOAL[0] - start[0]))
-    robot = robot_with_sensors_ahead()
-    result = boebot.run(brain, robot=robot, arena="arsim", seconds=SECONDS, pose=pose, seed=seed)
+    result = boebot.run(brain, robot=narrow_arsim(), arena="arsim", seconds=SECONDS, pose=pose, seed=seed)
     truth = result.truth
     assert truth is not None
     there = np.flatnonzero(np.hypot(truth.x - GOAL[0], truth.y - GOAL[1]) < NEAR_GOAL)
     end = int(there[0]) + 1 if len(there) else len(truth.time)
     return Crossing(
+        truth.plan,
         truth.x[:end],
         truth.y[:end],
         touch_indices(truth.time[:end], truth.contact[:end]),
@@ -218,18 +209,18 @@ def _draw(serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> 
     def draw(figure: Figure) -> None:
         left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1))
         for axes, name, crossings in ((left, "plans for 0.5 s", serial), (middle, "behavior-based", parallel)):
-            for x, y in ((-0.9, 0.7), (0.7, -0.9)):
-                axes.fill((x, x + 0.2, x + 0.2, x), (y, y, y + 0.2, y + 0.2), color="0.6")
-            axes.plot((-1.8, 1.8, 1.8, -1.8, -1.8), (-1.8, -1.8, 1.8, 1.8, -1.8), color="0.4")
+            floor(axes, crossings[0].plan)
             for one in crossings:
                 axes.plot(one.x, one.y, linewidth=0.8)
                 axes.plot(one.x[one.touched], one.y[one.touched], "x", color="red", markersize=5)
             axes.plot(*GOAL, "*", color="black")
-            axes.set(title=name, xlabel="x (m)", ylabel="y (m)", aspect="equal")
+            axes.set(title=name)
+            axes.locator_params(nbins=5)
         right.plot(PLANNINGS, hits, "o-", label="serial")
         right.axhline(sum(len(one.touched) for one in parallel), linestyle="--", color="C1", label="behavior-based")
         right.set(xlabel="time for a plan (s)", ylabel=f"collisions in {len(serial)} crossings")
         right.set_box_aspect(1.0)
-        right.legend(fontsize="small")
+        right.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        middle.set(ylabel="")
 
     return draw

@@ -1,5 +1,5 @@
-"""Predator and prey: M. xanthus feeds on E. coli, moves some 200 times slower, and lures it. Section 4.2 of the notes;
-end of section 4.6 of the specification.
+"""Predator and prey: M. xanthus feeds on E. coli, moves some 200 times slower, and lures it. Section 4.4.2 of the
+notes; end of section 4.6 of the specification.
 
 The predator is the source of what its prey takes for food: prey that follows (4.1) up the attractant gathers around it.
 """
@@ -31,7 +31,7 @@ def density_ratio(group: Swarm) -> float:
 @experiment(
     "predator-prey",
     title="M. xanthus lures E. coli",
-    source="section 4.2",
+    source="section 4.4.2",
     caption="Bacteria before and after 10 s, lured by a predator 200 times slower; circle: what is near to it.",
 )
 def lure(seed: int, progress: Progress) -> Outcome:

@@ -1,4 +1,4 @@
-"""Reflexes that warm up and tire: chapter 4 of the notes; section 4.3 of the specification. E25 and E26.
+"""Reflexes that warm up and tire: section 4.4.1 of the notes; section 4.3 of the specification. E25 and E26.
 
 τ_w dW/dt = S - W,   τ_f dF/dt = W - F,   ρ = max(0, W - g F)
 """
@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.behaviors.withdraw import ReflexIntensity
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, experiment
-from boebot.experiments.runs import Floats
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +41,7 @@ def judge_step(times: Floats, values: Floats) -> list[Measured]:
 @experiment(
     "E25",
     title="A reflex warms up and tires",
-    source="section 4.1, reflexes",
+    source="section 4.4.1, reflexes",
     caption="Intensity of a reflex under a stimulus that begins at 0 s and lasts; dashed: what is left in the end.",
 )
 def step_response(seed: int, progress: Progress) -> Outcome:
@@ -139,7 +138,7 @@ def judge(one: Larva) -> list[Measured]:
 @experiment(
     "E26",
     title="A larva that shuns light crawls into it",
-    source="section 4.1, reflexes",
+    source="section 4.4.1, reflexes",
     caption="Place of a fly larva in a dead-end tunnel that is lit at its mouth, and the intensity with which it turns "
     "away from the light; dashed: the intensity below which forward motion wins.",
 )

@@ -55,7 +55,7 @@ def disagreements(run: RunResult, brain: object) -> int:
 @experiment(
     "E68",
     title="The same brain and seed command the same on both boards, as long as telemetry agrees",
-    source="section 7.3 of the specification",
+    source="section 3.1; section 7.3 of the specification",
     caption="Motor signals that two brains commanded on the native board and on the emulated ATmega328P, and where "
     "first telemetry, then infrared or whiskers, then their commands differ.",
     robot="shieldbot (native, avr)",
@@ -135,8 +135,10 @@ def _draw(drawn: list[tuple[str, list[RunResult], list[Difference | None]]]) -> 
                 for difference, color in zip(differences, ("0.8", "C2", "red"), strict=True):
                     if difference is not None:
                         axes.axvline(difference.tick * runs[0].tick, color=color, linestyle=":")
-        rows[0].set(title="first difference: grey telemetry, green infrared or whiskers, red commands")
-        rows[0].legend(loc="upper right", ncols=2, fontsize="small")
+        rows[0].set_title(
+            "first difference: grey telemetry, green infrared or whiskers, red commands", loc="left", fontsize=9
+        )
+        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=2, fontsize="x-small")
         rows[-1].set(xlabel="time (s)")
 
     return draw

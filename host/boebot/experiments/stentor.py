@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 DECAYS = np.array((8.5, 4.3, 1.6, 0.75))  # a_2..a_5 (1/s)
 GAINS = np.array((12.0, 6.6, 2.75, 1.45))  # b_2..b_5 (1/s)

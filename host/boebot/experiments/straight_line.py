@@ -1,4 +1,4 @@
-"""Straight-line odometric navigation: section 5.2 of the notes, listings 5.3 and 5.4, (5.1); E22 to E24.
+"""Straight-line odometric navigation: section 5.4 of the notes, listings 5.3 and 5.4, (5.1); E22 to E24.
 
 s = a (D - d) / D      (5.1)      until |D - d| < b D,   with D = 1 m, a = 0.90, b = 0.02
 """
@@ -143,7 +143,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
 @experiment(
     "E22",
     title="A metre straight ahead by odometry",
-    source="section 5.2, code listings 5.3 and 5.4, equation (5.1)",
+    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
     caption="Distance and motor signals of the notes' robot on its way to a destination 1 m ahead.",
     robot="arsim",
 )
@@ -209,7 +209,7 @@ def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E22-shieldbot",
     title="A metre straight ahead by odometry: ten shieldbots",
-    source="section 5.2, code listings 5.3 and 5.4, equation (5.1)",
+    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
     caption="Distance and motor signals of ten shieldbots, each with servos of its own, on their way to a destination "
     "1 m ahead.",
     robot="shieldbot (native)",
@@ -222,7 +222,7 @@ def shieldbot_run(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E22-avr",
     title="A metre straight ahead by odometry: the AVR image",
-    source="section 5.2, code listings 5.3 and 5.4, equation (5.1)",
+    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
     caption="Distance and motor signals of three shieldbots with the image of their ATmega328P, each with servos of "
     "its own, on their way to a destination 1 m ahead.",
     robot="shieldbot (avr)",

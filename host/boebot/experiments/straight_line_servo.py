@@ -16,7 +16,8 @@ from boebot.behaviors import StraightRun
 from boebot.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment
 from boebot.experiments.straight_line import Straight, drive, runner
-from boebot.experiments.trials import PER_SEED, varied
+from boebot.experiments.trials import PER_SEED
+from boebot.experiments.variants import varied
 from boebot.link import messages
 from boebot.robot import Observation, Robot
 from boebot.robots import RobotDescription, load_robot
@@ -36,9 +37,9 @@ SPAN_US, PULSE_COUNT_US = 200.0, 0.0625
 def coarse(wheel_radius_m: float) -> RobotDescription:
     """A shieldbot with 16 edges to a turn, without differences between its servos."""
     edges = {"edges_per_turn": 16}
-    described = varied("shieldbot", "shieldbot-16", encoder_left=edges, encoder_right=edges)
-    body = msgspec.structs.replace(described.body, wheel_radius_m=wheel_radius_m)
-    return msgspec.structs.replace(described, body=body, unit=0)
+    body = {"wheel_radius_m": wheel_radius_m}
+    described = varied("shieldbot", "shieldbot-16", body, encoder_left=edges, encoder_right=edges)
+    return msgspec.structs.replace(described, unit=0)
 
 
 # ---- the model -------------------------------------------------------------------------------------------------------
@@ -128,10 +129,10 @@ def _draw(figure: Figure, rows: list[Series], dead_band: float) -> None:
 @experiment(
     "E23",
     title="A metre straight ahead on servos with a dead band",
-    source="section 5.2, equation (5.1); sections 1.11 and 4.2 of the specification",
+    source="section 5.4, equation (5.1); sections 1.11 and 4.2 of the specification",
     caption="The straight run on the servo model (dead band 0.05, lag 50 ms, encoder edges of 13.08 mm): the last "
     "fifth of the way with and without a least motor signal of 0.06.",
-    robot="servo model",
+    robot="shieldbot (16 edges, as a model of its servos)",
 )
 def servo_model(seed: int, progress: Progress) -> Outcome:
     with_least = on_servo_model(LEAST)
@@ -179,7 +180,7 @@ def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
 @experiment(
     "E23-shieldbot",
     title="A metre straight ahead on a shieldbot with coarse encoders",
-    source="section 5.2, equation (5.1); sections 1.11 and 4.2 of the specification",
+    source="section 5.4, equation (5.1); sections 1.11 and 4.2 of the specification",
     caption="The straight run of a shieldbot with encoders of 16 edges (13.0 mm): the last fifth of the way with and "
     "without a least motor signal of 0.06.",
     robot="shieldbot (native)",

@@ -1,4 +1,4 @@
-"""Phototaxis: two light sensors, crossed excitation, to the lamp from anywhere (section 4.2 of the notes; E27).
+"""Phototaxis: two light sensors, crossed excitation, to the lamp from anywhere (section 4.4.2 of the notes; E27).
 
 Section 4.4 of the specification; the behavior itself is boebot.behaviors.phototaxis.
 """
@@ -17,8 +17,10 @@ import numpy as np
 from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment
-from boebot.experiments.trials import PER_SEED, Trial, arena_file, at_angle, floor, start_of, try_once, varied
-from boebot.robots import RobotDescription, load_robot
+from boebot.experiments.paths import floor
+from boebot.experiments.trials import PER_SEED, Trial, start_of, try_once
+from boebot.experiments.variants import arena_file, at_angle, varied
+from boebot.robots import RobotDescription
 from boebot.vehicle_devices import Phototransistor
 
 if TYPE_CHECKING:
@@ -47,11 +49,8 @@ class Setting:
 
 def _arsim() -> RobotDescription:
     """The notes' robot with two phototransistors on its rim, turned 0.5 rad outwards as the shieldbot's are."""
-    lights = {
-        f"light_{side}": Phototransistor(**at_angle(0.20, angle)) for side, angle in (("left", 0.5), ("right", -0.5))
-    }
-    robot = load_robot("arsim")
-    return msgspec.structs.replace(robot, name="arsim-lights", device=dict(robot.device) | lights)
+    left, right = (Phototransistor(**at_angle(0.20, angle)) for angle in (0.5, -0.5))
+    return varied("arsim", "arsim-lights", light_left=left, light_right=right)
 
 
 # The shieldbot's sensors see ambient light of irradiance 1 everywhere: 667 / s each (decay 1.5 ms), 10 % more or less
@@ -130,7 +129,7 @@ def _draw(done: Sequence[Trial], times: Sequence[float], straight: float) -> Dra
         from boebot.report.robot_drawing import draw_robot
 
         left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-        floor(left, done[0], np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
+        floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
         for trial, time in zip(done, times, strict=True):
             until = int(np.searchsorted(trial.time, time)) + 1
             left.plot(*trial.path[:until].T, color=style.END if time < math.inf else style.ESTIMATE, lw=0.8, zorder=6)
@@ -166,7 +165,7 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E27",
     title="Taxis: to the lamp from everywhere",
-    source="section 4.2; section 4.4 of the specification",
+    source="section 4.4.2; section 4.4 of the specification",
     caption="Phototaxis from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, and times.",
     robot="arsim",
     slow=True,
@@ -178,7 +177,7 @@ def taxis(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E27-shieldbot",
     title="Taxis: the same brain on a board",
-    source="section 4.2; section 4.4 of the specification",
+    source="section 4.4.2; section 4.4 of the specification",
     caption="Phototaxis of a shieldbot from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, "
     "and times.",
     robot="shieldbot (native)",

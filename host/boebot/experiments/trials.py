@@ -1,34 +1,30 @@
 """Trials: one brain run again and again on a robot in an arena, and what the world knows of each run afterwards.
 
-Not an experiment itself. Robots as the notes' experiments vary them, arenas written down for one experiment, and
-pictures of many paths in one arena are here too.
+Not an experiment itself. Robots and arenas made for one experiment are those of `variants`; `paths` draws trials.
 """
 
 from __future__ import annotations
 
 import math
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.robots import RobotDescription, load_robot
+from boebot.experiments.experiment import Floats
 from boebot.runner import run
+from boebot.series import Pose, truth_at
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from boebot.brain import Brain
+    from boebot.floor_plan import FloorPlan
     from boebot.result import RunResult
+    from boebot.robots import RobotDescription
 
-Floats = NDArray[np.float64]
 PER_SEED = 1000
 """Trials of one experiment have the seeds from PER_SEED times the experiment's on."""
 
@@ -52,6 +48,12 @@ class Trial:
         pose = self.result.true_pose
         assert pose is not None, "experiments run in the simulator"
         return np.column_stack((pose.x, pose.y))
+
+    @property
+    def plan(self) -> FloorPlan:
+        """What stands in its arena."""
+        assert self.result.truth is not None
+        return self.result.truth.plan
 
     @cached_property
     def first_contact(self) -> float:
@@ -92,68 +94,10 @@ def try_once(brain: Brain, robot: str | RobotDescription, arena: str | Path, sec
     return Trial(run(brain, robot=robot, arena=arena, seconds=seconds, **terms), brain)
 
 
-# ---- robots ----------------------------------------------------------------------------------------------------------
-
-
-def varied(robot: str, name: str, **changes: dict[str, Any]) -> RobotDescription:
-    """A bundled robot under another name, with other keys in some of its devices."""
-    described = load_robot(robot)
-    devices = dict(described.device)
-    for device, keys in changes.items():
-        devices[device] = msgspec.structs.replace(devices[device], **keys)
-    return msgspec.structs.replace(described, name=name, device=devices)
-
-
-def at_angle(radius: float, angle: float) -> dict[str, Any]:
-    """Keys of a sensor on a round body's rim that looks outwards (m, rad), (3.9)."""
-    return {"position_m": (radius * math.cos(angle), radius * math.sin(angle)), "heading_rad": angle}
-
-
-# ---- arenas ----------------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def arena_file(name: str, text: str) -> Iterator[Path]:
-    """A file of an arena that exists for as long as it is needed; its keys are those of docs/reference/arenas.md."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{name}.toml"
-        path.write_text(f'name = "{name}"\n{text}', encoding="utf-8")
-        yield path
-
-
-# ---- pictures --------------------------------------------------------------------------------------------------------
-
-
-def floor(axes: Axes, trial: Trial, *places: Floats) -> None:
-    """Draws the arena of a run, wide enough for its walls or, in the open, for those places (m, shape (n, 2))."""
-    from boebot.report import scene
-    from boebot.report.arena_drawing import draw_arena, frame
-
-    assert trial.result.truth is not None
-    plan = trial.result.truth.plan
-    if plan.outlines:
-        low, high = scene.plan_bounds(plan, [])
-    else:
-        points = np.vstack(places)
-        edge = 0.15 * float(np.ptp(points, axis=0).max())
-        low, high = points.min(axis=0) - edge, points.max(axis=0) + edge
-    frame(axes, low, high)
-    draw_arena(axes, plan)
-
-
-def draw_paths(axes: Axes, trials: Sequence[Trial]) -> None:
-    """All paths, each up to its first contact, which a cross marks; the robot stands where the first one begins."""
-    from boebot.report import style
-    from boebot.report.robot_drawing import draw_robot
-
-    floor(axes, trials[0])
-    for number, trial in enumerate(trials, 1):
-        last = np.searchsorted(trial.time, trial.first_contact) if trial.has_collided else len(trial.time) - 1
-        path = trial.path[: int(last) + 1]
-        axes.plot(*path.T, color=style.colour(number), lw=1.1, alpha=0.85, zorder=6)
-        if trial.has_collided:
-            axes.plot(*path[-1], "x", color=style.CONTACT, ms=7, mew=1.8, zorder=13)
-    draw_robot(axes, trials[0].result.robot, start_of(trials[0]), style.START)
+def true_pose(result: RunResult, times: Sequence[float] | Floats) -> Pose:
+    """Where the robot really was at those times (s of the run)."""
+    assert result.truth is not None
+    return truth_at(result.truth, np.asarray(times, dtype=np.float64) + result.clock_offset)
 
 
 def start_of(trial: Trial) -> tuple[float, float, float]:

@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 import boebot
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brain.utility import Utilities
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from boebot.robot import Robot
-
-Floats = NDArray[np.float64]
 
 
 def advanced(functions: list[Utility], variables: dict[str, Floats], step: float) -> Floats:
@@ -50,7 +48,7 @@ KICK = 3.0  # of E63
 @experiment(
     "E61",
     title="A short loss of readings hardly moves a utility",
-    source="section 8.2, Fig. 8.2",
+    source="section 8.2.2, Fig. 8.2",
     caption="Left: a state variable z that is lost for 0.15 s. Right: a utility function of it, with time constant "
     "0.3 s; dotted: without.",
 )
@@ -93,7 +91,7 @@ def intervals(active: NDArray[np.bool_], times: Floats) -> list[tuple[float, flo
 @experiment(
     "E62",
     title="Of three behaviors the one of the highest utility is active",
-    source="section 8.2, Fig. 8.3",
+    source="section 8.2.3, Fig. 8.3",
     caption="Utilities of three behaviors: u1 (red) is constant, u2 (green) and u3 (blue) follow state variables. "
     "Below: the active one.",
 )
@@ -145,7 +143,7 @@ def three_behaviors(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E63",
     title="A gamma parameter calls a process for a while",
-    source="section 8.2, equation (8.6)",
+    source="section 8.2.2, equation (8.6)",
     caption="A process at rest at tanh(-0.5) whose gamma parameter is set to 3: gamma and utility; grey: active.",
 )
 def gamma(seed: int, progress: Progress) -> Outcome:
@@ -214,7 +212,7 @@ def _of_time(name: str, value: Callable[[float], float]) -> StateVariable:
 @experiment(
     "E64",
     title="One motor behavior, and every cognitive process above zero",
-    source="section 8.2",
+    source="section 8.2.3",
     caption="Utilities of three motor behaviors and three cognitive processes while a state variable is 1 from 1 s "
     "to 4 s; thick: active.",
     robot="arsim",

@@ -1,4 +1,4 @@
-"""Following the walls of a room: named in section 5.1 of the notes; the law is that of section 4.9 of the
+"""Following the walls of a room: named in chapter 5 of the notes, Fig. 5.1; the law is that of section 4.9 of the
 specification. E35.
 """
 
@@ -13,7 +13,8 @@ from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
-from boebot.experiments.runs import arena_file, device, variant
+from boebot.experiments.paths import floor
+from boebot.experiments.variants import arena_file, at_angle, varied
 from boebot.robots import RobotDescription
 from boebot.vehicle_devices import InfraredProximity, RegulatedMotor
 
@@ -24,14 +25,13 @@ if TYPE_CHECKING:
 
 LENGTH, WIDTH = 3.0, 2.0  # of the room (m)
 ROOM = f"""
-name = "3 m by 2 m"
 [[outline]]
 corners_m = [[0, 0], [{LENGTH}, 0], [{LENGTH}, {WIDTH}], [0, {WIDTH}]]
 """
 SECONDS = 80.0
+RADIUS = 0.07  # m
 SPEED = 0.12  # v_0 (m/s)
 FULL_SPEED = 0.17  # m/s at motor signal 1, of both robots
-FOUND_S = 5.0  # within which it has to have found its distance
 
 
 def follower() -> Brain:
@@ -43,29 +43,31 @@ def small_arsim() -> RobotDescription:
     """arsim in the size of a Boe-Bot (section 1.2 of the specification), one IR sensor ahead and one at -60 degrees."""
     sensor = partial(InfraredProximity, range_m=0.8, c1_m2=0.012, c2=0.02, sigma=0.03)
     motor = RegulatedMotor(gain_n_s=1.2, torque_maximum_n_m=0.268)
-    return variant(
+    body = {
+        "mass_kg": 0.6,
+        "inertia_kg_m2": 1.2e-3,
+        "radius_m": RADIUS,
+        "track_width_m": 0.105,
+        "wheel_radius_m": 0.0333,
+        "wheel_mass_kg": 0.03,
+        "wheel_inertia_kg_m2": 1.7e-5,
+        "angular_damping_n_m_s": 0.004,
+        "wheel_speed_maximum_m_s": FULL_SPEED,
+    }
+    return varied(
         "arsim",
-        {
-            "motor_left": motor,
-            "motor_right": motor,
-            "infrared_left": sensor(position_m=(0.07, 0.0), heading_rad=0.0),
-            "infrared_right": sensor(position_m=(0.035, -0.0606), heading_rad=-1.0472),
-        },
-        mass_kg=0.6,
-        inertia_kg_m2=1.2e-3,
-        radius_m=0.07,
-        track_width_m=0.105,
-        wheel_radius_m=0.0333,
-        wheel_mass_kg=0.03,
-        wheel_inertia_kg_m2=1.7e-5,
-        angular_damping_n_m_s=0.004,
-        wheel_speed_maximum_m_s=FULL_SPEED,
+        "arsim-small",
+        body,
+        motor_left=motor,
+        motor_right=motor,
+        infrared_left=sensor(**at_angle(RADIUS, 0.0)),
+        infrared_right=sensor(**at_angle(RADIUS, -1.0472)),
     )
 
 
 def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progress: Progress) -> RunResult:
     """A run along the walls, which begins `start` metres from one."""
-    with arena_file(ROOM) as arena:
+    with arena_file("room", ROOM) as arena:
         return run(
             follower(),
             robot=robot,
@@ -84,12 +86,11 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
     assert truth is not None
     time, x, y = truth.time - result.clock_offset, truth.x, truth.y
     distance = np.minimum(np.minimum(x, LENGTH - x), np.minimum(y, WIDTH - y))
-    following = time >= FOUND_S
     turns = (np.unwrap(truth.heading) - truth.heading[0]) / (2 * np.pi)
     measured = [
         Measured("turns about the room", float(turns[-1]), least=1.0),
-        Measured("least distance from a wall", float(distance[following].min()), "m", least=least),
-        Measured("greatest distance", float(distance[following].max()), "m", most=most),
+        Measured("least distance from a wall", float(distance.min()), "m", least=least),
+        Measured("greatest distance", float(distance.max()), "m", most=most),
         Measured("contacts", float(truth.contact.sum()), most=0.0),
     ]
     shown = slice(None, None, max(1, len(time) // 2000))
@@ -103,11 +104,10 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
 
     def draw(figure: Figure) -> None:
         above, beside = figure.subplots(1, 2, width_ratios=(1.5, 1))
-        above.plot([0, LENGTH, LENGTH, 0, 0], [0, 0, WIDTH, WIDTH, 0], color="#39415a", linewidth=2.5)
+        floor(above, truth.plan)
         above.plot(x, y, color="#0072b2", linewidth=1.3, label="path of its middle")
         above.plot(x[0], y[0], "o", color="#009e73", label="start")
         above.plot(x[-1], y[-1], "s", color="#d55e00", label="end")
-        above.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
         above.legend(loc="center", fontsize=9, frameon=False)
         beside.axhspan(least, most, color="#e3e5ea", label="criterion")
         beside.plot(time, distance, color="#0072b2", linewidth=1.0)
@@ -120,7 +120,7 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
 @experiment(
     "E35",
     title="A lap along the walls",
-    source="section 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
     caption="Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them.",
     robot="arsim in the size of a Boe-Bot, IR ahead and at -60 degrees",
 )
@@ -144,13 +144,13 @@ DERIVED = (
 
 def pinger() -> RobotDescription:
     """shieldbot with its Ping on the turret."""
-    return variant("shieldbot", {"turret": device("shieldbot", "turret", on=True)})
+    return varied("shieldbot", "shieldbot-turret", turret={"on": True})
 
 
 @experiment(
     "E35-shieldbot",
     title="A lap along the walls by Ping and IR pairs",
-    source="section 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
     caption="Path of shieldbot with the same brain: Ping on its turret looks to the wall, IR pairs look ahead.",
     robot="shieldbot with its turret (native)",
     criterion=DERIVED,
@@ -162,7 +162,7 @@ def wall_native(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E35-avr",
     title="A lap along the walls, with the firmware's AVR image",
-    source="section 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
     caption="The same on the emulated ATmega328P.",
     robot="shieldbot with its turret (avr)",
     criterion=DERIVED,

@@ -1,0 +1,78 @@
+"""Variants for one experiment: bundled robots with some devices or lengths changed, and arenas written down for it.
+
+Not an experiment itself. Robots keep to section 1.2 of the specification but for what is said; arenas have the keys of
+docs/reference/arenas.md.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from boebot.device import Device
+from boebot.robots import RobotDescription, load_robot
+
+NARROW_RAD = 0.3324  # directions of IR sensors that also see what lies ahead; arsim's own ±0.7854 rad leave it out
+
+
+def varied(
+    robot: str, name: str, body: Mapping[str, Any] | None = None, **devices: Device | Mapping[str, Any]
+) -> RobotDescription:
+    """A bundled robot under another name.
+
+    Args:
+        body: keys of its body to be changed.
+        devices: devices of its own with keys to be changed, or whole devices in their place or beside them.
+    """
+    described = load_robot(robot)
+    changed = {
+        device: new if isinstance(new, Device) else msgspec.structs.replace(described.device[device], **new)
+        for device, new in devices.items()
+    }
+    return msgspec.structs.replace(
+        described,
+        name=name,
+        body=msgspec.structs.replace(described.body, **(body or {})),
+        device=described.device | changed,
+    )
+
+
+def at_angle(radius: float, angle: float) -> dict[str, Any]:
+    """Keys of a sensor on a round body's rim that looks outwards (m, rad), (3.9)."""
+    return {"position_m": (radius * math.cos(angle), radius * math.sin(angle)), "heading_rad": angle}
+
+
+def narrow_arsim() -> RobotDescription:
+    """The notes' robot with its IR sensors at ±0.3324 rad."""
+    radius = load_robot("arsim").body.radius_m
+    left, right = at_angle(radius, NARROW_RAD), at_angle(radius, -NARROW_RAD)
+    return varied("arsim", "arsim-narrow", infrared_left=left, infrared_right=right)
+
+
+@contextmanager
+def arena_file(name: str, text: str) -> Iterator[Path]:
+    """A file of an arena of that TOML text, for as long as it is needed."""
+    with tempfile.TemporaryDirectory(prefix="boebot-") as folder:
+        path = Path(folder) / f"{name}.toml"
+        path.write_text(f'name = "{name}"\n{text}', encoding="utf-8")
+        yield path
+
+
+def scaled_arsim_arena(scale: float) -> str:
+    """Keys of ARSim's arena with its lengths times `scale`: walls, two pillars."""
+    wall, near_by, far = (f"{scale * length:.6g}" for length in (1.8, 0.7, 0.9))
+    near_to, far_to = f"-{near_by}", f"-{far}"
+    return f"""
+[[outline]]
+corners_m = [[-{wall}, -{wall}], [{wall}, -{wall}], [{wall}, {wall}], [-{wall}, {wall}]]
+[[obstacle]]
+corners_m = [[{far_to}, {near_by}], [{near_to}, {near_by}], [{near_to}, {far}], [{far_to}, {far}]]
+[[obstacle]]
+corners_m = [[{near_by}, {far_to}], [{far}, {far_to}], [{far}, {near_to}], [{near_by}, {near_to}]]
+"""
