@@ -143,7 +143,7 @@ class Traffic(Opening):
             self._service(now)
             return
         if now >= self._probe_due:
-            self._send(messages.ClockProbe.ID, messages.ClockProbe.STRUCT.pack(self._probes.next(now)))
+            self._send(messages.ClockProbe.ID, messages.ClockProbe.STRUCT.pack(self._probes.next(self._now())))
             self._probe_due = self._probes.due(now, self._opened_s, self.byte_s, self._time_out_s)
         self._due = min(due, self._probe_due)
 
