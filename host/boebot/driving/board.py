@@ -42,9 +42,9 @@ STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm i
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
-# How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make all
-# later ones late. In simulated time a look that finds earlier bytes ends at once where the line is idle; so it comes
-# when so many bytes of the telemetry are still to come, and ends with the last one.
+# How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
+# all later ones late. In simulated time a look that finds earlier bytes ends at once where the line is idle; so it is
+# taken when so many bytes of the telemetry are still to come, and ends with the last one.
 _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
