@@ -209,6 +209,16 @@ int sim_listen(sim *self, int number, uint64_t from) {
   return SIM_OK;
 }
 
+uint64_t sim_listens(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? SIM_NEVER : r->listen_from;
+}
+
+int sim_run_for(sim *self, int number, uint64_t cycles, uint64_t quiet) {
+  sim_listen(self, number, self->now + quiet);
+  return sim_run_until(self, self->now + cycles);
+}
+
 int sim_speaks(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r != NULL && is_look(self) && message_waits(r, self->now);
