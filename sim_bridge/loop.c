@@ -167,12 +167,18 @@ static int somebody_speaks(const sim *self) {
   return 0;
 }
 
+/* The first slice's end after `now` at which that robot may be heard. */
+static uint64_t next_slice(const sim *self, const robot *r) {
+  const uint64_t from = r->listen_from > self->now ? r->listen_from : self->now + 1u;
+  return from > SIM_NEVER - SLICE_CYCLES ? SIM_NEVER : (from + SLICE_CYCLES - 1u) / SLICE_CYCLES * SLICE_CYCLES;
+}
+
 /* Up to where boards run next. */
 static uint64_t next_target(const sim *self, uint64_t deadline) {
   uint64_t target = self->world < deadline ? self->world : deadline;
-  const uint64_t slice = self->now - self->now % SLICE_CYCLES + SLICE_CYCLES;
   for (int i = 0; i < self->robot_count; i++) {
-    if (slice < target && slice >= self->robots[i]->listen_from) target = slice;
+    const uint64_t slice = next_slice(self, self->robots[i]);
+    if (slice < target) target = slice;
   }
   return target;
 }
@@ -201,6 +207,16 @@ int sim_listen(sim *self, int number, uint64_t from) {
   if (r == NULL) return SIM_BAD_ARGUMENT;
   r->listen_from = from;
   return SIM_OK;
+}
+
+uint64_t sim_listens(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? SIM_NEVER : r->listen_from;
+}
+
+int sim_run_for(sim *self, int number, uint64_t cycles, uint64_t quiet) {
+  sim_listen(self, number, self->now + quiet);
+  return sim_run_until(self, self->now + cycles);
 }
 
 int sim_speaks(const sim *self, int number) {

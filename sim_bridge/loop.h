@@ -100,7 +100,12 @@ int sim_run_until(sim *self, uint64_t deadline);
 /* From that cycle on bytes from the robot end a run (2^64 - 1, as at first: never). `sim_speaks` says whether they have
  * come, and its line has been idle since. When a robot is heard does not depend on the other listeners. */
 int sim_listen(sim *self, int robot, uint64_t from);
+uint64_t sim_listens(const sim *self, int robot);
 int sim_speaks(const sim *self, int robot);
+
+/* Listens to a robot when `quiet` cycles from now have passed, and runs for `cycles` at most. Returns as
+ * sim_run_until. */
+int sim_run_for(sim *self, int robot, uint64_t cycles, uint64_t quiet);
 
 /* The cycle up to which the simulation has run. */
 uint64_t sim_now(const sim *self);

@@ -56,14 +56,13 @@ class Pace:
 
 def alone(sim: Sim, *, paced: bool = False) -> Wait:
     """Time passes for one robot only. `paced`: at most as fast as on the wall."""
-    pace = Pace(sim) if paced else None
+    if not paced:
+        return SimRobot.wait
+    pace = Pace(sim)
 
     def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        now = sim.cycle
-        robot.listen(now + max(quiet, 1))
-        sim.run_until(now + cycles)
-        if pace is not None:
-            pace.wait()
+        robot.wait(cycles, quiet)
+        pace.wait()
 
     return wait
 

@@ -23,7 +23,7 @@ from sim_bridge.floor_plan import Lateness
 from sim_bridge.joining import done, join
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.outline import collision_outline
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.sim_robot import PORTION_CYCLES, SimRobot
 from sim_bridge.vehicle import VehicleModel
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
@@ -32,7 +32,6 @@ RECORD_CYCLES = 160_000  # 10 ms
 REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the clock
 PATIENCE_S = 2.0  # that replaying takes without a word
 REPORT_S = 0.1  # between two words of progress
-PORTION_CYCLES = CLOCK_HZ  # of a long run, between two chances for Ctrl-C
 CYCLES_MAXIMUM = 2**62  # 9,000 years
 NUMBER_MAXIMUM = 2**30 - 1
 STEP_MINIMUM = 160  # cycles of a world step: 10 us
@@ -116,7 +115,6 @@ class Sim:
             raise MemoryError("simulation")
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
-        self.listening: dict[int, int] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
         self._handle: Any = ffi.gc(handle, _destroy)
 
@@ -245,7 +243,8 @@ class Sim:
     @property
     def cycle(self) -> int:
         """Up to where the simulation has run."""
-        cycle: int = lib.sim_now(self.handle)
+        handle = self._handle
+        cycle: int = lib.sim_now(self.handle if handle is None else handle)
         return cycle
 
     def run(self, cycles: int) -> None:
@@ -266,14 +265,15 @@ class Sim:
         """
         while True:  # in portions, or Ctrl-C would not be heard
             until = min(cycle, self.cycle + PORTION_CYCLES)
-            self._check(lib.sim_run_until(self.handle, until))
+            self.check(lib.sim_run_until(self.handle, until))
             if until == cycle or self.cycle < until or self._anybody_speaks():
                 return
 
     def _anybody_speaks(self) -> bool:
-        return any(lib.sim_speaks(self.handle, number) for number in self.listening)
+        return any(lib.sim_speaks(self.handle, number) for number in self.members)
 
-    def _check(self, crashed: int) -> None:
+    def check(self, crashed: int) -> None:
+        """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed."""
         if crashed:
             board = self.robot(crashed - 1).board
             whose = f" of robot {crashed}" if len(self.members) > 1 else ""
@@ -353,13 +353,13 @@ class Sim:
         except BaseException:
             fresh.close()
             raise
+        for number in self.members:
+            lib.sim_listen(fresh.handle, number, lib.sim_listens(self.handle, number))
         self.close()
         self._handle, self.members, self._outlines = fresh._handle, fresh.members, fresh._outlines
         for member in self.members.values():
             if member.board is not None:
                 self._take(member.board)
-        for number, cycle in self.listening.items():
-            lib.sim_listen(self.handle, number, cycle)
 
     def _heading(self) -> saved.Heading:
         return saved.Heading(
@@ -396,7 +396,7 @@ class Sim:
                 raise saved.SavedStateError(
                     "the saved simulation has an input that does not fit; expected what save() gave"
                 )
-            self._check(status)
+            self.check(status)
             if time.monotonic() - shown > REPORT_S:
                 shown = time.monotonic()
                 progress(self.cycle / CLOCK_HZ)

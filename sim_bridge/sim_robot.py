@@ -25,6 +25,7 @@ LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 BAUD_MAXIMUM = 4_000_000
 ROOM = 1024  # bytes that are fetched at a time
+PORTION_CYCLES = CLOCK_HZ  # of a long run, between two chances for Ctrl-C
 
 Floats = NDArray[np.float64]
 
@@ -61,10 +62,12 @@ class SimRobot:
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
-        handle, number, room = self._handle, self.number, self._room
-        data: bytes = self._view[: lib.sim_receive(handle, number, room, ROOM)]
-        while waiting := lib.sim_waiting(handle, number):
-            data += self._view[: lib.sim_receive(handle, number, room, min(waiting, ROOM))]
+        handle, number, room = self.sim.handle, self.number, self._room
+        count = lib.sim_receive(handle, number, room, ROOM)
+        data: bytes = self._view[:count]
+        while count == ROOM:
+            count = lib.sim_receive(handle, number, room, ROOM)
+            data += self._view[:count]
         return data
 
     def send(self, data: bytes | bytearray | memoryview) -> None:
@@ -76,8 +79,8 @@ class SimRobot:
         if not isinstance(data, bytes | bytearray | memoryview):
             raise BoardError(f"send: got {shown(data)}; expected bytes")
         data = bytes(data)
-        self._need_board("bytes")
-        lib.sim_send(self._handle, self.number, data, len(data))
+        if lib.sim_send(self.sim.handle, self.number, data, len(data)) != lib.SIM_OK:
+            self._need_board("bytes")
 
     # ---- without a board ---------------------------------------------------------------------------------------------
 
@@ -118,8 +121,23 @@ class SimRobot:
     def listen(self, cycle: int) -> None:
         """From that cycle on its bytes end a run of `Sim.run_until`."""
         cycle = whole("listen: the cycle", cycle, BoardError, least=0, most=2**64 - 1)
-        self.sim.listening[self.number] = cycle
         lib.sim_listen(self._handle, self.number, cycle)
+
+    def wait(self, cycles: int, quiet: int) -> None:
+        """Lets that many cycles pass; after `quiet` of them (0: 1) only until a robot speaks that is listened to, as
+        this one is then.
+
+        Raises:
+            BoardError: a board's program crashed.
+        """
+        sim, quiet = self.sim, quiet or 1
+        if cycles <= PORTION_CYCLES:
+            if crashed := lib.sim_run_for(sim.handle, self.number, cycles, quiet):
+                sim.check(crashed)
+        else:
+            now = sim.cycle
+            self.listen(now + quiet)
+            sim.run_until(now + cycles)
 
     @property
     def speaks(self) -> bool:

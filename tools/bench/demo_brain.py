@@ -11,7 +11,7 @@ from boebot.brains import load_brain
 from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.runner import execute
-from sim_bridge.sim import Sim
+from sim_bridge.sim_robot import SimRobot
 from tools.bench.figures import figure
 
 ROBOT, ARENA = "shieldbot-charging", "station"
@@ -61,16 +61,16 @@ def avr_run() -> float:
 def avr_share() -> float:
     """Of the run's time by the wall clock, what is spent inside the simulator's C core."""
     inside = 0.0
-    run_until = Sim.run_until
+    wait = SimRobot.wait
 
-    def timed(self: Sim, *arguments: Any, **named: Any) -> Any:
+    def timed(self: SimRobot, *arguments: Any, **named: Any) -> Any:
         nonlocal inside
         begun = time.perf_counter()
         try:
-            return run_until(self, *arguments, **named)
+            return wait(self, *arguments, **named)
         finally:
             inside += time.perf_counter() - begun
 
-    with mock.patch.object(Sim, "run_until", timed):
+    with mock.patch.object(SimRobot, "wait", timed):
         result = run("demo", "avr", 60.0)
     return 100 * inside / result.wall_time

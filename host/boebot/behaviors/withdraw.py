@@ -120,7 +120,7 @@ class Irritation(CognitiveProcess):
     def step(self, robot: Robot) -> None:
         reflex, now = self.reflex, robot.time
         touched = robot.left_whisker.pressed or robot.right_whisker.pressed
-        intensity = self._intensity.advance(float(touched), now - self._time)
+        intensity = self._intensity.advance(1.0 if touched else 0.0, now - self._time)
         self._time = now
         if touched and intensity >= self.least and now >= self._until - 1e-9:
             reflex.intensity = intensity

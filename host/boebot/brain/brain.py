@@ -125,30 +125,24 @@ class Brain:
 
     def step(self, robot: Robot) -> None:
         """One step, of a new run if that robot has not been seen before."""
+        now, utilities = robot.time, self._utilities
         if robot is not self._robot:
             self._begin(robot)
+            z = self._read(robot)
+            utilities.start(z)
         else:
             z = self._read(robot)
-            self._utilities.advance(z, robot.time - self._time)
-        self._time = robot.time
-        z = self._z
+            utilities.advance(z, now - self._time)
+        self._time = now
         self._activate(robot, z)
+        before, active = robot.command, self._active
         for index in self._cognitive:
-            if self._active[index]:
-                before = robot.command
+            if active[index]:
                 self._step_if_due(index, robot)
                 self._check_hands_off(index, robot, before)
         self._step_if_due(self._driving, robot)
-        utilities = self._utilities
-        self.steps.append(
-            BrainStep(
-                robot.time,
-                self.processes[self._driving].name,
-                tuple(z),
-                tuple(utilities.values),
-                tuple(utilities.gammas),
-            )
-        )
+        name = self.processes[self._driving].name
+        self.steps.append(BrainStep(now, name, z, tuple(utilities.values), tuple(utilities.gammas)))
 
     @property
     def active(self) -> str:
@@ -161,15 +155,15 @@ class Brain:
 
     def is_active(self, process: Process) -> bool:
         """Whether one of the brain's processes is active."""
-        return bool(self._active) and self._active[self.processes.index(process)]
+        return bool(self._active) and self._active[self._place(process)]
 
     def utility(self, process: Process) -> float:
         """The present utility of one of the brain's processes."""
-        return self._utilities.values[self.processes.index(process)]
+        return self._utilities.values[self._place(process)]
 
     def gamma(self, process: Process) -> float:
         """The present gamma parameter of one of the brain's processes."""
-        return self._utilities.gammas[self.processes.index(process)]
+        return self._utilities.gammas[self._place(process)]
 
     def _begin(self, robot: Robot) -> None:
         self._robot = robot
@@ -186,11 +180,9 @@ class Brain:
                 )
             self._every.append(round(ratio))
             process.join(period, robot.stream(process.name), self._find, self._kick)
-        self._utilities.start(self._read(robot))
 
-    def _read(self, robot: Robot) -> Sequence[float]:
-        self._z = [variable.value(robot) for variable in self.variables]
-        return self._z
+    def _read(self, robot: Robot) -> tuple[float, ...]:
+        return tuple([variable.value(robot) for variable in self.variables])
 
     def _activate(self, robot: Robot, z: Sequence[float]) -> None:
         """Motor behaviors: the one of the highest utility. Cognitive processes: all with a utility above 0."""
@@ -198,9 +190,10 @@ class Brain:
         best = max(self._motor, key=values.__getitem__)  # of equals, the first
         if self._driving < 0 or values[best] > values[self._driving] + self._margin:
             self._switch_motor(robot, best, z)
+        active = self._active
         for index in self._cognitive:
             wanted = values[index] > 0
-            if wanted != self._active[index]:
+            if wanted != active[index]:
                 name = self.processes[index].name
                 self._note(robot, "" if wanted else name, name if wanted else "", self._reason(index, z))
                 before = robot.command
@@ -234,10 +227,11 @@ class Brain:
 
     def _step_if_due(self, index: int, robot: Robot) -> None:
         # counted, not timed: a board's telemetry may come a tick late, and the step after that is none too many
-        if self._wait[index] == 0:
-            self._wait[index] = self._every[index]
+        wait = self._wait
+        if wait[index] == 0:
+            wait[index] = self._every[index]
             self.processes[index].step(robot)
-        self._wait[index] -= 1
+        wait[index] -= 1
 
     # ---- what processes ask ---------------------------------------------------------------------------------------
 
@@ -254,8 +248,14 @@ class Brain:
             raise BrainError(f"{'no' if not found else 'more than one'} process {what}; this brain has {names}")
         return found[0]
 
+    def _place(self, process: Process) -> int:
+        for index, each in enumerate(self.processes):
+            if each is process:
+                return index
+        raise BrainError(f"{process.name}: not one of this brain's processes")
+
     def _kick(self, process: Process, gamma: float) -> None:
-        self._utilities.gammas[self.processes.index(process)] = gamma
+        self._utilities.gammas[self._place(process)] = gamma
 
     # ---- reasons -------------------------------------------------------------------------------------------------
 

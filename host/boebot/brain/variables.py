@@ -60,9 +60,9 @@ def mean(readings: Iterable[float | None]) -> float | None:
 
 def minimum(readings: Iterable[float | None]) -> float | None:
     """(8.2), of those that are known."""
-    return min((reading for reading in readings if reading is not None), default=None)
+    return min([reading for reading in readings if reading is not None], default=None)
 
 
 def maximum(readings: Iterable[float | None]) -> float | None:
     """(8.3), of those that are known."""
-    return max((reading for reading in readings if reading is not None), default=None)
+    return max([reading for reading in readings if reading is not None], default=None)

@@ -60,6 +60,7 @@ class BatteryLevel(CognitiveProcess):
 
     def forget(self) -> None:
         self.voltage: float | None = None
+        self._filter = LeakyIntegrator(1 / self.tau)
         self.charging = False
         self._turned = math.nan  # the lowest voltage since the charger was left, or the highest since it was reached
 
@@ -76,21 +77,25 @@ class BatteryLevel(CognitiveProcess):
         self._time = robot.time
 
     def step(self, robot: Robot) -> None:
-        battery = robot.battery
-        if not battery.valid or battery.voltage is None or not math.isfinite(battery.voltage):
+        measured, _, valid = robot.battery
+        if not valid or measured is None or not math.isfinite(measured):
             return
-        elapsed, self._time = robot.time - self._time, robot.time
-        unloaded = battery.voltage + self.sag * _effort(robot)
+        now = robot.time
+        elapsed, self._time = now - self._time, now
+        unloaded = measured + self.sag * _effort(robot) if self.sag else measured
         if self.voltage is None:
-            self.voltage = self._turned = unloaded
+            self.voltage = self._turned = self._filter.value = unloaded
             return
-        filtered = LeakyIntegrator(1 / self.tau, value=self.voltage)
-        self.voltage = filtered.advance(unloaded, elapsed)
+        self.voltage = self._filter.advance(unloaded, elapsed)
         self._notice_charger(self.voltage)
 
     def _notice_charger(self, voltage: float) -> None:
-        self._turned = (max if self.charging else min)(self._turned, voltage)
-        changed = voltage < self._turned - self.fall if self.charging else voltage > self._turned + self.rise
+        if self.charging:
+            self._turned = max(self._turned, voltage)
+            changed = voltage < self._turned - self.fall
+        else:
+            self._turned = min(self._turned, voltage)
+            changed = voltage > self._turned + self.rise
         if changed:
             self.charging, self._turned = not self.charging, voltage
 

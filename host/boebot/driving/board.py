@@ -42,6 +42,11 @@ STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm i
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
+# How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
+# all later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
+# idle; so it is taken when so many bytes of the telemetry are still to come, and ends with the last one.
+_LOOK_EARLY = 0.5
+_LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
 _LATCH = 34  # offset in telemetry
 _TICK = Struct("<I")  # telemetry begins with it
@@ -240,6 +245,9 @@ class BoardDriver:
         time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
         end_s = seconds - tick_s / 2
         silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
+        on_time = not transport.realtime and link.line_s > 0
+        early_s = _LOOK_EARLY_BYTES * link.line_s if on_time else _LOOK_EARLY * tick_s
+        awaited = -1  # the tick that was looked for
         started_s = heard_s = look_s = transport.now()
         wait_until_s = heard_s + (period + 1) * tick_s
         started = next_progress = wall.perf_counter()
@@ -313,7 +321,9 @@ class BoardDriver:
                 steps.append((len(times) - 1, kind, left, right))
                 due = last - last % n + n
             ahead_ticks = min(due - last, (seconds - time_s) / tick_s)
-            look_s = heard_s + (ahead_ticks - 0.5) * tick_s
+            # looked for too early: it is about to come
+            look_s = heard_s if on_time and due == awaited else heard_s + ahead_ticks * tick_s - early_s
+            awaited = due
             wait_until_s = heard_s + (ahead_ticks + period + 1) * tick_s
 
     def _in_new_session(self, received: list[Received]) -> list[Received]:

@@ -15,6 +15,8 @@ is tangent at the end of a window W passes an old bound by at most w W^2 / 2: ea
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
 
@@ -26,7 +28,7 @@ WANDER = 0.02e-6  # 1/s: the change of rate that the bound allows for; a resonat
 WINDOW_S = 40.0
 RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and what is lost in rounding here
 _WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
-_WORTH_S = 1e-6
+_WORTH_S = 4e-6
 _WORTH_MOST_S = 1e-3  # of the present bound
 _ON_LINE_S = 1e-10
 _WRAP_US = 1 << 32
@@ -152,6 +154,22 @@ class BoardClock:
             self._middle + since_s * (1.0 + self._slope),
             self._bound + abs(since_s) * self._slope_bound,
         )
+
+    def observe_all(self, raw_us: Sequence[int], received_s: float) -> list[Stamp]:
+        """As `observe`, of messages that were received together, oldest first. Only the newest tells something of the
+        line: the others have come before."""
+        newest = self.observe(raw_us[-1], received_s)
+        if len(raw_us) == 1:
+            return [newest]
+        us, raw, at_s, middle, bound = self._us, raw_us[-1], self._at_s, self._middle, self._bound
+        rate, slope_bound = 1.0 + self._slope, self._slope_bound
+        stamps: list[Stamp] = []
+        for earlier in raw_us[:-1]:
+            board_s = (us - (raw - earlier) % _WRAP_US) * 1e-6
+            since_s = board_s - at_s
+            stamps.append((board_s, middle + since_s * rate, bound + abs(since_s) * slope_bound))
+        stamps.append(newest)
+        return stamps
 
     def at(self, board_s: float) -> Stamp:
         """The stamp of a board time (s), unwrapped."""

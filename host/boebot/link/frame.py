@@ -115,7 +115,10 @@ class Decoder:
             return []
         if count == 1:
             return [(self._ids[0], self._sequences[0], _unpack(self._payloads, self._ends[0]))]
-        ids, sequences, ends = (ffi.unpack(numbers, count) for numbers in (self._ids, self._sequences, self._ends))
-        payloads = ffi.unpack(self._payloads, ends[-1])
-        cut = [payloads[start:end] for start, end in zip([0, *ends], ends, strict=False)]
-        return list(zip(ids, sequences, cut, strict=True))
+        ends = _unpack(self._ends, count)
+        payloads = _unpack(self._payloads, ends[-1])
+        messages, start = [], 0
+        for message_id, sequence, end in zip(_unpack(self._ids, count), _unpack(self._sequences, count), ends):  # noqa: B905
+            messages.append((message_id, sequence, payloads[start:end]))
+            start = end
+        return messages

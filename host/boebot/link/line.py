@@ -55,6 +55,10 @@ class Line(ABC):
         """Sends what is due by now, and notes in `_due` when the next is."""
 
     @abstractmethod
+    def _piece_heard(self, now: float) -> None:
+        """Called after the messages of each piece of bytes, which came together."""
+
+    @abstractmethod
     def _refuse(self) -> None:
         """Raises why the board of `_refused` cannot be spoken with, unless that is being found out already."""
 
@@ -74,13 +78,15 @@ class Line(ABC):
 
     def _receive(self, wait_s: float, quiet_s: float) -> None:
         """Reads what arrived, and hands each message to who heeds it."""
+        handlers = self._handlers
         for stamp, data in self._read(wait_s, quiet_s):
             if self._record:
                 self.received.append((stamp, data))
             if self.hello is None:
                 self._heard.take(data)
             for message_id, _, payload in self.decoder.feed(data):
-                self._handlers[message_id](payload, stamp)
+                handlers[message_id](payload, stamp)
+            self._piece_heard(stamp)
         if self._refused is not None:
             self._refuse()
 

@@ -27,6 +27,7 @@ _SIGNAL = messages.SetpointSignal
 _SPEED = messages.SetpointSpeed
 _COAST = messages.SetpointCoast
 _BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
+_ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop so much before what was waited for
 
 # offsets in telemetry
 _SUPPLY = 30
@@ -74,8 +75,8 @@ class Link(Traffic):
         `polled_s` is then the time at which it returned."""
         now = self._now()
         while True:
-            if now >= self._due:
-                self._service(now)
+            if now + _ROUNDING_S >= self._due:
+                self._service(now + _ROUNDING_S)
             wait = (end_s if end_s < self._due else self._due) - now
             if wait < SHORTEST_S:
                 wait = SHORTEST_S

@@ -42,6 +42,7 @@ class Traffic(Opening):
         self.latest_devices: bytes | None = None
         self.board_counters = BoardCounters()
         self._telemetry: list[Telemetry] = []
+        self._unstamped: list[bytes] = []  # of the piece that is being heard
         self._devices: list[bytes] = []
         self._wants = Wanted()
         self._dropped = 0
@@ -143,7 +144,7 @@ class Traffic(Opening):
             self._service(now)
             return
         if now >= self._probe_due:
-            self._send(messages.ClockProbe.ID, messages.ClockProbe.STRUCT.pack(self._probes.next(now)))
+            self._send(messages.ClockProbe.ID, messages.ClockProbe.STRUCT.pack(self._probes.next(self._now())))
             self._probe_due = self._probes.due(now, self._opened_s, self.byte_s, self._time_out_s)
         self._due = min(due, self._probe_due)
 
@@ -191,7 +192,7 @@ class Traffic(Opening):
     def _end_session(self) -> None:
         super()._end_session()
         self._requests.ended(self.transport.name)
-        self._telemetry = []
+        self._telemetry, self._unstamped = [], []
         if self.latest is not None:
             self._last_tick = int.from_bytes(self.latest[:4], "little")
             self._last_heard_s = self._latest_s
@@ -235,13 +236,21 @@ class Traffic(Opening):
         self.latest = payload
         self._latest_s = now
         self._replaced_since = NEVER
-        board_s, host_s, bound_s = self.clock.observe(int.from_bytes(payload[4:8], "little"), now)
-        self._telemetry.append((payload, board_s, host_s, bound_s))
-        if now - host_s > self._late_after_s and self.clock.bounded:
+        self._unstamped.append(payload)
+
+    def _piece_heard(self, now: float) -> None:
+        payloads = self._unstamped
+        if not payloads:
+            return
+        self._unstamped = []
+        times = [int.from_bytes(payload[4:8], "little") for payload in payloads]
+        stamps = self.clock.observe_all(times, now)
+        self._telemetry += [(payload, *stamp) for payload, stamp in zip(payloads, stamps, strict=True)]
+        if now - stamps[-1][1] > self._late_after_s and self.clock.bounded:  # the others have come before
             self._late += 1
-        if len(self._telemetry) > _TELEMETRY_ROOM:
-            self._dropped += 1
-            del self._telemetry[0]
+        if (excess := len(self._telemetry) - _TELEMETRY_ROOM) > 0:
+            self._dropped += excess
+            del self._telemetry[:excess]
 
     def _hear_devices(self, payload: bytes, now: float) -> None:
         if not self.is_open:
