@@ -9,6 +9,7 @@
 #ifndef VEHICLES_VEHICLE_H
 #define VEHICLES_VEHICLE_H
 
+#include "../world/numbers.h"
 #include "model.h"
 
 /* python: begin */
@@ -151,5 +152,12 @@ struct vehicles {
   double *readings;
   unsigned char *brains;
 };
+
+/* Torque of a quasi-static DC motor by its signal and the speed of its wheel's rim. */
+NUMBERS_INLINE double vehicle_dc_torque(const motor_dc_parameters *motor, double wheel_radius, double signal,
+                                        double rim, double hold) {
+  const double volts = motor_dc_voltage(motor, signal); /* V = s V_max */
+  return motor_dc_torque(motor, volts, rim / wheel_radius, hold);
+}
 
 #endif

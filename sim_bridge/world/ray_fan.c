@@ -105,18 +105,21 @@ LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
   const double x = q->x;
   const double y = q->y;
   const double height = q->height;
+  const float far = (float)(limit * (1.0 + 1e-6)); /* no less than the limit: one entry too many changes nothing */
   const directions to = g->to;
   lanes best = lanes_of(limit);
   masks along = {0};
   const ray_list_entry *entry = g->list;
-  for (unsigned asked = 0; (double)entry->bound <= limit; entry++, asked++) {
+  const ray_list_entry *const early = entry + AT_ONCE;
+  for (; entry->bound <= far; entry++) {
+    const uint32_t strip = entry->strip;
     /* What was met is known late: looking at it for each entry costs more than the entries that it spares. */
-    if (asked >= AT_ONCE || entry->strip == RAY_LIST_END) {
+    if (entry >= early || strip == RAY_LIST_END) {
       const masks open = best >= (double)entry->bound;
       if (!masks_any(&open)) break;
-      if (entry->strip == RAY_LIST_END) return 0;
+      if (strip == RAY_LIST_END) return 0;
     }
-    const uint32_t first = ray_strip_first(entry->strip);
+    const uint32_t first = ray_strip_first(strip);
     if (first >= where->edge_count) {
       const arena_disc *disc = &where->disc[first - where->edge_count];
       if (!(disc->height >= height)) continue;
@@ -126,10 +129,14 @@ LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
       continue;
     }
     const arena_edge *e = &where->edge[first];
-    const arena_edge *end = e + ray_strip_count(entry->strip);
-    do {
+    if (strip == first) { /* one edge */
       if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
-    } while (++e < end);
+      continue;
+    }
+    const arena_edge *const end = e + ray_strip_count(strip);
+    for (; e < end; e++) {
+      if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
+    }
   }
   *nearest = best;
   return !masks_any(&along);
@@ -165,7 +172,7 @@ LANES_INLINE void ask_group(const group *g) {
   lanes_store(&q->distances[g->first], &nearest);
 }
 
-LANES_INLINE void ask(const fan_question *questions, size_t count) {
+LANES_INLINE void arena_fans_inline(const fan_question *questions, size_t count) {
   group groups[TOGETHER];
   size_t waiting = 0;
   for (size_t i = 0; i < count; i++) {
@@ -182,21 +189,7 @@ LANES_INLINE void ask(const fan_question *questions, size_t count) {
   for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
 }
 
-LANES_NOT_INLINE static void ask_anywhere(const fan_question *questions, size_t count) { ask(questions, count); }
-
-#ifdef LANES_AVX2
-LANES_AVX2 static void ask_by_avx2(const fan_question *questions, size_t count) { ask(questions, count); }
-#endif
-
-void arena_fans(const fan_question *questions, size_t count) {
-#ifdef LANES_AVX2
-  if (LANES_HAVE_AVX2()) {
-    ask_by_avx2(questions, count);
-    return;
-  }
-#endif
-  ask_anywhere(questions, count);
-}
+LANES_FUNCTION(extern, arena_fans, (const fan_question *questions, size_t count), (questions, count))
 
 #else
 
