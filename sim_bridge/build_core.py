@@ -110,8 +110,8 @@ def links_whole_program() -> bool:
             return False
 
 
-# Nothing but the module's entry is seen from outside: what is called within the library may be inlined there. Nobody asks
-# for errno or floating-point traps: without them loops become vectors, with the same results.
+# Nothing but the module's entry is seen from outside: what is called within the library may be inlined there. Nobody
+# asks for errno or floating-point traps: without them loops become vectors, with the same results.
 INSIDE = [
     "-std=gnu11",
     "-fvisibility=hidden",

@@ -126,7 +126,8 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
       const double speed = rims[side] / m->body.wheel_radius;
       out[side] = m->full ? motor_dc_step(motor, &s->currents[side], motor_dc_voltage(motor, s->signals[side]), speed,
                                           w->hold, m->dt)
-                          : vehicle_dc_torque(motor, m->body.wheel_radius, s->signals[side], rims[side], w->hold);
+                          : vehicle_dc_torque(motor, m->body.wheel_radius, s->signals[side], rims[side],
+                                              motor_dc_stopping(motor, w->hold));
     }
     return;
   }

@@ -16,14 +16,17 @@
 LANES_INLINE void dc_torques_inline(const vehicle_model *m, vehicle *const worlds[], double left[], double right[]) {
   const motor_dc_parameters motors[2] = {m->dc[0], m->dc[1]}; /* here, where no result can be */
   const double radius = m->body.wheel_radius;
-  const double hold = worlds[0]->hold;
+  const double stopping[2] = {motor_dc_stopping(&motors[0], worlds[0]->hold),
+                              motor_dc_stopping(&motors[1], worlds[0]->hold)};
   double signals[2][ROW], rims[2][ROW];
   ROW_GATHER(signals[0], k, worlds[k]->state.signals[0])
   ROW_GATHER(signals[1], k, worlds[k]->state.signals[1])
   ROW_GATHER(rims[0], k, worlds[k]->body.state.rim_left)
   ROW_GATHER(rims[1], k, worlds[k]->body.state.rim_right)
-  for (size_t k = 0; k < ROW; k++) left[k] = vehicle_dc_torque(&motors[0], radius, signals[0][k], rims[0][k], hold);
-  for (size_t k = 0; k < ROW; k++) right[k] = vehicle_dc_torque(&motors[1], radius, signals[1][k], rims[1][k], hold);
+  for (size_t k = 0; k < ROW; k++)
+    left[k] = vehicle_dc_torque(&motors[0], radius, signals[0][k], rims[0][k], stopping[0]);
+  for (size_t k = 0; k < ROW; k++)
+    right[k] = vehicle_dc_torque(&motors[1], radius, signals[1][k], rims[1][k], stopping[1]);
 }
 
 LANES_FUNCTION(static, dc_torques, (const vehicle_model *m, vehicle *const worlds[], double left[], double right[]),
@@ -103,13 +106,16 @@ static void draw(sensing_row *s) {
 LANES_INLINE void finish_eyes_inline(const infrared_proximity *eye, const double (*distances)[BEAM_RAYS],
                                      const double draws[], double readings[]) {
   double sums[ROW] = {0.0};
+  double seen[ROW];
   for (int i = 0; i < eye->beam.rays; i++) {
+    const double c1 = eye->c1[i];
+    const double inward = eye->beam.inward[i];
     double distance[ROW];
     ROW_GATHER(distance, k, distances[k][i])
-    for (size_t k = 0; k < ROW; k++)
-      sums[k] += infrared_proximity_ray(eye->c1[i], eye->c2, distance[k], eye->beam.inward[i]);
+    for (size_t k = 0; k < ROW; k++) sums[k] += infrared_proximity_ray(c1, eye->c2, distance[k], inward);
   }
-  for (size_t k = 0; k < ROW; k++) readings[k] = infrared_proximity_of(eye, sums[k], draws[k]);
+  for (size_t k = 0; k < ROW; k++) seen[k] = infrared_proximity_of(eye, sums[k], draws[k]);
+  memcpy(readings, seen, sizeof seen);
 }
 
 LANES_FUNCTION(static, finish_eyes,

@@ -70,24 +70,33 @@ NUMBERS_INLINE double motor_dc_current(const motor_dc_parameters *self, double v
   return (volts - self->emf_constant * self->gear * speed) / self->resistance_ohm; /* (1.1) with di/dt = 0, (1.2) */
 }
 
+/* Torque per rad/s of the motor's axis with which friction stops it, `hold` being that of the wheel; without one any
+ * motion meets the whole friction. */
+NUMBERS_INLINE double motor_dc_stopping(const motor_dc_parameters *self, double hold) {
+  const double ratio = self->gear * self->efficiency;
+  const double axis_hold = ratio > 0.0 ? hold / (ratio * self->gear) : 0.0;
+  return axis_hold > 0.0 ? axis_hold : 1e300;
+}
+
 /* Coulomb friction at the motor's axis against `driving` torque: it holds a motor that stands, and stops one that moves
- * at most: `hold` is here the torque per rad/s of the axis that stops it within the step. */
-NUMBERS_INLINE double motor_dc_coulomb(const motor_dc_parameters *self, double driving, double axis, double hold) {
-  const double c = self->coulomb_n_m;
-  const double against = axis > 0.0 ? c : -c;
-  const double moving = hold > 0.0 ? number_limited(driving + hold * axis, c) : against;
-  return fabs(axis) < MOTOR_DC_STANDSTILL ? number_limited(driving, c) : moving;
+ * at most. */
+NUMBERS_INLINE double motor_dc_coulomb(const motor_dc_parameters *self, double driving, double axis, double stopping) {
+  const double opposed = fabs(axis) < MOTOR_DC_STANDSTILL ? driving : driving + stopping * axis;
+  return number_limited(opposed, self->coulomb_n_m);
+}
+
+/* motor_dc_shaft_torque with what motor_dc_stopping says. */
+NUMBERS_INLINE double motor_dc_geared(const motor_dc_parameters *self, double current, double speed, double stopping) {
+  const double axis = self->gear * speed;                        /* (1.10) */
+  const double generated = self->torque_constant * current;      /* (1.3) */
+  const double driving = generated - self->viscous_n_m_s * axis; /* (1.9) */
+  const double torque = driving - motor_dc_coulomb(self, driving, axis, stopping);
+  return number_limited(self->gear * self->efficiency * torque, self->torque_maximum_n_m); /* (1.10) */
 }
 
 NUMBERS_INLINE double motor_dc_shaft_torque(const motor_dc_parameters *self, double current, double speed,
                                             double hold) {
-  const double axis = self->gear * speed;                        /* (1.10) */
-  const double generated = self->torque_constant * current;      /* (1.3) */
-  const double driving = generated - self->viscous_n_m_s * axis; /* (1.9) */
-  const double ratio = self->gear * self->efficiency;
-  const double axis_hold = ratio > 0.0 ? hold / (ratio * self->gear) : 0.0;
-  const double torque = driving - motor_dc_coulomb(self, driving, axis, axis_hold);
-  return number_limited(ratio * torque, self->torque_maximum_n_m); /* (1.10) */
+  return motor_dc_geared(self, current, speed, motor_dc_stopping(self, hold));
 }
 
 NUMBERS_INLINE double motor_dc_torque(const motor_dc_parameters *self, double volts, double speed, double hold) {

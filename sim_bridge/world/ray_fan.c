@@ -109,32 +109,36 @@ LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
   const directions to = g->to;
   lanes best = lanes_of(limit);
   masks along = {0};
+  const uint32_t edges = (uint32_t)where->edge_count;
+  const arena_edge *const edge = where->edge;
   const ray_list_entry *entry = g->list;
   const ray_list_entry *const early = entry + AT_ONCE;
   for (; entry->bound <= far; entry++) {
     const uint32_t strip = entry->strip;
     /* What was met is known late: looking at it for each entry costs more than the entries that it spares. */
-    if (entry >= early || strip == RAY_LIST_END) {
+    if (entry >= early) {
       const masks open = best >= (double)entry->bound;
       if (!masks_any(&open)) break;
-      if (strip == RAY_LIST_END) return 0;
+    }
+    if (strip < edges) { /* one edge */
+      if (edge[strip].height >= height) ask_edge(&edge[strip], x, y, &to, &best, &along);
+      continue;
+    }
+    if (strip == RAY_LIST_END) {
+      const masks open = best >= (double)entry->bound;
+      if (!masks_any(&open)) break;
+      return 0;
     }
     const uint32_t first = ray_strip_first(strip);
-    if (first >= where->edge_count) {
-      const arena_disc *disc = &where->disc[first - where->edge_count];
+    if (first >= edges) {
+      const arena_disc *disc = &where->disc[first - edges];
       if (!(disc->height >= height)) continue;
       lanes in_memory = best;
       ask_disc(disc, x, y, &g->to, &in_memory);
       best = in_memory;
       continue;
     }
-    const arena_edge *e = &where->edge[first];
-    if (strip == first) { /* one edge */
-      if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
-      continue;
-    }
-    const arena_edge *const end = e + ray_strip_count(strip);
-    for (; e < end; e++) {
+    for (const arena_edge *e = &edge[first]; e < &edge[first] + ray_strip_count(strip); e++) {
       if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
     }
   }
@@ -172,21 +176,27 @@ LANES_INLINE void ask_group(const group *g) {
   lanes_store(&q->distances[g->first], &nearest);
 }
 
+LANES_INLINE void ask_groups(group groups[], size_t count) {
+  for (size_t k = 0; k < count; k++) find_list(&groups[k]);
+  for (size_t k = 0; k < count; k++) ask_group(&groups[k]);
+}
+
 LANES_INLINE void arena_fans_inline(const fan_question *questions, size_t count) {
   group groups[TOGETHER];
   size_t waiting = 0;
   for (size_t i = 0; i < count; i++) {
-    for (size_t first = 0; first < questions[i].rays->rays; first += RAY_FAN_GROUP) {
-      group *g = &groups[waiting++];
-      g->from = &questions[i];
-      g->first = first;
-      find_list(g);
-      if (waiting < TOGETHER) continue;
-      for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
-      waiting = 0;
-    }
+    size_t first = 0;
+    do {
+      if (waiting == TOGETHER) {
+        ask_groups(groups, waiting);
+        waiting = 0;
+      }
+      groups[waiting].from = &questions[i];
+      groups[waiting++].first = first;
+      first += RAY_FAN_GROUP;
+    } while (first < questions[i].rays->rays);
   }
-  for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
+  ask_groups(groups, waiting);
 }
 
 LANES_FUNCTION(extern, arena_fans, (const fan_question *questions, size_t count), (questions, count))
