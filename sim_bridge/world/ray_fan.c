@@ -56,6 +56,7 @@ typedef struct {
 typedef struct {
   directions to;
   const fan_question *from;
+  const ray_list_cell *cell;
   const ray_list_entry *list; /* NULL: one by one */
   size_t first;               /* ray */
 } group;
@@ -146,20 +147,28 @@ LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
   return !masks_any(&along);
 }
 
-/* The list for a group of rays that point much the same way. */
-LANES_INLINE void find_list(group *g) {
+/* The lists of the cell where a group of rays starts that point much the same way. */
+LANES_INLINE void find_cell(group *g) {
   const fan_question *q = g->from;
   const ray_lists *lists = q->where->lists;
   size_t number;
-  g->list = NULL;
+  g->cell = NULL;
   if (lists == NULL || q->where->grid.columns == 0 || !(q->reach > 0.0)) return;
   if (!(q->rays->alike >> g->first / RAY_FAN_GROUP & 1u)) return;
   if (!(fabs(q->cosine * q->cosine + q->sine * q->sine - 1.0) < 1e-9)) return;
-  const ray_list_cell *cell = ray_lists_at(lists, q->x, q->y, &number);
-  if (cell == NULL) return;
+  g->cell = ray_lists_at(lists, q->x, q->y, &number);
+}
+
+/* The one for where they point to. */
+LANES_INLINE void find_list(group *g) {
+  const fan_question *q = g->from;
+  g->list = NULL;
+  if (g->cell == NULL) return;
   turn(q, g->first, &g->to);
-  const unsigned sector = ray_sector(lists, g->to.cosine[0], g->to.sine[0]);
-  if (sector < RAY_SECTORS_MOST) g->list = &cell->entry[cell->fan_start[sector / RAY_FAN_STEP]];
+  const unsigned sector = ray_sector(q->where->lists, g->to.cosine[0], g->to.sine[0]);
+  if (sector >= RAY_SECTORS_MOST) return;
+  g->list = &g->cell->entry[g->cell->fan_start[sector / RAY_FAN_STEP]];
+  __builtin_prefetch(g->list);
 }
 
 /* Writes four distances. */
@@ -176,7 +185,12 @@ LANES_INLINE void ask_group(const group *g) {
   lanes_store(&q->distances[g->first], &nearest);
 }
 
+/* Each look into memory is begun for all groups before the first of them needs what is there. */
 LANES_INLINE void ask_groups(group groups[], size_t count) {
+  for (size_t k = 0; k < count; k++) {
+    find_cell(&groups[k]);
+    if (groups[k].cell != NULL) __builtin_prefetch(groups[k].cell->fan_start);
+  }
   for (size_t k = 0; k < count; k++) find_list(&groups[k]);
   for (size_t k = 0; k < count; k++) ask_group(&groups[k]);
 }
