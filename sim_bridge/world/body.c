@@ -1,16 +1,13 @@
 /* body.c: see body.h. */
-#include "body.h"
+#include "body_drive.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "contact.h"
 #include "ground.h"
-#include "lanes.h"
 #include "numbers.h"
 
-#define SPEED_LIMIT 100.0 /* m/s: a drive that diverges stays finite */
-#define TURN_LIMIT 1000.0 /* rad/s */
 #define SLIP_ROUNDS 40
 #define SLIP_SETTLED 1e-12 /* m/s */
 #define SPIN_SHARE 0.1     /* least spin inertia of a slipping wheel / M r^2 */
@@ -144,24 +141,15 @@ static void hold_across(body *self, const scene *around, const double limits[2],
   }
 }
 
-/* (2.31), (2.32), (3.16), (3.17) */
-NUMBERS_INLINE void speed_up(const body *self, double torque_left, double torque_right, double dt, double *speed,
-                             double *turn_rate) {
-  const double force = self->force_gain * (torque_left + torque_right) - self->drag * *speed;
-  const double moment = self->torque_gain * (torque_right - torque_left) - self->turn_drag * *turn_rate;
-  *speed = number_limited(*speed + dt * force, SPEED_LIMIT);
-  *turn_rate = number_limited(*turn_rate + dt * moment, TURN_LIMIT);
-}
-
 /* New speeds by the torques. */
-static void drive(body *self, const scene *around, const double torque[2], double dt) {
+void body_drive(body *self, const scene *around, const double torque[2], double dt) {
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2];
   if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     double speed = s->speed;
     double turn_rate = s->turn_rate;
-    speed_up(self, torque[0], torque[1], dt, &speed, &turn_rate);
+    body_speed_up(self, torque[0], torque[1], dt, &speed, &turn_rate);
     if (!p->slip || s->lateral == 0.0) {
       ground_limits(self, around->arena, limits);
       if (!p->slip || ground_holds(self, limits, torque[0], torque[1], speed, turn_rate, dt)) {
@@ -174,11 +162,11 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
   }
   ground_limits(self, around->arena, limits);
   slide(self, around, limits, torque, dt);
-  s->speed = number_limited(s->speed, SPEED_LIMIT);
-  s->lateral = number_limited(s->lateral, SPEED_LIMIT);
-  s->turn_rate = number_limited(s->turn_rate, TURN_LIMIT);
-  s->rim_left = number_limited(s->rim_left, 10.0 * SPEED_LIMIT);
-  s->rim_right = number_limited(s->rim_right, 10.0 * SPEED_LIMIT);
+  s->speed = number_limited(s->speed, BODY_SPEED_LIMIT);
+  s->lateral = number_limited(s->lateral, BODY_SPEED_LIMIT);
+  s->turn_rate = number_limited(s->turn_rate, BODY_TURN_LIMIT);
+  s->rim_left = number_limited(s->rim_left, 10.0 * BODY_SPEED_LIMIT);
+  s->rim_right = number_limited(s->rim_right, 10.0 * BODY_SPEED_LIMIT);
 }
 
 /* ---- steps -------------------------------------------------------------------------------------------------------- */
@@ -210,7 +198,7 @@ static int is_long(const body *self, const scene *around, double way, double dt)
 /* 1 if nothing can come within the body's reach during the step, in which its middle moves by `way`: it stays within the
  * clear circle around where it looked, and no mover is near. Where it looked last must not show: what goes through
  * contact without touching anything comes out the same. */
-static int stays_clear(body *self, const scene *around, double way, double dt) {
+int body_stays_clear(body *self, const scene *around, double way, double dt) {
   const body_state *s = &self->state;
   const body_surroundings *near = &self->near;
   if (is_long(self, around, way, dt)) return 0;
@@ -228,23 +216,17 @@ static int stays_clear(body *self, const scene *around, double way, double dt) {
   return 1;
 }
 
-/* (3.19)-(3.22) */
-NUMBERS_INLINE void shift(double speed, double lateral, double cosine, double sine, double dt, double *x, double *y) {
-  *x += (speed * cosine - lateral * sine) * dt;
-  *y += (speed * sine + lateral * cosine) * dt;
-}
-
 /* Heading, (3.18), then position, where nothing is in the way. */
 static void move_freely(body *self, double way, double dt) {
   body_state *s = &self->state;
   contact_turn(self, s->turn_rate * dt);
-  shift(s->speed, s->lateral, s->cosine, s->sine, dt, &s->x, &s->y);
+  body_shift(s->speed, s->lateral, s->cosine, s->sine, dt, &s->x, &s->y);
   s->distance += way;
   s->touching = 0;
 }
 
 /* Moves by `way`; `clear`: what stays_clear says. */
-static void move_alone(body *self, const scene *around, int clear, double way, double dt) {
+void body_move_alone(body *self, const scene *around, int clear, double way, double dt) {
   if (clear) {
     move_freely(self, way, dt);
   } else {
@@ -254,7 +236,7 @@ static void move_alone(body *self, const scene *around, int clear, double way, d
 
 static int is_finite(double left, double right) { return fabs(left) + fabs(right) < 1e300; }
 
-static void turn_wheels(body *self, double dt) {
+void body_turn_wheels(body *self, double dt) {
   body_state *s = &self->state;
   if (!s->slipping) { /* rolling without slip, (2.16), (2.17) */
     s->rim_left = body_left_speed(self);
@@ -265,137 +247,18 @@ static void turn_wheels(body *self, double dt) {
   s->wheel_right += s->rim_right * angle;
 }
 
-/* While motors drive, a mover that waited presses on nobody: what it pinches would have to have two speeds. */
-static void rest_movers(const scene *around, double dt) {
-  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = around->movers[i].waits ? 0.0 : dt;
-}
-
-/* All movers go, until contacts stop one. */
-static void start_movers(const scene *around, double dt) {
-  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = dt;
-}
-
-static void count_waits(const scene *around, double dt) {
-  for (size_t i = 0; i < around->movers_count; i++) {
-    mover *m = &around->movers[i];
-    m->waits = m->stops < dt;
-    m->waited += dt - m->stops;
-  }
-}
-
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
   const double torque[2] = {torque_left, torque_right};
   if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
   if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
-  rest_movers(around, dt);
-  drive(self, around, torque, dt);
-  start_movers(around, dt);
+  body_rest_movers(around, dt);
+  body_drive(self, around, torque, dt);
+  body_start_movers(around, dt);
   const double way = body_way(self, dt);
-  move_alone(self, around, stays_clear(self, around, way, dt), way, dt);
-  count_waits(around, dt);
-  turn_wheels(self, dt);
+  body_move_alone(self, around, body_stays_clear(self, around, way, dt), way, dt);
+  body_count_waits(around, dt);
+  body_turn_wheels(self, dt);
   return BODY_OK;
-}
-
-/* Bodies of a row side by side, as numbers that wait for each other's turn in no order. */
-typedef struct {
-  double x[ROW], y[ROW], heading[ROW], cosine[ROW], sine[ROW];
-  double speed[ROW], turn_rate[ROW], lateral[ROW];
-  double way[ROW], distance[ROW];
-  double rim_left[ROW], rim_right[ROW], wheel_left[ROW], wheel_right[ROW];
-} motion;
-
-LANES_INLINE void speed_up_row_inline(body *const bodies[], const double left[], const double right[], double dt,
-                                      motion *all) {
-  double speed[ROW], turn_rate[ROW];
-  ROW_GATHER(speed, k, bodies[k]->state.speed)
-  ROW_GATHER(turn_rate, k, bodies[k]->state.turn_rate)
-  for (size_t k = 0; k < ROW; k++) speed_up(bodies[0], left[k], right[k], dt, &speed[k], &turn_rate[k]);
-  memcpy(all->speed, speed, sizeof speed);
-  memcpy(all->turn_rate, turn_rate, sizeof turn_rate);
-}
-
-LANES_FUNCTION(static, speed_up_row,
-               (body *const bodies[], const double left[], const double right[], double dt, motion *all),
-               (bodies, left, right, dt, all))
-
-/* What drive does. Tyres that may slip, and what drifts sideways, are looked at for each body alone. */
-static void drive_row(body *const bodies[], const scene around[], const double left[], const double right[], double dt,
-                      motion *all) {
-  speed_up_row(bodies, left, right, dt, all);
-  for (size_t k = 0; k < ROW; k++) {
-    body *b = bodies[k];
-    if (b->parameters.slip || b->state.lateral != 0.0) {
-      drive(b, &around[k], (const double[]){left[k], right[k]}, dt);
-    } else {
-      b->state.speed = all->speed[k];
-      b->state.turn_rate = all->turn_rate[k];
-    }
-  }
-}
-
-/* What move_freely and turn_wheels do for bodies that do not slip. */
-LANES_INLINE void go_row_inline(body *const bodies[], double dt, motion *all) {
-  const double half_track = bodies[0]->parameters.half_track;
-  const double angle = bodies[0]->per_radius * dt;
-  ROW_GATHER(all->x, k, bodies[k]->state.x)
-  ROW_GATHER(all->y, k, bodies[k]->state.y)
-  ROW_GATHER(all->heading, k, bodies[k]->state.heading)
-  ROW_GATHER(all->speed, k, bodies[k]->state.speed)
-  ROW_GATHER(all->turn_rate, k, bodies[k]->state.turn_rate)
-  ROW_GATHER(all->lateral, k, bodies[k]->state.lateral)
-  ROW_GATHER(all->distance, k, bodies[k]->state.distance)
-  ROW_GATHER(all->wheel_left, k, bodies[k]->state.wheel_left)
-  ROW_GATHER(all->wheel_right, k, bodies[k]->state.wheel_right)
-  for (size_t k = 0; k < ROW; k++) {
-    all->heading[k] = number_wrap(all->heading[k] + all->turn_rate[k] * dt);
-    number_sincos(all->heading[k], &all->sine[k], &all->cosine[k]);
-    shift(all->speed[k], all->lateral[k], all->cosine[k], all->sine[k], dt, &all->x[k], &all->y[k]);
-    all->distance[k] += all->way[k];
-    all->rim_left[k] = all->speed[k] - half_track * all->turn_rate[k];
-    all->rim_right[k] = all->speed[k] + half_track * all->turn_rate[k];
-    all->wheel_left[k] += all->rim_left[k] * angle;
-    all->wheel_right[k] += all->rim_right[k] * angle;
-  }
-}
-
-LANES_FUNCTION(static, go_row, (body *const bodies[], double dt, motion *all), (bodies, dt, all))
-
-static void give(const motion *all, size_t k, body_state *s) {
-  s->x = all->x[k];
-  s->y = all->y[k];
-  s->heading = all->heading[k];
-  s->cosine = all->cosine[k];
-  s->sine = all->sine[k];
-  s->distance = all->distance[k];
-  s->rim_left = all->rim_left[k];
-  s->rim_right = all->rim_right[k];
-  s->wheel_left = all->wheel_left[k];
-  s->wheel_right = all->wheel_right[k];
-  s->touching = 0;
-}
-
-void body_advance_row(body *const bodies[], const scene around[], const double left[], const double right[],
-                      double dt) {
-  motion all;
-  int clear[ROW];
-  for (size_t k = 0; k < ROW; k++) rest_movers(&around[k], dt);
-  drive_row(bodies, around, left, right, dt, &all);
-  for (size_t k = 0; k < ROW; k++) {
-    start_movers(&around[k], dt);
-    all.way[k] = body_way(bodies[k], dt);
-    clear[k] = stays_clear(bodies[k], &around[k], all.way[k], dt);
-  }
-  go_row(bodies, dt, &all);
-  for (size_t k = 0; k < ROW; k++) {
-    if (clear[k] && !bodies[k]->state.slipping) {
-      give(&all, k, &bodies[k]->state);
-    } else {
-      move_alone(bodies[k], &around[k], clear[k], all.way[k], dt);
-      turn_wheels(bodies[k], dt);
-    }
-    count_waits(&around[k], dt);
-  }
 }
 
 /* Makes the groups of places i and k one. */
@@ -458,12 +321,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
-  rest_movers(around, dt);
+  body_rest_movers(around, dt);
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
-    drive(sorted[i], around, torques[order[i]], dt);
+    body_drive(sorted[i], around, torques[order[i]], dt);
   }
-  start_movers(around, dt);
+  body_start_movers(around, dt);
   find_groups(sorted, count, around, dt, group);
   for (size_t i = 0; i < count; i++) {
     if (group[i] != i) continue;
@@ -473,12 +336,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     }
     if (members == 1) {
       const double way = body_way(sorted[i], dt);
-      move_alone(sorted[i], around, stays_clear(sorted[i], around, way, dt), way, dt);
+      body_move_alone(sorted[i], around, body_stays_clear(sorted[i], around, way, dt), way, dt);
     } else {
       contact_move(together, members, around, dt);
     }
   }
-  count_waits(around, dt);
-  for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
+  body_count_waits(around, dt);
+  for (size_t i = 0; i < count; i++) body_turn_wheels(sorted[i], dt);
   return BODY_OK;
 }
