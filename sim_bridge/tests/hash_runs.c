@@ -8,7 +8,7 @@
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
 
-#define WORLDS 6
+#define WORLDS 9 /* a row (world/row.h) and one alone */
 #define STEPS 600
 #define BODY 8
 
@@ -62,6 +62,13 @@ static int add_sensors(vehicle_model *m) {
                                                               .edges_per_turn = 64.0,
                                                               .slips_per_s = 0.1,
                                                               .slip_share = 1.0}) < 0;
+  /* As the notes have them: what a row reads at once. */
+  bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .bias = 0.2}, 0.0) < 0;
+  bad |= vehicle_model_add_odometer(m, &(odometer_parameters){.half_track = 0.05,
+                                                              .wheel_radius = 0.033,
+                                                              .factor_left = 1.01,
+                                                              .factor_right = 0.99,
+                                                              .sigma_step = 1e-4}) < 0;
   bad |= vehicle_model_add_whisker(m, 0.05, 0.03, 0.12, 0.06) < 0;
   return bad;
 }

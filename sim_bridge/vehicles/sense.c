@@ -155,41 +155,38 @@ static void read_eyes(const sensing *s, sensor_slot *slots, noise_source *noise,
   }
 }
 
-static void read_others(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
+static void read_one(const sensing *s, size_t number, sensor_slot *slots, noise_source *noise, double *readings) {
   const vehicle_model *m = s->all->model;
   const vehicle_state *state = &s->world->state;
-  for (size_t k = 0; k < m->others.count; k++) {
-    const vehicle_sensor *sensor = &m->sensors[m->others.number[k]];
-    sensor_slot *slot = &slots[m->others.number[k]];
-    if (sensor->kind == SENSOR_ACCELEROMETER && state->step > 0)
-      accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, state->acceleration, m->dt);
-    if (!due(sensor, slot, s->time)) continue;
-    key_noise(noise, slot, state->step);
-    read(s, sensor, slot, noise, &readings[sensor->first]);
-    if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, readings[sensor->first]);
-  }
+  const vehicle_sensor *sensor = &m->sensors[number];
+  sensor_slot *slot = &slots[number];
+  if (sensor->kind == SENSOR_ACCELEROMETER && state->step > 0)
+    accelerometer_step(&sensor->as.accelerometer, &slot->as.accelerometer, state->acceleration, m->dt);
+  if (!due(sensor, slot, s->time)) return;
+  key_noise(noise, slot, state->step);
+  read(s, sensor, slot, noise, &readings[sensor->first]);
+  if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, readings[sensor->first]);
+}
+
+void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from) {
+  const vehicle_model *m = self->model;
+  vehicle *w = &self->worlds[i];
+  const sensing s = {.all = self, .world = w, .from = *from, .time = (double)w->state.step * m->dt};
+  noise_source noise = {.keyed = 1, .on = m->noise != 0};
+  read_one(&s, number, &self->slots[i * m->sensors_count], &noise, &self->readings[i * m->readings]);
 }
 
 void vehicle_sense(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
-  const body_state *b = &w->body.state;
   const scene around = vehicle_surroundings(w);
-  const sensing s = {.all = self,
-                     .world = w,
-                     .from = {.around = &around,
-                              .x = b->x,
-                              .y = b->y,
-                              .heading = b->heading,
-                              .cosine = b->cosine,
-                              .sine = b->sine,
-                              .id = w->state.id},
-                     .time = (double)w->state.step * m->dt};
+  const sensing s = {
+      .all = self, .world = w, .from = vehicle_viewpoint(w, &around), .time = (double)w->state.step * m->dt};
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
   noise_source noise = {.keyed = 1, .on = m->noise != 0};
   read_eyes(&s, slots, &noise, readings);
-  read_others(&s, slots, &noise, readings);
+  for (size_t k = 0; k < m->others.count; k++) read_one(&s, m->others.number[k], slots, &noise, readings);
   w->state.sensed = w->state.step + 1;
 }

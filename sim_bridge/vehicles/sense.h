@@ -7,7 +7,22 @@
 /* Readings of world `i` after its present step; does nothing when they are there already. */
 void vehicle_sense(vehicles *self, size_t i);
 
+/* The same for one sensor, if it is due; `from`: where the body is. */
+void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from);
+
 /* Sensors at the beginning of a run. */
 void vehicle_sensors_start(vehicles *self, size_t i);
+
+/* Where its body is, and what is around it. */
+static inline viewpoint vehicle_viewpoint(const vehicle *self, const scene *around) {
+  const body_state *b = &self->body.state;
+  return (viewpoint){.around = around,
+                     .x = b->x,
+                     .y = b->y,
+                     .heading = b->heading,
+                     .cosine = b->cosine,
+                     .sine = b->sine,
+                     .id = self->state.id};
+}
 
 #endif

@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../world/numbers.h"
 #include "sense.h"
+#include "vehicle_row.h"
 
 #define SERVO_PERIOD_S 0.020
 #define SPEED_LIMIT 100.0 /* m/s: as body.c limits it */
@@ -107,15 +109,10 @@ int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate
 
 void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
 
-static double limited(double signal) {
-  const double below = signal < 1.0 ? signal : 1.0;
-  return below > -1.0 ? below : -1.0;
-}
-
 int vehicles_send(vehicles *self, size_t i, double left, double right) {
   if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
-  self->worlds[i].state.signals[0] = limited(left);
-  self->worlds[i].state.signals[1] = limited(right);
+  self->worlds[i].state.signals[0] = number_limited(left, 1.0);
+  self->worlds[i].state.signals[1] = number_limited(right, 1.0);
   return VEHICLE_OK;
 }
 
@@ -126,10 +123,11 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   if (m->drive == DRIVE_DC) {
     for (int side = 0; side < 2; side++) {
       const motor_dc_parameters *motor = &m->dc[side];
-      const double volts = motor_dc_voltage(motor, s->signals[side]); /* V = s V_max */
       const double speed = rims[side] / m->body.wheel_radius;
-      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], volts, speed, w->hold, m->dt)
-                          : motor_dc_torque(motor, volts, speed, w->hold);
+      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], motor_dc_voltage(motor, s->signals[side]), speed,
+                                          w->hold, m->dt)
+                          : vehicle_dc_torque(motor, m->body.wheel_radius, s->signals[side], rims[side],
+                                              motor_dc_stopping(motor, w->hold));
     }
     return;
   }
@@ -213,37 +211,83 @@ int vehicles_step_one(vehicles *self, size_t i, double left, double right) {
   return self->worlds[i].state.flag;
 }
 
+/* Motor signals of a world's next step: from its brain; without one they hold. Returns VEHICLE_OK, or that the run of a
+ * world whose brain failed has ended. */
+static int command(vehicles *self, size_t i, vehicle_brain *brain) {
+  if (brain == NULL) return VEHICLE_OK;
+  double signals[2] = {0.0, 0.0};
+  brain(self->brains + i * self->state_size, &self->readings[i * self->model->readings], signals);
+  const int sent = vehicles_send(self, i, signals[0], signals[1]);
+  if (sent != VEHICLE_OK) self->worlds[i].state.flag = VEHICLE_BRAIN_FAILED;
+  return sent;
+}
+
+static int runs(const vehicles *self, size_t i) { return self->worlds[i].state.flag == VEHICLE_RUNS; }
+
+/* Steps of one world until its run ends. */
+static int run_alone(vehicles *self, size_t i, vehicle_brain *brain, size_t steps) {
+  for (size_t step = 0; step < steps && runs(self, i); step++) {
+    const int sent = command(self, i, brain);
+    if (sent != VEHICLE_OK) return sent;
+    finish_step(self, i);
+  }
+  return VEHICLE_OK;
+}
+
+/* Steps of ROW worlds that run, side by side until a run ends. */
+static int run_row(vehicles *self, const size_t row[], vehicle_brain *brain, size_t steps) {
+  int status = VEHICLE_OK;
+  int all_run = 1;
+  size_t left = steps;
+  for (; left > 0 && all_run; left--) {
+    for (size_t k = 0; k < ROW; k++) {
+      const int sent = command(self, row[k], brain);
+      if (sent != VEHICLE_OK) status = sent;
+      all_run &= sent == VEHICLE_OK;
+    }
+    if (all_run) vehicle_row_step(self, row);
+    for (size_t k = 0; k < ROW; k++) {
+      if (!all_run && runs(self, row[k])) finish_step(self, row[k]);
+    }
+    for (size_t k = 0; k < ROW; k++) all_run &= runs(self, row[k]);
+  }
+  for (size_t k = 0; k < ROW && left > 0; k++) {
+    const int ran = run_alone(self, row[k], brain, left);
+    if (ran != VEHICLE_OK) status = ran;
+  }
+  return status;
+}
+
+/* Worlds that run are taken into rows; the last few go alone. */
+static int run_all(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps) {
+  int status = VEHICLE_OK;
+  size_t row[ROW];
+  size_t waiting = 0;
+  for (size_t i = first; i < first + count; i++) {
+    if (runs(self, i)) row[waiting++] = i;
+    if (waiting < ROW) continue;
+    const int ran = run_row(self, row, brain, steps);
+    if (ran != VEHICLE_OK) status = ran;
+    waiting = 0;
+  }
+  for (size_t k = 0; k < waiting; k++) {
+    const int ran = run_alone(self, row[k], brain, steps);
+    if (ran != VEHICLE_OK) status = ran;
+  }
+  return status;
+}
+
 int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps) {
   if (!ready(self, first, count)) return VEHICLE_NOT_PLACED;
   for (size_t i = 0; i < 2 * count; i++) {
     if (!isfinite(signals[i])) return VEHICLE_BAD_NUMBER;
   }
-  for (size_t k = 0; k < count; k++) {
-    const size_t i = first + k;
-    (void)vehicles_send(self, i, signals[2 * k], signals[2 * k + 1]);
-    for (size_t step = 0; step < steps && self->worlds[i].state.flag == VEHICLE_RUNS; step++) finish_step(self, i);
-  }
-  return VEHICLE_OK;
+  for (size_t k = 0; k < count; k++) (void)vehicles_send(self, first + k, signals[2 * k], signals[2 * k + 1]);
+  return run_all(self, first, count, NULL, steps);
 }
 
 int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps) {
-  if (!ready(self, first, count)) return VEHICLE_NOT_PLACED;
-  int status = VEHICLE_OK;
-  for (size_t i = first; i < first + count; i++) {
-    const double *readings = &self->readings[i * self->model->readings];
-    for (size_t step = 0; step < steps && self->worlds[i].state.flag == VEHICLE_RUNS; step++) {
-      double signals[2] = {0.0, 0.0};
-      brain(self->brains + i * self->state_size, readings, signals);
-      const int sent = vehicles_send(self, i, signals[0], signals[1]);
-      if (sent != VEHICLE_OK) {
-        status = sent;
-        self->worlds[i].state.flag = VEHICLE_BRAIN_FAILED;
-        break;
-      }
-      finish_step(self, i);
-    }
-  }
-  return status;
+  return ready(self, first, count) ? run_all(self, first, count, brain, steps) : VEHICLE_NOT_PLACED;
 }
 
 /* ---- what can be asked -------------------------------------------------------------------------------------------- */

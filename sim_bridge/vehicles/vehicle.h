@@ -9,6 +9,7 @@
 #ifndef VEHICLES_VEHICLE_H
 #define VEHICLES_VEHICLE_H
 
+#include "../world/numbers.h"
 #include "model.h"
 
 /* python: begin */
@@ -151,5 +152,13 @@ struct vehicles {
   double *readings;
   unsigned char *brains;
 };
+
+/* Torque of a quasi-static DC motor by its signal and the speed of its wheel's rim. `stopping`: of motor_dc_stopping. */
+NUMBERS_INLINE double vehicle_dc_torque(const motor_dc_parameters *motor, double wheel_radius, double signal,
+                                        double rim, double stopping) {
+  const double volts = signal * motor->voltage_maximum; /* V = s V_max: a signal that was sent is limited */
+  const double speed = rim / wheel_radius;
+  return motor_dc_geared(motor, motor_dc_current(motor, volts, speed), speed, stopping);
+}
 
 #endif

@@ -13,6 +13,7 @@
 
 #include "arena.h"
 #include "outline.h"
+#include "row.h"
 #include "scene.h"
 
 /* python: begin */
@@ -119,6 +120,10 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
 /* The same for one robot. */
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
 
+/* The same for ROW robots of one model, each alone in a world of its own; torques are finite, dt as it has to be. */
+void body_advance_row(body *const bodies[], const scene around[], const double torques_left[],
+                      const double torques_right[], double dt);
+
 /* How others see it. Reflectances are 1. */
 void body_as_mover(const body *self, mover *out);
 
@@ -149,11 +154,23 @@ static inline double body_core_way(const body *self, double way, double angle) {
  * `height` high: an edge or disc of the arena, a mover with another id. */
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1, double height);
 
-/* 1 if nothing of the arena is within the body's reach, without looking at it. */
-int body_is_clear(body *self, const arena *where);
+/* 1 if the lists of near things are good while the body is within `share` of their slack. */
+static inline int body_knows(const body *self, const arena *where, double share) {
+  const body_surroundings *near = &self->near;
+  const double dx = self->state.x - near->x;
+  const double dy = self->state.y - near->y;
+  const double good = share * near->slack;
+  return good > 0.0 && dx * dx + dy * dy < good * good && near->version == arena_version(where);
+}
 
 /* Renews the lists of near things when the body has moved by more than `share` of what they are good for. */
 void body_look_around(body *self, const arena *where, double share);
+
+/* 1 if nothing of the arena is within the body's reach, without looking at it. */
+static inline int body_is_clear(body *self, const arena *where) {
+  if (!body_knows(self, where, 1.0)) body_look_around(self, where, 1.0);
+  return self->near.edge_count == 0 && self->near.disc_count == 0;
+}
 
 /* What is on neither list, after looking around with a share of 1/2, is at least so far from the body's core (outline.h). */
 static inline double body_looks_far(const body *self) {

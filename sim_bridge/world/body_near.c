@@ -4,17 +4,8 @@
 
 #define CLEARANCE_LIMIT 0.75 /* m */
 
-/* 1 if the lists are good while the body is within `share` of their slack. */
-static inline int knows(const body *self, const arena *where, double share) {
-  const body_surroundings *near = &self->near;
-  const double dx = self->state.x - near->x;
-  const double dy = self->state.y - near->y;
-  const double good = share * near->slack;
-  return good > 0.0 && dx * dx + dy * dy < good * good && near->version == arena_version(where);
-}
-
 void body_look_around(body *self, const arena *where, double share) {
-  if (knows(self, where, share)) return;
+  if (body_knows(self, where, share)) return;
   body_surroundings *near = &self->near;
   near->x = self->state.x;
   near->y = self->state.y;
@@ -43,11 +34,6 @@ const uint32_t *body_near_discs(const body *self, const arena *where, size_t *co
   const int all = self->near.disc_count > BODY_DISCS_CAPACITY;
   *count = all ? arena_disc_count(where) : self->near.disc_count;
   return all ? NULL : self->near.discs;
-}
-
-int body_is_clear(body *self, const arena *where) {
-  if (!knows(self, where, 1.0)) body_look_around(self, where, 1.0);
-  return self->near.edge_count == 0 && self->near.disc_count == 0;
 }
 
 static int mover_meets_segment(const mover *m, double ax, double ay, double bx, double by) {

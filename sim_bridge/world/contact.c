@@ -25,7 +25,7 @@ static size_t core_of(const body *self, const double **core, double *rounding) {
 }
 
 /* Where along from a (0) to b (1) a segment is nearest to (x, y). */
-static double nearest_share(double ax, double ay, double bx, double by, double x, double y) {
+NUMBERS_INLINE double nearest_share(double ax, double ay, double bx, double by, double x, double y) {
   const double ex = bx - ax;
   const double ey = by - ay;
   const double squared = ex * ex + ey * ey;
@@ -71,7 +71,7 @@ static void add(contacts *out, const body *self, const capsule *c, double px, do
 }
 
 /* Velocity of the point p of the body relative to the point q of what is met. */
-static double velocity_x(const body *self, const capsule *c, double py, double qy) {
+NUMBERS_INLINE double velocity_x(const body *self, const capsule *c, double py, double qy) {
   const body_state *s = &self->state;
   const double own = s->speed * s->cosine - s->lateral * s->sine - s->turn_rate * (py - s->y);
   if (c->other == NULL) return own - (c->vx - c->turn_rate * (qy - c->y));
@@ -79,7 +79,7 @@ static double velocity_x(const body *self, const capsule *c, double py, double q
   return own - (o->speed * o->cosine - o->lateral * o->sine - o->turn_rate * (qy - o->y));
 }
 
-static double velocity_y(const body *self, const capsule *c, double px, double qx) {
+NUMBERS_INLINE double velocity_y(const body *self, const capsule *c, double px, double qx) {
   const body_state *s = &self->state;
   const double own = s->speed * s->sine + s->lateral * s->cosine + s->turn_rate * (px - s->x);
   if (c->other == NULL) return own - (c->vy + c->turn_rate * (qx - c->x));
@@ -88,8 +88,8 @@ static double velocity_y(const body *self, const capsule *c, double px, double q
 }
 
 /* A pair of points, one of the core, one of the capsule. */
-static void pair(contacts *out, const body *self, const capsule *c, double px, double py, double qx, double qy,
-                 double apart, double margin) {
+NUMBERS_INLINE void pair(contacts *out, const body *self, const capsule *c, double px, double py, double qx, double qy,
+                         double apart, double margin) {
   const double dx = px - qx;
   const double dy = py - qy;
   const double distance = sqrt(dx * dx + dy * dy);
@@ -102,19 +102,28 @@ static void pair(contacts *out, const body *self, const capsule *c, double px, d
   if (closing < 0.0 && (gap + CONTACT_DEPTH) / -closing < out->first) out->first = (gap + CONTACT_DEPTH) / -closing;
 }
 
-static void meet(contacts *out, const body *self, const capsule *c, double margin) {
+/* The point of a capsule's segment nearest to the body's middle. */
+NUMBERS_INLINE void nearest_point(const body_state *s, const capsule *c, double *x, double *y) {
+  const double t = nearest_share(c->ax, c->ay, c->bx, c->by, s->x, s->y);
+  *x = c->ax + t * (c->bx - c->ax);
+  *y = c->ay + t * (c->by - c->ay);
+}
+
+NUMBERS_INLINE void meet_circle(contacts *out, const body *self, const capsule *c, double margin) {
+  const body_state *s = &self->state;
+  double mx, my;
+  nearest_point(s, c, &mx, &my);
+  pair(out, self, c, s->x, s->y, mx, my, self->parameters.radius + c->rounding, margin);
+}
+
+static void meet_polygon(contacts *out, const body *self, const capsule *c, double margin) {
   const body_state *s = &self->state;
   const double *core;
   double rounding;
   const size_t n = core_of(self, &core, &rounding);
   const double apart = rounding + c->rounding;
-  const double t = nearest_share(c->ax, c->ay, c->bx, c->by, s->x, s->y);
-  const double mx = c->ax + t * (c->bx - c->ax);
-  const double my = c->ay + t * (c->by - c->ay);
-  if (n == 1) {
-    pair(out, self, c, s->x, s->y, mx, my, apart, margin);
-    return;
-  }
+  double mx, my;
+  nearest_point(s, c, &mx, &my);
   const double far = sqrt((mx - s->x) * (mx - s->x) + (my - s->y) * (my - s->y)) - self->body_reach - c->rounding;
   if (far > rounding + margin) { /* out of reach */
     if (far < out->nearest) out->nearest = far;
@@ -137,6 +146,14 @@ static void meet(contacts *out, const body *self, const capsule *c, double margi
     const double w = nearest_share(p[0], p[1], q[0], q[1], c->bx, c->by);
     if (w > 0.0 && w < 1.0)
       pair(out, self, c, p[0] + w * (q[0] - p[0]), p[1] + w * (q[1] - p[1]), c->bx, c->by, apart, margin);
+  }
+}
+
+static void meet(contacts *out, const body *self, const capsule *c, double margin) {
+  if (self->parameters.outline == NULL) {
+    meet_circle(out, self, c, margin);
+  } else {
+    meet_polygon(out, self, c, margin);
   }
 }
 
@@ -205,13 +222,18 @@ void contact_find(body *self, const scene *around, double elapsed, double margin
   body_look_around(self, around->arena, 0.5);
   out->nearest = body_looks_far(self);
   for (size_t i = 0; i < around->movers_count; i++) meet_mover(out, self, &around->movers[i], elapsed, margin);
+  const int circle = self->parameters.outline == NULL;
   const arena_edge *edges = arena_edges(around->arena);
   size_t count;
   const uint32_t *list = body_near_edges(self, around->arena, &count);
   for (size_t i = 0; i < count; i++) {
     const arena_edge *e = &edges[list != NULL ? list[i] : i];
     const capsule c = {.ax = e->ax, .ay = e->ay, .bx = e->ax + e->ex, .by = e->ay + e->ey};
-    meet(out, self, &c, margin);
+    if (circle) {
+      meet_circle(out, self, &c, margin);
+    } else {
+      meet_polygon(out, self, &c, margin);
+    }
   }
   const arena_disc *discs = arena_discs(around->arena);
   list = body_near_discs(self, around->arena, &count);

@@ -27,12 +27,12 @@ static contact_answer answer_of(const body *self, double nx, double ny, double r
   return a;
 }
 
-static double velocity_along(const body *self, const contact_answer *a) {
+NUMBERS_INLINE double velocity_along(const body *self, const contact_answer *a) {
   const body_state *s = &self->state;
   return s->speed * a->along + s->lateral * a->across + s->turn_rate * a->moment;
 }
 
-static void push(body *self, const contact_answer *a, double impulse) {
+NUMBERS_INLINE void push(body *self, const contact_answer *a, double impulse) {
   body_state *s = &self->state;
   if (self->parameters.slip && !s->slipping) {
     s->rim_left = body_left_speed(self);
@@ -90,7 +90,7 @@ static contact_hold hold_of(const body *self, const contact *k, const situation 
 
 /* Takes away the velocity into one contact beyond what is allowed. The impulse acts where the bodies touch: on the
  * surface. */
-static double stop(body *self, const contact_hold *h) {
+NUMBERS_INLINE double stop(body *self, const contact_hold *h) {
   double into = velocity_along(self, &h->own) - h->met;
   if (h->other != NULL) into -= velocity_along(h->other, &h->its);
   if (into >= -h->allowed) return 0.0;

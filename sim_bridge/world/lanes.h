@@ -28,6 +28,7 @@
 
 typedef double lanes __attribute__((vector_size(8 * LANES)));
 typedef int64_t masks __attribute__((vector_size(8 * LANES)));
+typedef int32_t lanes_int __attribute__((vector_size(4 * LANES)));
 
 /* Lanes of `yes` where the mask is set, else of `no`. */
 #define lanes_select(mask, yes, no) ((lanes)(((masks)(yes) & (mask)) | ((masks)(no) & ~(mask))))
@@ -35,12 +36,26 @@ typedef int64_t masks __attribute__((vector_size(8 * LANES)));
 
 LANES_INLINE int masks_any(const masks *m) {
 #ifdef __SSE2__
-  typedef int32_t half_masks __attribute__((vector_size(4 * LANES)));
-  return _mm_movemask_ps((__m128) __builtin_convertvector(*m, half_masks)) != 0;
+  return _mm_movemask_ps((__m128) __builtin_convertvector(*m, lanes_int)) != 0;
 #else
   return ((*m)[0] | (*m)[1] | (*m)[2] | (*m)[3]) != 0;
 #endif
 }
+
+/* to = {value for k = from, from + 1, ...}: numbers from several places, which become a vector without a detour by memory,
+ * where those written one by one could not be read together at once. */
+#define LANES_GATHER(to, k, from, value)              \
+  do {                                                \
+    size_t k = (from);                                \
+    const double first_ = (value);                    \
+    k++;                                              \
+    const double second_ = (value);                   \
+    k++;                                              \
+    const double third_ = (value);                    \
+    k++;                                              \
+    const double fourth_ = (value);                   \
+    (to) = (lanes){first_, second_, third_, fourth_}; \
+  } while (0)
 
 #else
 
@@ -51,11 +66,36 @@ LANES_INLINE int masks_any(const masks *m) {
 typedef double lanes;
 typedef int masks;
 
+#define LANES_GATHER(to, k, from, value) \
+  do {                                   \
+    const size_t k = (from);             \
+    (to) = (value);                      \
+  } while (0)
+
 #define lanes_select(mask, yes, no) ((mask) ? (yes) : (no))
 #define lanes_of(value) (value)
 
 LANES_INLINE int masks_any(const masks *m) { return *m; }
 
+#endif
+
+/* Defines the function `name`, `linkage` extern or static, which does what `name`_inline does: by AVX2 where the processor
+ * has it. `arguments` are the names in `parameters`. It should call nothing often: between code for AVX2 and other code
+ * processors lose time. */
+#ifdef LANES_AVX2
+#define LANES_FUNCTION(linkage, name, parameters, arguments)                           \
+  LANES_NOT_INLINE static void name##_anywhere parameters { name##_inline arguments; } \
+  LANES_AVX2 static void name##_by_avx2 parameters { name##_inline arguments; }        \
+  linkage void name parameters {                                                       \
+    if (LANES_HAVE_AVX2()) {                                                           \
+      name##_by_avx2 arguments;                                                        \
+    } else {                                                                           \
+      name##_anywhere arguments;                                                       \
+    }                                                                                  \
+  }
+#else
+#define LANES_FUNCTION(linkage, name, parameters, arguments) \
+  linkage void name parameters { name##_inline arguments; }
 #endif
 
 LANES_INLINE void lanes_load(lanes *to, const double *from) { memcpy(to, from, sizeof *to); }

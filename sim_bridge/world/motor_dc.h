@@ -20,6 +20,12 @@
 #ifndef WORLD_MOTOR_DC_H
 #define WORLD_MOTOR_DC_H
 
+#include <math.h>
+
+#include "numbers.h"
+
+#define MOTOR_DC_STANDSTILL 1e-6 /* rad/s of the motor's axis */
+
 /* python: begin */
 typedef struct {
   double torque_constant;    /* c_t, N m / A */
@@ -39,21 +45,62 @@ typedef struct {
 void motor_dc_default(motor_dc_parameters *out);
 
 /* Volts for a motor signal: s in [-1, 1], beyond it limited, times the maximum. */
-double motor_dc_voltage(const motor_dc_parameters *self, double signal);
+static double motor_dc_voltage(const motor_dc_parameters *self, double signal);
 
 /* Quasi-static current, A, at `volts` while the shaft turns at `speed` rad/s. */
-double motor_dc_current(const motor_dc_parameters *self, double volts, double speed);
+static double motor_dc_current(const motor_dc_parameters *self, double volts, double speed);
 
 /* Torque at the shaft, N m, for a current in A: friction, gear, limit. */
-double motor_dc_shaft_torque(const motor_dc_parameters *self, double current, double speed, double hold);
+static double motor_dc_shaft_torque(const motor_dc_parameters *self, double current, double speed, double hold);
 
 /* Quasi-static torque at the shaft, N m: (1.8), (1.9), (1.10). */
-double motor_dc_torque(const motor_dc_parameters *self, double volts, double speed, double hold);
+static double motor_dc_torque(const motor_dc_parameters *self, double volts, double speed, double hold);
 
 /* The same of the full model for the next `dt` seconds: `current`, A, goes from its value at their beginning to that at
  * their end by (1.1); the torque is that of its mean. Without inductance it is the quasi-static motor. */
 double motor_dc_step(const motor_dc_parameters *self, double *current, double volts, double speed, double hold,
                      double dt);
 /* python: end */
+
+NUMBERS_INLINE double motor_dc_voltage(const motor_dc_parameters *self, double signal) {
+  return number_limited(signal, 1.0) * self->voltage_maximum;
+}
+
+NUMBERS_INLINE double motor_dc_current(const motor_dc_parameters *self, double volts, double speed) {
+  return (volts - self->emf_constant * self->gear * speed) / self->resistance_ohm; /* (1.1) with di/dt = 0, (1.2) */
+}
+
+/* Torque per rad/s of the motor's axis with which friction stops it, `hold` being that of the wheel; without one any
+ * motion meets the whole friction. */
+NUMBERS_INLINE double motor_dc_stopping(const motor_dc_parameters *self, double hold) {
+  const double ratio = self->gear * self->efficiency;
+  const double axis_hold = ratio > 0.0 ? hold / (ratio * self->gear) : 0.0;
+  return axis_hold > 0.0 ? axis_hold : 1e300;
+}
+
+/* Coulomb friction at the motor's axis against `driving` torque: it holds a motor that stands, and stops one that moves
+ * at most. */
+NUMBERS_INLINE double motor_dc_coulomb(const motor_dc_parameters *self, double driving, double axis, double stopping) {
+  const double opposed = fabs(axis) < MOTOR_DC_STANDSTILL ? driving : driving + stopping * axis;
+  return number_limited(opposed, self->coulomb_n_m);
+}
+
+/* motor_dc_shaft_torque with what motor_dc_stopping says. */
+NUMBERS_INLINE double motor_dc_geared(const motor_dc_parameters *self, double current, double speed, double stopping) {
+  const double axis = self->gear * speed;                        /* (1.10) */
+  const double generated = self->torque_constant * current;      /* (1.3) */
+  const double driving = generated - self->viscous_n_m_s * axis; /* (1.9) */
+  const double torque = driving - motor_dc_coulomb(self, driving, axis, stopping);
+  return number_limited(self->gear * self->efficiency * torque, self->torque_maximum_n_m); /* (1.10) */
+}
+
+NUMBERS_INLINE double motor_dc_shaft_torque(const motor_dc_parameters *self, double current, double speed,
+                                            double hold) {
+  return motor_dc_geared(self, current, speed, motor_dc_stopping(self, hold));
+}
+
+NUMBERS_INLINE double motor_dc_torque(const motor_dc_parameters *self, double volts, double speed, double hold) {
+  return motor_dc_shaft_torque(self, motor_dc_current(self, volts, speed), speed, hold); /* (1.8), (1.9) */
+}
 
 #endif

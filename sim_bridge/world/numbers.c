@@ -1,49 +1,7 @@
-/* numbers.c: see numbers.h. Sine and cosine by minimax polynomials on [-pi/4, pi/4], the others by
- * series on a reduced argument. */
+/* numbers.c: see numbers.h. Series on a reduced argument. */
 #include "numbers.h"
 
 #include <stddef.h>
-#include <stdint.h>
-#include <string.h>
-
-void number_sincos(double angle, double *sine, double *cosine) {
-  /* pi/2 in three parts: the first two have few enough bits for exact products with small whole numbers. */
-  static const double part_1 = 1.57079632673412561417e+00;
-  static const double part_2 = 6.07710050630396597660e-11;
-  static const double part_3 = 2.02226624879595063154e-21;
-  const double shifted =
-      angle * (2.0 / NUMBERS_PI) + 0x1.8p52; /* its last bits are those of the nearest whole number */
-  const double n = shifted - 0x1.8p52;
-  uint64_t quarter;
-  memcpy(&quarter, &shifted, sizeof quarter);
-  const double r = ((angle - n * part_1) - n * part_2) - n * part_3;
-  const double z = r * r;
-  const double s = r + r * z *
-                           (-1.66666666666666324348e-01 +
-                            z * (8.33333333332248946124e-03 +
-                                 z * (-1.98412698298579493134e-04 +
-                                      z * (2.75573137070700676789e-06 +
-                                           z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-  const double c =
-      (1.0 - 0.5 * z) + z * z *
-                            (4.16666666666666019037e-02 +
-                             z * (-1.38888888888741095749e-03 +
-                                  z * (2.48015872894767294178e-05 +
-                                       z * (-2.75573143513906633035e-07 +
-                                            z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
-  /* Turned by so many quarters: sine and cosine change places by each, and signs by each second one. */
-  const uint64_t swap = (uint64_t)0 - (quarter & 1u);
-  const uint64_t sine_sign = (quarter & 2u) << 62;
-  const uint64_t cosine_sign = ((quarter + 1u) & 2u) << 62;
-  uint64_t s_bits, c_bits;
-  memcpy(&s_bits, &s, sizeof s_bits);
-  memcpy(&c_bits, &c, sizeof c_bits);
-  const uint64_t change = (s_bits ^ c_bits) & swap;
-  s_bits ^= change ^ sine_sign;
-  c_bits ^= change ^ cosine_sign;
-  memcpy(sine, &s_bits, sizeof s_bits);
-  memcpy(cosine, &c_bits, sizeof c_bits);
-}
 
 /* e^r - 1 for |r| <= 0.35, by its series. */
 static double small_expm1(double r) {
@@ -166,13 +124,4 @@ double number_atan2(double y, double x) {
     angle = x < 0.0 ? NUMBERS_PI / 2.0 + (high + (low + half_pi_low)) : NUMBERS_PI / 2.0 - (high + (low - half_pi_low));
   }
   return y < 0.0 ? -angle : angle;
-}
-
-double number_wrap(double angle) {
-  if (angle > -NUMBERS_PI && angle <= NUMBERS_PI) return angle;
-  const double turns = (double)number_floor(angle / (2.0 * NUMBERS_PI) + 0.5);
-  double wrapped = angle - turns * (2.0 * NUMBERS_PI);
-  if (wrapped <= -NUMBERS_PI) wrapped += 2.0 * NUMBERS_PI;
-  if (wrapped > NUMBERS_PI) wrapped -= 2.0 * NUMBERS_PI;
-  return wrapped;
 }

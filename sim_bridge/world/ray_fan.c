@@ -56,6 +56,7 @@ typedef struct {
 typedef struct {
   directions to;
   const fan_question *from;
+  const ray_list_cell *cell;
   const ray_list_entry *list; /* NULL: one by one */
   size_t first;               /* ray */
 } group;
@@ -105,50 +106,69 @@ LANES_INLINE int ask_list(const group *g, double limit, lanes *nearest) {
   const double x = q->x;
   const double y = q->y;
   const double height = q->height;
+  const float far = (float)(limit * (1.0 + 1e-6)); /* no less than the limit: one entry too many changes nothing */
   const directions to = g->to;
   lanes best = lanes_of(limit);
   masks along = {0};
+  const uint32_t edges = (uint32_t)where->edge_count;
+  const arena_edge *const edge = where->edge;
   const ray_list_entry *entry = g->list;
-  for (unsigned asked = 0; (double)entry->bound <= limit; entry++, asked++) {
+  const ray_list_entry *const early = entry + AT_ONCE;
+  for (; entry->bound <= far; entry++) {
+    const uint32_t strip = entry->strip;
     /* What was met is known late: looking at it for each entry costs more than the entries that it spares. */
-    if (asked >= AT_ONCE || entry->strip == RAY_LIST_END) {
+    if (entry >= early) {
       const masks open = best >= (double)entry->bound;
       if (!masks_any(&open)) break;
-      if (entry->strip == RAY_LIST_END) return 0;
     }
-    const uint32_t first = ray_strip_first(entry->strip);
-    if (first >= where->edge_count) {
-      const arena_disc *disc = &where->disc[first - where->edge_count];
+    if (strip < edges) { /* one edge */
+      if (edge[strip].height >= height) ask_edge(&edge[strip], x, y, &to, &best, &along);
+      continue;
+    }
+    if (strip == RAY_LIST_END) {
+      const masks open = best >= (double)entry->bound;
+      if (!masks_any(&open)) break;
+      return 0;
+    }
+    const uint32_t first = ray_strip_first(strip);
+    if (first >= edges) {
+      const arena_disc *disc = &where->disc[first - edges];
       if (!(disc->height >= height)) continue;
       lanes in_memory = best;
       ask_disc(disc, x, y, &g->to, &in_memory);
       best = in_memory;
       continue;
     }
-    const arena_edge *e = &where->edge[first];
-    const arena_edge *end = e + ray_strip_count(entry->strip);
-    do {
+    for (const arena_edge *e = &edge[first]; e < &edge[first] + ray_strip_count(strip); e++) {
       if (e->height >= height) ask_edge(e, x, y, &to, &best, &along);
-    } while (++e < end);
+    }
   }
   *nearest = best;
   return !masks_any(&along);
 }
 
-/* The list for a group of rays that point much the same way. */
-LANES_INLINE void find_list(group *g) {
+/* The lists of the cell where a group of rays starts that point much the same way. */
+LANES_INLINE void find_cell(group *g) {
   const fan_question *q = g->from;
   const ray_lists *lists = q->where->lists;
   size_t number;
-  g->list = NULL;
+  g->cell = NULL;
   if (lists == NULL || q->where->grid.columns == 0 || !(q->reach > 0.0)) return;
   if (!(q->rays->alike >> g->first / RAY_FAN_GROUP & 1u)) return;
   if (!(fabs(q->cosine * q->cosine + q->sine * q->sine - 1.0) < 1e-9)) return;
-  const ray_list_cell *cell = ray_lists_at(lists, q->x, q->y, &number);
-  if (cell == NULL) return;
+  g->cell = ray_lists_at(lists, q->x, q->y, &number);
+}
+
+/* The one for where they point to. */
+LANES_INLINE void find_list(group *g) {
+  const fan_question *q = g->from;
+  g->list = NULL;
+  if (g->cell == NULL) return;
   turn(q, g->first, &g->to);
-  const unsigned sector = ray_sector(lists, g->to.cosine[0], g->to.sine[0]);
-  if (sector < RAY_SECTORS_MOST) g->list = &cell->entry[cell->fan_start[sector / RAY_FAN_STEP]];
+  const unsigned sector = ray_sector(q->where->lists, g->to.cosine[0], g->to.sine[0]);
+  if (sector >= RAY_SECTORS_MOST) return;
+  g->list = &g->cell->entry[g->cell->fan_start[sector / RAY_FAN_STEP]];
+  __builtin_prefetch(g->list);
 }
 
 /* Writes four distances. */
@@ -165,38 +185,35 @@ LANES_INLINE void ask_group(const group *g) {
   lanes_store(&q->distances[g->first], &nearest);
 }
 
-LANES_INLINE void ask(const fan_question *questions, size_t count) {
+/* Each look into memory is begun for all groups before the first of them needs what is there. */
+LANES_INLINE void ask_groups(group groups[], size_t count) {
+  for (size_t k = 0; k < count; k++) {
+    find_cell(&groups[k]);
+    if (groups[k].cell != NULL) __builtin_prefetch(groups[k].cell->fan_start);
+  }
+  for (size_t k = 0; k < count; k++) find_list(&groups[k]);
+  for (size_t k = 0; k < count; k++) ask_group(&groups[k]);
+}
+
+LANES_INLINE void arena_fans_inline(const fan_question *questions, size_t count) {
   group groups[TOGETHER];
   size_t waiting = 0;
   for (size_t i = 0; i < count; i++) {
-    for (size_t first = 0; first < questions[i].rays->rays; first += RAY_FAN_GROUP) {
-      group *g = &groups[waiting++];
-      g->from = &questions[i];
-      g->first = first;
-      find_list(g);
-      if (waiting < TOGETHER) continue;
-      for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
-      waiting = 0;
-    }
+    size_t first = 0;
+    do {
+      if (waiting == TOGETHER) {
+        ask_groups(groups, waiting);
+        waiting = 0;
+      }
+      groups[waiting].from = &questions[i];
+      groups[waiting++].first = first;
+      first += RAY_FAN_GROUP;
+    } while (first < questions[i].rays->rays);
   }
-  for (size_t k = 0; k < waiting; k++) ask_group(&groups[k]);
+  ask_groups(groups, waiting);
 }
 
-LANES_NOT_INLINE static void ask_anywhere(const fan_question *questions, size_t count) { ask(questions, count); }
-
-#ifdef LANES_AVX2
-LANES_AVX2 static void ask_by_avx2(const fan_question *questions, size_t count) { ask(questions, count); }
-#endif
-
-void arena_fans(const fan_question *questions, size_t count) {
-#ifdef LANES_AVX2
-  if (LANES_HAVE_AVX2()) {
-    ask_by_avx2(questions, count);
-    return;
-  }
-#endif
-  ask_anywhere(questions, count);
-}
+LANES_FUNCTION(extern, arena_fans, (const fan_question *questions, size_t count), (questions, count))
 
 #else
 

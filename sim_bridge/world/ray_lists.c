@@ -406,7 +406,8 @@ static ray_list_cell *packed(const ray_lists *self, const gathered *all, size_t 
   const unsigned lists = out.sectors + out.fans;
   each_list(&out, all, count_sight, NULL);
   size_t total = 0;
-  for (unsigned k = 0; k < lists; k++) {
+  for (unsigned i = 0; i < lists; i++) {
+    const unsigned k = (out.sectors + i) % lists; /* fans come first: what many rays ask lies close together */
     out.start[k] = (uint32_t)total;
     total += (out.length[k] < LIST_LONGEST ? out.length[k] : LIST_LONGEST) + 1;
     out.length[k] = 0;

@@ -35,8 +35,8 @@ static inline uint32_t ray_strip_count(uint32_t strip) { return (strip >> 28) + 
 
 typedef struct {
   uint16_t start[RAY_SECTORS_MOST]; /* of each sector's list */
-  uint16_t
-      fan_start[RAY_FANS_MOST]; /* of the list of RAY_FAN_SECTORS sectors together, from sector RAY_FAN_STEP i on */
+  /* Of the list of RAY_FAN_SECTORS sectors together, from sector RAY_FAN_STEP i on. */
+  uint16_t fan_start[RAY_FANS_MOST];
   ray_list_entry entry[];
 } ray_list_cell;
 

@@ -79,6 +79,7 @@ static inline fan_question beam_question(const beam *self, const viewpoint *from
 }
 
 /* A source whose next draws are those of `step`, at most 1024 per step: a reading is a function of key and step alone. */
-static inline void noise_at(noise_source *self, uint64_t step) { self->step = step << 10; }
+static inline uint64_t noise_first(uint64_t step) { return step << 10; }
+static inline void noise_at(noise_source *self, uint64_t step) { self->step = noise_first(step); }
 
 #endif

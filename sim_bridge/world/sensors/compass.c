@@ -17,12 +17,10 @@ void compass_field(const compass_parameters *p, const viewpoint *from, double cu
 
 double compass_read(const compass_parameters *p, const viewpoint *from, double current, noise_source *noise) {
   double heading = from->heading;
-  const int disturbed = p->iron_x != 0.0 || p->iron_y != 0.0 || p->current_x != 0.0 || p->current_y != 0.0;
-  if (disturbed) {
+  if (compass_is_disturbed(p)) {
     double x, y;
     compass_field(p, from, current, &x, &y);
     heading = number_atan2(-y, x);
   }
-  const double noisy = p->sigma > 0.0 ? p->sigma * noise_next_normal(noise) : 0.0;
-  return number_wrap(heading + p->bias + noisy);
+  return compass_of(p, heading, p->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
 }

@@ -6,6 +6,7 @@
 #ifndef SENSORS_COMPASS_H
 #define SENSORS_COMPASS_H
 
+#include "../numbers.h"
 #include "beam.h"
 
 /* python: begin */
@@ -26,5 +27,14 @@ void compass_field(const compass_parameters *self, const viewpoint *from, double
 /* Heading, rad in (-pi, pi]. */
 double compass_read(const compass_parameters *self, const viewpoint *from, double current, noise_source *noise);
 /* python: end */
+
+static inline int compass_is_disturbed(const compass_parameters *p) {
+  return p->iron_x != 0.0 || p->iron_y != 0.0 || p->current_x != 0.0 || p->current_y != 0.0;
+}
+
+/* The reading by the heading that the field shows and a normal draw, 0 without noise. */
+NUMBERS_INLINE double compass_of(const compass_parameters *self, double heading, double draw) {
+  return number_wrap(heading + self->bias + self->sigma * draw);
+}
 
 #endif

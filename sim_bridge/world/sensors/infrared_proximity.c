@@ -17,62 +17,27 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
   return 0;
 }
 
-/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. */
-LANES_INLINE void see(const double *c1, double c2, const double *distances, const double *inward, double *readings) {
-  lanes gain, d, towards;
-  lanes_load(&gain, c1);
-  lanes_load(&d, distances);
-  lanes_load(&towards, inward);
-  const lanes none = lanes_of(0.0);
-  const lanes full = lanes_of(1.0);
-  const lanes squared = d * d;
-  const lanes product = (gain + c2 * squared) * towards;
-  const lanes quotient = product / squared;
-  const lanes limited = lanes_select(product < squared, quotient, full);
-  const lanes seen = lanes_select(d >= 0.0, limited, none);
-  lanes_store(readings, &seen);
-}
-
 /* The sum of all rays' readings; `c1` and `distances` by ray. */
 LANES_INLINE double sum_of(const infrared_proximity *self, const double *c1, const double *distances) {
   double readings[BEAM_RAYS];
   double sum = 0.0;
-  int first = 0;
-  do {
-    see(&c1[first], self->c2, &distances[first], &self->beam.inward[first], &readings[first]);
-    first += (int)LANES;
-  } while (first < self->beam.rays);
+  for (int first = 0; first < self->beam.rays; first += (int)RAY_FAN_GROUP) {
+    for (int i = first; i < first + (int)RAY_FAN_GROUP; i++) {
+      readings[i] = infrared_proximity_ray(c1[i], self->c2, distances[i], self->beam.inward[i]);
+    }
+  }
   for (int i = 0; i < self->beam.rays; i++) sum += readings[i];
   return sum;
 }
 
-LANES_INLINE void sum_each(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
-                           double sums[]) {
+LANES_INLINE void infrared_proximity_sums_inline(const infrared_proximity *const sensors[],
+                                                 const fan_question answered[], size_t count, double sums[]) {
   for (size_t i = 0; i < count; i++) sums[i] = sum_of(sensors[i], sensors[i]->c1, answered[i].distances);
 }
 
-LANES_NOT_INLINE static void sums_anywhere(const infrared_proximity *const sensors[], const fan_question answered[],
-                                           size_t count, double sums[]) {
-  sum_each(sensors, answered, count, sums);
-}
-
-#ifdef LANES_AVX2
-LANES_AVX2 static void sums_by_avx2(const infrared_proximity *const sensors[], const fan_question answered[],
-                                    size_t count, double sums[]) {
-  sum_each(sensors, answered, count, sums);
-}
-#endif
-
-void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
-                             double sums[]) {
-#ifdef LANES_AVX2
-  if (LANES_HAVE_AVX2()) {
-    sums_by_avx2(sensors, answered, count, sums);
-    return;
-  }
-#endif
-  sums_anywhere(sensors, answered, count, sums);
-}
+LANES_FUNCTION(extern, infrared_proximity_sums,
+               (const infrared_proximity *const sensors[], const fan_question answered[], size_t count, double sums[]),
+               (sensors, answered, count, sums))
 
 /* Where each surface reflects in its own way. */
 LANES_NOT_INLINE static double sum_by_reflectance(const infrared_proximity *self, const viewpoint *from) {

@@ -6,6 +6,7 @@
 #ifndef SENSORS_INFRARED_PROXIMITY_H
 #define SENSORS_INFRARED_PROXIMITY_H
 
+#include "../numbers.h"
 #include "beam.h"
 
 /* python: begin */
@@ -45,11 +46,25 @@ static inline fan_question infrared_proximity_ask(const infrared_proximity *self
 void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
                              double sums[]);
 
+/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. `inward`:
+ * cos(kappa). */
+NUMBERS_INLINE double infrared_proximity_ray(double c1, double c2, double distance, double inward) {
+  const double squared = distance * distance;
+  const double product = (c1 + c2 * squared) * inward;
+  const double limited = product < squared ? product / squared : 1.0;
+  return distance >= 0.0 ? limited : 0.0;
+}
+
+/* The reading by a normal draw, 0 without noise. */
+NUMBERS_INLINE double infrared_proximity_of(const infrared_proximity *self, double sum, double draw) {
+  const double exact = sum / (double)self->beam.rays;      /* (3.12) */
+  const double noisy = exact * (1.0 + self->sigma * draw); /* (3.1) */
+  const double least = noisy > 0.0 ? noisy : 0.0;          /* each a single operation, no branch */
+  return least < 1.0 ? least : 1.0;
+}
+
 static inline double infrared_proximity_finish(const infrared_proximity *self, double sum, noise_source *noise) {
-  double s = sum / (double)self->beam.rays;                                 /* (3.12) */
-  if (self->sigma > 0.0) s *= 1.0 + self->sigma * noise_next_normal(noise); /* (3.1) */
-  s = s > 0.0 ? s : 0.0;                                                    /* each a single operation, no branch */
-  return s < 1.0 ? s : 1.0;
+  return infrared_proximity_of(self, sum, self->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
 }
 
 #endif

@@ -1,0 +1,222 @@
+/* vehicle_row.c: see vehicle_row.h. Motors (1.8)-(1.10), IR proximity sensors (3.10)-(3.13), odometer (2.7)-(2.9) and compass
+ * of a row are computed together; what a model has beside them, each world computes alone. */
+#include "vehicle_row.h"
+
+#include <string.h>
+
+#include "../world/lanes.h"
+#include "../world/noise_block.h"
+#include "../world/row.h"
+#include "sense.h"
+
+#define DRAWS (VEHICLE_SENSORS + 1u) /* sensors draw one number each, an odometer two */
+
+/* ---- moving -------------------------------------------------------------------------------------------------------- */
+
+LANES_INLINE void dc_torques_inline(const vehicle_model *m, vehicle *const worlds[], double left[], double right[]) {
+  const motor_dc_parameters motors[2] = {m->dc[0], m->dc[1]}; /* here, where no result can be */
+  const double radius = m->body.wheel_radius;
+  const double stopping[2] = {motor_dc_stopping(&motors[0], worlds[0]->hold),
+                              motor_dc_stopping(&motors[1], worlds[0]->hold)};
+  double signals[2][ROW], rims[2][ROW];
+  ROW_GATHER(signals[0], k, worlds[k]->state.signals[0])
+  ROW_GATHER(signals[1], k, worlds[k]->state.signals[1])
+  ROW_GATHER(rims[0], k, worlds[k]->body.state.rim_left)
+  ROW_GATHER(rims[1], k, worlds[k]->body.state.rim_right)
+  for (size_t k = 0; k < ROW; k++)
+    left[k] = vehicle_dc_torque(&motors[0], radius, signals[0][k], rims[0][k], stopping[0]);
+  for (size_t k = 0; k < ROW; k++)
+    right[k] = vehicle_dc_torque(&motors[1], radius, signals[1][k], rims[1][k], stopping[1]);
+}
+
+LANES_FUNCTION(static, dc_torques, (const vehicle_model *m, vehicle *const worlds[], double left[], double right[]),
+               (m, worlds, left, right))
+
+static void torques(vehicles *self, const size_t row[], vehicle *const worlds[], double left[], double right[]) {
+  if (self->model->drive == DRIVE_DC && !self->model->full) {
+    dc_torques(self->model, worlds, left, right);
+    return;
+  }
+  for (size_t k = 0; k < ROW; k++) {
+    double torque[2];
+    vehicle_torques(self, row[k], torque);
+    left[k] = torque[0];
+    right[k] = torque[1];
+  }
+}
+
+static void move(vehicles *self, const size_t row[], vehicle *const worlds[]) {
+  double left[ROW], right[ROW], before[ROW];
+  scene around[ROW];
+  body *bodies[ROW];
+  for (size_t k = 0; k < ROW; k++) {
+    before[k] = worlds[k]->body.state.speed;
+    around[k] = vehicle_scene(worlds[k]);
+    bodies[k] = &worlds[k]->body;
+  }
+  torques(self, row, worlds, left, right);
+  body_advance_row(bodies, around, left, right, self->model->dt);
+  for (size_t k = 0; k < ROW; k++) {
+    vehicle_moved(self, row[k], before[k]);
+    vehicles_update_arena(self, row[k]);
+    vehicles_check(self, row[k]);
+  }
+}
+
+/* ---- sensing ------------------------------------------------------------------------------------------------------- */
+
+/* Worlds that sense, and their draws: as many rows of them as the sensors that are read together take. */
+typedef struct {
+  vehicles *all;
+  const size_t *row;
+  vehicle *const *worlds;
+  viewpoint from[ROW];
+  sensor_slot *slots[ROW]; /* of the first sensor */
+  double *readings[ROW];
+  double draws[DRAWS][ROW];
+} sensing_row;
+
+/* How many normal draws a sensor takes of which the whole row is read at once; 0: it is read for each world alone. */
+static unsigned draws_of(const vehicle_sensor *sensor) {
+  if (sensor->period > 0.0) return 0;
+  if (sensor->kind == SENSOR_INFRARED_PROXIMITY) return !sensor->as.infrared_proximity.reflectance;
+  if (sensor->kind == SENSOR_COMPASS) return !compass_is_disturbed(&sensor->as.compass);
+  return sensor->kind == SENSOR_ODOMETER && odometer_is_plain(&sensor->as.odometer) ? 2 : 0;
+}
+
+/* All draws that the row's sensors take together; 0 without noise. */
+static void draw(sensing_row *s) {
+  const vehicle_model *m = s->all->model;
+  uint64_t keys[DRAWS][ROW];
+  unsigned count = 0;
+  for (size_t number = 0; number < m->sensors_count; number++) {
+    const unsigned draws = draws_of(&m->sensors[number]);
+    for (unsigned i = 0; i < draws; i++, count++) {
+      for (size_t k = 0; k < ROW; k++)
+        keys[count][k] = s->slots[k][number].key ^ (noise_first(s->worlds[k]->state.step) + i);
+    }
+  }
+  if (m->noise) {
+    noise_block_normals(keys[0], s->draws[0], count * ROW);
+  } else {
+    memset(s->draws, 0, sizeof s->draws);
+  }
+}
+
+LANES_INLINE void finish_eyes_inline(const infrared_proximity *eye, const double (*distances)[BEAM_RAYS],
+                                     const double draws[], double readings[]) {
+  double sums[ROW] = {0.0};
+  double seen[ROW];
+  for (int i = 0; i < eye->beam.rays; i++) {
+    const double c1 = eye->c1[i];
+    const double inward = eye->beam.inward[i];
+    double distance[ROW];
+    ROW_GATHER(distance, k, distances[k][i])
+    for (size_t k = 0; k < ROW; k++) sums[k] += infrared_proximity_ray(c1, eye->c2, distance[k], inward);
+  }
+  for (size_t k = 0; k < ROW; k++) seen[k] = infrared_proximity_of(eye, sums[k], draws[k]);
+  memcpy(readings, seen, sizeof seen);
+}
+
+LANES_FUNCTION(static, finish_eyes,
+               (const infrared_proximity *eye, const double (*distances)[BEAM_RAYS], const double draws[],
+                double readings[]),
+               (eye, distances, draws, readings))
+
+static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+  const infrared_proximity *eye = &sensor->as.infrared_proximity;
+  fan_question asked[ROW];
+  double distances[ROW][BEAM_RAYS];
+  double readings[ROW];
+  for (size_t k = 0; k < ROW; k++) asked[k] = infrared_proximity_ask(eye, &s->from[k], distances[k]);
+  arena_fans(asked, ROW);
+  for (size_t k = 0; k < ROW; k++) {
+    if (s->from[k].around->movers_count > 0) scene_fan_movers(s->from[k].around, &asked[k], s->from[k].id);
+  }
+  finish_eyes(eye, (const double(*)[BEAM_RAYS])distances, draws, readings);
+  for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
+}
+
+LANES_INLINE void read_compasses_inline(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+  double readings[ROW];
+  ROW_GATHER(readings, k, s->from[k].heading)
+  for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(&sensor->as.compass, readings[k], draws[k]);
+  for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
+}
+
+LANES_FUNCTION(static, read_compasses, (const sensing_row *s, const vehicle_sensor *sensor, const double draws[]),
+               (s, sensor, draws))
+
+LANES_INLINE void read_odometers_inline(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+  const odometer_parameters *p = &sensor->as.odometer;
+  const size_t number = (size_t)(sensor - s->all->model->sensors);
+  const double spread = p->sigma_step > 0.0 ? odometer_spread(p, s->all->model->dt) : 0.0;
+  const double share = odometer_share(p);
+  odometer_state *states[ROW];
+  const body_state *bodies[ROW];
+  double left[ROW], right[ROW], x[ROW], y[ROW], heading[ROW], distance[ROW];
+  for (size_t k = 0; k < ROW; k++) {
+    states[k] = &s->slots[k][number].as.odometer;
+    bodies[k] = &s->worlds[k]->body.state;
+  }
+  ROW_GATHER(left, k, bodies[k]->wheel_left - states[k]->wheel_left)
+  ROW_GATHER(right, k, bodies[k]->wheel_right - states[k]->wheel_right)
+  ROW_GATHER(x, k, states[k]->x)
+  ROW_GATHER(y, k, states[k]->y)
+  ROW_GATHER(heading, k, states[k]->heading)
+  ROW_GATHER(distance, k, states[k]->distance)
+  for (size_t k = 0; k < ROW; k++) {
+    left[k] = odometer_travel(p, left[k], p->factor_left) + spread * draws[k];
+    right[k] = odometer_travel(p, right[k], p->factor_right) + spread * draws[ROW + k];
+    odometer_lay_off(p->half_track, share, left[k], right[k], &x[k], &y[k], &heading[k], &distance[k]);
+  }
+  for (size_t k = 0; k < ROW; k++) {
+    odometer_state *state = states[k];
+    double *readings = &s->readings[k][sensor->first];
+    state->wheel_left = bodies[k]->wheel_left;
+    state->wheel_right = bodies[k]->wheel_right;
+    readings[0] = state->x = x[k];
+    readings[1] = state->y = y[k];
+    readings[2] = state->heading = heading[k];
+    state->distance = distance[k];
+  }
+}
+
+LANES_FUNCTION(static, read_odometers, (const sensing_row *s, const vehicle_sensor *sensor, const double draws[]),
+               (s, sensor, draws))
+
+static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
+  const vehicle_model *m = self->model;
+  sensing_row s;
+  scene around[ROW];
+  s.all = self;
+  s.row = row;
+  s.worlds = worlds;
+  for (size_t k = 0; k < ROW; k++) {
+    around[k] = vehicle_surroundings(worlds[k]);
+    s.from[k] = vehicle_viewpoint(worlds[k], &around[k]);
+    s.slots[k] = &self->slots[row[k] * m->sensors_count];
+    s.readings[k] = &self->readings[row[k] * m->readings];
+  }
+  draw(&s);
+  unsigned count = 0;
+  for (size_t number = 0; number < m->sensors_count; number++) {
+    const vehicle_sensor *sensor = &m->sensors[number];
+    const double *draws = s.draws[count];
+    const unsigned taken = draws_of(sensor);
+    count += taken;
+    for (size_t k = 0; k < ROW && taken == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
+    if (taken == 0) continue;
+    if (sensor->kind == SENSOR_INFRARED_PROXIMITY) read_eyes(&s, sensor, draws);
+    if (sensor->kind == SENSOR_COMPASS) read_compasses(&s, sensor, draws);
+    if (sensor->kind == SENSOR_ODOMETER) read_odometers(&s, sensor, draws);
+  }
+  for (size_t k = 0; k < ROW; k++) worlds[k]->state.sensed = worlds[k]->state.step + 1;
+}
+
+void vehicle_row_step(vehicles *self, const size_t row[]) {
+  vehicle *worlds[ROW];
+  for (size_t k = 0; k < ROW; k++) worlds[k] = &self->worlds[row[k]];
+  move(self, row, worlds);
+  sense(self, row, worlds);
+}
