@@ -60,7 +60,6 @@ class BatteryLevel(CognitiveProcess):
 
     def forget(self) -> None:
         self.voltage: float | None = None
-        self._filter = LeakyIntegrator(1 / self.tau)
         self.charging = False
         self._turned = math.nan  # the lowest voltage since the charger was left, or the highest since it was reached
 
@@ -84,7 +83,8 @@ class BatteryLevel(CognitiveProcess):
         elapsed, self._time = now - self._time, now
         unloaded = measured + self.sag * _effort(robot) if self.sag else measured
         if self.voltage is None:
-            self.voltage = self._turned = self._filter.value = unloaded
+            self.voltage = self._turned = unloaded
+            self._filter = LeakyIntegrator(1 / self.tau, value=unloaded)
             return
         self.voltage = self._filter.advance(unloaded, elapsed)
         self._notice_charger(self.voltage)
