@@ -1,0 +1,138 @@
+"""The program of an image as a graph, and the rows of the timing table that the image carries: the types that the
+parts of this package share.
+
+Addresses are byte addresses in flash. Cycles are those of the CPU's clock, after the AVR instruction set manual for
+cores with a 16-bit program counter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """One machine instruction.
+
+    `cycles` is what it takes when the program goes on behind it, `operands` the decoded numbers in the order of the
+    manual's syntax (registers by number, constants, byte addresses of branches, I/O addresses).
+    """
+
+    address: int
+    size: int  # bytes, 2 or 4
+    mnemonic: str  # as objdump writes it: "ldi", "brne", "rcall", ...
+    operands: tuple[int, ...]
+    cycles: int
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A way out of a block: `cycles` is what the block's last instruction takes on this way, without a callee."""
+
+    to: int  # address of a block of the same function
+    cycles: int
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Instructions that run one after another. A call ends a block; its only edge leads behind the call.
+
+    A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
+    call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
+    instruction takes then.
+    """
+
+    start: int
+    instructions: tuple[Instruction, ...]
+    edges: tuple[Edge, ...]
+    calls: tuple[int, ...] = ()  # entries of the functions that its last instruction may call; mostly one
+    last_cycles: int = 0  # of the last instruction, where there are no edges
+
+    @property
+    def body_cycles(self) -> int:
+        """Cycles of all instructions but the last."""
+        return sum(instruction.cycles for instruction in self.instructions[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: where it begins and its blocks by their addresses."""
+
+    name: str
+    entry: int
+    blocks: dict[int, Block]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopBound:
+    """What the source says of a loop: `address` lies in its body.
+
+    At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
+    `cycles` in all, to which one more pass may come. None: not said.
+    """
+
+    address: int
+    passes: int | None
+    cycles: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskRow:
+    """TASK of tasks.def: runs in each slot whose number mod `period` is `phase`; `budget` in cycles, interrupts not counted."""
+
+    name: str
+    period: int
+    phase: int
+    budget: int
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptRow:
+    """INTERRUPT of tasks.def: all numbers but `vector` in cycles.
+
+    `budget` is its span from acceptance to the end of RETI, `latency` the longest from the request to acceptance,
+    `interval` the least time between two requests in the long run.
+    """
+
+    name: str
+    vector: int
+    budget: int
+    latency: int
+    interval: int
+
+
+@dataclass(frozen=True, slots=True)
+class SensorRow:
+    """SENSOR of tasks.def: a reading takes `conversion` us in hardware, comes every `period` ticks, and is at most `age` us
+    old when telemetry takes it."""
+
+    name: str
+    conversion: int
+    period: int
+    age: int
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The timing table of an image, in its order."""
+
+    tasks: tuple[TaskRow, ...] = ()
+    interrupts: tuple[InterruptRow, ...] = ()
+    sensors: tuple[SensorRow, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """All functions of an image that can be reached, by entry, and what the image says of itself."""
+
+    path: str
+    functions: dict[int, Function]
+    by_name: dict[str, int]  # entry of each named function
+    bounds: tuple[LoopBound, ...] = ()
+    table: Table = field(default_factory=Table)
+    lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
+
+    def where(self, address: int) -> str:
+        """A place for people: `0x1A2C (safety.c:57)`."""
+        line = self.lines.get(address)
+        return f"0x{address:04X}" + (f" ({line})" if line else "")
