@@ -78,7 +78,7 @@ class LoopBound:
 
 @dataclass(frozen=True, slots=True)
 class TaskRow:
-    """TASK of tasks.def: runs in each slot whose number mod `period` is `phase`; `budget` in cycles, interrupts not counted."""
+    """TASK of tasks.def: runs in each slot whose number mod `period` is `phase`; `budget` in cycles, net."""
 
     name: str
     period: int
@@ -103,8 +103,8 @@ class InterruptRow:
 
 @dataclass(frozen=True, slots=True)
 class SensorRow:
-    """SENSOR of tasks.def: a reading takes `conversion` us in hardware, comes every `period` ticks, and is at most `age` us
-    old when telemetry takes it."""
+    """SENSOR of tasks.def: a reading takes `conversion` us in hardware, comes every `period` ticks, and is at most
+    `age` us old when telemetry takes it."""
 
     name: str
     conversion: int
