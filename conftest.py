@@ -4,6 +4,7 @@ each folder's tests take, for the table at the end of `make test` (tools/times_t
 from __future__ import annotations
 
 import os
+import signal
 from collections import Counter
 from pathlib import Path
 
@@ -18,6 +19,10 @@ TIMES = os.environ.get("BOEBOT_TEST_TIMES")  # file to which a line per folder i
 settings.register_profile("same every time", max_examples=8 if SANITIZED else 100, deadline=None, derandomize=True)
 settings.register_profile("fuzz", max_examples=int(EXAMPLES or 100), deadline=None, print_blob=True)
 settings.load_profile("fuzz" if EXAMPLES else "same every time")
+
+# A shell without job control lets its background processes ignore Ctrl-C, and their children: tests need to be heard.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _tests: Counter[str] = Counter()
 _seconds: Counter[str] = Counter()
