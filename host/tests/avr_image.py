@@ -6,6 +6,12 @@ import re
 import subprocess
 from pathlib import Path
 
+import pytest
+
+from boebot.errors import TimingError
+from boebot.timing.graph import load_program
+from boebot.timing.program import Function, Program
+
 # `main` and the vectors come from avr-libc's start-up code.
 ASSEMBLER = """
 #define __SFR_OFFSET 0
@@ -48,3 +54,23 @@ def operands(text: str, address: int) -> tuple[int, ...]:
         else:
             numbers.append(int(word.removeprefix("r"), 0))
     return tuple(numbers)
+
+
+def assembled(folder: Path, source: str, *flags: str) -> Program:
+    return load_program(build(folder, source, *flags, assembler=True))
+
+
+def compiled(folder: Path, source: str, *flags: str) -> Program:
+    return load_program(build(folder, source, *flags))
+
+
+def function(program: Program, name: str) -> Function:
+    return program.functions[program.by_name[name]]
+
+
+def refusal(folder: Path, source: str, *flags: str, assembler: bool = True) -> str:
+    with pytest.raises(TimingError) as caught:
+        load_program(build(folder, source, *flags, assembler=assembler))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from avr_image import disassembly, operands
 
+from avr_image import disassembly, operands
 from boebot.timing.elf import read_image
 from boebot.timing.instructions import BRANCHES, SKIPS, decode
 
