@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avr_image import disassembly, operands
+from avr_image import assembled, disassembly, function, operands
 from boebot.timing.elf import read_image
 from boebot.timing.instructions import BRANCHES, SKIPS, decode
 
@@ -19,6 +19,8 @@ CYCLES = {
     3: "rcall icall jmp lpm",
     4: "call ret reti",
 }
+
+EEPROM = {("sbi", 0x1F), ("out", 0x1F)}  # instructions that write EECR
 
 
 def test_every_opcode_is_what_objdump_says(tmp_path: Path) -> None:
@@ -65,11 +67,31 @@ def test_cycles_are_those_of_the_data_sheet() -> None:
     seen: dict[str, int] = {}
     for word in range(0x10000):
         instruction = decode(word.to_bytes(2, "little") + bytes(2), 0)
-        if instruction is not None:
+        if instruction is not None and (instruction.mnemonic, *instruction.operands[:1]) not in EEPROM:
             assert instruction.cycles == expected.get(instruction.mnemonic, 1), instruction
             assert instruction.size == (4 if instruction.mnemonic in ("jmp", "call", "lds", "sts") else 2)
             seen[instruction.mnemonic] = instruction.cycles
     assert seen.keys() >= expected.keys() | BRANCHES | SKIPS
+
+
+@pytest.mark.parametrize(
+    ("source", "cycles"),
+    [
+        ("sbi EECR, EERE", 2 + 4),  # section 8.6.3: "when the EEPROM is read, the CPU is halted for four cycles"
+        ("sbi EECR, EEPE", 2 + 2),  # "when EEPE has been set, the CPU is halted for two cycles"
+        ("sbi EECR, EEMPE", 2),
+        ("cbi EECR, EERIE", 2),
+        ("out EECR, r24", 1 + 4),  # at most
+        ("sts 0x3F, r24", 2 + 4),
+        ("sts 0x1F, r24", 2),
+        ("out EEDR, r24", 1),
+        ("in r24, EECR", 1),
+    ],
+)
+def test_the_eeprom_halts_the_cpu(tmp_path: Path, source: str, cycles: int) -> None:
+    program = assembled(tmp_path, f"main: {source}\n ret")
+    main = function(program, "main")
+    assert main.blocks[main.entry].body_cycles == cycles
 
 
 def test_an_instruction_that_the_end_cuts_off_is_none() -> None:

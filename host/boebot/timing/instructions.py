@@ -153,6 +153,22 @@ def _relative(value: int, bits: int, address: int) -> int:
     return address + 2 + 2 * signed
 
 
+# The EEPROM's control register, and for how long it halts the CPU when a bit of it is set (data sheet, section 8.6.3).
+EECR_IO, EECR_DATA = 0x1F, 0x3F
+EEPROM_HALTS = {0: 4, 1: 2}  # EERE begins a read, EEPE a write
+
+
+def _halt(mnemonic: str, operands: tuple[int, ...]) -> int:
+    """Cycles for which the CPU stands still behind an instruction.
+
+    What `out` and `sts` write is not known here: they count as a read, which takes longest.
+    """
+    if mnemonic == "sbi" and operands[0] == EECR_IO:
+        return EEPROM_HALTS.get(operands[1], 0)
+    writes = (mnemonic == "out" and operands[0] == EECR_IO) or (mnemonic == "sts" and operands[0] == EECR_DATA)
+    return max(EEPROM_HALTS.values()) if writes else 0
+
+
 # How a field becomes an operand: from its value, its width in bits and the address of the instruction.
 READINGS: dict[str, Callable[[int, int, int], int]] = {
     "": lambda value, bits, address: value,
@@ -191,7 +207,7 @@ class _Row:
 
     def decode(self, opcode: int, address: int) -> Instruction:
         operands = tuple([operand.value(opcode, address) for operand in self.operands])
-        return Instruction(address, self.size, self.mnemonic, operands, self.cycles)
+        return Instruction(address, self.size, self.mnemonic, operands, self.cycles + _halt(self.mnemonic, operands))
 
 
 def _operand(text: str, pattern: str) -> _Operand:

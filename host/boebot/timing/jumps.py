@@ -148,7 +148,7 @@ class _Machine:
         self._forget_flags()
 
     def _forget_flags(self) -> None:
-        self._carry, self._zero = self._new(), self._new()
+        self._carry, self._zero = (_term(lambda byte: byte & 1, self._new()) for _ in range(2))
 
     def _branch(self, name: str, taken: bool) -> None:
         if name in ("brcs", "brcc"):
