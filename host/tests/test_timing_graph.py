@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from avr_image import assembled, disassembly, function, operands, refusal
 from boebot.timing.elf import read_image
-from boebot.timing.graph import load_program
+from boebot.timing.graph import load_program, program_of
 from boebot.timing.program import Edge, Instruction
 
 IMAGES = Path(__file__).resolve().parents[2] / "build" / "images"
@@ -102,6 +103,17 @@ def test_names_of_one_address_are_all_kept(tmp_path: Path) -> None:
     program = assembled(tmp_path, "main: rcall first\n ret\n .global first, second\n first:\n second: ret")
     assert program.by_name["first"] == program.by_name["second"]
     assert "0x" not in function(program, "first").name
+
+
+def test_of_two_functions_with_one_name_the_global_one_is_meant(tmp_path: Path) -> None:
+    # Local symbols of several files can have the same name.
+    program = assembled(tmp_path, "main: rcall 1f\n rcall twin\n ret\n 1: nop\n ret\n .global twin\n twin: ret")
+    image = read_image(tmp_path / "program.elf")
+    (twin,) = [s for s in image.symbols if s.name == "twin"]
+    local = replace(twin, address=twin.address - 4, strength=2)
+    again = program_of(replace(image, symbols=(local, *image.symbols)))
+    assert program.by_name["twin"] == again.by_name["twin"] == twin.address
+    assert again.functions[local.address].name == "twin"
 
 
 def test_code_that_no_symbol_names_is_named_after_the_one_before(tmp_path: Path) -> None:

@@ -207,3 +207,15 @@ def test_shared_code_that_saves_registers_is_part_of_each_function(tmp_path: Pat
                 assert text[edge.to - 4].startswith("jmp") or text[edge.to - 2].startswith("rjmp")
     assert users >= 1
     assert not any("__prologue" in f.name or "__epilogue" in f.name for f in program.functions.values())
+
+
+def test_a_long_computation_before_the_jump_is_refused(tmp_path: Path) -> None:
+    steps = "add r30, r24\n adc r31, r25\n" * 400
+    assert "cannot be proven" in refusal(tmp_path, f"main: andi r24, 1\n {steps} ijmp")
+
+
+def test_a_loop_before_the_jump_is_no_way_of_its_own(tmp_path: Path) -> None:
+    # Z is 0 only the first time: the way back around adds to it.
+    assert "cannot be proven" in refusal(
+        tmp_path, "main: clr r30\n clr r31\n 1: adiw r30, 1\n dec r24\n brne 1b\n ijmp"
+    )
