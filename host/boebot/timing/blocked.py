@@ -239,7 +239,8 @@ class Blocked:
         for callee, edge_cycles, to in _leaving(block):
             for following in states:
                 if callee is not None:
-                    found += self._call(flow, node, following, callee, edge_cycles, to)
+                    effect = self._callee(callee, block, function, state.flag is not Flag.OFF)
+                    found += self._call(flow, node, following, effect, edge_cycles, to)
                 elif to is not None:
                     found.append((to, 0, following))
                     self._go(flow, node, found[-1], edge_cycles, instruction.address)
@@ -263,10 +264,15 @@ class Blocked:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
         flow.returned.setdefault(node, []).append((flag is Flag.OFF, cycles))
 
-    def _call(self, flow: _Flow, node: _Node, state: State, callee: int, cycles: int, to: int | None) -> list[_Node]:
+    def _callee(self, entry: int, block: Block, function: Function, on: bool) -> Effect:
+        """What a callee does to the flag; in time, where it leaves it alone, with the argument that it gets."""
+        if self._is_plain(entry) and not on:
+            return Effect(through=self.worst_case.callee(entry, block, function).cycles)
+        return self.effect(entry, on)
+
+    def _call(self, flow: _Flow, node: _Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[_Node]:
         """A call, or a jump into another function (`to` None)."""
         flag = node[2].flag
-        effect = self.effect(callee, on=flag is not Flag.OFF)
         flow.within.append(effect.within)
         if flag is not Flag.OFF:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
