@@ -105,7 +105,7 @@ def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None
 
 def test_refusal_names_the_line(tmp_path: Path) -> None:
     source = "#include <stdint.h>\nvolatile uint8_t x;\nint main(void) {\n  while (x != 0) {\n    x--;\n  }\n}\n"
-    program = load_program(build(tmp_path, source, "-g"))
+    program = load_program(build(tmp_path, source, "-gdwarf-2"))
     with pytest.raises(TimingError, match=r"loop at 0x[0-9A-F]{4} \(.*program\.c:[45]\)"):
         WorstCase(program).of("main")
 
