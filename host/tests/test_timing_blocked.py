@@ -29,7 +29,7 @@ JUMP = 3  # of a vector, where the linker does not relax
          1 + 3 + (1 + 1 + 1 + 1 + 4) + 1 + 1),
         ("main: cli\n ldi r24, 10\n 1: dec r24\n brne 1b\n sei\n nop\n ret", 1 + 1 + (9 * 3 + 2) + 1 + 1),
         ("main: ldi r24, 10\n 1: cli\n nop\n sei\n dec r24\n brne 1b\n ret", 1 + 1 + 1 + 1),
-        ("main: cli\n sei\n nop\n cli\n nop\n sei\n nop\n ret", 3 + 4),  # `cli` may run before what waits
+        ("main: cli\n sei\n nop\n cli\n nop\n sei\n nop\n ret", 4),  # an interrupt comes between the two
         ("main: cli\n sei\n nop\n nop\n cli\n nop\n sei\n nop\n ret", 4),
         ("main: cli\n sei\n cli\n sei\n nop\n ret", 5),  # it never was on
         ("main: in r18, SREG\n cli\n push r18\n nop\n pop r18\n out SREG, r18\n nop\n ret", 1 + 2 + 1 + 2 + 1 + 1),
@@ -79,6 +79,17 @@ def test_interrupts(tmp_path: Path) -> None:
     assert blocked.latency(1) == third + main
     assert blocked.latency(2) == third + main + (first + 4)
     assert blocked.latency(3) == third + main + (first + 4) + (second + 4)
+
+
+def test_only_one_interrupt_comes_before_a_cli_at_once(tmp_path: Path) -> None:
+    """So each of higher priority is followed by all of that stretch, not by one instruction only."""
+    source = VECTORS + (
+        "main: cli\n sei\n nop\n {} cli\n nop\n nop\n nop\n sei\n nop\n ret\n __vector_1: reti\n __vector_2: reti"
+    )
+    interrupt, stretch = ENTRY + JUMP + 4, 1 + 3 + 1 + 1
+    for between, behind in (("", stretch), ("nop\n", 4)):
+        blocked = Blocked(assembled(tmp_path, source.format(between)))
+        assert blocked.latency(2) == (interrupt + stretch) + (interrupt + behind)
 
 
 def test_planted_instruction_lengthens_the_stretch(tmp_path: Path) -> None:

@@ -1,9 +1,9 @@
 """The longest time in which no interrupt is accepted: of a function, of a whole image, and what each interrupt waits.
 
-A stretch begins with the first cycle of `cli`, or with the acceptance of an interrupt, whose entry takes 4 cycles (data
-sheet, 7.7.1). It ends with the instruction behind the one that sets the flag. Where a `cli` follows at once on that
-instruction, an interrupt that was let in returns to it, and it runs before the next one is accepted: both stretches
-count as one. The same holds when an interrupt returns: one instruction runs, and it may be a `cli`.
+A stretch begins with the first cycle of `cli`, or with the acceptance of an interrupt, whose entry takes 4 cycles
+(data sheet, 7.7.1). It ends with the instruction behind the one that sets the flag. When an interrupt returns, one
+instruction runs before the next one is accepted, and that may be a `cli`. So where a `cli` comes as soon as interrupts
+are on again, only one interrupt gets in between two stretches.
 
 Taken for granted: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
 not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. While the CPU sleeps, it wakes in
@@ -50,6 +50,7 @@ class Effect:
         head: cycles from entry until interrupts can come.
         tail: the longest stretch that lasts from within until its return.
         on: whether it can return with interrupts on.
+        chained: the longest stretch within that begins when only one interrupt could come since the one before.
     """
 
     within: Stretch = NONE
@@ -57,6 +58,8 @@ class Effect:
     head: int | None = None
     tail: Stretch | None = None
     on: bool = False
+    chained: Stretch = NONE
+    plain: bool = False  # leaves the flag alone
 
 
 _Node = tuple[int, int, State]  # block, number of the instruction in it, state before it
@@ -71,8 +74,9 @@ class _Flow:
     goes: dict[_Node, list[tuple[_Node, int]]] = field(default_factory=dict)
     ended: dict[_Node, list[int]] = field(default_factory=dict)  # cycles until interrupts can come
     returned: dict[_Node, list[tuple[bool, int]]] = field(default_factory=dict)  # whether off, cycles
-    begins: list[tuple[_Node, int, Stretch]] = field(default_factory=list)  # node, cycles before it, of a callee
-    within: list[Stretch] = field(default_factory=list)  # of callees
+    # First node, cycles before it, where, whether interrupts had just come on
+    begins: list[tuple[_Node, int, Stretch, bool]] = field(default_factory=list)
+    callees: list[Effect] = field(default_factory=list)
 
 
 class Blocked:
@@ -127,6 +131,8 @@ class Blocked:
         as often as they can come in that time, each with one instruction behind it.
         """
         own = self.of("main").cycles
+        chained = self.effect(self.program.by_name["main"], on=True).chained.cycles
+        between = max(chained, LONGEST_INSTRUCTION)
         rows = {row.vector: row.interval for row in self.program.table.interrupts}
         spans = {number: self.interrupt(number) for number in self.vectors()}
         begun = [own, WAKE]
@@ -140,7 +146,7 @@ class Blocked:
             longer = start
             for number, first in higher.items():
                 interval = rows.get(number, 0)
-                longer += (wait // interval + 1 if interval > 0 else 1) * (first + LONGEST_INSTRUCTION)
+                longer += (wait // interval + 1 if interval > 0 else 1) * (first + between)
             if longer == wait:
                 return wait
             wait = longer
@@ -164,7 +170,7 @@ class Blocked:
     def _worked_out(self, entry: int, on: bool) -> Effect:
         if not self._is_plain(entry):
             return self._effect(self.program.functions[entry], on)
-        return Effect(on=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
+        return Effect(on=True, plain=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
 
     def _is_plain(self, entry: int) -> bool:
         """Nothing in it or below it writes the flag."""
@@ -193,11 +199,13 @@ class Blocked:
     def _effect(self, function: Function, on: bool) -> Effect:
         flow = self._flow(function, on)
         marks = self.worst_case.marks(function)
-        within = list(flow.within)
+        within = [callee.within for callee in flow.callees]
+        chained = [callee.chained for callee in flow.callees]
         tails: list[Stretch] = []
-        for node, before, at in flow.begins:
+        for node, before, at, just_on in flow.begins:
             ended = self._longest(flow, node, marks, _ended)
             within += [] if ended is None else [Stretch(before + ended, at.begin)]
+            chained += within[-1:] if just_on and ended is not None else []
             returned = self._longest(flow, node, marks, _returned)
             tails += [] if returned is None else [Stretch(before + returned, at.begin)]
         returns = [off for each in flow.returned.values() for off, _ in each]
@@ -207,6 +215,7 @@ class Blocked:
             head=None if on else self._longest(flow, flow.entry, marks, _ended),
             tail=max(tails, key=_cycles, default=None),
             on=not all(returns),
+            chained=max(chained, key=_cycles, default=NONE),
         )
 
     def _longest(
@@ -272,10 +281,10 @@ class Blocked:
         flag, following = node[2].flag, to[2].flag
         if flag is Flag.JUST_ON:
             flow.ended.setdefault(node, []).append(0)
-        if flag is Flag.ON and following is Flag.OFF:
-            flow.begins.append((node, 0, Stretch(0, address)))
-        if flag.blocks or following is Flag.OFF:
+        if flag.blocks:
             flow.goes.setdefault(node, []).append((to, cycles))
+        elif following is Flag.OFF:
+            flow.begins.append((to, cycles, Stretch(0, address), flag is Flag.JUST_ON))
 
     def _return(self, flow: _Flow, node: _Node, cycles: int) -> None:
         flag = node[2].flag
@@ -292,7 +301,7 @@ class Blocked:
     def _call(self, flow: _Flow, node: _Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[_Node]:
         """A call, or a jump into another function (`to` None)."""
         flag = node[2].flag
-        flow.within.append(effect.within)
+        flow.callees.append(effect)
         if flag is not Flag.OFF:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
         if effect.head is not None:
@@ -305,7 +314,7 @@ class Blocked:
             if tail is not None:
                 ret = (node[0], node[1], State(Flag.OFF, frozenset(), -1))
                 flow.returned.setdefault(ret, []).append((True, 0))
-                flow.begins.append((ret, tail.cycles, tail))
+                flow.begins.append((ret, tail.cycles, tail, False))
             if effect.on:
                 flow.returned.setdefault(node, []).append((False, 0))
             return found
@@ -314,10 +323,11 @@ class Blocked:
             flow.goes.setdefault(node, []).append((behind_off, cycles + effect.through))
             found.append(behind_off)
         if tail is not None:
-            flow.begins.append((behind_off, tail.cycles, tail))
+            flow.begins.append((behind_off, tail.cycles, tail, False))
             found.append(behind_off)
         if effect.on:
-            found.append((to, 0, State(Flag.ON, state.copies, state.pushed)))
+            behind = Flag.ON if effect.plain else Flag.JUST_ON
+            found.append((to, 0, State(behind, state.copies, state.pushed)))
         return found
 
 
