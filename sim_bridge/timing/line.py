@@ -53,6 +53,12 @@ class Line:
         self.free = begin + len(wire) * BYTE_CYCLES
         return self.free
 
+    def pad(self, count: int) -> None:
+        """Sends so many delimiters, which are empty frames, behind the last frame."""
+        if count > 0:
+            self.bench.access.send(bytes(count), at=self.free)
+            self.free += count * BYTE_CYCLES
+
     def numbered(self, kind: Any, *fields: int) -> Any:
         """The next request of the session."""
         self._number = (self._number + 1) & 0xFFFF
@@ -126,7 +132,7 @@ class Line:
         self.ask(messages.SetParameter, messages.PARAMETERS[parameter].id, value)
 
     def arm(self) -> None:
-        """Ends the latch, once the supply has been measured; set-points that answer a later tick then move the motors."""
+        """Ends the latch once the supply has been measured; set-points that answer later ticks then move the motors."""
         newest = self.wait(messages.Telemetry, len(self.heard))
         while newest.supply == 0:
             newest = self.wait(messages.Telemetry, len(self.heard))

@@ -1,7 +1,7 @@
 """Loads at the pins: an emulated board by itself, and what drives its lines: encoder wheels, echoes, contacts.
 
-A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that phases
-are swept. Bytes are in line.py.
+A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that
+phases are swept. Bytes are in line.py.
 """
 
 from __future__ import annotations
@@ -30,16 +30,21 @@ ECHO_SHORTEST, ECHO_LONGEST = 2_000, 290_000  # cycles: 0.125 to 18.1 ms (ibid.:
 
 @dataclass(frozen=True)
 class Load:
-    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line."""
+    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line.
+
+    `frame_bytes`: each frame to the board takes so many bytes of a line that is full both ways; 0: back to back, as
+    short as they are; None: a set-point each tick, and telemetry.
+    """
 
     name: str
     edges_per_s: int
-    saturated: bool  # frames back to back both ways, else a set-point each tick
+    frame_bytes: int | None
 
 
-FIGURES = Load("figures", edges_per_s=1500, saturated=False)
-SATURATED = Load("saturated", edges_per_s=4000, saturated=True)
-LOADS = (FIGURES, SATURATED)
+FIGURES = Load("figures", edges_per_s=1500, frame_bytes=None)
+SATURATED = Load("saturated", edges_per_s=4000, frame_bytes=30)
+SHORT_FRAMES = Load("short frames", edges_per_s=4000, frame_bytes=0)
+LOADS = (FIGURES, SATURATED, SHORT_FRAMES)
 
 
 class Source(Protocol):
@@ -174,13 +179,13 @@ class Ping:
         self.pin, self.step = pin, step
         self.echoes: list[tuple[int, int]] = []
         """cycles of rise and fall of each"""
-        self._seen = 0
+        self._seen: int | None = None
 
     def queue(self, bench: Bench, until: int) -> None:
-        """See Source."""
+        """See Source. Triggers from before the first call get no answer."""
         del until
         log = bench.edges[self.pin]
-        for edge in log[self._seen :]:
+        for edge in log[self._seen if self._seen is not None else len(log) :]:
             if edge.level == Level.LOW:
                 self._answer(bench, edge.cycle)
         self._seen = len(log)
