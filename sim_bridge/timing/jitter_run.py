@@ -58,7 +58,7 @@ def drive(bench: Bench, start: int, load: Load, seconds: float, seed: int, share
     prepare(line)
     first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
     lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]
-    traffic = EachTick(line, first) if load.frame_bytes is None else FullLine(line, first, load.frame_bytes)
+    traffic = FullLine(line, first) if load.full_line else EachTick(line, first)
     run = Run(
         load=load,
         bench=bench,

@@ -53,12 +53,6 @@ class Line:
         self.free = begin + len(wire) * BYTE_CYCLES
         return self.free
 
-    def pad(self, count: int) -> None:
-        """Sends so many delimiters, which are empty frames, behind the last frame."""
-        if count > 0:
-            self.bench.access.send(bytes(count), at=self.free)
-            self.free += count * BYTE_CYCLES
-
     def numbered(self, kind: Any, *fields: int) -> Any:
         """The next request of the session."""
         self._number = (self._number + 1) & 0xFFFF

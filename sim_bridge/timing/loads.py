@@ -30,21 +30,16 @@ ECHO_SHORTEST, ECHO_LONGEST = 2_000, 290_000  # cycles: 0.125 to 18.1 ms (ibid.:
 
 @dataclass(frozen=True)
 class Load:
-    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line.
-
-    `frame_bytes`: each frame to the board takes so many bytes of a line that is full both ways; 0: back to back, as
-    short as they are; None: a set-point each tick, and telemetry.
-    """
+    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line."""
 
     name: str
     edges_per_s: int
-    frame_bytes: int | None
+    full_line: bool  # frames back to back both ways, else a set-point and telemetry each tick
 
 
-FIGURES = Load("figures", edges_per_s=1500, frame_bytes=None)
-SATURATED = Load("saturated", edges_per_s=4000, frame_bytes=30)
-SHORT_FRAMES = Load("short frames", edges_per_s=4000, frame_bytes=0)
-LOADS = (FIGURES, SATURATED, SHORT_FRAMES)
+FIGURES = Load("figures", edges_per_s=1500, full_line=False)
+SATURATED = Load("saturated", edges_per_s=4000, full_line=True)
+LOADS = (FIGURES, SATURATED)
 
 
 class Source(Protocol):

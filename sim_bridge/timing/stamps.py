@@ -85,7 +85,8 @@ class EncoderStamps:
         return self._bench.access.read_memory(self._head, 1)[0]
 
     def _entry(self, place: int) -> bytes:
-        return self._bench.access.read_memory(self._ring + place, CHANGE_BYTES)
+        """The first place is a copy of the one behind the last, which is written before the head says so."""
+        return self._bench.access.read_memory(self._ring + (place or CHANGES_BYTES), CHANGE_BYTES)
 
     def _look(self) -> None:
         head = self._now()

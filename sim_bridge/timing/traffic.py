@@ -1,7 +1,7 @@
 """What a host sends while jitter is measured: a set-point each tick, or frames without a gap; and probes of the clock.
 
-Frames to the board have 8 to 16 bytes on the wire. A full line carries more of them than it would of longer ones, and
-each costs the board; delimiters between them, which are empty frames, make it as many as of any length.
+The protocol's frames to the board have 10 to 16 bytes on the wire, most answers 15: a full line carries more of them
+than of longer ones, and the board has work with each.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from boebot.link import messages
-from sim_bridge.timing.line import BYTE_CYCLES, Line
+from sim_bridge.timing.line import Line
 from sim_bridge.timing.loads import Bench
 
 SETPOINT_PERIOD = 159_001  # cycles: a prime below the tick, so at least one each tick, at each of its phases
@@ -18,7 +18,6 @@ HOLD = 1_113_007  # cycles from one change of the motor signals to the next: thr
 TIME_TO_LIVE_MS = 250
 SIGNALS = ((3000, -3000), (-1500, 4500))  # in 1/10000; the widths of all of them are whole cycles
 EVERY_SETPOINT = 10  # frames of a full line; all others but probes are requests, whose answers fill the way back
-EVERY_IDENTIFY = 5  # of padded frames: an answer of 68 bytes, for what the padding leaves of the way back
 
 
 class Change(NamedTuple):
@@ -84,28 +83,19 @@ class EachTick(Traffic):
 
 
 class FullLine(Traffic):
-    """A line that is full both ways: set-points and requests, each with its answer."""
+    """Frames back to back: set-points and requests, and as many answers."""
 
-    def __init__(self, line: Line, first: int, frame_bytes: int) -> None:
-        """Each frame takes `frame_bytes` of the line at least."""
+    def __init__(self, line: Line, first: int) -> None:
         super().__init__(line, first)
         self._first = first
-        self._frame_bytes = frame_bytes
         self._count = 0
         self._request = line.numbered(messages.SetParameter, messages.PARAMETERS["track_width"].id, 10_000)
 
     def queue(self, bench: Bench, until: int) -> None:
         """See Source. The board answers a request that comes again as it answered the first time."""
         while (at := max(self._first, self.line.free, bench.now)) < until:
-            self._frame(at)
-            taken = (self.line.free - at) // BYTE_CYCLES
-            self.line.pad(self._frame_bytes - taken)
+            if self._count % EVERY_SETPOINT == 0:
+                self.setpoint(at)
+            elif not self.probe(at):
+                self.line.send(self._request, at)
             self._count += 1
-
-    def _frame(self, at: int) -> None:
-        if self._count % EVERY_SETPOINT == 0:
-            self.setpoint(at)
-        elif self._frame_bytes and self._count % EVERY_IDENTIFY == 1:
-            self.line.send(messages.Identify(), at)
-        elif not self.probe(at):
-            self.line.send(self._request, at)
