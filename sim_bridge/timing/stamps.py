@@ -109,7 +109,7 @@ class EchoStamps:
         self._bench, self._start = bench, start
         at = variables(bench.elf, "rise", "fall")
         self._rise, self._fall = at["rise"], at["fall"]
-        self._last = self._read()
+        self._taken = self._before = self._read()
         bench.after_slice.append(self._look)
 
     def _read(self) -> tuple[bytes, bytes]:
@@ -117,10 +117,11 @@ class EchoStamps:
         return memory(self._rise, 3), memory(self._fall, 3)
 
     def _look(self) -> None:
-        rise, fall = self._read()
-        if fall != self._last[1]:
-            self._last = (rise, fall)
-            self.echoes.append((self._cycle(rise), self._cycle(fall)))
+        read = self._read()
+        if read[1] != self._taken[1] and read == self._before:  # not in the midst of writing
+            self._taken = read
+            self.echoes.append((self._cycle(read[0]), self._cycle(read[1])))
+        self._before = read
 
     def _cycle(self, moment: bytes) -> int:
         """Of a schedule_moment: slot n begins when the timer has counted (n + 1) slots; offsets above three quarters of
