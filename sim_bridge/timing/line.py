@@ -104,8 +104,8 @@ class Line:
 
     def open(self) -> messages.Hello:
         """Opens a session with a board that has none."""
-        hello = self.wait(messages.Hello, 0)
-        self.seed = 0
+        self.decoder.seed = frame.NO_SESSION
+        hello = self.wait(messages.Hello, len(self.heard))
         since = len(self.heard)
         self.send(messages.Open(messages.PROTOCOL_VERSION, hello.board_nonce, HOST_NONCE))
         self.decoder.seed = self.seed = hello.board_nonce ^ HOST_NONCE

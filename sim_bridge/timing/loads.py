@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -139,7 +139,7 @@ def coprime_periods(edges_per_s: int, count: int) -> list[int]:
     return found
 
 
-def wheels(pins: list[tuple[int, ...]], edges_per_s: int, first: int) -> list[list[PulseTrain]]:
+def wheels(pins: Sequence[tuple[int, ...]], edges_per_s: int, first: int) -> list[list[PulseTrain]]:
     """The encoder lines of each wheel, one or two a wheel, at `edges_per_s` a line; with two, A leads B by a quarter
     turn of the pattern: forward."""
     periods = coprime_periods(edges_per_s, len(pins))
