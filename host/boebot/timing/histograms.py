@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from boebot.errors import BoebotError
 from boebot.report import style
@@ -60,12 +61,13 @@ def draw(distributions: Sequence[Distribution], path: Path) -> Path:
 
 def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None:
     """Shares of all values by bins, on a scale where one in a thousand is seen; limits as dashed lines."""
-    values = np.concatenate([one.values for one in found]).astype(np.float64)
+    values = np.concatenate([one.values for one in found])
     limits = sorted({limit for one in found for limit in (one.least, one.most) if limit is not None})
     scale = 16_000.0 if np.abs(values).max() > MILLISECONDS_FROM else 1.0
-    low, high = values.min(), values.max()
+    low, high = float(values.min()), float(values.max())
     each_cycle = scale == 1.0 and high - low < BINS
-    edges = np.arange(low - 0.5, high + 1.5) if each_cycle else np.linspace(low, high, BINS + 1)
+    bins = int(np.clip(np.sqrt(len(values)), 8, BINS))  # few values in many bins would show nothing but gaps
+    edges = np.arange(low - 0.5, high + 1.0) if each_cycle else np.linspace(low, high, bins + 1)
     for one, colour, dashes in zip(found, cycle(style.ROBOTS), cycle(style.DASHES), strict=False):
         label = one.load if one.subject == "boebot" else f"{one.subject}, {one.load}"
         shares = np.histogram(one.values, bins=edges)[0] / one.count
@@ -75,7 +77,10 @@ def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None
         if low - span <= limit <= high + span:  # else it would squeeze the values
             axes.axvline(limit / scale, color=style.ESTIMATE, ls=(0, (4, 2)), lw=1.0)
     axes.set_yscale("log")
-    axes.set_ylim(2e-4, 2.0)
+    axes.set_ylim(2e-4, 4.0)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g} %"))
+    if high == low:
+        axes.set_xlim(low - 3.0, high + 3.0)
     axes.set_title(quantity)
     axes.set_xlabel("ms" if scale != 1.0 else "cycles")
     axes.legend(fontsize=6.5, loc="upper right")
