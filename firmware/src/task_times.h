@@ -13,7 +13,6 @@ extern "C" {
 enum {
 #define TASK(name, period, phase, budget) TASK_##name,
 #include "tasks.def"
-#undef TASK
   TASKS
 };
 
