@@ -433,7 +433,7 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the request */
   uint8_t status; /* answer_status */
-  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or its board does not take time */
+  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board */
 } msg_answer;
 
 /* Something happened. Sent again until acknowledged. */

@@ -853,7 +853,7 @@ class DevicesTelemetry(_DevicesTelemetryFields):
 class _AnswerFields(NamedTuple):
     number: int  # of the request
     status: int  # answer_status
-    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or its board does not take time
+    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board
 
 
 class Answer(_AnswerFields):

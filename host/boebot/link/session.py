@@ -246,7 +246,7 @@ class Link(Traffic):
     def take_task_times(self) -> dict[str, int | None]:
         """How long each task of the firmware took at most, in cycles of 1/16 us, interrupts on top included, since
         this was last asked, or since the board started; from now on anew. 65535: so long or longer. None: it has not
-        run, or the board does not take time (the native one).
+        run, or takes no time (on the native board, where only the Ping's pulse does).
 
         How many ticks overran is in the telemetry: `overruns`.
 

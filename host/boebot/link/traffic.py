@@ -291,7 +291,10 @@ class Traffic(Opening):
         cause = self.hello.reset_cause
         if reset_cause.by_watchdog(cause):
             where = self.transport.name
-            self.notices.append(f"the last reset of the board at {where} was by its {reset_cause.in_words(cause)}")
+            self.notices.append(
+                f"the last reset of the board at {where} was by its {reset_cause.in_words(cause)}: the firmware hung there, "
+                "or fell behind for good"
+            )
 
     def _hear_answer(self, payload: bytes, now: float) -> None:
         if not self.is_open:
