@@ -26,11 +26,11 @@ def row(what: str, expected: int, code: str, before: str = "", after: str = "") 
 
 def plain() -> list[Row]:
     """Those that take the same time always and lead to the next instruction."""
-    two_registers = "ADD ADC SUB SBC AND OR EOR CP CPC MOV".split()
-    constant = "SUBI SBCI ANDI ORI CPI LDI".split()
-    one_register = "COM NEG INC DEC ASR LSR ROR SWAP".split()
-    aliases = "TST CLR LSL ROL".split()  # of AND, EOR, ADD, ADC
-    products = "MUL MULS MULSU FMUL FMULS FMULSU".split()
+    two_registers = ["ADD", "ADC", "SUB", "SBC", "AND", "OR", "EOR", "CP", "CPC", "MOV"]
+    constant = ["SUBI", "SBCI", "ANDI", "ORI", "CPI", "LDI"]
+    one_register = ["COM", "NEG", "INC", "DEC", "ASR", "LSR", "ROR", "SWAP"]
+    aliases = ["TST", "CLR", "LSL", "ROL"]  # of AND, EOR, ADD, ADC
+    products = ["MUL", "MULS", "MULSU", "FMUL", "FMULS", "FMULSU"]
     loads = ["X", "X+", "-X", "Y", "Y+", "-Y", "Z", "Z+", "-Z"]
     return [
         *(row(f"{name} Rd,Rr", 1, f"{name} r16, r17") for name in two_registers),

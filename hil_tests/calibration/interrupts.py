@@ -1,7 +1,7 @@
 """Interrupts: entry, return, wake-up from idle, and the one instruction that always runs before the next one.
 
-The interrupts are INT0 and INT1, which the program raises itself: pins 2 and 3 are outputs, and their edges count all the
-same (data sheet, 13). Each vector holds a JMP, 3 cycles.
+Most are INT0 and INT1, which the program raises itself: pins 2 and 3 are outputs, and their edges count all the same
+(data sheet, 13). Each vector holds a JMP, 3 cycles.
 """
 
 from __future__ import annotations

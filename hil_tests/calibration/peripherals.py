@@ -68,6 +68,7 @@ UART = [
         source="20.6: begins with the next clock of the transmitter",
         code=f"""
           clr r8
+          store UCSR0A, 1 << TXC0 | 1 << U2X0
           store UCSR0B, 1 << TXEN0 | 1 << TXCIE0
           ldi r24, 'U'
           begin

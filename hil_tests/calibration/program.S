@@ -165,7 +165,6 @@ end_line:
   lds r24, UCSR0A
   sbrs r24, TXC0
   rjmp 1b
-  store UCSR0A, 1 << TXC0 | 1 << U2X0
   ret
 
 /* The distance of the two stamps. */

@@ -40,16 +40,8 @@ def image() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "rows.inc").write_text(source(), encoding="ascii")
         elf = Path(folder, "calibration.elf")
-        command = [
-            "avr-gcc",
-            "-mmcu=atmega328p",
-            f"-I{folder}",
-            f'-DPROGRAM_NAME="{name()}"',
-            "-o",
-            str(elf),
-            str(FRAME),
-        ]
-        _run(command, "assembles the calibration program")
+        options = ["-mmcu=atmega328p", f"-I{folder}", f'-DPROGRAM_NAME="{name()}"']
+        _run(["avr-gcc", *options, "-o", str(elf), str(FRAME)], "assembles the calibration program")
         return elf.read_bytes()
 
 

@@ -69,7 +69,7 @@ def capture(noise_filter: int) -> Row:
     cancelled = 4 * noise_filter
     return Row(
         group=GROUP,
-        what=f"Timer 1, capture {'with' if noise_filter else 'without'} noise canceller: from the edge to the count kept",
+        what=f"Timer 1, capture {'with' if noise_filter else 'without'} noise canceller: from edge to count kept",
         expected=3 + cancelled,
         source="16.6.2: 4 cycles; 17.1: 2.5 to 3.5" if noise_filter else "16.6.1, 17.1: 2.5 to 3.5",
         code=f"""
