@@ -9,6 +9,7 @@ from hil_tests.calibration.interrupts import ENTRY, JMP
 from hil_tests.calibration.rows import CPU_HZ, STAMP_CYCLES, Row
 
 WAKE_UP = 4
+OWN_OSCILLATOR = "timed by an oscillator of the chip's own"
 FROM_IDLE = ENTRY + WAKE_UP + JMP
 STS, SBI = 2, 2
 
@@ -96,6 +97,7 @@ UART = [
           {UART_ON}
         """,
         edges=(-3, -2),
+        board_only_shown="the computer's serial adapter decides",
     ),
     *(
         Row(
@@ -233,6 +235,7 @@ EEPROM = [
           sleep_until 1
         """,
         around=STAMP_CYCLES + SBI + SBI + FROM_IDLE,
+        board_only_shown=OWN_OSCILLATOR,
     ),
     window(2),
     window(3),
@@ -325,6 +328,7 @@ def watchdog(step: int) -> Row:
           store TCCR1B, 1 << CS10
         """,
         scale=64,
+        board_only_shown=OWN_OSCILLATOR,
     )
 
 

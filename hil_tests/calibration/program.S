@@ -69,6 +69,11 @@
 .endm
 
 .macro ask count
+9:
+  lds r24, UDR0                     /* what came before it was asked for */
+  lds r24, UCSR0A
+  sbrc r24, RXC0
+  rjmp 9b
   ldi r25, '>'
   call send
   ldi r25, '0' + \count

@@ -51,11 +51,20 @@ def flash_bytes() -> bytes:
     Raises:
         BoardError: avr-objcopy is missing or fails.
     """
+    return _converted("binary")
+
+
+def flash_hex() -> str:
+    """The same as an Intel hex file. Raises as `flash_bytes`."""
+    return _converted("ihex").decode("ascii")
+
+
+def _converted(to: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        elf, binary = Path(folder, "calibration.elf"), Path(folder, "calibration.bin")
+        elf, converted = Path(folder, "calibration.elf"), Path(folder, "calibration.out")
         elf.write_bytes(image())
-        _run(["avr-objcopy", "-O", "binary", str(elf), str(binary)], "takes the program out of its ELF file")
-        return binary.read_bytes()
+        _run(["avr-objcopy", "-O", to, str(elf), str(converted)], "takes the program out of its ELF file")
+        return converted.read_bytes()
 
 
 def _run(command: list[str], purpose: str) -> None:

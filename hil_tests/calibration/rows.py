@@ -32,6 +32,7 @@ class Row:
     edges: tuple[int, int] = (-2, -1)  # which of the row's edges at pin 13 are the two stamps
     unit: str = "cycles"
     difference: str = ""  # why the emulator is known not to agree
+    board_only_shown: str = ""  # why a real board's value is no verdict
 
     def value(self, number: int) -> int:
         """What was measured, from the number that the program sent."""
