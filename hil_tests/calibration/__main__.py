@@ -19,16 +19,17 @@ from hil_tests.calibration import avr8js, board, emulator, table
 
 def measured(port: str | None, flash: bool) -> table.Calibration:
     """All columns that can be had."""
-    with Console(stderr=True).status("emulator") as status:
-        ours = emulator.measure()
-        status.update("avr8js")
-        theirs = avr8js.measure()
+    with Console(stderr=True).status("assembling") as status:
         real = None
         if port is not None:
             if flash:
                 status.update(f"flashing {port}")
                 board.flash(port)
             real = board.listen(port, lambda awaited: status.update(f"{port}: {awaited}"))
+        status.update("emulator")
+        ours = emulator.measure()
+        status.update("avr8js")
+        theirs = avr8js.measure()
     return table.Calibration(ours, theirs, real)
 
 
