@@ -110,7 +110,7 @@ def test_another_program_is_refused() -> None:
 
 
 def test_talk_cut_anywhere_is_understood_and_says_what_it_awaits() -> None:
-    said = f"garbage\n{name()}\nUUU\n=0000 0006\n>3\n\xff\n=0001 0007\n".encode("latin-1")
+    said = f"garbage\n=0002 0009\nend\n{name()}\nUUU\n=0000 0006\n>3\n\xff\n=0001 0007\n".encode("latin-1")
     for cut in range(len(said)):
         talk = Talk()
         assert talk.awaited == "the program's name"

@@ -50,7 +50,7 @@ MATCH = f"""
   sei
 """
 UNMATCH = "cli\nsts TIMSK1, r1"
-# The flag is set one count after the match (figure 16-11), and the stamp reads in its second cycle.
+# The flag is set one count after the match (figure 16-10), and the stamp reads in its second cycle.
 MATCH_AROUND = MATCH_DISTANCE + 1 + JMP + 1
 
 ROWS = [

@@ -10,6 +10,7 @@ from hil_tests.calibration.rows import CPU_HZ, STAMP_CYCLES, Row
 
 WAKE_UP = 4
 OWN_OSCILLATOR = "timed by an oscillator of the chip's own"
+PULL_UPS = "weak pull-ups make the lines slow"
 FROM_IDLE = ENTRY + WAKE_UP + JMP
 STS, SBI = 2, 2
 
@@ -271,6 +272,7 @@ TWO_WIRE = [
           {TWI_STOP}
         """,
         around=STAMP_CYCLES + STS + FROM_IDLE,
+        board_only_shown=PULL_UPS,
     ),
     Row(
         group="Two-wire interface, 100 kHz",
@@ -295,6 +297,7 @@ TWO_WIRE = [
           {TWI_STOP}
         """,
         edges=(-3, -1),
+        board_only_shown=PULL_UPS,
     ),
 ]
 

@@ -42,7 +42,11 @@ class Talk:
         return answer
 
     def _understand(self, line: bytes, start: int, end: int) -> bytes:
-        if result := _RESULT.fullmatch(line):
+        if line.startswith(b"boebot calibration"):
+            self._greeted(line.decode("ascii", "replace"))
+        elif not self.heard_name:
+            pass  # the end of an earlier run
+        elif result := _RESULT.fullmatch(line):
             row = int(result[1], 16)
             self.numbers[row] = int(result[2], 16)
             self.lines[row] = (start, end)
@@ -50,8 +54,6 @@ class Talk:
             return ASKED_BYTES[: int(asking[1])]
         elif line == b"end":
             self.ended = True
-        elif line.startswith(b"boebot calibration"):
-            self._greeted(line.decode("ascii", "replace"))
         return b""
 
     def _greeted(self, heard: str) -> None:

@@ -71,7 +71,7 @@ def capture(noise_filter: int) -> Row:
         group=GROUP,
         what=f"Timer 1, capture {'with' if noise_filter else 'without'} noise canceller: from edge to count kept",
         expected=3 + cancelled,
-        source="16.6.2: 4 cycles; 17.1: 2.5 to 3.5" if noise_filter else "16.6.1, 17.1: 2.5 to 3.5",
+        source="16.6.2: 4 cycles; 17.3: 2.5 to 3.5" if noise_filter else "16.6.1, 17.3: 2.5 to 3.5",
         code=f"""
           sbi DDRB, 0
           cbi PORTB, 0
@@ -156,7 +156,7 @@ ROWS = [
         group=GROUP,
         what="Timer 1, compare output A: counts from the match to the edge at pin 9",
         expected=1,
-        source="16.8, figure 16-11",
+        source="16.8, figure 16-10",
         code="""
           sbi DDRB, 1
           store TCCR1A, 1 << COM1A1 | 0 << COM1A0
