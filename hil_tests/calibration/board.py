@@ -16,8 +16,8 @@ BAUD = 500_000
 UPLOAD_BAUD = 115_200  # of the Uno's bootloader
 UPLOAD_TIMEOUT_S = 60.0  # a lost byte lets avrdude try for minutes
 ASK_AGAIN_S = 0.5  # while the bootloader waits, nobody hears
-GREETING_S = 10.0
-QUIET_S = 5.0  # no row takes as long
+GREETING_S = 20.0
+QUIET_S = 20.0  # no row takes as long
 
 Watch = Callable[[str], None]
 

@@ -22,9 +22,12 @@ UART_ON = "store UCSR0B, 1 << RXEN0 | 1 << TXEN0"
 
 
 def overrun(count: int) -> str:
-    """Asks for bytes and reads none for 20 ms; then r24: how many can be read, r25: whether DOR0 was set."""
+    """Asks for bytes and reads none until 20 ms after the first; then r20: how many can be read, r21: DOR0 was set."""
     return f"""
       ask {count}
+    4: lds r24, UCSR0A
+      sbrs r24, RXC0
+      rjmp 4b
       ldi r18, 5
       sbi TIFR1, TOV1
     1: sbis TIFR1, TOV1
