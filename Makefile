@@ -145,7 +145,7 @@ check-images: $(IMAGES)
 .PHONY: ready-run ready-test ready-bench ready-check ready-firmware
 ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
-ready-bench: ready-test $(VENV)/.done-bench
+ready-bench: ready-test build/avr8js/.done
 ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 
@@ -194,6 +194,10 @@ build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test
 
 build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
 	@$$(tools/find_python.sh) tools/fetch_simavr.py
+	@touch $@
+
+build/avr8js/.done: tools/fetch_avr8js.py hil_tests/calibration/avr8js.py $(VENV)/.done-bench
+	@$(PYTHON_VENV) -m tools.fetch_avr8js
 	@touch $@
 
 build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) build/simavr/.done $(VENV)/.done-firmware

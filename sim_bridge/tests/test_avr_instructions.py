@@ -1,4 +1,4 @@
-"""Instruction and interrupt times of the emulated ATmega328P against its data sheet."""
+"""Instructions and interrupts of the emulated ATmega328P; what each of them takes is in hil_tests/calibration."""
 
 from __future__ import annotations
 
@@ -8,79 +8,7 @@ from boebot.errors import BoardError
 from sim_bridge.boards.board import Level, ResetCause
 from sim_bridge.tests.avr_program import Machine, edges_of, gaps
 
-# What is measured stands between two SBI that toggle pin 13; each takes effect at its end, so that the distance of
-# the edges is the time of the code between them and of one SBI.
 SBI_CYCLES = 2
-
-# Instruction set manual: (code, cycles).
-INSTRUCTIONS = [
-    ("nop", 1),
-    ("add r24, r25", 1),
-    ("adiw r24, 1", 2),
-    ("sbiw r24, 1", 2),
-    ("movw r24, r22", 1),
-    ("mul r24, r25", 2),
-    ("fmuls r20, r21", 2),
-    ("ldi r24, 1", 1),
-    ("ld r24, X", 2),
-    ("ld r24, -X", 2),
-    ("ldd r24, Y+3", 2),
-    ("lds r24, 0x0200", 2),
-    ("st X+, r24", 2),
-    ("std Z+3, r24", 2),
-    ("sts 0x0200, r24", 2),
-    ("lpm", 3),
-    ("lpm r24, Z+", 3),
-    ("in r24, GPIOR0", 1),
-    ("out GPIOR0, r24", 1),
-    ("sbi GPIOR0, 0", 2),
-    ("cbi GPIOR0, 0", 2),
-    ("push r24\n pop r24", 4),
-    ("rjmp 1f\n1:", 2),
-    ("jmp 1f\n1:", 3),
-    ("ldi r30, pm_lo8(1f)\n ldi r31, pm_hi8(1f)\n ijmp\n1:", 4),
-    ("rcall nothing", 3 + 4),
-    ("call nothing", 4 + 4),
-    ("ldi r30, pm_lo8(nothing)\n ldi r31, pm_hi8(nothing)\n icall", 2 + 3 + 4),
-    ("rcall nothing_with_reti", 3 + 4),
-    ("sez\n breq 1f\n1:", 1 + 2),
-    ("clz\n breq 1f\n1:", 1 + 1),
-    ("clr r24\n sbrc r24, 0\n nop", 1 + 2),  # skips one word
-    ("clr r24\n sbrc r24, 0\n jmp 0", 1 + 3),  # skips two words
-    ("clr r24\n sbrs r24, 0\n nop", 1 + 1 + 1),  # does not skip
-    ("cpse r24, r24\n nop", 2),
-    ("cpse r24, r24\n lds r24, 0x0200", 3),
-    ("cbi GPIOR0, 0\n sbic GPIOR0, 0\n nop", 2 + 2),
-    ("cbi GPIOR0, 0\n sbis GPIOR0, 0\n nop", 2 + 1 + 1),
-    ("bst r24, 0\n bld r24, 1", 2),
-    ("wdr", 1),
-]
-
-
-@pytest.mark.parametrize(("code", "cycles"), INSTRUCTIONS)
-def test_instruction_takes_its_cycles(code: str, cycles: int) -> None:
-    machine = Machine(
-        f"""
-        nothing: ret
-        nothing_with_reti: reti
-        main:
-          sbi DDRB, 5
-          ldi r26, 0
-          ldi r27, 2
-          ldi r28, 0
-          ldi r29, 2
-          ldi r30, 0
-          ldi r31, 2
-          sbi PINB, 5
-          {code}
-          sbi PINB, 5
-        end: rjmp end
-        """
-    )
-    machine.board.run(500)
-    _, first, second = edges_of(machine.board.log(), 13)
-    assert second - first == cycles + SBI_CYCLES
-
 
 # Timer 1 matches at a known cycle, shown by the edge of its own output pin 9; the interrupt moves pin 13.
 MATCH_INTERRUPT = """
@@ -118,33 +46,9 @@ def latency(main_loop: str) -> int:
     return reaction - match - VECTOR_JUMP - SBI_CYCLES
 
 
-def test_interrupt_entry_takes_four_cycles() -> None:
-    assert latency(".rept 4000\n nop\n .endr\n1: rjmp 1b") == ENTRY
-
-
-def test_interrupt_entry_from_sleep_takes_eight_cycles() -> None:
-    assert latency("ldi r24, 1\n out SMCR, r24\n1: sleep\n rjmp 1b") == ENTRY + 4
-
-
 def test_instruction_is_finished_before_an_interrupt() -> None:
     latencies = {latency(f".rept {shift}\n nop\n .endr\n1: jmp 1b") for shift in range(3)}
     assert latencies == {ENTRY, ENTRY + 1, ENTRY + 2}
-
-
-def test_sleep_without_sleep_enable_does_nothing() -> None:
-    machine = Machine(
-        """
-        main:
-          sbi DDRB, 5
-          sbi PINB, 5
-          sleep
-          sbi PINB, 5
-        1: rjmp 1b
-        """
-    )
-    machine.board.run(100)
-    _, first, second = edges_of(machine.board.log(), 13)
-    assert second - first == 1 + SBI_CYCLES
 
 
 def test_one_instruction_runs_between_two_interrupts() -> None:
@@ -169,32 +73,6 @@ def test_one_instruction_runs_between_two_interrupts() -> None:
     periods = set(gaps(edges))
     around = ENTRY + VECTOR_JUMP + SBI_CYCLES + 4  # and one instruction: NOP or RJMP
     assert periods == {around + 1, around + 2}
-
-
-def test_sei_lets_one_instruction_run() -> None:
-    machine = Machine(
-        """
-        .global __vector_1
-        __vector_1:
-          sbi PINB, 4
-          cbi EIMSK, 0
-          reti
-        main:
-          sbi DDRB, 5
-          sbi DDRB, 4
-          sbi EIMSK, 0
-          sei
-          sbi PINB, 5
-          sbi PINB, 5
-        1: rjmp 1b
-        """
-    )
-    machine.board.drive(2, Level.LOW)
-    machine.board.run(200)
-    log = machine.board.log()
-    _, first, second = edges_of(log, 13)
-    _, reaction = edges_of(log, 12)
-    assert first < reaction < second
 
 
 def test_interrupt_enabled_while_its_flag_is_set_fires() -> None:

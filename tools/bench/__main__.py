@@ -26,7 +26,18 @@ from tools.bench import report
 from tools.bench.figures import FIGURES, Figure
 
 RESULT = Path("build/bench.json")
-MODULES = ("codec", "board_link", "busy", "clock", "speed", "demo_brain", "world", "precision", "setup_time")
+MODULES = (
+    "codec",
+    "board_link",
+    "busy",
+    "clock",
+    "speed",
+    "demo_brain",
+    "world",
+    "precision",
+    "calibration",
+    "setup_time",
+)
 
 
 def figures(only: list[str]) -> list[Figure]:

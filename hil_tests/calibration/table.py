@@ -1,0 +1,147 @@
+"""The calibration's table: what the data sheet says beside what each emulator and the board measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from hil_tests.calibration.emulator import Measured
+from hil_tests.calibration.program import ROWS
+from hil_tests.calibration.rows import Row
+
+COLUMNS = ("what", "unit", "data sheet", "where", "emulator", "avr8js", "board")
+NOT_CONNECTED, NOT_INSTALLED, NOT_REACHED = "not connected", "not installed", "–"
+PAGE = Path(__file__).with_name("page.md")
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What was measured. `avr8js` and `board` are None where there was none."""
+
+    emulator: Measured
+    avr8js: Measured | None = None
+    board: list[int | None] | None = None
+
+
+def is_right(row: Row, by_program: int | None, by_pin: int | None) -> bool:
+    """Whether both ways of measuring say what the data sheet says; the pin says nothing of some rows."""
+    values = [by_program] if row.told else [by_program, by_pin]
+    return all(value is not None and row.is_right(value) for value in values)
+
+
+def right_rows(measured: Measured) -> list[bool]:
+    """Row by row."""
+    pairs = zip(measured.by_program, measured.by_pin, strict=True)
+    return [is_right(row, *pair) for row, pair in zip(ROWS, pairs, strict=True)]
+
+
+def wrong_rows(result: Calibration) -> list[str]:
+    """What is not as the data sheet says, and not known to be so; nor known to be so and right."""
+    wrong = [
+        f"emulator: {row.group}: {row.what}"
+        for row, right in zip(ROWS, right_rows(result.emulator), strict=True)
+        if right == bool(row.difference)
+    ]
+    if result.board is not None:
+        wrong += [
+            f"board: {row.group}: {row.what}"
+            for row, value in zip(ROWS, result.board, strict=True)
+            if not row.board_only_shown and (value is None or not row.is_right(value))
+        ]
+    return wrong
+
+
+def _both(row: Row, by_program: int | None, by_pin: int | None) -> str:
+    """One emulator's cell."""
+    if by_program is None:
+        return NOT_REACHED
+    text = str(by_program)
+    if not row.told and by_pin != by_program:
+        text += f", at the pin {NOT_REACHED if by_pin is None else by_pin}"
+    return text if is_right(row, by_program, by_pin) else f"{text}: wrong"
+
+
+def _of_board(row: Row, value: int | None) -> str:
+    if value is None:
+        return NOT_REACHED
+    if row.board_only_shown:
+        return f"{value} ({row.board_only_shown})"
+    return str(value) if row.is_right(value) else f"{value}: differs"
+
+
+def cells(result: Calibration, index: int) -> list[str]:
+    """One row's text by COLUMNS."""
+    row = ROWS[index]
+
+    def measured(by: Measured | None) -> str:
+        return NOT_INSTALLED if by is None else _both(row, by.by_program[index], by.by_pin[index])
+
+    emulator = measured(result.emulator) + (f"; known: {row.difference}" if row.difference else "")
+    board = NOT_CONNECTED if result.board is None else _of_board(row, result.board[index])
+    return [row.what, row.unit, row.expected_text, row.source, emulator, measured(result.avr8js), board]
+
+
+def summary(result: Calibration) -> str:
+    """How many rows are right."""
+    parts = [f"emulator {sum(right_rows(result.emulator))}"]
+    if result.avr8js is not None:
+        parts.append(f"avr8js {sum(right_rows(result.avr8js))}")
+    if result.board is not None:
+        judged = [(row, value) for row, value in zip(ROWS, result.board, strict=True) if not row.board_only_shown]
+        right = sum(value is not None and row.is_right(value) for row, value in judged)
+        parts.append(f"board {right} (of {len(judged)} that are judged)")
+    return f"As the data sheet says, of {len(ROWS)} rows: {', '.join(parts)}."
+
+
+def table(result: Calibration) -> Table:
+    """For a terminal; group by group."""
+    shown = Table(*COLUMNS, title="Calibration of the emulated board")
+    group = ""
+    for index, row in enumerate(ROWS):
+        if row.group != group:
+            group = row.group
+            shown.add_section()
+            shown.add_row(f"[bold]{group}[/]")
+        shown.add_row(*cells(result, index))
+    return shown
+
+
+def page(result: Calibration) -> str:
+    """The documentation's page."""
+    parts = [PAGE.read_text(encoding="utf-8"), summary(result)]
+    ruler = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"
+    for group in dict.fromkeys(row.group for row in ROWS):
+        rows = [cells(result, i) for i, row in enumerate(ROWS) if row.group == group]
+        parts.append(f"## {group}\n\n{ruler}\n" + "\n".join(f"| {' | '.join(row)} |" for row in rows))
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def as_json(result: Calibration) -> dict[str, Any]:
+    """For programs. Values that were not measured are null."""
+
+    def both(measured: Measured | None, index: int) -> dict[str, Any] | None:
+        if measured is None:
+            return None
+        program, pin = measured.by_program[index], measured.by_pin[index]
+        return {"program": program, "pin": pin, "right": is_right(ROWS[index], program, pin)}
+
+    rows = []
+    for index, row in enumerate(ROWS):
+        low, high = row.expected if isinstance(row.expected, tuple) else (row.expected, row.expected)
+        rows.append(
+            {
+                "group": row.group,
+                "what": row.what,
+                "unit": row.unit,
+                "expected": [low, high],
+                "source": row.source,
+                "emulator": both(result.emulator, index),
+                "known_difference": row.difference or None,
+                "avr8js": both(result.avr8js, index),
+                "board": None if result.board is None else result.board[index],
+            }
+        )
+    return {"rows": rows, "wrong": wrong_rows(result)}

@@ -1,0 +1,241 @@
+"""The emulated board against the data sheet, row by row; the command, the page and the way to a board on a port."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from boebot.boards import BoardRequest
+from boebot.errors import BoardError
+from boebot.robots import load_robot
+from hil_tests.calibration import __main__ as command
+from hil_tests.calibration import avr8js, board, emulator, table
+from hil_tests.calibration.emulator import Measured
+from hil_tests.calibration.program import ROWS, image, name
+from hil_tests.calibration.talk import Talk, at_pin
+from sim_bridge.serve import serve
+
+pytestmark = pytest.mark.emulated
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "calibration.md"
+
+# The instruction set summary of the manual for AVRe+ with 128 KB at most, aliases left out where BRBS, BRBC, BSET and
+# BCLR stand for them; SPM is not in use.
+INSTRUCTIONS = """
+ADD ADC ADIW SUB SUBI SBC SBCI SBIW AND ANDI OR ORI EOR COM NEG SBR CBR INC DEC TST CLR SER MUL MULS MULSU FMUL FMULS
+FMULSU RJMP IJMP JMP RCALL ICALL CALL RET RETI CPSE CP CPC CPI SBRC SBRS SBIC SBIS BRBS BRBC MOV MOVW LDI LD LDD LDS ST
+STD STS LPM IN OUT PUSH POP LSL LSR ROL ROR ASR SWAP SBI CBI BST BLD NOP SLEEP WDR BREAK
+SEC CLC SEN CLN SEZ CLZ SEI CLI SES CLS SEV CLV SET CLT SEH CLH
+"""
+
+
+@cache
+def measured() -> Measured:
+    return emulator.measure()
+
+
+@pytest.mark.parametrize("index", range(len(ROWS)), ids=[f"{row.group}: {row.what}" for row in ROWS])
+def test_emulator_says_what_the_data_sheet_says(index: int) -> None:
+    row, by_program, by_pin = ROWS[index], measured().by_program[index], measured().by_pin[index]
+    right = table.is_right(row, by_program, by_pin)
+    said = f"program {by_program}, pin {by_pin}; data sheet ({row.source}): {row.expected_text} {row.unit}"
+    assert right != bool(row.difference), said
+
+
+def test_every_time_is_measured_twice() -> None:
+    for row, by_program, by_pin in zip(ROWS, measured().by_program, measured().by_pin, strict=True):
+        assert by_program is not None
+        assert by_pin == (None if row.told else by_program), row.what
+
+
+def test_every_instruction_is_measured() -> None:
+    rows = [row for row in ROWS if row.group == "Instructions"]
+    named = {re.match(r"[A-Z]+|\(", row.what)[0]: row for row in rows}  # type: ignore[index]
+    assert set(named) == {*INSTRUCTIONS.split(), "("}
+    for mnemonic, row in named.items():
+        between = row.code.partition("\nbegin\n")[2].partition("\nfinish\n")[0]
+        assert mnemonic == "(" or between.upper().startswith(mnemonic), row.what
+
+
+# ---- what is said when something differs ----
+
+
+def changed(values: list[int | None], index: int, by: int) -> list[int | None]:
+    """One value made wrong."""
+    value = values[index]
+    assert value is not None
+    return [*values[:index], value + by, *values[index + 1 :]]
+
+
+@pytest.mark.parametrize("way", ["by_program", "by_pin"])
+@pytest.mark.parametrize("by", [-1, 1])
+def test_one_cycle_more_or_less_is_wrong(way: str, by: int) -> None:
+    for index, row in enumerate(ROWS):
+        if isinstance(row.expected, tuple) or (row.told and way == "by_pin"):
+            continue
+        off = replace(measured(), **{way: changed(getattr(measured(), way), index, by)})
+        wrong = table.wrong_rows(table.Calibration(off))
+        assert wrong == [f"emulator: {row.group}: {row.what}"]
+        assert table.cells(table.Calibration(off), index)[4].endswith(": wrong")
+
+
+def test_a_known_difference_that_is_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = (replace(ROWS[0], difference="it is said to be slow"), *ROWS[1:])
+    monkeypatch.setattr(table, "ROWS", rows)
+    assert len(table.wrong_rows(table.Calibration(measured()))) == 1
+
+
+def test_a_board_is_judged_where_it_can_be() -> None:
+    real = list(measured().by_program)
+    oscillator = next(index for index, row in enumerate(ROWS) if row.board_only_shown)
+    assert table.wrong_rows(table.Calibration(measured(), board=changed(real, oscillator, 500))) == []
+    result = table.Calibration(measured(), board=changed(real, 5, 1))
+    assert table.wrong_rows(result) == [f"board: {ROWS[5].group}: {ROWS[5].what}"]
+    assert table.cells(result, 5)[-1].endswith(": differs")
+
+
+def test_another_program_is_refused() -> None:
+    with pytest.raises(BoardError, match=r"'boebot calibration 00000000', another version.*flash it"):
+        Talk().hear(b"\nboebot calibration 00000000\n")
+
+
+def test_talk_cut_anywhere_is_understood_and_says_what_it_awaits() -> None:
+    said = f"garbage\n=0002 0009\nend\n{name()}\nUUU\n=0000 0006\n>3\n\xff\n=0001 0007\n".encode("latin-1")
+    for cut in range(len(said)):
+        talk = Talk()
+        assert talk.awaited == "the program's name"
+        assert len(talk.hear(said[:cut]) + talk.hear(said[cut:])) == 3
+        assert talk.values()[:3] == [0, 1, None]
+        assert talk.awaited.startswith("row 2, Instructions: ADC")
+    assert at_pin(talk, [0] * len(said), []) == [None] * len(ROWS)
+
+
+# ---- page ----
+
+
+def test_page_is_what_the_command_writes() -> None:
+    """But for the avr8js's column, which only the bench can measure, and for phases that the data sheet leaves open."""
+    text = PAGE.read_text(encoding="utf-8")
+    assert text.startswith(table.PAGE.read_text(encoding="utf-8").strip())
+    found = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    found = [row for row in found if row[0] != table.COLUMNS[0]]
+    result = table.Calibration(measured())
+    assert len(found) == len(ROWS)
+    for index, row in enumerate(ROWS):
+        expected, there = table.cells(result, index), found[index]
+        if isinstance(row.expected, tuple):
+            assert row.is_right(int(there[4]))
+            expected[4] = there[4]
+        assert re.fullmatch(r"–|-?\d+(, at the pin (–|-?\d+))?(: wrong)?", there[5]), "no column of avr8js"
+        assert there[:5] + there[6:] == expected[:5] + expected[6:]
+
+
+# ---- avr8js ----
+
+
+def test_avr8js_that_is_missing_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(avr8js, "FOLDER", tmp_path / "nothing")
+    assert avr8js.measure() is None
+    assert table.cells(table.Calibration(measured()), 0)[5:] == ["not installed", "not connected"]
+
+
+@pytest.mark.skipif(not avr8js.is_installed(), reason="avr8js comes with make bench")
+def test_avr8js_agrees_on_instructions() -> None:
+    """All but CBI, which takes 1 cycle there."""
+    theirs = avr8js.measure()
+    assert theirs is not None
+    differing = [
+        row.what
+        for row, right in zip(ROWS, table.right_rows(theirs), strict=True)
+        if row.group == "Instructions" and not right
+    ]
+    assert differing == ["CBI A,b"]
+
+
+# ---- a board on a port ----
+
+
+@contextlib.contextmanager
+def served(elf: Path) -> Iterator[str]:
+    """The port of an emulated robot with that program, at the pace of the clock."""
+    urls: queue.Queue[str] = queue.Queue()
+    running = threading.Event()
+    running.set()
+    request = BoardRequest(robot=load_robot("shieldbot"), image=str(elf))
+    server = threading.Thread(
+        target=serve, args=("avr", request), kwargs={"tcp": None, "announce": urls.put, "running": running.is_set}
+    )
+    server.start()
+    try:
+        yield urls.get(timeout=60)
+    finally:
+        running.clear()
+        server.join(60)
+
+
+@pytest.fixture
+def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where a stand-in for avrdude, found first, leaves its arguments and the program."""
+    recorded = tmp_path / "recorded.json"
+    tool = tmp_path / "bin" / "avrdude"
+    tool.parent.mkdir()
+    tool.write_text(
+        "#!/usr/bin/env python3\nimport json, sys\n"
+        "program = open(sys.argv[-1].split(':')[2]).read()\n"
+        f"json.dump([sys.argv[1:], program], open({str(recorded)!r}, 'w'))\n",
+        encoding="utf-8",
+    )
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tool.parent}{os.pathsep}{os.environ['PATH']}")
+    return recorded
+
+
+def test_board_on_a_port(
+    tmp_path: Path, avrdude: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Flashing stands in; the rest is real: a port, an emulated Shield-Bot behind it, its answers."""
+    elf = tmp_path / "calibration.elf"
+    elf.write_bytes(image())
+    monkeypatch.setattr(avr8js, "FOLDER", tmp_path / "nothing")
+    with served(elf) as port:
+        assert command.main(["--port", port, "--json"]) == 0
+    arguments, program = json.loads(avrdude.read_text(encoding="utf-8"))
+    assert arguments[:-1] == ["-p", "atmega328p", "-c", "arduino", "-b", "115200", "-P", port, "-D", "-U"]
+    assert program.startswith(":10000000") and program.endswith(":00000001FF\n")
+    found = json.loads(capsys.readouterr().out)
+    assert found["wrong"] == []
+    for row, shown in zip(ROWS, found["rows"], strict=True):
+        assert row.board_only_shown or row.is_right(shown["board"]), row.what
+
+
+def test_port_that_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["--port", "/dev/no-board", "--no-flash"]) == 2
+    assert capsys.readouterr().err.startswith("calibration: ")
+
+
+def test_board_that_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(board, "GREETING_S", 0.2)
+    master, slave = os.openpty()
+    try:
+        with pytest.raises(BoardError, match="does not talk; awaited: the program's name"):
+            board.listen(os.ttyname(slave))
+    finally:
+        os.close(slave)
+        os.close(master)
+
+
+def test_avrdude_that_fails(tmp_path: Path, avrdude: Path) -> None:
+    tool = tmp_path / "bin" / "avrdude"
+    tool.write_text("#!/bin/sh\necho >&2; echo 'avrdude: no answer' >&2; exit 1\n", encoding="utf-8")
+    with pytest.raises(BoardError, match=r"could not flash the board at /dev/robot: avrdude: no answer"):
+        board.flash("/dev/robot")
