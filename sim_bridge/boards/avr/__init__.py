@@ -74,14 +74,15 @@ class AvrBoard:
     object: whoever uses the pointer keeps this object.
     """
 
-    def __init__(self, elf: bytes, name: str) -> None:
-        """Powers on a board whose flash holds the program of an ELF file; `name` is for errors."""
+    def __init__(self, elf: bytes, path: Path) -> None:
+        """Powers on a board whose flash holds the program of an ELF file, which is at `path`."""
         extension = _extension()
         self._ffi, self._lib = extension.ffi, extension.lib
+        self.elf = path
         error = self._ffi.new("char[]", ERROR_SIZE)
         self._board = self._lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
         if self._board == self._ffi.NULL:
-            raise BoardError(f"the firmware image {name} cannot be loaded: {self._ffi.string(error).decode()}")
+            raise BoardError(f"the firmware image {path} cannot be loaded: {self._ffi.string(error).decode()}")
 
     @property
     def pointer(self) -> int:
@@ -92,7 +93,7 @@ class AvrBoard:
 
     def access(self) -> BoardAccess:
         """The board's operations, for use without a simulated world."""
-        return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self)
+        return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self, elf=self.elf)
 
     def data(self, address: int, size: int = 1) -> bytes:
         """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100."""
@@ -173,4 +174,4 @@ def create(elf: Path) -> AvrBoard:
         image = elf.read_bytes()
     except OSError as error:
         raise BoardError(f"the firmware image {elf} cannot be read: {error.strerror}") from error
-    return AvrBoard(image, str(elf))
+    return AvrBoard(image, elf)
