@@ -41,7 +41,7 @@ enum {
 _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go together");
 _Static_assert(TASKS <= 32, "the due tasks are bits of 32");
 
-volatile uint8_t schedule_slot;
+HAL_NAMED volatile uint8_t schedule_slot;
 uint8_t schedule_next_slot;
 volatile uint16_t schedule_slot_start;
 

@@ -126,7 +126,7 @@ class Line:
         self.ask(messages.SetParameter, messages.PARAMETERS[parameter].id, value)
 
     def arm(self) -> None:
-        """Ends the latch, once the supply has been measured; set-points that answer a later tick then move the motors."""
+        """Ends the latch once the supply has been measured; set-points that answer later ticks then move the motors."""
         newest = self.wait(messages.Telemetry, len(self.heard))
         while newest.supply == 0:
             newest = self.wait(messages.Telemetry, len(self.heard))

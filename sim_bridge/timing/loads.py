@@ -1,7 +1,7 @@
 """Loads at the pins: an emulated board by itself, and what drives its lines: encoder wheels, echoes, contacts.
 
-A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that phases
-are swept. Bytes are in line.py.
+A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that
+phases are swept. Bytes are in line.py.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class Load:
 
     name: str
     edges_per_s: int
-    saturated: bool  # frames back to back both ways, else a set-point each tick
+    full_line: bool  # frames back to back both ways, else a set-point and telemetry each tick
 
 
-FIGURES = Load("figures", edges_per_s=1500, saturated=False)
-SATURATED = Load("saturated", edges_per_s=4000, saturated=True)
+FIGURES = Load("figures", edges_per_s=1500, full_line=False)
+SATURATED = Load("saturated", edges_per_s=4000, full_line=True)
 LOADS = (FIGURES, SATURATED)
 
 
@@ -190,13 +190,13 @@ class Ping:
         self.pin, self.step = pin, step
         self.echoes: list[tuple[int, int]] = []
         """cycles of rise and fall of each"""
-        self._seen = 0
+        self._seen: int | None = None
 
     def queue(self, bench: Bench, until: int) -> None:
-        """See Source."""
+        """See Source. Triggers from before the first call get no answer."""
         del until
         log = bench.edges[self.pin]
-        for edge in log[self._seen :]:
+        for edge in log[self._seen if self._seen is not None else len(log) :]:
             if edge.level == Level.LOW:
                 self._answer(bench, edge.cycle)
         self._seen = len(log)
