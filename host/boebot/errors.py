@@ -25,3 +25,7 @@ class BoardError(BoebotError):
 
 class ProtocolError(BoebotError):
     """The board speaks, but not this kit's protocol."""
+
+
+class TimingError(BoebotError):
+    """An image's timing cannot be told: no bound, no graph, no table, or one that contradicts itself."""

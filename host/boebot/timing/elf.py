@@ -1,0 +1,236 @@
+"""Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
+
+What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines (DWARF) and the two sections
+in which the firmware describes itself, `.boebot.timing` and `.boebot.loops`. The file need not have the last three.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from elftools.common.exceptions import DWARFError, ELFError
+from elftools.construct import ConstructError
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from boebot.errors import TimingError
+from boebot.timing.program import InterruptRow, LoopBound, SensorRow, Table, TaskRow
+
+FLASH_SIZE = 0x8000  # bytes
+RAM_START = 0x800100  # avr-gcc gives data memory the addresses from 0x800000
+RAM_END = 0x800900
+DATA_SPACE = 0x800000
+EM_AVR = "EM_AVR"
+PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
+NOT_SAID = 0xFFFFFFFF
+# What pyelftools raises on a damaged file.
+DAMAGE: tuple[type[Exception], ...] = (
+    *(ELFError, DWARFError, ConstructError, struct.error, ValueError, LookupError),
+    *(AttributeError, TypeError, AssertionError, OverflowError, RecursionError),
+)
+STRENGTH = {"STB_GLOBAL": 0, "STB_WEAK": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A name of an address in flash: "STT_FUNC" a function, "STT_OBJECT" data, "STT_NOTYPE" a label."""
+
+    name: str
+    address: int
+    size: int
+    kind: str
+    strength: int  # 0 global, 1 weak, 2 local
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What an ELF file says. Addresses are byte addresses, those of RAM without the 0x800000 of the file."""
+
+    path: str
+    code: bytes  # the flash from address 0; bytes that the file does not give are 0xFF
+    entry: int  # where the program begins after a reset
+    executable: tuple[range, ...]  # addresses that can hold instructions
+    symbols: tuple[Symbol, ...]  # those of flash, by address
+    flash_bytes: int  # written to flash: code, constants, initial values of variables
+    ram_bytes: int  # of all variables
+    ram_end: int  # first address behind the last variable
+    stack_start: int  # first value of the stack pointer
+    lines: dict[int, str] = field(default_factory=dict)
+    table: Table = field(default_factory=Table)
+    bounds: tuple[LoopBound, ...] = ()
+
+
+def read_image(path: Path) -> Image:
+    """Reads an ELF file. Raises TimingError when it is not a linked program for an AVR, or is damaged."""
+    try:
+        with path.open("rb") as stream:
+            return _image(path, ELFFile(stream))
+    except OSError as error:
+        raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
+    except DAMAGE as error:
+        raise TimingError(f"{path} is not an ELF file, or is damaged: {error or type(error).__name__}") from error
+
+
+def _image(path: Path, elf: ELFFile) -> Image:
+    if elf["e_machine"] != EM_AVR:
+        raise TimingError(
+            f"{path} is for another processor ({elf['e_machine']}): an image for the ATmega328P is expected"
+        )
+    if elf["e_type"] != "ET_EXEC":
+        raise TimingError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
+    code, written = _flash(path, elf)
+    ram = _ram(elf)
+    symbols, stack_start = _symbols(elf)
+    return Image(
+        path=str(path),
+        code=code,
+        entry=elf["e_entry"],
+        executable=_executable(elf, len(code)),
+        symbols=symbols,
+        flash_bytes=written,
+        ram_bytes=sum(size for _, size in ram),
+        ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
+        stack_start=stack_start,
+        lines=_lines(elf, len(code)),
+        table=_table(path, _section(path, elf, ".boebot.timing")),
+        bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
+    )
+
+
+def _flash(path: Path, elf: ELFFile) -> tuple[bytes, int]:
+    """The bytes of flash from address 0, and how many the file gives."""
+    flash, written, end = bytearray(b"\xff" * FLASH_SIZE), 0, 0
+    for segment in elf.iter_segments(PT_LOAD):
+        start, size = segment["p_paddr"], segment["p_filesz"]
+        if start >= RAM_START or size == 0:  # EEPROM, fuses
+            continue
+        data = segment.data()
+        if len(data) < size:
+            raise TimingError(
+                f"{path} is cut off: {size} bytes of flash at 0x{start:04X} are said, {len(data)} are there"
+            )
+        if start + size > FLASH_SIZE:
+            raise TimingError(f"{path} needs flash up to 0x{start + size:X}: the ATmega328P has {FLASH_SIZE} bytes")
+        flash[start : start + size] = data
+        written, end = written + size, max(end, start + size)
+    if end == 0:
+        raise TimingError(f"{path} has nothing for the flash: an image for the ATmega328P is expected")
+    return bytes(flash[:end]), written
+
+
+def _ram(elf: ELFFile) -> list[tuple[int, int]]:
+    """(start, size) of the sections in RAM."""
+    return [
+        (section["sh_addr"], section["sh_size"])
+        for section in elf.iter_sections()
+        if section["sh_flags"] & ALLOCATED and RAM_START <= section["sh_addr"] < RAM_END
+    ]
+
+
+def _executable(elf: ELFFile, end: int) -> tuple[range, ...]:
+    """The sections with instructions; the whole flash where the file has no sections."""
+    found = tuple(
+        range(section["sh_addr"], min(section["sh_addr"] + section["sh_size"], end))
+        for section in elf.iter_sections()
+        if section["sh_flags"] & EXECUTABLE
+    )
+    return found or (range(end),)
+
+
+def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
+    """The symbols of flash, and the first value of the stack pointer."""
+    stack_start = RAM_END - 1 - DATA_SPACE
+    found = []
+    for section in elf.iter_sections():
+        if not isinstance(section, SymbolTableSection):
+            continue
+        for symbol in section.iter_symbols():
+            info, address = symbol["st_info"], symbol["st_value"]
+            if symbol.name == "__stack":
+                stack_start = address & 0xFFFF
+            if not isinstance(symbol["st_shndx"], int) or not symbol.name or address >= FLASH_SIZE:
+                continue  # of no section, as __SP_L__
+            if info["type"] in ("STT_FUNC", "STT_OBJECT", "STT_NOTYPE"):
+                strength = STRENGTH.get(info["bind"], 2)
+                found.append(Symbol(symbol.name, address, symbol["st_size"], info["type"], strength))
+    return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
+
+
+def _lines(elf: ELFFile, end: int) -> dict[int, str]:
+    """Source lines, "file.c:123", of each even address that the line tables cover; none without them."""
+    lines: dict[int, str] = {}
+    if not elf.has_dwarf_info():
+        return lines
+    dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
+    for unit in dwarf.iter_CUs():
+        program = dwarf.line_program_for_CU(unit)
+        if program is None:
+            continue
+        first = 0 if program["version"] >= 5 else 1  # DWARF 5 numbers its files from 0
+        files = [entry.name.decode("utf-8", "replace").rsplit("/", 1)[-1] for entry in program["file_entry"]]
+        before = None
+        for entry in program.get_entries():
+            state = entry.state
+            if state is None:
+                continue
+            if before is not None:
+                text = f"{files[before.file - first]}:{before.line}"
+                for address in range(before.address, min(state.address, end), 2):
+                    lines[address] = text
+            before = None if state.end_sequence else state
+    return lines
+
+
+def _section(path: Path, elf: ELFFile, name: str) -> bytes:
+    section = elf.get_section_by_name(name)
+    if section is None:
+        return b""
+    data: bytes = section.data()
+    if len(data) < section["sh_size"]:
+        raise TimingError(f"{path} is cut off: section {name} is not whole")
+    return data
+
+
+ROWS: dict[str, tuple[type[TaskRow] | type[InterruptRow] | type[SensorRow], int]] = {
+    "TASK": (TaskRow, 3),
+    "INTERRUPT": (InterruptRow, 4),
+    "SENSOR": (SensorRow, 3),
+}
+
+
+def _table(path: Path, data: bytes) -> Table:
+    """The rows of `.boebot.timing`: lines as "TASK whisker 1 0 200", each ended by a zero byte."""
+    rows = [_table_row(path, text) for text in data.split(b"\0") if text]
+    return Table(
+        tasks=tuple(row for row in rows if isinstance(row, TaskRow)),
+        interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
+        sensors=tuple(row for row in rows if isinstance(row, SensorRow)),
+    )
+
+
+def _table_row(path: Path, data: bytes) -> TaskRow | InterruptRow | SensorRow:
+    text = data.decode("ascii", "backslashreplace")
+    kind, *words = text.split()
+    row, numbers = ROWS.get(kind, (None, 0))
+    if row is None:
+        raise TimingError(
+            f"{path}: row {text!r} of its timing table is of no known kind: {', '.join(ROWS)} are expected"
+        )
+    if len(words) != 1 + numbers or not all(word.isascii() and word.isdigit() for word in words[1:]):
+        raise TimingError(f"{path}: row {text!r} of its timing table: a name and {numbers} whole numbers are expected")
+    return row(words[0], *(int(word) for word in words[1:]))
+
+
+def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
+    """The records of `.boebot.loops`: address in a loop's body, most passes, most cycles, of 32 bits each."""
+    if len(data) % 12:
+        raise TimingError(f"{path}: section .boebot.loops has {len(data)} bytes: records of 12 bytes are expected")
+    bounds = []
+    for address, passes, cycles in struct.iter_unpack("<III", data):
+        if address >= end or address % 2:
+            raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")
+        given = tuple(None if number == NOT_SAID else number for number in (passes, cycles))
+        bounds.append(LoopBound(address, *given))
+    return tuple(bounds)
