@@ -1,0 +1,129 @@
+"""Bounds of loops that show in the machine code itself: those that the compiler and its library make.
+
+The source has no place for an annotation of them: copies of structures, delays, shifts, divisions. Found are loops
+whose every pass counts a register down that nothing else in the loop writes, from a constant. Shifts by a variable
+count are bounded by the language: a count that is not less than the width of the operand has no meaning (C11, 6.5.7).
+"""
+
+from __future__ import annotations
+
+from boebot.timing.loops import Loop
+from boebot.timing.program import Block, Function, Instruction
+from boebot.timing.registers import KEEPS_FLAGS, before, constant, written
+
+MOST = 1 << 16  # passes that are tried; longer loops have other counters
+SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
+CALLS = frozenset(("call", "rcall", "icall"))
+
+
+def passes(loop: Loop[int], function: Function) -> int | None:
+    """How often the header runs at most for each entry of the loop; None if its code does not show it."""
+    came_from = before(function)
+    inner = frozenset(node for each in loop.inner for node in each.nodes)
+    found: list[int] = []
+    for start in loop.nodes - inner:
+        block = function.blocks[start]
+        if any(edge.to not in loop.nodes for edge in block.edges) and _in_every_pass(start, loop, function):
+            count = _counted(block, loop, function, came_from)
+            if count is not None:
+                found.append(count)
+    return min(found, default=None)
+
+
+def _in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:
+    """Without it there is no way from the header back to the header."""
+    if start == loop.header:
+        return True
+    seen = {loop.header}
+    work = [loop.header]
+    while work:
+        for edge in function.blocks[work.pop()].edges:
+            if edge.to == loop.header:
+                return False
+            if edge.to in loop.nodes and edge.to != start and edge.to not in seen:
+                seen.add(edge.to)
+                work.append(edge.to)
+    return True
+
+
+def _counted(block: Block, loop: Loop[int], function: Function, came_from: dict[int, list[Block]]) -> int | None:
+    branch = block.instructions[-1]
+    if branch.mnemonic not in ("brne", "breq", "brpl", "brmi", "brcc", "brcs") or len(block.edges) != 2:
+        return None
+    counting = _counting(block.instructions[:-1])
+    if counting is None:
+        return None
+    register, width, step, instructions = counting
+    registers = frozenset(range(register, register + width))
+    for start in loop.nodes:
+        for instruction in function.blocks[start].instructions:
+            if instruction in instructions:
+                continue
+            if written(instruction) & registers or instruction.mnemonic in CALLS:
+                return None
+    stays = branch.operands[-1] in loop.nodes
+    counts: list[int] = []
+    for previous in came_from[loop.header]:
+        if previous.start not in loop.nodes:
+            parts = [constant(register + i, previous, came_from) for i in range(width)]
+            known = [part for part in parts if part is not None]
+            if len(known) < width:
+                return _shift(loop, function, instructions)
+            value = sum(part << 8 * i for i, part in enumerate(known))
+            count = _runs(value, step, 8 * width, branch.mnemonic, stays)
+            if count is None:
+                return None
+            counts.append(count)
+    return max(counts, default=None)
+
+
+def _counting(instructions: tuple[Instruction, ...]) -> tuple[int, int, int, tuple[Instruction, ...]] | None:
+    """The counter whose flags the branch behind these instructions reads: register, bytes, step, its instructions."""
+    rest = list(instructions)
+    while rest and rest[-1].mnemonic in KEEPS_FLAGS:
+        rest.pop()
+    if not rest:
+        return None
+    last = rest[-1]
+    if last.mnemonic == "dec":
+        return last.operands[0], 1, 1, (last,)
+    if last.mnemonic == "subi":
+        return last.operands[0], 1, last.operands[1], (last,)
+    if last.mnemonic == "sbiw":
+        return last.operands[0], 2, last.operands[1], (last,)
+    if last.mnemonic == "sbci" and len(rest) > 1 and rest[-2].mnemonic == "subi":
+        low = rest[-2]
+        if low.operands[0] + 1 == last.operands[0]:
+            return low.operands[0], 2, last.operands[1] << 8 | low.operands[1], (low, last)
+    return None
+
+
+def _runs(value: int, step: int, bits: int, branch: str, stays: bool) -> int | None:
+    """How often `value -= step` runs until the branch leaves the loop."""
+    mask = (1 << bits) - 1
+    for count in range(1, MOST + 1):
+        borrow = value < step
+        value = value - step & mask
+        flag = {"ne": value != 0, "eq": value == 0, "cc": not borrow, "cs": borrow}.get(branch[2:])
+        if flag is None:
+            flag = (value >> (bits - 1) == 0) == (branch == "brpl")
+        if flag != stays:
+            return count
+    return None
+
+
+def _shift(loop: Loop[int], function: Function, counting: tuple[Instruction, ...]) -> int | None:
+    """Of a loop that does nothing but shift an operand: the test runs once more than the shift."""
+    shifts = 0
+    for start in loop.nodes:
+        for instruction in function.blocks[start].instructions:
+            if instruction.mnemonic in SHIFTS:
+                doubles = instruction.mnemonic in ("add", "adc")
+                if doubles and instruction.operands[0] != instruction.operands[1]:
+                    return None
+                shifts += 1
+            elif instruction not in counting and instruction.mnemonic not in ("rjmp", "brne", "brpl"):
+                return None
+    if counting[0].mnemonic != "dec" or shifts not in (1, 2, 3, 4):
+        return None
+    return 32 if shifts > 2 else 16  # int is the least width that C shifts
