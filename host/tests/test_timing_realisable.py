@@ -142,7 +142,7 @@ def test_table_of_an_image_gives_the_boards_times() -> None:
         (TaskRow("first", 1, 0, 1600), TaskRow("late", 4, 2, 800), TaskRow("telemetry", 4, 0, 3200)), (), (PING,)
     )
     times = BoardTimes.of(table)
-    assert (times.telemetry_s, times.set_point_s) == (pytest.approx(300e-6), pytest.approx(200e-6))
+    assert times.telemetry_s == pytest.approx(300e-6) and times.set_point_s == pytest.approx(200e-6)
     assert times.sensors == (PING,)
 
 
@@ -235,6 +235,6 @@ def test_steps_longer_than_the_period_are_counted(monkeypatch: pytest.MonkeyPatc
         now[0] += 0.03 if robot.tick % 6 == 0 else 0.005
 
     result = boebot.run(step, robot="arsim", period=0.02, seconds=0.6)
-    assert (result.steps, result.long_steps, result.longest_step) == (30, 10, pytest.approx(0.03))
+    assert (result.steps, result.long_steps) == (30, 10) and result.longest_step == pytest.approx(0.03)
     table = result.table()
     assert (table["long_steps"], table["longest_step_ms"]) == (10, 30.0)

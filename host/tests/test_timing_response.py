@@ -17,7 +17,6 @@ from boebot.timing.response import (
     receive_backlog,
     response,
     responses,
-    wait,
 )
 
 QUICK = settings(max_examples=60, deadline=None)
@@ -36,17 +35,8 @@ def test_example_with_release_jitter() -> None:
     assert response(6, [Source("a", 2, 10, jitter=3)]) == 10
 
 
-def test_example_of_a_bus() -> None:
-    """Davis et al. (2007), section 3: A, B, C of 1 ms each every 2.5, 3.5, 3.5 ms are sent after 2, 3, 3.5 ms at the
-    latest; C's second message of a busy period is the one that waits longest. In half milliseconds."""
-    a, b, c = Source("a", 2, 5), Source("b", 2, 7), Source("c", 2, 7)
-    waits = [wait(2, a, []), wait(2, b, [a]), wait(0, c, [a, b])]
-    assert [None if one is None else one + 2 for one in waits] == [4, 6, 7]
-
-
 def test_overload_is_said() -> None:
     assert response(1, [Source("a", 5, 10), Source("b", 5, 10)]) is None, "interrupts alone take all"
-    assert wait(0, Source("a", 11, 10), []) is None
     full = Schedule(((Piece("task", 60),),), slot_cycles=100, slots_per_tick=1)
     assert responses(full, [Source("a", 4, 10)]) is None
     assert receive_backlog(full, [Source("a", 4, 10)], Source("a", 4, 10), 20, 0) is None
@@ -142,42 +132,6 @@ def test_a_late_slot_delays_the_next() -> None:
     assert misses(schedule, bound.slots) == []
     assert misses(schedule, (14, 11)) == [1], "the second slot has no other slot of its tick to spare"
     assert misses(schedule, (21, 8)) == [0]
-
-
-@QUICK
-@given(
-    st.lists(sources.filter(bool), min_size=1, max_size=1), st.integers(0, 6), st.lists(st.integers(0, 9), min_size=1)
-)
-def test_no_interrupt_waits_longer_than_its_bound(nested: list[list[Source]], blocking: int, late: list[int]) -> None:
-    *above, own = nested[0]
-    bound = wait(blocking, own, above)
-    if bound is None:
-        return
-    for lateness in ([0], late):
-        requests = sorted(
-            (moment, rank) for rank, one in enumerate([*above, own]) for moment in times(one, 200, lateness)
-        )
-        longest = longest_wait(requests, [*above, own], blocking, 400)
-        assert longest <= bound
-        if lateness == [0] and own.jitter == 0:
-            assert longest == bound, "when all come together"
-
-
-def longest_wait(requests: list[tuple[int, int]], ranked: list[Source], blocking: int, end: int) -> int:
-    """Of the last rank, when nothing is interrupted and the highest rank that waits goes first."""
-    now, longest = blocking, 0
-    waiting = list(requests)
-    while now < end:
-        here = [one for one in waiting if one[0] <= now]
-        if not here:
-            now += 1
-            continue
-        chosen = min(here, key=lambda one: (one[1], one[0]))
-        waiting.remove(chosen)
-        if chosen[1] == len(ranked) - 1:
-            longest = max(longest, now - chosen[0])
-        now += ranked[chosen[1]].cycles
-    return longest
 
 
 @QUICK

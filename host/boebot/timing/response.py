@@ -8,8 +8,7 @@ of C cycles that begins together with the first request of every interrupt is do
 
 and at no other moment does it take longer. Where R does not exist the interrupts alone are too much: overload.
 
-For the wait of an interrupt itself, which no other one interrupts: R. Davis et al., "Controller Area Network (CAN)
-schedulability analysis: refuted, revisited and revised", Real-Time Systems 35 (2007). All times are in cycles.
+What an interrupt itself waits is in blocked.py. All times are in cycles.
 """
 
 from __future__ import annotations
@@ -203,34 +202,6 @@ def receive_backlog(
             if waiting - piece.polls * frame_least <= idle_most or index - first > 4 * len(pieces):
                 break
     return most
-
-
-def wait(blocking: int, own: Source, above: Sequence[Source], after_return: int = 0) -> int | None:
-    """The longest time from a request of an interrupt to its acceptance; None: overload.
-
-    `blocking` is the longest stretch in which no interrupt is accepted, or span of an interrupt of lower rank; `above`
-    are those of higher rank. `after_return`: cycles of the one instruction that the main program carries out after each
-    interrupt before the next is accepted.
-    """
-    if load((*above, own)) >= 1:
-        return None
-    mine = own.cycles + after_return
-
-    def higher(window: int) -> int:
-        return sum((source.cycles + after_return) * source.requests(window) for source in above)
-
-    busy = _least(lambda time: blocking + higher(time) + mine * own.requests(time), blocking + mine)
-    if busy is None:
-        return None
-    longest = 0
-    for number in range(
-        own.requests(busy)
-    ):  # the first request of a busy period need not be the one that waits longest
-        begins = _least(lambda time, before=number * mine: blocking + before + higher(time + 1), 0)  # type: ignore[misc]
-        if begins is None:
-            return None
-        longest = max(longest, begins - max(0, number * own.interval - own.jitter))
-    return longest
 
 
 def _least(needed: Callable[[int], int], time: int) -> int | None:
