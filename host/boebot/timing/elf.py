@@ -1,6 +1,6 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
-What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines (DWARF) and the two sections
+What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the two sections
 in which the firmware describes itself, `.boebot.timing` and `.boebot.loops`. The file need not have the last three.
 """
 
@@ -17,6 +17,7 @@ from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import TimingError
 from boebot.timing.program import InterruptRow, LoopBound, SensorRow, Table, TaskRow
+from boebot.timing.source_lines import source_lines
 
 FLASH_SIZE = 0x8000  # bytes
 RAM_START = 0x800100  # avr-gcc gives data memory the addresses from 0x800000
@@ -104,7 +105,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         ram_bytes=sum(size for _, size in ram),
         ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
         stack_start=stack_start,
-        lines=_lines(elf, len(code)),
+        lines=source_lines(elf, len(code)),
         table=_table(path, _section(path, elf, ".boebot.timing")),
         bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
     )
@@ -167,31 +168,6 @@ def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
                 strength = STRENGTH.get(info["bind"], 2)
                 found.append(Symbol(symbol.name, address, symbol["st_size"], info["type"], strength))
     return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
-
-
-def _lines(elf: ELFFile, end: int) -> dict[int, str]:
-    """Source lines, "file.c:123", of each even address that the line tables cover; none without them."""
-    lines: dict[int, str] = {}
-    if not elf.has_dwarf_info():
-        return lines
-    dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
-    for unit in dwarf.iter_CUs():
-        program = dwarf.line_program_for_CU(unit)
-        if program is None:
-            continue
-        first = 0 if program["version"] >= 5 else 1  # DWARF 5 numbers its files from 0
-        files = [entry.name.decode("utf-8", "replace").rsplit("/", 1)[-1] for entry in program["file_entry"]]
-        before = None
-        for entry in program.get_entries():
-            state = entry.state
-            if state is None:
-                continue
-            if before is not None:
-                text = f"{files[before.file - first]}:{before.line}"
-                for address in range(before.address, min(state.address, end), 2):
-                    lines[address] = text
-            before = None if state.end_sequence else state
-    return lines
 
 
 def _section(path: Path, elf: ELFFile, name: str) -> bytes:

@@ -52,12 +52,12 @@ class _Names:
 
     def __init__(self, image: Image) -> None:
         self.at: dict[int, list[Symbol]] = defaultdict(list)
-        self.data: list[Symbol] = []  # constants in flash
+        self.data: set[int] = set()  # addresses of constants in flash
         for symbol in image.symbols:
             if not any(symbol.address in area for area in image.executable):
                 continue
             if symbol.kind == "STT_OBJECT":
-                self.data.append(symbol)
+                self.data.update(range(symbol.address, min(symbol.address + symbol.size, len(image.code))))
             else:
                 self.at[symbol.address].append(symbol)
         self.functions = {address for address, at in self.at.items() if any(s.kind == "STT_FUNC" for s in at)}
@@ -71,10 +71,6 @@ class _Names:
         before = self._named[place]
         best = min(self.at[before], key=lambda s: (s.kind != "STT_FUNC", s.strength, s.name))
         return best.name if before == address else f"{best.name}+0x{address - before:X}"
-
-    def is_data(self, address: int) -> bool:
-        """Whether a constant lies there."""
-        return any(symbol.address <= address < symbol.address + symbol.size for symbol in self.data)
 
 
 @dataclass(slots=True)
@@ -274,16 +270,19 @@ class _Explorer:
 
     def _decode(self, draft: _Draft, address: int) -> Instruction:
         instruction = decode(self.image.code, address)
-        if instruction is None or not any(address in area for area in self.image.executable):
+        if instruction is None or not self._is_code(address):
             text = self.image.code[address : address + 2]
             what = f"0x{int.from_bytes(text, 'little'):04X} is no instruction" if len(text) == 2 else "there is no code"
             raise self._refusal(address, f"{what}, but {self.names.of(draft.entry)} leads there")
-        if self.names.is_data(address):
+        if address in self.names.data:
             raise self._refusal(address, f"a constant lies there, but {self.names.of(draft.entry)} leads there")
         return instruction
 
+    def _is_code(self, address: int) -> bool:
+        return any(address in area for area in self.image.executable)
+
     def _check(self, address: int, target: int) -> None:
-        if not any(target in area for area in self.image.executable):
+        if not self._is_code(target):
             raise self._refusal(address, f"leads out of the code, to 0x{target:04X}")
 
     def _refusal(self, address: int, text: str) -> TimingError:

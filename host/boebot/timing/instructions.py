@@ -6,6 +6,7 @@ ATmega328P has the AVRe+ set without what needs more than 64 KB of flash: no `ei
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -165,17 +166,18 @@ READINGS: dict[str, Callable[[int, int, int], int]] = {
 
 @dataclass(frozen=True, slots=True)
 class _Operand:
-    positions: tuple[int, ...]  # of the field's bits in the opcode, the highest first; none: a fixed number
+    pieces: tuple[tuple[int, int], ...]  # of the field in the opcode, the highest first: lowest bit, width
+    width: int  # of the field; 0: a fixed number
     read: Callable[[int, int, int], int]
     number: int = 0
 
     def value(self, opcode: int, address: int) -> int:
-        if not self.positions:
+        if self.width == 0:
             return self.number
         field = 0
-        for position in self.positions:
-            field = field << 1 | (opcode >> position & 1)
-        return self.read(field, len(self.positions), address)
+        for lowest, width in self.pieces:
+            field = field << width | (opcode >> lowest & (1 << width) - 1)
+        return self.read(field, self.width, address)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,16 +190,16 @@ class _Row:
     cycles: int
 
     def decode(self, opcode: int, address: int) -> Instruction:
-        operands = tuple(operand.value(opcode, address) for operand in self.operands)
+        operands = tuple([operand.value(opcode, address) for operand in self.operands])
         return Instruction(address, self.size, self.mnemonic, operands, self.cycles)
 
 
 def _operand(text: str, pattern: str) -> _Operand:
     letter, _, reading = text.partition(":")
     if not letter.isalpha():
-        return _Operand((), READINGS[""], int(text))
-    width = len(pattern)
-    return _Operand(tuple(width - 1 - i for i, c in enumerate(pattern) if c == letter), READINGS[reading])
+        return _Operand((), 0, READINGS[""], int(text))
+    pieces = tuple((len(pattern) - piece.end(), len(piece[0])) for piece in re.finditer(f"{letter}+", pattern))
+    return _Operand(pieces, sum(width for _, width in pieces), READINGS[reading])
 
 
 def _row(line: str) -> _Row:

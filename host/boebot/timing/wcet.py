@@ -112,8 +112,9 @@ class WorstCase:
             return self.bound(entry)
         register = ARGUMENTS[called.name][0]
         came_from = before(function)
-        low = constant(register, block, came_from)
-        high = constant(register + 1, block, came_from)
+        call_itself = len(block.instructions) - 1
+        low = constant(register, block, came_from, call_itself)
+        high = constant(register + 1, block, came_from, call_itself)
         if low is None or high is None:
             call = self.program.where(block.instructions[-1].address)
             raise TimingError(
@@ -127,11 +128,14 @@ class WorstCase:
         if argument is None and function.entry in self._marks:
             return self._marks[function.entry]
         result: dict[int, list[Mark]] = {}
-        for bound in self.program.bounds:
+        for i, bound in enumerate(self.program.bounds):
+            # Rows at one address are of different loops; copies of one loop have its line of the source.
+            nth = sum(other.address == bound.address for other in self.program.bounds[:i])
+            line = self.program.lines.get(bound.address, bound.address)
+            source: Hashable = (line, nth, bound.passes, bound.cycles)
             for block in function.blocks.values():
                 last = block.instructions[-1]
                 if block.start <= bound.address < last.address + last.size:
-                    source: Hashable = self.program.lines.get(bound.address, bound.address)
                     result.setdefault(block.start, []).append(Mark(source, bound.passes, bound.cycles))
         for loop in _all_loops(function, self.program):
             runs = counted.passes(loop, function)

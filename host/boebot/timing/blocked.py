@@ -1,0 +1,324 @@
+"""The longest time in which no interrupt is accepted: of a function, of a whole image, and what each interrupt waits.
+
+A stretch begins with the first cycle of `cli`, or with the acceptance of an interrupt, whose entry takes 4 cycles (data
+sheet, 7.7.1). It ends with the instruction behind the one that sets the flag. Where a `cli` follows at once on that
+instruction, an interrupt that was let in returns to it, and it runs before the next one is accepted: both stretches
+count as one. The same holds when an interrupt returns: one instruction runs, and it may be a `cli`.
+
+Taken for granted: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
+not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. While the CPU sleeps, it wakes in
+4 cycles. Requests are as the timing table says; of an interrupt that is not in it, one at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from boebot.errors import TimingError
+from boebot.timing.flag import Flag, State, after
+from boebot.timing.paths import Graph, Mark, Way, longest
+from boebot.timing.program import Block, Function, Program
+from boebot.timing.stack import VECTORS
+from boebot.timing.wcet import WorstCase
+
+ENTRY = 4  # cycles from acceptance to the vector's jump
+LONGEST_INSTRUCTION = 4  # cycles: call, ret, reti
+WAKE = 4  # cycles from a request in sleep to its acceptance
+HORIZON = 1 << 24  # cycles; who waits longer waits for ever
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Cycles with interrupts off, and the address of the instruction with which they begin."""
+
+    cycles: int
+    begin: int
+
+
+NONE = Stretch(0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What a function does to the flag, when it is called with it on or off. None: cannot happen.
+
+    Attributes:
+        within: the longest stretch that begins and ends in it.
+        through: cycles from entry to return without an interrupt.
+        head: cycles from entry until interrupts can come.
+        tail: the longest stretch that lasts from within until its return.
+        on: whether it can return with interrupts on.
+    """
+
+    within: Stretch = NONE
+    through: int | None = None
+    head: int | None = None
+    tail: Stretch | None = None
+    on: bool = False
+
+
+_Node = tuple[int, int, State]  # block, number of the instruction in it, state before it
+
+
+@dataclass(frozen=True, slots=True)
+class _Flow:
+    """All ways from (block, instruction, state) to the next that belong to a stretch. Besides those that go on: its end
+    (`ended`), and the function's return (`returned`)."""
+
+    entry: _Node
+    goes: dict[_Node, list[tuple[_Node, int]]] = field(default_factory=dict)
+    ended: dict[_Node, list[int]] = field(default_factory=dict)  # cycles until interrupts can come
+    returned: dict[_Node, list[tuple[bool, int]]] = field(default_factory=dict)  # whether off, cycles
+    begins: list[tuple[_Node, int, Stretch]] = field(default_factory=list)  # node, cycles before it, of a callee
+    within: list[Stretch] = field(default_factory=list)  # of callees
+
+
+class Blocked:
+    """Stretches of the functions of a program, each worked out once."""
+
+    def __init__(self, program: Program, worst_case: WorstCase | None = None) -> None:
+        self.program = program
+        self.worst_case = worst_case or WorstCase(program)
+        self._effects: dict[tuple[int, bool], Effect] = {}
+        self._plain: dict[int, bool] = {}
+        self._under_way: set[tuple[int, bool]] = set()
+
+    def of(self, function: str | int) -> Stretch:
+        """The longest stretch that a function makes when it is called with interrupts on.
+
+        Raises:
+            TimingError: no such function; a loop without a bound while interrupts are off.
+        """
+        if isinstance(function, str):
+            if function not in self.program.by_name:
+                raise TimingError(f"{self.program.path} has no function {function}")
+            function = self.program.by_name[function]
+        effect = self.effect(function, on=True)
+        return max(effect.within, effect.tail or NONE, key=_cycles)
+
+    def interrupt(self, vector: int) -> tuple[int, int | None]:
+        """Of an interrupt: cycles from acceptance until others can come, and, where its body lets others in, the
+        longest stretch after that up to its return, or None."""
+        effect = self.effect(4 * vector, on=False)
+        begin = max(effect.through or 0, effect.head or 0)
+        return ENTRY + begin, None if effect.head is None else max(
+            effect.within, effect.tail or NONE, key=_cycles
+        ).cycles
+
+    def image(self) -> Stretch:
+        """The longest of the whole image: of `main` and all that it calls, or of an interrupt."""
+        stretches = [self.of("main")]
+        for vector in self.vectors():
+            first, second = self.interrupt(vector)
+            stretches += [Stretch(first, 4 * vector), Stretch(second or 0, 4 * vector)]
+        return max(stretches, key=_cycles)
+
+    def vectors(self) -> list[int]:
+        """Numbers of the interrupts in use, the highest priority first."""
+        return [number for number in VECTORS if 4 * number in self.program.functions]
+
+    def latency(self, vector: int) -> int:
+        """Most cycles from the request of an interrupt to its acceptance.
+
+        First what has just begun: another interrupt, which may return to a `cli`. Then interrupts of higher priority,
+        as often as they can come in that time, each with one instruction behind it.
+        """
+        own = self.of("main").cycles
+        rows = {row.vector: row.interval for row in self.program.table.interrupts}
+        spans = {number: self.interrupt(number) for number in self.vectors()}
+        begun = [own, WAKE]
+        for number, (first, second) in spans.items():
+            if number == vector and rows.get(number, 0) > first + own:
+                continue  # its next request comes when it has long returned
+            begun += [each + max(own, LONGEST_INSTRUCTION) for each in (first, second) if each is not None]
+        higher = {number: first for number, (first, _) in spans.items() if number < vector}
+        wait = start = max(begun)
+        while wait < HORIZON:
+            longer = start
+            for number, first in higher.items():
+                interval = rows.get(number, 0)
+                longer += (wait // interval + 1 if interval > 0 else 1) * (first + LONGEST_INSTRUCTION)
+            if longer == wait:
+                return wait
+            wait = longer
+        raise TimingError(f"interrupt {vector} may wait for ever: those of higher priority take all the time")
+
+    def effect(self, entry: int, on: bool) -> Effect:
+        """What a function does to the flag, called with interrupts on or off."""
+        if (entry, on) not in self._effects:
+            if (entry, on) in self._under_way:
+                raise TimingError(
+                    f"recursion at {self.program.where(entry)}: {self.program.functions[entry].name} calls itself; "
+                    "expected functions that do not"
+                )
+            self._under_way.add((entry, on))
+            try:
+                self._effects[entry, on] = self._worked_out(entry, on)
+            finally:
+                self._under_way.discard((entry, on))
+        return self._effects[entry, on]
+
+    def _worked_out(self, entry: int, on: bool) -> Effect:
+        if not self._is_plain(entry):
+            return self._effect(self.program.functions[entry], on)
+        return Effect(on=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
+
+    def _is_plain(self, entry: int) -> bool:
+        """Nothing in it or below it writes the flag."""
+        if entry not in self._plain:
+            self._plain[entry] = False  # while it is worked out: what calls itself is not plain
+            blocks = self.program.functions[entry].blocks.values()
+            self._plain[entry] = all(
+                not _writes_flag(block) and all(self._is_plain(callee) for callee in block.calls) for block in blocks
+            )
+        return self._plain[entry]
+
+    def _effect(self, function: Function, on: bool) -> Effect:
+        flow = self._flow(function, on)
+        marks = self.worst_case.marks(function)
+        within = list(flow.within)
+        tails: list[Stretch] = []
+        for node, before, at in flow.begins:
+            ended = self._longest(flow, node, marks, _ended)
+            within += [] if ended is None else [Stretch(before + ended, at.begin)]
+            returned = self._longest(flow, node, marks, _returned)
+            tails += [] if returned is None else [Stretch(before + returned, at.begin)]
+        returns = [off for each in flow.returned.values() for off, _ in each]
+        return Effect(
+            within=max(within, key=_cycles, default=NONE),
+            through=None if on else self._longest(flow, flow.entry, marks, _returned),
+            head=None if on else self._longest(flow, flow.entry, marks, _ended),
+            tail=max(tails, key=_cycles, default=None),
+            on=not all(returns),
+        )
+
+    def _longest(
+        self, flow: _Flow, start: _Node, marks: dict[int, list[Mark]], ends: Callable[[_Flow, _Node], Iterable[int]]
+    ) -> int | None:
+        """The longest way from a node, with interrupts off all the way, to one kind of end."""
+        ways: dict[_Node, list[Way[_Node]]] = {}
+        work = [start]
+        while work:
+            node = work.pop()
+            if node in ways:
+                continue
+            ways[node] = [Way(node, None, cycles) for cycles in ends(flow, node)]
+            for to, cycles in flow.goes.get(node, ()):
+                ways[node].append(Way(node, to, cycles))
+                work.append(to)
+        counted = {node: marks[node[0]] for node in ways if node[1] == 0 and node[0] in marks}
+        walk = longest(Graph(start, ways, lambda node: self.program.where(node[0]), counted))
+        return None if walk is None else walk.cycles
+
+    def _flow(self, function: Function, on: bool) -> _Flow:
+        entry = (function.entry, 0, State(Flag.ON if on else Flag.OFF))
+        flow = _Flow(entry)
+        seen = {entry}
+        work = [entry]
+        while work:
+            node = work.pop()
+            for to in self._step(function, node, flow):
+                if to not in seen:
+                    seen.add(to)
+                    work.append(to)
+        return flow
+
+    def _step(self, function: Function, node: _Node, flow: _Flow) -> list[_Node]:
+        """Adds the ways out of a node to the flow; the nodes that they lead to."""
+        start, number, state = node
+        block = function.blocks[start]
+        instruction = block.instructions[number]
+        states = after(instruction, state)
+        found: list[_Node] = []
+        if number + 1 < len(block.instructions):
+            for following in states:
+                found.append((start, number + 1, following))
+                self._go(flow, node, found[-1], instruction.cycles, instruction.address)
+            return found
+        for callee, edge_cycles, to in _leaving(block):
+            for following in states:
+                if callee is not None:
+                    found += self._call(flow, node, following, callee, edge_cycles, to)
+                elif to is not None:
+                    found.append((to, 0, following))
+                    self._go(flow, node, found[-1], edge_cycles, instruction.address)
+                else:
+                    self._return(flow, node, edge_cycles)
+        return found
+
+    def _go(self, flow: _Flow, node: _Node, to: _Node, cycles: int, address: int) -> None:
+        """From one instruction to the next: within a stretch, at its begin, at its end, or outside."""
+        flag, following = node[2].flag, to[2].flag
+        if flag is Flag.JUST_ON:
+            flow.ended.setdefault(node, []).append(0)
+        if flag is Flag.ON and following is Flag.OFF:
+            flow.begins.append((node, 0, Stretch(0, address)))
+        if flag.blocks or following is Flag.OFF:
+            flow.goes.setdefault(node, []).append((to, cycles))
+
+    def _return(self, flow: _Flow, node: _Node, cycles: int) -> None:
+        flag = node[2].flag
+        if flag in (Flag.ONE_MORE, Flag.JUST_ON):
+            flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
+        flow.returned.setdefault(node, []).append((flag is Flag.OFF, cycles))
+
+    def _call(self, flow: _Flow, node: _Node, state: State, callee: int, cycles: int, to: int | None) -> list[_Node]:
+        """A call, or a jump into another function (`to` None)."""
+        flag = node[2].flag
+        effect = self.effect(callee, on=flag is not Flag.OFF)
+        flow.within.append(effect.within)
+        if flag is not Flag.OFF:
+            flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
+        if effect.head is not None:
+            flow.ended.setdefault(node, []).append(cycles + effect.head)
+        found: list[_Node] = []
+        tail = effect.tail
+        if to is None:
+            if effect.through is not None:
+                flow.returned.setdefault(node, []).append((True, cycles + effect.through))
+            if tail is not None:
+                ret = (node[0], node[1], State(Flag.OFF, frozenset(), -1))
+                flow.returned.setdefault(ret, []).append((True, 0))
+                flow.begins.append((ret, tail.cycles, tail))
+            if effect.on:
+                flow.returned.setdefault(node, []).append((False, 0))
+            return found
+        behind_off = (to, 0, State(Flag.OFF, state.copies, state.pushed))
+        if effect.through is not None:
+            flow.goes.setdefault(node, []).append((behind_off, cycles + effect.through))
+            found.append(behind_off)
+        if tail is not None:
+            flow.begins.append((behind_off, tail.cycles, tail))
+            found.append(behind_off)
+        if effect.on:
+            found.append((to, 0, State(Flag.ON, state.copies, state.pushed)))
+        return found
+
+
+def _cycles(stretch: Stretch) -> int:
+    return stretch.cycles
+
+
+def _ended(flow: _Flow, node: _Node) -> Iterable[int]:
+    return flow.ended.get(node, ())
+
+
+def _returned(flow: _Flow, node: _Node) -> Iterable[int]:
+    return [cycles for off, cycles in flow.returned.get(node, ()) if off]
+
+
+def _writes_flag(block: Block) -> bool:
+    return any(
+        instruction.mnemonic in ("cli", "sei", "reti")
+        or (instruction.mnemonic == "out" and instruction.operands[0] == 0x3F)
+        for instruction in block.instructions
+    )
+
+
+def _leaving(block: Block) -> list[tuple[int | None, int, int | None]]:
+    """Ways out of a block: callee or None, cycles of its last instruction, block behind or None."""
+    callees: list[int | None] = [*block.calls] if block.calls else [None]
+    if not block.edges:
+        return [(callee, block.last_cycles, None) for callee in callees]
+    return [(callee, edge.cycles, edge.to) for callee in callees for edge in block.edges]

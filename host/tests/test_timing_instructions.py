@@ -1,0 +1,79 @@
+"""The decoder against avr-objdump, and its cycles against the data sheet of the ATmega328P (section 31)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avr_image import disassembly, operands
+from boebot.timing.elf import read_image
+from boebot.timing.instructions import BRANCHES, SKIPS, decode
+
+IMAGES = Path(__file__).resolve().parents[2] / "build" / "images"
+# objdump knows the instructions of all cores; the ATmega328P does not have these.
+OTHER_CORES = {"des", "eicall", "eijmp", "elpm", "lac", "las", "lat", "xch"}
+# Cycles of an instruction that goes on behind it, data sheet section 31. All others take 1.
+CYCLES = {
+    2: "adiw sbiw mul muls mulsu fmul fmuls fmulsu rjmp ijmp sbi cbi ld ldd lds st std sts push pop",
+    3: "rcall icall jmp lpm",
+    4: "call ret reti",
+}
+
+
+def test_every_opcode_is_what_objdump_says(tmp_path: Path) -> None:
+    # Each opcode is followed by two words of zeros, so that those of two words have their second one.
+    opcodes = b"".join(word.to_bytes(2, "little") + bytes(4) for word in range(0x10000))
+    binary = tmp_path / "opcodes.bin"
+    binary.write_bytes(opcodes)
+    expected = disassembly(binary, "-D", "-b", "binary", "-m", "avr:5")
+    wrong = []
+    for word in range(0x10000):
+        address = 6 * word
+        text = expected[address]
+        instruction = decode(opcodes, address)
+        name = text.split()[0]
+        if name == ".word" or name in OTHER_CORES or text.startswith("spm\tZ+"):
+            right = instruction is None
+        else:
+            numbers = (0, 30, 0) if text.strip() == "lpm" else operands(text, address)
+            right = instruction is not None and (instruction.mnemonic, instruction.operands) == (name, numbers)
+        if not right:
+            wrong.append(f"{word:04x}: {text!r}, decoded {instruction}")
+    assert not wrong, wrong[:10]
+
+
+@pytest.mark.parametrize("name", ["boebot", "shieldbot", "shieldbot-quad"])
+def test_every_instruction_of_the_images_is_what_objdump_says(name: str) -> None:
+    path = IMAGES / f"{name}.elf"
+    code = read_image(path).code
+    compared = 0
+    for address, text in disassembly(path, "-d").items():
+        words = text.split()
+        if words[0] in OTHER_CORES or words[0] == ".word":  # only constants look like that
+            continue
+        instruction = decode(code, address)
+        assert instruction is not None, f"{address:04x}: {text}"
+        numbers = (0, 30, 0) if words == ["lpm"] else operands(text, address)
+        assert (instruction.mnemonic, instruction.operands) == (words[0], numbers), f"{address:04x}: {text}"
+        compared += 1
+    assert compared > 5000  # of an image with all devices
+
+
+def test_cycles_are_those_of_the_data_sheet() -> None:
+    expected = {name: cycles for cycles, names in CYCLES.items() for name in names.split()}
+    seen: dict[str, int] = {}
+    for word in range(0x10000):
+        instruction = decode(word.to_bytes(2, "little") + bytes(2), 0)
+        if instruction is not None:
+            assert instruction.cycles == expected.get(instruction.mnemonic, 1), instruction
+            assert instruction.size == (4 if instruction.mnemonic in ("jmp", "call", "lds", "sts") else 2)
+            seen[instruction.mnemonic] = instruction.cycles
+    assert seen.keys() >= expected.keys() | BRANCHES | SKIPS
+
+
+def test_an_instruction_that_the_end_cuts_off_is_none() -> None:
+    assert decode(b"", 0) is None
+    assert decode(b"\x0c", 0) is None
+    assert decode(b"\x0c\x94", 0) is None  # the first word of `jmp`
+    assert decode(b"\x00\x00", -2) is None
