@@ -153,9 +153,7 @@ def _frame(program: Program, frame_most: int) -> int:
     """What a poll of the link takes when no loop over bytes sees more of them than a frame has; 0: there is none."""
     if LINK_POLL not in program.by_name:
         return 0
-    bounds = [
-        one if one.passes is None else replace(one, passes=min(one.passes, frame_most)) for one in program.bounds
-    ]
+    bounds = [one if one.passes is None else replace(one, passes=min(one.passes, frame_most)) for one in program.bounds]
     return WorstCase(replace(program, bounds=tuple(bounds))).of(LINK_POLL).cycles
 
 
