@@ -37,6 +37,16 @@ class Spans:
 
 
 @dataclass(frozen=True, slots=True)
+class Moment:
+    """One span of one tick: `begin` and `end` in cycles since the tick began, interrupts in between counted."""
+
+    name: str
+    kind: str  # "task" or "interrupt"
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
     """Of one or several runs: spans by the names of the timing table, and what the runs were like."""
 
@@ -47,3 +57,4 @@ class Measurement:
     load: float  # share of cycles in which instructions ran, 0..1
     worst_tick: int = 0  # most cycles of tasks and interrupts in one control tick
     scenarios: tuple[str, ...] = field(default_factory=tuple)
+    tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
