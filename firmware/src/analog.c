@@ -3,6 +3,7 @@
 
 #include <stdbool.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/parameters.h"
@@ -65,7 +66,7 @@ static uint8_t next_input(void) {
 }
 
 void analog_start(void) {
-  for (uint8_t i = 0; i < ANALOG_INPUTS; i++) {
+  BOUNDED(ANALOG_INPUTS, for (uint8_t i = 0; i < ANALOG_INPUTS; i++)) {
     results[i] = 0;
     ages[i] = AGE_NEVER;
   }

@@ -1,12 +1,14 @@
 /* buzzer.c: see buzzer.h. */
 #include "buzzer.h"
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/parameters.h"
 #include "pins.h"
 
 #define START_FREQUENCY 2000u /* Hz */
+#define STEPS_MAX 4u          /* of a division; the finest clock's */
 
 static uint8_t left;  /* ticks of the tone still to come */
 static uint8_t token; /* of the last tone */
@@ -26,7 +28,7 @@ void buzzer_start(void) {
 static uint8_t half_period(uint16_t half_rate, uint8_t steps, uint16_t frequency) {
   uint16_t quotient = half_rate / frequency;
   uint16_t rest = half_rate % frequency;
-  for (; steps > 0; steps--) {
+  BOUNDED(STEPS_MAX, for (; steps > 0; steps--)) {
     quotient = (uint16_t)(quotient << 1);
     rest = (uint16_t)(rest << 1);
     if (rest >= frequency) {
@@ -40,7 +42,7 @@ static uint8_t half_period(uint16_t half_rate, uint8_t steps, uint16_t frequency
 /* The fastest clock in which half a period is 255 counts at most. */
 static void sound(uint16_t frequency) {
   if (frequency > 3906u) {
-    hal_tone_start(HAL_TONE_BY_8, half_period(62500u, 4, frequency)); /* 1 MHz */
+    hal_tone_start(HAL_TONE_BY_8, half_period(62500u, STEPS_MAX, frequency)); /* 1 MHz */
   } else if (frequency > 488u) {
     hal_tone_start(HAL_TONE_BY_64, half_period(62500u, 1, frequency)); /* 125 kHz */
   } else if (frequency > 122u) {

@@ -1,6 +1,7 @@
 /* encoder.c: see encoder.h. Equations: notes section 1.4 (counts for travel, edge periods for speed). */
 #include "encoder.h"
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/parameters.h"
@@ -151,7 +152,7 @@ static inline __attribute__((always_inline)) void work_off(uint8_t bits, uint32_
 
 /* Masks lines until the next tick and has them reported. */
 static void convict(uint8_t lines) {
-  for (uint8_t line = 0; line < LINES; line++) {
+  BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
     if ((lines & line_bit[line]) != 0) {
       fired[line] = (uint8_t)(limit + 1u);
     }
@@ -172,10 +173,10 @@ static uint8_t noisy_lines(uint8_t head) {
   uint8_t other_edges = 0;
   uint8_t lines = 0;
   uint8_t bits = hal_change_after(at)->bits;
-  for (; left > 0; left--) {
+  BOUNDED(HAL_CHANGES - 2u, for (; left > 0; left--)) {
     at = (uint8_t)(at - HAL_CHANGE_BYTES);
     const uint8_t earlier = hal_change_after(at)->bits;
-    for (uint8_t line = 0; line < LINES; line++) {
+    BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
       if (((bits ^ earlier) & line_bit[line]) != 0 && ++edges[line] >= share) {
         lines |= line_bit[line];
       }
@@ -202,14 +203,15 @@ void encoder_poll(void) {
   const uint8_t head = hal_changes_head; /* before the time is read: every change up to it is in the past */
   if (tail != head) {
     const uint32_t now = schedule_now();
-    do {
+    /* Equal indices are an empty ring: it holds one change less than it has places. */
+    BOUNDED(HAL_CHANGES - 1u, while (tail != head)) {
       const volatile hal_change *oldest = hal_change_after(tail);
       const uint16_t age = (uint16_t)((uint16_t)now - oldest->time);
       const uint8_t bits = oldest->bits;
       tail = (uint8_t)(tail + HAL_CHANGE_BYTES);
       hal_changes_tail = tail;
       work_off(bits, now - age);
-    } while (tail != head);
+    }
     if (phantoms > limit) { /* nobody knows whose */
       convict(watched);
       phantoms = 0;
@@ -240,10 +242,10 @@ void encoder_start(void) {
   phantoms = 0;
   awaited = other_bit = 0;
   other_seen = false;
-  for (uint8_t side = LEFT; side < SIDES; side++) {
+  BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
   }
-  for (uint8_t line = 0; line < LINES; line++) {
+  BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
     fired[line] = 0;
   }
   limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
@@ -273,7 +275,7 @@ static void close_wheel(uint8_t side) {
   }
   w->edges = 0;
   w->reading.masked = false;
-  for (uint8_t i = 0; i < LINES_PER_SIDE; i++) {
+  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
     uint8_t *count = &fired[(uint8_t)(side * LINES_PER_SIDE + i)];
     w->reading.masked = w->reading.masked || *count > limit;
     *count = 0;

@@ -4,6 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "storage.h"
@@ -58,7 +59,7 @@ uint8_t reset_cause(void) { return cause; }
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
  * undone. Close numbers come out far apart. */
 static uint32_t mixed(uint32_t x) {
-  for (uint8_t round = 0; round < 3u; round++) {
+  BOUNDED(3, for (uint8_t round = 0; round < 3u; round++)) {
     x = x * 0x0B352Dul & NONCE_MASK;
     x ^= x >> 11;
   }

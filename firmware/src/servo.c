@@ -3,6 +3,7 @@
 
 #include <stdbool.h>
 
+#include "bounds.h"
 #include "hal/hal.h"
 #include "pins.h"
 
@@ -24,7 +25,7 @@ void servo_start(void) {
   HAL_PIN_OUTPUT(SERVO_LEFT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
   HAL_PIN_OUTPUT(TURRET);
-  for (uint8_t servo = 0; servo < SERVOS; servo++) {
+  BOUNDED(SERVOS, for (uint8_t servo = 0; servo < SERVOS; servo++)) {
     wanted[servo] = in_force[servo] = 0;
   }
 }

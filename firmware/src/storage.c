@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/parameters.h"
@@ -88,7 +89,7 @@ static uint16_t crc16(uint16_t crc, uint8_t byte) {
 static bool read_record(uint16_t address, uint8_t size) {
   hal_eeprom_wait(); /* for a write from before the reset */
   uint16_t expected = CRC_START;
-  for (uint8_t i = 0; i < size; i++) {
+  BOUNDED(sizeof record.bytes, for (uint8_t i = 0; i < size; i++)) {
     record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
     if (i > 0 && i < size - 2u) {
       expected = crc16(expected, record.bytes[i]);
@@ -127,7 +128,7 @@ static bool is_written(void) { return write_left == 0 && !hal_eeprom_busy(); }
 
 /* Reads a few of the step's bytes back and takes them off `step_count`; false if one is not as it should be. */
 static bool reads_back(void) {
-  for (uint8_t n = 0; n < READ_BACK && step_count > 0; n++) {
+  BOUNDED(READ_BACK, for (uint8_t n = 0; n < READ_BACK && step_count > 0; n++)) {
     if (hal_eeprom_read((uint16_t)(record_address + step_first)) != record.bytes[step_first]) {
       return false;
     }
@@ -172,14 +173,14 @@ OUTLINE bool read_copy(uint8_t copy) {
 void storage_load_parameters(void) {
   bool whole[COPIES];
   uint8_t generations[COPIES];
-  for (uint8_t copy = 0; copy < COPIES; copy++) {
+  BOUNDED(COPIES, for (uint8_t copy = 0; copy < COPIES; copy++)) {
     whole[copy] = read_copy(copy);
     generations[copy] = record.copy.generation;
   }
   const uint8_t newer = whole[1] && (!whole[0] || (int8_t)(uint8_t)(generations[1] - generations[0]) > 0);
   generation = whole[newer] ? generations[newer] : 0u;
   loaded = true;
-  for (uint8_t i = 0; i < COPIES; i++) {
+  BOUNDED(COPIES, for (uint8_t i = 0; i < COPIES; i++)) {
     copy_in_force = newer ^ i;
     if (whole[copy_in_force] && read_copy(copy_in_force) && parameters_restore(record.copy.values)) {
       return;
@@ -229,7 +230,7 @@ static uint16_t boot_address(uint8_t entry) { return (uint16_t)(BOOT_ADDRESS + e
 static void find_boots(void) {
   boots = 0;
   boot_newest = BOOT_RECORDS - 1u;
-  for (uint8_t entry = 0; entry < BOOT_RECORDS; entry++) {
+  BOUNDED(BOOT_RECORDS, for (uint8_t entry = 0; entry < BOOT_RECORDS; entry++)) {
     if (read_record(boot_address(entry), sizeof(boot_record))) {
       const uint32_t count = (uint32_t)record.boot.count[1] << 16 | record.boot.count[0];
       if (count > boots) {

@@ -4,6 +4,7 @@
 #include "supply.h"
 
 #include "analog.h"
+#include "bounds.h"
 #include "link/parameters.h"
 
 #define HYSTERESIS 100u /* mV */
@@ -25,7 +26,7 @@ static uint16_t millivolts(uint16_t bandgap, uint16_t result) {
   const uint16_t dividend = (uint16_t)(bandgap * 32u); /* at most 38400 */
   uint16_t quotient = dividend / result;
   uint16_t rest = dividend % result;
-  for (uint8_t step = 0; step < 5u; step++) {
+  BOUNDED(5, for (uint8_t step = 0; step < 5u; step++)) {
     quotient = (uint16_t)(quotient << 1);
     rest = (uint16_t)(rest << 1);
     if (rest >= result) {

@@ -5,6 +5,7 @@
 #define NATIVE_BENCH_H
 
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
@@ -41,6 +42,14 @@ struct message {
   }
 };
 
+/* A loop that breaks its bound (bounds.h) ends the test. */
+inline void check_no_fault(const native_machine &machine) {
+  if (machine.fault[0] != '\0') {
+    std::fprintf(stderr, "%s\n", machine.fault);
+    std::abort();
+  }
+}
+
 class native_bench {
  public:
   native_machine machine{};
@@ -69,6 +78,7 @@ class native_bench {
     };
     host_decoder_start(&decoder_, FRAME_NO_SESSION);
     api_->start(&machine, reset_cause);
+    check_no_fault(machine);
     schedule_start(first_tick);
     start_ = machine.now;
   }
@@ -84,11 +94,11 @@ class native_bench {
   void run(uint64_t cycles) { run_to(machine.now + cycles); }
   void run_to(uint64_t cycle) {
     while (attended_ && cycle >= next_probe_) {
-      api_->advance(next_probe_);
+      advance(next_probe_);
       probe(0);
       next_probe_ = machine.now + PROBE_PERIOD;
     }
-    api_->advance(cycle);
+    advance(cycle);
   }
 
   /* The cycle at which the slot, tick of that number (counted from the start) begins. */
@@ -247,6 +257,11 @@ class native_bench {
   }
 
  private:
+  void advance(uint64_t cycle) {
+    api_->advance(cycle);
+    check_no_fault(machine);
+  }
+
   static native_bench &of(native_machine *machine) { return *reinterpret_cast<native_bench *>(machine); }
 
   static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_t level) {

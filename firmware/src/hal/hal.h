@@ -173,9 +173,9 @@ uint32_t hal_image_hash(void);
  *   void hal_serial_again(void)                   or do again
  *   bool hal_serial_receive(uint8_t *byte)        takes the oldest; false if there is none
  *   bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size)
- *                                                 takes bytes up to a zero, which it takes and leaves out, and appends them
- *                                                 to `bytes`; past size - 1 each takes the last place. False if all came
- *                                                 before a zero. *count < size
+ *                                                 takes bytes up to a zero, which it takes and leaves out, at most `size` (a
+ *                                                 constant), and appends them to `bytes`; those past size - 1 are not
+ *                                                 kept. False without a zero: bytes may still wait. *count < size
  *   uint8_t *hal_serial_place(void)               where the next byte to send goes,
  *   uint8_t *hal_serial_beyond(place, count)      where the one `count` (less than 128) after that,
  *   void hal_serial_put(&place, uint8_t byte)     writes there and moves on,

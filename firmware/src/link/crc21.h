@@ -8,6 +8,7 @@
 
 #include <stdint.h>
 
+#include "bounds.h"
 #include "hal/hal.h"
 
 #define CRC21_BIT_0 0xEDFB78ul /* the polynomial, shifted by three */
@@ -55,8 +56,8 @@ typedef struct {
 } crc21;
 
 /* crc21_take(crc, byte)                takes one byte in
- * crc21_take_all(crc, bytes, count)    takes bytes in, at least one
- * crc21_take_sent(crc, place, count)   takes bytes in, at least one, from a place of hal_serial_beyond() on, which moves on
+ * crc21_take_all(crc, bytes, count, most)    takes bytes in, at least one and at most the constant `most`
+ * crc21_take_sent(crc, place, count, most)   the same from a place of hal_serial_beyond() on, which moves on
  * crc21_spread(crc)                    makes its 21 bits three bytes of seven, each with its top bit set
  * crc21_align(seed)                    a seed in the top 21 of 24 bits; what is above them stays */
 #ifdef __AVR__
@@ -75,25 +76,27 @@ typedef struct {
   "lpm %[low], Z                \n"
 #define CRC21_REGISTER [high] "+r"(crc->high), [middle] "+r"(crc->middle), [low] "+r"(crc->low)
 
-static inline __attribute__((always_inline)) void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count) {
+static inline __attribute__((always_inline)) void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count,
+                                                                 uint8_t most) {
   uint8_t byte;
-  __asm__ volatile("1: ld %[byte], %a[bytes]+ \n" CRC21_TAKE
+  __asm__ volatile("1: ld %[byte], %a[bytes]+ \n" BOUNDED_ASM("%[most]") CRC21_TAKE
                    "dec %[count]              \n"
                    "brne 1b                   \n"
                    : CRC21_REGISTER, [bytes] "+x"(bytes), [count] "+r"(count), [byte] "=&r"(byte)
-                   : [table] "i"(crc21_table)
+                   : [table] "i"(crc21_table), [most] "n"(most)
                    : "r30", "r31", "memory");
 }
 
-static inline __attribute__((always_inline)) void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count) {
+static inline __attribute__((always_inline)) void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count,
+                                                                  uint8_t most) {
   uint8_t byte;
-  __asm__ volatile("1: ld %[byte], %a[place]        \n" CRC21_TAKE
+  __asm__ volatile("1: ld %[byte], %a[place]        \n" BOUNDED_ASM("%[most]") CRC21_TAKE
                    "inc %A[place]                   \n"
                    HAL_SEND_WRAP(place)
                    "dec %[count]                    \n"
                    "brne 1b                         \n"
                    : CRC21_REGISTER, [place] "+x"(*place), [count] "+r"(count), [byte] "=&r"(byte)
-                   : [table] "i"(crc21_table), [mask] "M"(HAL_SEND_MASK)
+                   : [table] "i"(crc21_table), [mask] "M"(HAL_SEND_MASK), [most] "n"(most)
                    : "r30", "r31", "memory");
 }
 
@@ -122,14 +125,15 @@ static inline void crc21_take(crc21 *crc, uint8_t byte) {
   *crc = (crc21){(uint8_t)(crc->middle ^ entry[0]), (uint8_t)(crc->low ^ entry[256]), entry[512]};
 }
 
-static inline void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count) {
-  do {
+static inline void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count, uint8_t most) {
+  (void)most; /* unless it is checked */
+  BOUNDED(most, for (; count != 0; count--)) {
     crc21_take(crc, *bytes++);
-  } while (--count != 0);
+  }
 }
 
-static inline void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count) {
-  crc21_take_all(crc, *place, count);
+static inline void crc21_take_sent(crc21 *crc, uint8_t **place, uint8_t count, uint8_t most) {
+  crc21_take_all(crc, *place, count, most);
   *place += count;
 }
 

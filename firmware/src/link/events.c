@@ -3,6 +3,7 @@
 
 #include <stdbool.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "link/counters.h"
 #include "link/link.h"
@@ -37,7 +38,7 @@ void events_start(void) {
 }
 
 static void take_out(msg_event *event) {
-  for (end--; event != end; event++) {
+  BOUNDED(PLACES + KINDS - 1u, for (end--; event != end; event++)) {
     event[0] = event[1];
   }
 }
@@ -49,7 +50,7 @@ void events_raise(uint8_t kind, uint16_t value) {
   if (end >= queue + PLACES) {
     counters_count(deferred);
   }
-  for (msg_event *event = queue + PLACES; event < end; event++) {
+  BOUNDED(KINDS, for (msg_event *event = queue + PLACES; event < end; event++)) {
     if (event->kind == kind) {           /* the new one has the latest value */
       if (kind == EVENT_KIND_WHISKERS) { /* the high byte: all that closed since */
         value = (uint16_t)(value | (event->value & 0xFF00u));

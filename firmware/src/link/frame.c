@@ -5,8 +5,10 @@
 #include "link/cobs.h"
 #include "link/crc21.h"
 
+#define HEAD_BYTES 3u /* code byte, id, sequence */
 #define CHECK_BYTES 3u
-#define INSIDE_MIN 6u /* code byte, id, sequence, checksum */
+#define ACCEPTED_MAX (FRAME_ACCEPTED_MAX + HEAD_BYTES) /* stuffed, without its checksum */
+#define INSIDE_MIN 6u                                  /* code byte, id, sequence, checksum */
 
 /* The register that starts from a seed aligned with it. */
 static inline crc21 crc_from(uint32_t aligned) {
@@ -24,7 +26,7 @@ _Static_assert(FRAME_NO_SESSION > 0xFFFFFFul && FRAME_SEED_MAX << 3 <= 0xFFFFFFu
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
   crc21 crc = crc_start(seed);
   if (count > 0) {
-    crc21_take_all(&crc, bytes, count);
+    crc21_take_all(&crc, bytes, count, UINT8_MAX);
   }
   return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
 }
@@ -33,13 +35,13 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
   *wire = 0;
   cobs_stuffing stuffing = {hal_serial_beyond(wire, (uint8_t)(length + 4u)), 1};
   if (length != 0) {
-    cobs_put_all(&stuffing, (const uint8_t *)payload + length, length);
+    cobs_put_all(&stuffing, (const uint8_t *)payload + length, length, FRAME_PAYLOAD_MAX);
   }
   cobs_put(&stuffing, sequence);
   cobs_put(&stuffing, id);
   hal_serial_put_before(&stuffing.to, stuffing.distance);
   crc21 crc = crc_from(aligned_seed(id, seed));
-  crc21_take_sent(&crc, &stuffing.to, (uint8_t)(length + 3u));
+  crc21_take_sent(&crc, &stuffing.to, (uint8_t)(length + HEAD_BYTES), FRAME_PAYLOAD_MAX + HEAD_BYTES);
   crc21_spread(&crc);
   hal_serial_put(&stuffing.to, crc.high);
   hal_serial_put(&stuffing.to, crc.middle);
@@ -64,12 +66,13 @@ static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t 
   }
   crc21 crc = crc_from(aligned);
   const uint8_t size = (uint8_t)(count - CHECK_BYTES);
-  crc21_take_all(&crc, bytes, size);
+  crc21_take_all(&crc, bytes, size, ACCEPTED_MAX);
   crc21_spread(&crc);
   const uint8_t expected[CHECK_BYTES] = {crc.high, crc.middle, crc.low};
   const uint8_t *const check = bytes + size;
   /* branches, for a value made of them takes 14 bytes more */
-  if (check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2] && unstuff(bytes, size)) {
+  if (check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2] &&
+      unstuff(bytes, size, ACCEPTED_MAX - 2u)) {
     return true;
   }
   return false;

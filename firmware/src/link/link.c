@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "bounds.h"
 #include "link/counters.h"
 #include "link/devices.h"
 #include "link/dispatch.h"
@@ -29,13 +30,14 @@ void link_use_seed(uint32_t seed) {
   link_room = 0; /* a request of the session before is not carried out any more */
 }
 
+/* One piece between delimiters, and an empty one before it. What else waits stays due: so this takes a known time, whatever
+ * came. */
 bool link_take_frame(void) {
   hal_serial_seen();
-  for (;;) {
-    if (!hal_serial_receive_block(decoder.bytes, &decoder.count, sizeof decoder.bytes)) {
-      return false;
-    }
-    if (decoder.count != 0 && frame_decode_end(&decoder)) {
+  bool ended = false;
+  BOUNDED(2, for (uint8_t pieces = 0; pieces < 2u; pieces++)) {
+    ended = hal_serial_receive_block(decoder.bytes, &decoder.count, sizeof decoder.bytes);
+    if (!ended || decoder.count != 0) {
       break;
     }
     decoder.synchronised = true; /* by an empty frame too */
@@ -43,7 +45,7 @@ bool link_take_frame(void) {
   if (hal_serial_received()) {
     hal_serial_again();
   }
-  return true;
+  return ended && frame_decode_end(&decoder);
 }
 
 void link_poll(void) {

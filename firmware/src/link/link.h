@@ -19,7 +19,7 @@ void link_start(uint16_t baud);
  * forgotten. */
 void link_use_seed(uint32_t seed);
 
-/* Takes received bytes, up to the end of an accepted frame; false if they end before. A part of link_poll(). */
+/* Takes received bytes, up to the end of one frame; false unless it is accepted. A part of link_poll(). */
 bool link_take_frame(void);
 
 /* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "pins.h"
@@ -23,6 +24,7 @@ HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
 
 /* Rates that the line can have, in counts of the parameter. */
 HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
+#define BAUD_RATES (sizeof baud_rates / sizeof *baud_rates)
 
 #define LIMIT_MIN_u16 0
 #define LIMIT_MAX_u16 UINT16_MAX
@@ -49,7 +51,7 @@ static int32_t meant(uint16_t kept, uint8_t is_signed) { return is_signed ? (int
 static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUILT) == 0; }
 
 static bool is_baud_rate(uint16_t value) {
-  for (uint8_t i = 0; i < sizeof baud_rates / sizeof *baud_rates; i++) {
+  BOUNDED(BAUD_RATES, for (uint8_t i = 0; i < BAUD_RATES; i++)) {
     uint16_t rate = 0;
     hal_table_copy(&rate, &baud_rates[i], sizeof rate);
     if (value == rate) {
@@ -80,7 +82,7 @@ void parameters_start(void) {
 }
 
 void parameters_reset(void) {
-  for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
+  BOUNDED(PARAMETER_COUNT, for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++)) {
     values[parameter] = range_of(parameter).initial;
   }
 }
@@ -111,7 +113,7 @@ bool parameters_device_on(uint16_t device) { return (values[PARAMETER_DEVICES] &
 const uint16_t *parameters_values(void) { return values; }
 
 bool parameters_restore(const uint16_t *kept) {
-  for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
+  BOUNDED(PARAMETER_COUNT, for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++)) {
     const parameter_range range = range_of(parameter);
     if (!is_allowed(parameter, kept[parameter], &range)) {
       return false;

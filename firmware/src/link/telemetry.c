@@ -1,6 +1,7 @@
 /* telemetry.c: see telemetry.h. */
 #include "link/telemetry.h"
 
+#include "bounds.h"
 #include "encoder.h"
 #include "generated/messages.h"
 #include "infrared.h"
@@ -26,7 +27,8 @@ void telemetry_start_line(void) {
   static const uint8_t factors[] = {2, 5, 10};                                   /* 1, 2, 5, 10, 20, 50, 100 */
   const uint32_t needed = 2u * send_time(MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD); /* us */
   line_period = 1;
-  for (uint8_t i = 0, decade = 1; line_period * (uint32_t)SCHEDULE_TICK_US < needed && line_period < 100; i++) {
+  BOUNDED(
+      6, for (uint8_t i = 0, decade = 1; line_period * (uint32_t)SCHEDULE_TICK_US < needed && line_period < 100; i++)) {
     if (i == sizeof factors) {
       i = 0;
       decade = 10;

@@ -4,6 +4,7 @@
 #define frame_encode END(frame_encode)
 #define frame_decoder_start END(frame_decoder_start)
 #define frame_decode_end END(frame_decode_end)
+#define BOUNDS_UNCHECKED
 #include "link/frame.c"
 
 #include <stdlib.h>

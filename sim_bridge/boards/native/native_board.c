@@ -187,6 +187,24 @@ static void lose_power(native_board *self) {
   }
 }
 
+/* The program cannot go on, and why. */
+static void keep_fault(native_board *self, const char *sentence) {
+  const size_t size = strlen(sentence) + 1;
+  self->api = NULL;
+  self->fault = malloc(size);
+  if (self->fault != NULL) {
+    memcpy(self->fault, sentence, size);
+  }
+}
+
+/* Whether the program has given up. */
+static bool has_failed(native_board *self) {
+  if (self->machine.fault[0] != '\0') {
+    keep_fault(self, self->machine.fault);
+  }
+  return self->api == NULL;
+}
+
 /* Begins the program, the first time or anew. */
 static bool restart(native_board *self) {
   char error[256];
@@ -198,22 +216,18 @@ static bool restart(native_board *self) {
   if (!self->started) {
     self->started = true;
     self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
-    return true;
+    return !has_failed(self);
   }
   self->resets++;
   cut_outgoing(self);
   cut_incoming(self);
   library_unload(&self->library);
   if (!load(self, error, sizeof error)) {
-    self->fault = malloc(sizeof error);
-    if (self->fault != NULL) {
-      memcpy(self->fault, error, sizeof error);
-    }
-    self->api = NULL;
+    keep_fault(self, error);
     return false;
   }
   self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
-  return true;
+  return !has_failed(self);
 }
 
 /* ---- the face of a board ---- */
@@ -248,6 +262,9 @@ static board_state board_advance(board *face, uint64_t until) {
       return BOARD_CRASHED;
     }
     self->api->advance(until);
+    if (has_failed(self)) {
+      return BOARD_CRASHED;
+    }
   } while (self->reset_asked);
   return BOARD_RUNNING;
 }

@@ -1,4 +1,5 @@
 /* hal_avr.c: timers, carrier, tone, Ping trigger and image of the ATmega328P. */
+#include "bounds.h"
 #include "hal/hal.h"
 #include "pins.h"
 
@@ -122,7 +123,7 @@ uint32_t hal_image_hash(void) {
       0xEDB88320ul, 0xF00F9344ul, 0xD6D6A3E8ul, 0xCB61B38Cul, 0x9B64C2B0ul, 0x86D3D2D4ul, 0xA00AE278ul, 0xBDBDF21Cul};
   uint32_t crc = 0xFFFFFFFFul;
   const uint16_t size = (uint16_t)hal_image_size();
-  for (uint16_t address = 0; address < size; address++) {
+  BOUNDED(FLASHEND + 1ul, for (uint16_t address = 0; address < size; address++)) {
     const uint8_t byte = pgm_read_byte(address);
     crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ byte) & 0x0Fu]);
     crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ (byte >> 4)) & 0x0Fu]);

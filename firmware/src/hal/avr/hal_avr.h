@@ -21,6 +21,8 @@
 #include <stdint.h>
 #include <util/atomic.h>
 
+#include "bounds.h"
+
 #define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect)
 #define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect)
 #define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect)
@@ -41,7 +43,8 @@
 /* Covers what can stand before the edge's interrupt (one that has begun, 51 cycles; a storm of pin changes, 5 x 79 and 16
  * to stop it; a stamped change, 30; a capture, 110) and its own prologue, 50. */
 #define HAL_EDGE_LEAD 672u
-#define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
+#define HAL_EDGE_CLOSE 150u /* cycles before it from which nothing else is done */
+#define HAL_EDGE_TAKES 35u  /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
@@ -136,10 +139,12 @@ static inline uint8_t hal_two_wire_byte(void) { return TWDR; }
 
 /* EEPROM (data sheet, 8.6). */
 #define HAL_EEPROM_SIZE 1024u
+/* 26,368 periods of the RC oscillator (table 8-1), whose 8 MHz may be 10 % less (table 29-1). */
+#define HAL_EEPROM_WRITE_CYCLES (26368ul * (F_CPU / 100000ul) / 72ul)
 static inline bool hal_eeprom_busy(void) { return (EECR & _BV(EEPE)) != 0; }
 
 static inline void hal_eeprom_wait(void) {
-  while (hal_eeprom_busy()) {
+  BOUNDED_TIME(HAL_EEPROM_WRITE_CYCLES, while (hal_eeprom_busy())) {
   }
 }
 
@@ -228,42 +233,43 @@ static inline bool hal_serial_receive(uint8_t *byte) {
 /* 10 cycles a byte. */
 static inline __attribute__((always_inline)) bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count,
                                                                            uint8_t size) {
-  for (;;) {
-    const uint8_t tail = HAL_RECEIVE_TAIL;
-    uint8_t left = (uint8_t)(HAL_RECEIVE_HEAD - tail);
-    if (left == 0) {
-      return false;
-    }
-    uint8_t *from;
-    HAL_RING_PLACE(from, hal_receive_ring, tail);
-    const uint8_t room = (uint8_t)(size - *count);
-    if (left > room) {
-      left = room;
-    }
-    uint8_t *to = bytes + *count;
-    uint8_t byte;
-    __asm__ volatile(
-        "1: ld %[byte], %a[from]   \n"
-        "inc %A[from]              \n"
-        "st %a[to]+, %[byte]       \n"
-        "tst %[byte]               \n"
-        "breq 2f                   \n"
-        "dec %[left]               \n"
-        "brne 1b                   \n"
-        "2:                        \n"
-        : [to] "+x"(to), [from] "+z"(from), [left] "+r"(left), [byte] "=&r"(byte)
-        :
-        : "memory");
-    HAL_RECEIVE_TAIL = (uint8_t)(uintptr_t)from;
-    uint8_t filled = (uint8_t)(to - bytes);
-    if (byte == 0 || filled == size) { /* without the zero; or the last place again */
-      filled--;
-    }
-    *count = filled;
-    if (byte == 0) {
-      return true;
-    }
+  const uint8_t tail = HAL_RECEIVE_TAIL;
+  uint8_t left = (uint8_t)(HAL_RECEIVE_HEAD - tail);
+  if (left == 0) {
+    return false;
   }
+  uint8_t *from;
+  HAL_RING_PLACE(from, hal_receive_ring, tail);
+  uint8_t *to = bytes + *count;
+  uint8_t room = (uint8_t)(size - *count);
+  const bool is_full = room == 1u;
+  if (is_full) { /* what is too long is no message: it need not be kept */
+    to = bytes;
+    room = size;
+  }
+  if (left > room) {
+    left = room;
+  }
+  uint8_t byte;
+  __asm__ volatile(
+      "1: ld %[byte], %a[from]   \n" BOUNDED_ASM("%[size]")
+      "inc %A[from]              \n"
+      "st %a[to]+, %[byte]       \n"
+      "tst %[byte]               \n"
+      "breq 2f                   \n"
+      "dec %[left]               \n"
+      "brne 1b                   \n"
+      "2:                        \n"
+      : [to] "+x"(to), [from] "+z"(from), [left] "+r"(left), [byte] "=&r"(byte)
+      : [size] "n"(size)
+      : "memory");
+  HAL_RECEIVE_TAIL = (uint8_t)(uintptr_t)from;
+  uint8_t filled = (uint8_t)(to - bytes);
+  if (byte == 0 || filled == size) { /* without the zero; or the last place again */
+    filled--;
+  }
+  *count = is_full ? (uint8_t)(size - 1u) : filled;
+  return byte == 0;
 }
 
 static inline bool hal_serial_room(uint8_t count) {
@@ -307,15 +313,15 @@ static inline __attribute__((always_inline)) void hal_serial_put_before(uint8_t 
 void hal_serial_queue(uint8_t count);
 
 /* Returns a fixed number of cycles after the timer has read `time`, whenever it was called. Far from it, received bytes
- * are taken meanwhile, for the receiver holds two and no more. Then the coarse loop ends within 256 cycles of it, the
- * fine one takes the rest three by three, the branches after it the last 0 to 2. */
+ * are taken meanwhile, for the receiver holds two and no more. Then, within HAL_EDGE_CLOSE cycles of it, the fine loop
+ * takes the rest three by three, the branches after it the last 0 to 2. */
 static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
-  while ((int16_t)(time - TCNT1) > 150) {
+  BOUNDED_TIME(HAL_EDGE_LEAD - HAL_EDGE_CLOSE, while ((int16_t)(time - TCNT1) > (int16_t)HAL_EDGE_CLOSE)) {
     hal_serial_take();
   }
   uint16_t left;
   __asm__ volatile(
-      "1: movw %A[left], %A[time]       \n"
+      "1: movw %A[left], %A[time]       \n" BOUNDED_ASM("1")
       "   lds __tmp_reg__, %[low]       \n" /* also latches the high byte */
       "   sub %A[left], __tmp_reg__     \n"
       "   lds __tmp_reg__, %[high]      \n"
@@ -323,7 +329,7 @@ static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
       "   brmi 5f                       \n" /* late */
       "   tst %B[left]                  \n"
       "   brne 1b                       \n"
-      "2: subi %A[left], 3              \n"
+      "2: subi %A[left], 3              \n" BOUNDED_ASM("%[fine]")
       "   brcc 2b                       \n"
       "   cpi %A[left], 0xFE            \n" /* -3, -2 or -1 remain: 0, 1 or 2 cycles more */
       "   brcc 3f                       \n"
@@ -331,7 +337,8 @@ static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
       "   brcc 5f                       \n"
       "5:                               \n"
       : [left] "=&d"(left)
-      : [time] "r"(time), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)));
+      : [time] "r"(time), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)),
+        [fine] "n"(HAL_EDGE_CLOSE / 3u + 1u));
 }
 
 static inline uint16_t hal_edge_delay(uint16_t time) {

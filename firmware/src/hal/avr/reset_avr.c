@@ -1,6 +1,7 @@
 /* reset_avr.c: what the ATmega328P knows of its resets, memory that survives them, and the watchdog (data sheet, 11). */
 #include <avr/wdt.h>
 
+#include "bounds.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 
@@ -36,7 +37,7 @@ void *hal_noinit(void) { return noinit; }
 /* FNV-1a from here up to the stack. */
 uint32_t hal_memory_noise(void) {
   uint32_t hash = 0x811C9DC5ul;
-  for (const uint8_t *byte = noinit; byte < (const uint8_t *)SP; byte++) {
+  BOUNDED(RAMEND + 1ul - RAMSTART, for (const uint8_t *byte = noinit; byte < (const uint8_t *)SP; byte++)) {
     hash = (hash ^ *byte) * 0x01000193ul;
   }
   return hash;

@@ -1,5 +1,6 @@
 /* serial_avr.c: the UART by interrupts, a ring each way. Both interrupts are written out: 47 cycles for a byte received (48
  * for a zero), 43 for a byte sent (45 for the last), with entry, vector and return; a byte lasts 320 at 500,000 baud. */
+#include "bounds.h"
 #include "hal/hal.h"
 
 #define DOUBLE_SPEED 8u /* clock cycles per sample with U2X0: at 16 MHz nearer to all rates than 16 are */
@@ -102,7 +103,7 @@ void hal_serial_send(const uint8_t *bytes, uint8_t count) {
     return;
   }
   uint8_t *place = hal_serial_place();
-  for (uint8_t i = 0; i < count; i++) {
+  BOUNDED(HAL_SEND_RING - 1u, for (uint8_t i = 0; i < count; i++)) {
     *hal_serial_beyond(place, i) = bytes[i];
   }
   hal_serial_queue(count);

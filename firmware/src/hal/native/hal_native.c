@@ -1,11 +1,13 @@
 /* hal_native.c: the microcontroller as an event queue. Each source of interrupts has the cycle of its next event; the
  * earliest comes first, the firmware's interrupt runs at that cycle, and then its main loop if the event would have
  * woken it with something to do. Between events nothing happens, so nothing is spent. */
+#include <setjmp.h>
 #include <string.h>
 
 #include "firmware.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
+#include "hal/native/bounds_native.h"
 #include "hal/native/events.h"
 #include "pins.h"
 #include "schedule.h"
@@ -180,8 +182,7 @@ static void poll_firmware(void) {
   } while (firmware_due());
 }
 
-static void start(native_machine *owner, uint8_t cause) {
-  native = owner;
+static void begin(uint8_t cause) {
   reset_cause = cause;
   hal_native_port_b = hal_native_port_c = hal_native_port_d = 0;
   for (int event = 0; event < EVENTS; event++) {
@@ -281,7 +282,7 @@ static void run_event(native_event event, uint64_t until) {
   }
 }
 
-static void advance(uint64_t until) {
+static void run(uint64_t until) {
   while (!native->stop) {
     const native_event event = next_event();
     const uint64_t next = native_next[event];
@@ -296,6 +297,35 @@ static void advance(uint64_t until) {
   if (native->now < until && !native->stop) {
     native->now = until;
   }
+}
+
+/* ---- the machine's owner ---- */
+
+static jmp_buf owner_waits;
+
+static void end_run(const char *sentence) {
+  memcpy(native->fault, sentence, strlen(sentence) + 1u);
+  longjmp(owner_waits, 1);
+}
+
+/* The firmware runs from here on, until leave(). */
+#define ENTER() (native_bound_broken = end_run, setjmp(owner_waits) == 0)
+
+static void leave(void) { native_bound_broken = NULL; }
+
+static void start(native_machine *owner, uint8_t cause) {
+  native = owner;
+  if (ENTER()) {
+    begin(cause);
+  }
+  leave();
+}
+
+static void advance(uint64_t until) {
+  if (ENTER()) {
+    run(until);
+  }
+  leave();
 }
 
 NATIVE_EXPORT const native_api *firmware_board_api(void);

@@ -6,6 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "bounds.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -93,7 +95,8 @@ void hal_serial_again(void);
 bool hal_serial_receive(uint8_t *byte);
 static inline bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size) {
   uint8_t byte = 0;
-  while (hal_serial_receive(&byte)) {
+  BOUNDED(size, for (uint8_t room = (uint8_t)(*count < size - 1 ? size - *count : size);
+                     room > 0 && hal_serial_receive(&byte); room--)) {
     if (byte == 0) {
       return true;
     }
