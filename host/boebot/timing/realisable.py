@@ -241,25 +241,30 @@ def _of_board(
         Event(f"set-point, {command_bytes} B", "line", command_bytes * byte_s),
         Event("set-point taken", "command", board.set_point_s),
     ]
-    beside = [_reading(row, robot) for row in board.sensors if _has(robot, row)]
+    beside = [_reading(row, robot) for row in board.sensors if row.conversion > 0 and _has(robot, row)]
     events = (*_one_after_another([event for event in path if event.seconds > 0]), *beside)
-    faults = [_slow_sensor(event, "period_ticks") for event in beside if event.seconds > event.every + 1e-9]
+    slow = [event for event in beside if event.seconds > event.every + 1e-9]
+    faults = [_slow_sensor(event, "period_ticks") for event in slow if _is_asked(robot, event.name)]
     if late := _overfull(events, period_s, None):
         faults += late + _faster_line(events, period_s, rate, telemetry_bytes + command_bytes)
     return Verdict(robot.name, asked_s, period_s, rate, events, tuple(faults), _notes(beside, asked_s, period_s, rate))
 
 
 def _has(robot: RobotDescription, row: SensorRow) -> bool:
-    """A row of the image is for a device of that name, or for several whose names begin so ("light": light_left)."""
-    if row.name == "supply":
-        return True
-    return any(robot.has(name) and (name == row.name or name.startswith(f"{row.name}_")) for name in robot.device)
+    """A row of the image is for a device of that name, or for those whose names begin so ("light": light_left)."""
+    stem = row.name.removesuffix("s")
+    return any(robot.has(name) and (name == stem or name.startswith(f"{stem}_")) for name in robot.device)
 
 
 def _reading(row: SensorRow, robot: RobotDescription) -> Event:
     """A sensor of the board; the description may say another period than the image's own."""
     ticks = getattr(robot.device.get(row.name), "period_ticks", row.period)
     return Event(row.name, "sense", row.conversion * 1e-6, every=ticks * TICK_S)
+
+
+def _is_asked(robot: RobotDescription, name: str) -> bool:
+    """Its description says how often it is to measure; other sensors measure by themselves, and are read so often."""
+    return hasattr(robot.device.get(name), "period_ticks")
 
 
 def _notes(beside: list[Event], asked_s: float, period_s: float, rate: int) -> tuple[str, ...]:
@@ -269,7 +274,12 @@ def _notes(beside: list[Event], asked_s: float, period_s: float, rate: int) -> t
             f"the brain steps every {ms(period_s)}, not every {ms(asked_s)}: at {rate} bit/s telemetry comes no oftener"
         )
     for event in beside:
-        if event.every > period_s + 1e-9 and event.seconds > TICK_S:
+        if event.seconds > event.every + 1e-9:
+            notes.append(
+                f"{event.name}: a reading takes {ms(event.seconds)} and is looked at every {ms(event.every)}: "
+                "it is often the one before"
+            )
+        elif event.every > period_s + 1e-9 and event.seconds > TICK_S:
             notes.append(
                 f"{event.name}: a reading takes {ms(event.seconds)}; it is sampled every {ms(event.every)}, and the "
                 f"brain sees each of them {event.every / period_s:.3g} times"
