@@ -42,6 +42,7 @@ class Costs:
     """Cycles of each piece."""
 
     tasks: dict[str, int]
+    alone: dict[str, int]  # the same without the polls that tasks call themselves
     interrupts: dict[str, int]  # from acceptance to the end of RETI
     latencies: dict[str, int]  # from request to acceptance
     round: int  # of the main loop and the scheduler around a slot's tasks
@@ -72,7 +73,7 @@ class Costs:
         for slot in range(count):
             pieces = [Piece("scheduler", self.round, 1)]
             pieces += [
-                Piece(row.name, self.tasks[row.name] + self.quiet_poll, 1)
+                Piece(row.name, self.alone[row.name] + self.quiet_poll, 1)
                 for row in rows
                 if slot % row.period == row.phase
             ]
@@ -91,11 +92,13 @@ def costs(program: Program, load: Load) -> Costs:
     table = program.table
     tasks = {row.name: worst.of(f"{row.name}_task").cycles for row in table.tasks}
     polls = [name for name in (ENCODER_POLL, LINK_POLL) if name in program.by_name]
+    without_polls = WithoutCallees(program, polls)
     around = WithoutCallees(program, [*(f"{name}_task" for name in tasks), *polls])
     quiet = sum(_quiet(program, name) for name in polls)
     scheduler = around.of(SCHEDULER).cycles if SCHEDULER in program.by_name else 0
     return Costs(
         tasks=tasks,
+        alone={name: without_polls.of(f"{name}_task").cycles + quiet for name in tasks},
         interrupts={row.name: ENTRY + worst.bound(4 * row.vector).cycles for row in table.interrupts},
         latencies={row.name: blocked.latency(row.vector) for row in table.interrupts},
         round=scheduler + 2 * quiet + _loop(program, [*polls, SCHEDULER]),

@@ -134,10 +134,8 @@ def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
         _names(axes, [one for one in row if one.kind == "task"], slot, slot_cycles, width)
         for span in row:
             if span.kind == "interrupt":
-                begin = span.begin - slot * slot_cycles
-                axes.barh(
-                    slot + 0.27, span.end - span.begin, 0.16, left=begin, color=_COLOURS["interrupt"], linewidth=0
-                )
+                begin, length = span.begin - slot * slot_cycles, span.end - span.begin
+                axes.barh(slot + 0.27, length, 0.16, left=begin, color=_COLOURS["interrupt"], linewidth=0)
     axes.set_yticks(range(count), [f"slot {slot}" for slot in range(count)])
     axes.set_ylim(count - 0.5, -0.75)
     axes.set_xlim(0, width)

@@ -87,7 +87,7 @@ LOADS: dict[str, Load] = {
     ),
     "saturated": Load(
         "saturated",
-        "the same with valid frames of 20 to 40 bytes, 50,000 bytes/s each way, and four encoder lines of 4,000 edges/s",
+        "the same with valid frames of 20 to 40 bytes, 50,000 bytes/s each way, four encoder lines of 4,000 edges/s",
         {
             RECEIVE: (Stream(BYTE),),
             SEND: (Stream(BYTE),),
