@@ -16,7 +16,10 @@ from boebot.cli import timing
 from boebot.errors import BoebotError, TimingError
 from boebot.robots import load_robot
 from boebot.timing import budget, diagram, loads, realisable
+from boebot.timing.graph import load_program
 from boebot.timing.measured import Measurement, Moment, Spans, Worst
+from boebot.timing.program import InterruptRow
+from boebot.timing.response import responses
 from command import boebot as command
 
 FIGURES = loads.LOADS["figures"]
@@ -82,14 +85,20 @@ def test_planted_faults_are_found(tmp_path: Path, options: dict[str, int], sente
     assert faults == ([] if sentence is None else [sentence])
 
 
-def test_slot_that_ends_in_the_next_tick_is_found(report: budget.Report) -> None:
-    """The second task of 50,000 moved to the last slot: it ends after the tick."""
-    costs = replace(report.costs, alone=report.costs.alone | {"first": 45_000})
-    schedule = costs.schedule(budget.load_program(Path(report.path)))
-    answers = budget.responses(schedule, report.sources)
-    assert answers is None
-    full = replace(report, responses=None)
-    assert "overload: under the load 'figures'" in full.faults[0]
+def judged(report: budget.Report, **cycles: int) -> budget.Report:
+    """The same with other tasks."""
+    costs = replace(report.costs, alone=report.costs.alone | cycles)
+    schedule = costs.schedule(load_program(Path(report.path)))
+    answers = responses(schedule, report.sources)
+    return replace(report, costs=costs, schedule=schedule, responses=answers)
+
+
+def test_tick_that_is_too_full_is_found(report: budget.Report) -> None:
+    """Four slots of 45,000 are more than the tick has; one of 90,000 in slot 1 ends in time, one of 125,000 does not."""
+    (fault,) = judged(report, first=45_000).faults
+    assert fault.startswith("overload: under the load 'figures' tasks and interrupts may take 112.")
+    assert judged(report, second=90_000).faults == []
+    assert any("slot 1 may end 12" in fault for fault in judged(report, second=125_000).faults)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +138,7 @@ def test_unknown_load_is_refused() -> None:
 
 def test_saturated_line_asks_what_it_says() -> None:
     """50,000 bytes/s are one in 320 cycles; four lines of 4,000 edges/s one in 4,000 each."""
-    row = loads.InterruptRow("receive", loads.RECEIVE, 60, 640, 320)
+    row = InterruptRow("receive", loads.RECEIVE, 60, 640, 320)
     (bytes_,) = loads.LOADS["saturated"].sources(row, 53)
     assert bytes_.requests(16_000_000) == 50_000
     edges = loads.LOADS["saturated"].sources(replace(row, vector=loads.ENCODERS), 113)

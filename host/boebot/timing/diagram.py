@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 NAME = "timing"
 _CYCLES_PER_MS = 16_000
-_LANES = ("tasks", "interrupts", "line", "brain", "sensors")
 _COLOURS = {"task": "#0072b2", "interrupt": "#d55e00", "line": "#cc79a7", "process": "#009e73", "sense": "#e69f00"}
 _HEIGHT = 0.66  # of a box, in lanes
 _LETTER = 0.011  # width of a letter, as a share of the axes
@@ -84,11 +83,9 @@ def _tick(axes: Axes, spans: Sequence[Moment], report: Report, verdict: Verdict 
     if verdict is not None:
         period_ms = max(period_ms, verdict.period_s * 1000)
         for event in verdict.events:
-            lane = {"line": "line", "process": "brain"}.get(event.kind)
-            if event.beside:
-                lane = event.name
-            if lane is None:
-                continue
+            if event.kind == "command" or (event.kind == "sense" and not event.beside):
+                continue  # work of tasks, which are drawn
+            lane = event.name.partition(",")[0]
             rows.append((lane, event.name, event.kind, event.begin * 1000, event.end * 1000))
             lanes += [] if lane in lanes else [lane]
     for lane, name, kind, begin, end in rows:
