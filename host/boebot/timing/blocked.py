@@ -19,6 +19,7 @@ from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
 from boebot.timing.paths import Graph, Mark, Way, longest
 from boebot.timing.program import Block, Function, Program
+from boebot.timing.registers import CALL_CLOBBERED, written
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -82,6 +83,7 @@ class Blocked:
         self.worst_case = worst_case or WorstCase(program)
         self._effects: dict[tuple[int, bool], Effect] = {}
         self._plain: dict[int, bool] = {}
+        self._written: dict[int, frozenset[int]] = {}
         self._under_way: set[tuple[int, bool]] = set()
 
     def of(self, function: str | int) -> Stretch:
@@ -174,6 +176,20 @@ class Blocked:
             )
         return self._plain[entry]
 
+    def _clobbers(self, entry: int) -> frozenset[int]:
+        """Registers that a callee writes, of those that it need not keep: the compiler knows of its library's routines
+        that they leave some of these alone."""
+        if entry not in self._written:
+            self._written[entry] = CALL_CLOBBERED  # while it is worked out: of what calls itself
+            result: set[int] = set()
+            for block in self.program.functions[entry].blocks.values():
+                for instruction in block.instructions[: -1 if block.calls else None]:
+                    result |= written(instruction)
+                for callee in block.calls:
+                    result |= self._clobbers(callee)
+            self._written[entry] = CALL_CLOBBERED.intersection(result)
+        return self._written[entry]
+
     def _effect(self, function: Function, on: bool) -> Effect:
         flow = self._flow(function, on)
         marks = self.worst_case.marks(function)
@@ -229,7 +245,10 @@ class Blocked:
         start, number, state = node
         block = function.blocks[start]
         instruction = block.instructions[number]
-        states = after(instruction, state)
+        clobbered = None
+        if block.calls and number + 1 == len(block.instructions):
+            clobbered = frozenset[int]().union(*(self._clobbers(callee) for callee in block.calls))
+        states = after(instruction, state, clobbered)
         found: list[_Node] = []
         if number + 1 < len(block.instructions):
             for following in states:
@@ -239,7 +258,8 @@ class Blocked:
         for callee, edge_cycles, to in _leaving(block):
             for following in states:
                 if callee is not None:
-                    found += self._call(flow, node, following, callee, edge_cycles, to)
+                    effect = self._callee(callee, block, function, state.flag is not Flag.OFF)
+                    found += self._call(flow, node, following, effect, edge_cycles, to)
                 elif to is not None:
                     found.append((to, 0, following))
                     self._go(flow, node, found[-1], edge_cycles, instruction.address)
@@ -263,10 +283,15 @@ class Blocked:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
         flow.returned.setdefault(node, []).append((flag is Flag.OFF, cycles))
 
-    def _call(self, flow: _Flow, node: _Node, state: State, callee: int, cycles: int, to: int | None) -> list[_Node]:
+    def _callee(self, entry: int, block: Block, function: Function, on: bool) -> Effect:
+        """What a callee does to the flag; in time, where it leaves it alone, with the argument that it gets."""
+        if self._is_plain(entry) and not on:
+            return Effect(through=self.worst_case.callee(entry, block, function).cycles)
+        return self.effect(entry, on)
+
+    def _call(self, flow: _Flow, node: _Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[_Node]:
         """A call, or a jump into another function (`to` None)."""
         flag = node[2].flag
-        effect = self.effect(callee, on=flag is not Flag.OFF)
         flow.within.append(effect.within)
         if flag is not Flag.OFF:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)

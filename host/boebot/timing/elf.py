@@ -71,7 +71,8 @@ def read_image(path: Path) -> Image:
     except OSError as error:
         raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
     except DAMAGE as error:
-        raise TimingError(f"{path} is not an ELF file, or is damaged: {error or type(error).__name__}") from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise TimingError(f"{path} is not an ELF file, or is damaged: {reason}") from error
 
 
 def read_table(path: Path) -> Table:
@@ -199,7 +200,7 @@ def _table(path: Path, data: bytes) -> Table:
 
 def _table_row(path: Path, data: bytes) -> TaskRow | InterruptRow | SensorRow:
     text = data.decode("ascii", "backslashreplace")
-    kind, *words = text.split()
+    kind, *words = text.split() or [""]
     row, numbers = ROWS.get(kind, (None, 0))
     if row is None:
         raise TimingError(

@@ -44,10 +44,11 @@ class State:
     pushed: int = 0
 
 
-def after(instruction: Instruction, state: State) -> list[State]:
+def after(instruction: Instruction, state: State, clobbered: frozenset[int] | None = None) -> list[State]:
     """The states that can follow; two where SREG is written and it is not known with what.
 
-    Of a call this is what holds when it has begun; what the callee does is for the caller to know.
+    Of a call this is what holds when it has begun, but for the registers that its callee writes (`clobbered`; None:
+    all that the calling convention lets it); what it does to the flag is for the caller to know.
     """
     name, operands = instruction.mnemonic, instruction.operands
     on = _on(state.flag)
@@ -59,7 +60,7 @@ def after(instruction: Instruction, state: State) -> list[State]:
     elif name == "out" and operands[0] == SREG:
         copy = dict(state.copies).get(("register", operands[1]))
         flags = ([_set(state.flag)] if copy is not False else []) + ([Flag.OFF] if copy is not True else [])
-    copies, pushed = _copies(instruction, state, on)
+    copies, pushed = _copies(instruction, state, on, written(instruction) if clobbered is None else clobbered)
     return [State(flag, copies, pushed) for flag in flags]
 
 
@@ -73,10 +74,11 @@ def _set(flag: Flag) -> Flag:
     return Flag.JUST_ON if flag is Flag.ONE_MORE else Flag.ON
 
 
-def _copies(instruction: Instruction, state: State, on: bool) -> tuple[frozenset[tuple[_Place, bool]], int]:
+def _copies(
+    instruction: Instruction, state: State, on: bool, lost: frozenset[int]
+) -> tuple[frozenset[tuple[_Place, bool]], int]:
     name, operands = instruction.mnemonic, instruction.operands
     old, pushed = dict(state.copies), state.pushed
-    lost = written(instruction)
     new = {place: value for place, value in old.items() if place[0] != "register" or place[1] not in lost}
     if lost & {FRAME, FRAME + 1}:
         new = {place: value for place, value in new.items() if place[0] != "frame"}

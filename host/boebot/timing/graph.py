@@ -41,9 +41,12 @@ def program_of(image: Image) -> Program:
     program = Program(str(image.path), {}, {}, image.bounds, image.table, image.lines)
     explorer = _Explorer(image, names, program)
     explorer.follow()
-    for draft in explorer.drafts.values():
-        program.functions[draft.entry] = Function(names.of(draft.entry), draft.entry, _blocks(draft))
-        program.by_name.update((symbol.name, draft.entry) for symbol in names.at.get(draft.entry, ()))
+    for entry, draft in sorted(explorer.drafts.items()):
+        program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
+    # Of several functions with one name, those of no file's own come first, then the first in flash.
+    for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
+        if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:
+            program.by_name.setdefault(symbol.name, symbol.address)
     return program
 
 

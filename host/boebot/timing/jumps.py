@@ -21,7 +21,7 @@ from boebot.timing.instructions import BRANCHES, SKIPS
 from boebot.timing.program import Instruction
 
 Values = NDArray[np.int64]  # of one term, one for each choice of the unknown bytes
-LONGEST_WAY = 100  # instructions
+LONGEST_WAY = 64  # instructions
 MOST_UNKNOWN = 2  # bytes: 65,536 choices
 MOST_PLACES = 255  # an index of one byte has 256 values when nothing limits it: this is no proof
 ZERO_REGISTER = 1
@@ -32,6 +32,8 @@ SREG = 0x3F  # I/O address
 INERT = frozenset(("nop", "std", "push", "cbi", "sbi", "sei", "cli", "wdr", "sleep", "bst", "jmp", "rjmp", "ijmp"))
 INERT |= BRANCHES | SKIPS | frozenset(("set", "clt", "sen", "cln", "ses", "cls", "sev", "clv", "seh", "clh"))
 LOADS = frozenset(("ld", "ldd", "lds", "pop", "in", "bld"))  # their first operand becomes unknown
+CHANGES = frozenset(("com", "neg", "swap", "inc", "dec", "asr"))  # and with these the flags too
+PRODUCTS = frozenset(("mul", "muls", "mulsu", "fmul", "fmuls", "fmulsu"))  # into r1:r0
 
 
 class NotProvenError(Exception):
@@ -125,6 +127,12 @@ class _Machine:
             self._arithmetic(name, *operands)
         elif name in LOADS:
             self._load(name, *operands)
+        elif name in CHANGES:
+            self._registers[operands[0]] = self._new()
+            self._forget_flags()
+        elif name in PRODUCTS:
+            self._forget_pair(0)
+            self._forget_flags()
         elif not (name in INERT or (name == "rcall" and operands[0] == behind)):
             self._forget()
 

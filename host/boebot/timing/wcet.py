@@ -7,12 +7,10 @@ code (counted.py), or, in library routines, by what they are called with (ARGUME
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 from boebot.errors import TimingError
-from boebot.timing import counted
-from boebot.timing.loops import IrreducibleError, Loop, natural_loops, reverse_postorder
+from boebot.timing.marks import marks_of
 from boebot.timing.paths import Graph, Mark, Walk, Way, longest
 from boebot.timing.program import Block, Function, Program
 from boebot.timing.registers import before, constant
@@ -125,46 +123,11 @@ class WorstCase:
 
     def marks(self, function: Function, argument: int | None = None) -> dict[int, list[Mark]]:
         """What is known of the function's loops, at the blocks whose runs it counts."""
-        if argument is None and function.entry in self._marks:
-            return self._marks[function.entry]
-        result: dict[int, list[Mark]] = {}
-        for i, bound in enumerate(self.program.bounds):
-            # Rows at one address are of different loops; copies of one loop have its line of the source.
-            nth = sum(other.address == bound.address for other in self.program.bounds[:i])
-            line = self.program.lines.get(bound.address, bound.address)
-            source: Hashable = (line, nth, bound.passes, bound.cycles)
-            for block in function.blocks.values():
-                last = block.instructions[-1]
-                if block.start <= bound.address < last.address + last.size:
-                    result.setdefault(block.start, []).append(Mark(source, bound.passes, bound.cycles))
-        for loop in _all_loops(function, self.program):
-            runs = counted.passes(loop, function)
-            if runs is None and argument is not None and not loop.inner:
-                runs = argument + ARGUMENTS[function.name][1]
-            if runs is not None:  # shown by the code itself: it takes the place of what is said
-                inner = frozenset(node for each in loop.inner for node in each.nodes)
-                for node in loop.nodes - inner:
-                    result.pop(node, None)
-                result[loop.header] = [Mark(loop.header, runs, None)]
-        if argument is None:
-            self._marks[function.entry] = result
-        return result
-
-
-def _all_loops(function: Function, program: Program) -> list[Loop[int]]:
-    def successors(start: int) -> list[int]:
-        return [edge.to for edge in function.blocks[start].edges]
-
-    order = reverse_postorder(function.entry, successors)
-    try:
-        work = natural_loops(order, successors)
-    except IrreducibleError:
-        return []  # refused by whoever looks for its paths
-    found: list[Loop[int]] = []
-    while work:
-        found.append(work.pop())
-        work += found[-1].inner
-    return found
+        if argument is not None:
+            return marks_of(self.program, function, argument + ARGUMENTS[function.name][1])
+        if function.entry not in self._marks:
+            self._marks[function.entry] = marks_of(self.program, function)
+        return self._marks[function.entry]
 
 
 def _told(walk: Walk[int]) -> Bound:

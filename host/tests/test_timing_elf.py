@@ -1,0 +1,211 @@
+"""What is read of an ELF file, against avr-size, avr-nm and avr-addr2line; and files that are damaged."""
+
+from __future__ import annotations
+
+import random
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from avr_image import build, disassembly
+from boebot.errors import TimingError
+from boebot.timing.elf import Image, read_image
+from boebot.timing.graph import load_program
+from boebot.timing.program import InterruptRow, LoopBound, SensorRow, TaskRow
+
+IMAGE = Path(__file__).resolve().parents[2] / "build" / "images" / "shieldbot.elf"
+PROGRAM = """
+#include <stdint.h>
+static uint8_t bytes[37];
+uint16_t initial = 0x1234;
+uint8_t kept __attribute__((section(".noinit")));
+__attribute__((noinline)) static int sum(int n)
+{
+    int s = 0;
+    for (int i = 0; i < n; i++)
+        s += bytes[i] + initial;
+    return s;
+}
+int main(void)
+{
+    kept = (uint8_t)sum(30);
+    return sum(kept);
+}
+"""
+ROWS = """
+main: ret
+.section .boebot.timing, "", @progbits
+"""
+
+
+def output(*command: str | Path) -> str:
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True).stdout
+
+
+def test_sizes_are_those_of_avr_size(tmp_path: Path) -> None:
+    for path in (IMAGE, build(tmp_path, PROGRAM)):
+        image = read_image(path)
+        sections = {
+            words[0]: (int(words[1]), int(words[2]))
+            for words in (line.split() for line in output("avr-size", "-A", path).splitlines())
+            if len(words) == 3 and words[1].isdigit()
+        }
+        ram = {name: where for name, where in sections.items() if where[1] >= 0x800100}
+        assert image.flash_bytes == sections[".text"][0] + sections[".data"][0]
+        assert image.ram_bytes == sum(size for size, _ in ram.values())
+        assert image.ram_end == max(size + start for size, start in ram.values()) - 0x800000
+        assert image.stack_start == 0x08FF  # RAMEND, as the start-up code sets it
+        assert image.entry == 0
+
+
+def test_symbols_are_those_of_avr_nm() -> None:
+    image = read_image(IMAGE)
+    listed = [line.split() for line in output("avr-nm", IMAGE).splitlines()]
+    expected = {
+        (name, int(address, 16)) for address, kind, name in listed if kind in "tTwW" and int(address, 16) < 0x8000
+    }
+    assert {(symbol.name, symbol.address) for symbol in image.symbols} >= expected - {
+        ("__heap_end", 0),
+        ("__stack", 0x8FF),
+    }
+
+
+def test_the_code_is_that_of_avr_objcopy(tmp_path: Path) -> None:
+    binary = tmp_path / "flash.bin"
+    output("avr-objcopy", "-O", "binary", "-R", ".eeprom", IMAGE, binary)
+    assert read_image(IMAGE).code == binary.read_bytes()
+
+
+@pytest.mark.parametrize("flags", [("-gdwarf-2",), ("-gdwarf-4",), ("-gdwarf-4", "-Wl,--relax", "-mcall-prologues")])
+def test_source_lines_are_those_of_addr2line(tmp_path: Path, flags: tuple[str, ...]) -> None:
+    path = build(tmp_path, PROGRAM, *flags)
+    image = read_image(path)
+    addresses = list(disassembly(path))
+    found = output("avr-addr2line", "-s", "-e", path, *(hex(address) for address in addresses)).splitlines()
+    known = {a: line.split(" ")[0] for a, line in zip(addresses, found, strict=True) if "?" not in line}
+    assert len(known) > 20
+    assert {address: image.lines.get(address) for address in known} == known
+
+
+def test_an_image_without_lines_has_none(tmp_path: Path) -> None:
+    path = build(tmp_path, PROGRAM)
+    assert read_image(path).lines == {}
+    assert load_program(path).where(0x1A2) == "0x01A2"
+
+
+def test_an_image_without_symbols_is_followed_the_same(tmp_path: Path) -> None:
+    path = build(tmp_path, PROGRAM)
+    named = load_program(path)
+    output("avr-strip", path)
+    stripped = load_program(path)
+    assert stripped.by_name == {}
+    reset = named.functions[0].blocks
+    assert stripped.functions[0].blocks == reset
+    assert named.by_name["main"] in stripped.functions  # as start-up calls it
+
+
+def rows(folder: Path, *lines: str) -> Image:
+    text = "".join(f'.asciz "{line}"\n' for line in lines)
+    return read_image(build(folder, ROWS + text, assembler=True))
+
+
+def test_the_rows_of_the_timing_table_are_read_in_their_order(tmp_path: Path) -> None:
+    lines = ["TASK whisker 1 0 200", "INTERRUPT receive 18 48 600 320", "SENSOR ping 18500 5 20000", "TASK ir 2 1 900"]
+    table = rows(tmp_path, *lines).table
+    assert table.tasks == (TaskRow("whisker", 1, 0, 200), TaskRow("ir", 2, 1, 900))
+    assert table.interrupts == (InterruptRow("receive", 18, 48, 600, 320),)
+    assert table.sensors == (SensorRow("ping", 18500, 5, 20000),)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("TASK whisker 1 0", "a name and 3 whole numbers are expected"),
+        ("TASK whisker 1 0 -200", "a name and 3 whole numbers are expected"),
+        ("TASK whisker 1 0 2e2", "a name and 3 whole numbers are expected"),
+        ("INTERRUPT receive 18 48 600", "a name and 4 whole numbers are expected"),
+        ("SENSOR", "a name and 3 whole numbers are expected"),
+        ("JOB whisker 1 0 200", "is of no known kind: TASK, INTERRUPT, SENSOR are expected"),
+        ("   ", "is of no known kind"),
+    ],
+)
+def test_a_broken_row_is_refused(tmp_path: Path, line: str, expected: str) -> None:
+    with pytest.raises(TimingError) as caught:
+        rows(tmp_path, "TASK first 1 0 10", line)
+    assert repr(line) in str(caught.value) and expected in str(caught.value)
+
+
+def loops(folder: Path, records: bytes) -> Image:
+    text = 'main: ret\n.section .boebot.loops, "", @progbits\n' + "".join(f".byte {byte}\n" for byte in records)
+    return read_image(build(folder, text, assembler=True))
+
+
+def test_bounds_of_loops_are_read(tmp_path: Path) -> None:
+    records = struct.pack("<6I", 0x6A, 12, 0xFFFFFFFF, 0x70, 0xFFFFFFFF, 4000)
+    assert loops(tmp_path, records).bounds == (LoopBound(0x6A, 12, None), LoopBound(0x70, None, 4000))
+
+
+@pytest.mark.parametrize(
+    ("records", "expected"),
+    [
+        (struct.pack("<3I", 0x6A, 1, 1)[:-1], "has 11 bytes: records of 12 bytes are expected"),
+        (struct.pack("<3I", 0x7000, 1, 1), "0x7000, which is not one of an instruction"),
+        (struct.pack("<3I", 0x6B, 1, 1), "0x6B, which is not one of an instruction"),
+    ],
+)
+def test_a_broken_bound_is_refused(tmp_path: Path, records: bytes, expected: str) -> None:
+    with pytest.raises(TimingError) as caught:
+        loops(tmp_path, records)
+    assert expected in str(caught.value)
+
+
+def refused(path: Path) -> str:
+    with pytest.raises(TimingError) as caught:
+        load_program(path)
+    text = str(caught.value)
+    assert str(path) in text and "\n" not in text
+    return text
+
+
+def test_what_is_no_image_is_refused(tmp_path: Path) -> None:
+    assert "cannot be read: No such file" in refused(tmp_path / "none.elf")
+    assert "cannot be read" in refused(tmp_path)
+    text = tmp_path / "text.elf"
+    text.write_text("an image", encoding="ascii")
+    assert "is not an ELF file, or is damaged" in refused(text)
+    text.write_bytes(b"")
+    assert "is not an ELF file, or is damaged" in refused(text)
+    assert "is for another processor" in refused(Path("/bin/true").resolve())
+    program = tmp_path / "part.c"
+    program.write_text(PROGRAM, encoding="ascii")
+    output("avr-gcc", "-mmcu=atmega328p", "-c", "-o", tmp_path / "part.o", program)
+    assert "is not linked" in refused(tmp_path / "part.o")
+    output("avr-gcc", "-mmcu=atmega2560", "-Wl,--section-start=.text=0x9000", "-o", tmp_path / "large.elf", program)
+    assert "the ATmega328P has 32768 bytes" in refused(tmp_path / "large.elf")
+
+
+def test_a_file_that_is_cut_off_is_refused_or_read_whole(tmp_path: Path) -> None:
+    whole = build(tmp_path, PROGRAM, "-gdwarf-4").read_bytes()
+    path = tmp_path / "cut.elf"
+    for size in (*range(0, 200, 7), *range(200, len(whole), 61)):
+        path.write_bytes(whole[:size])
+        refused(path)
+
+
+def test_a_damaged_file_is_read_or_refused(tmp_path: Path) -> None:
+    whole = build(tmp_path, PROGRAM, "-gdwarf-4").read_bytes()
+    path = tmp_path / "damaged.elf"
+    chance = random.Random(6)
+    refusals = 0
+    for _ in range(100):
+        data = bytearray(whole)
+        for _ in range(chance.choice((1, 3, 20))):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        path.write_bytes(data)
+        try:
+            load_program(path)
+        except TimingError:  # anything else fails the test
+            refusals += 1
+    assert 0 < refusals < 100

@@ -1,0 +1,147 @@
+"""Worst-case execution times of small programs, counted by hand after the instruction set manual; planted changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avr_image import assembled, build, compiled
+from boebot.errors import TimingError
+from boebot.timing.graph import load_program
+from boebot.timing.wcet import Visit, WorstCase
+
+# What firmware/src/bounds.h writes, in short.
+LOOP = """
+.macro bounded passes, cycles=0xFFFFFFFF
+.Lloop\\@:
+.pushsection .boebot.loops, "", @progbits
+.long .Lloop\\@, \\passes, \\cycles
+.popsection
+.endm
+"""
+C_LOOP = """
+#include <stdint.h>
+#include <string.h>
+__asm__(".macro bounded passes, cycles\\n.Lloop\\\\@:\\n.pushsection .boebot.loops, \\"\\", @progbits\\n"
+        ".long .Lloop\\\\@, \\\\passes, \\\\cycles\\n.popsection\\n.endm");
+#define BOUNDED(n) __asm__ volatile("bounded %0, 0xFFFFFFFF" ::"n"(n))
+"""
+WHILE = "main: ldi r24, 0\n 1: tst r25\n breq 2f\n bounded 5\n nop\n rjmp 1b\n 2: ret"
+NESTED = """main: nop
+1: dec r24
+ breq 9f
+ bounded 3
+2: bounded 4
+ lds r25, 256
+ cp r25, r24
+ brne 2b
+ rjmp 1b
+9: ret
+"""
+
+
+def cycles_of(folder: Path, source: str, name: str = "main") -> int:
+    return WorstCase(assembled(folder, LOOP + source)).of(name).cycles
+
+
+@pytest.mark.parametrize(
+    ("source", "cycles"),
+    [
+        ("main: nop\n nop\n ret", 1 + 1 + 4),
+        ("main: tst r24\n breq 1f\n adiw r24, 1\n 1: ret", 1 + 1 + 2 + 4),
+        ("main: tst r24\n breq 1f\n nop\n 1: ret", 1 + 2 + 4),  # 1 + 1 + 1 + 4 the other way
+        ("main: sbrc r24, 0\n sts 256, r24\n ret", 1 + 2 + 4),  # as long as the skip of two words
+        ("main: call f\n ret\n f: push r24\n pop r24\n ret", 4 + (2 + 2 + 4) + 4),
+        ("main: rcall f\n rcall f\n ret\n f: ret", 2 * (3 + 4) + 4),
+        ("main: jmp f\n .type f, @function\n f: ret", 3 + 4),
+        (WHILE, 1 + 5 * (1 + 1 + 1 + 2) + (1 + 2) + 4),
+        (NESTED, 1 + 3 * (1 + 1 + (3 * (2 + 1 + 2) + (2 + 1 + 1)) + 2) + (1 + 2) + 4),
+        ("main: ldi r24, 7\n 1: nop\n dec r24\n brne 1b\n ret", 1 + 6 * (1 + 1 + 2) + (1 + 1 + 1) + 4),
+        ("main: ldi r24, 7\n 1: dec r24\n brpl 1b\n ret", 1 + 7 * 3 + 2 + 4),  # 6 to 0, then 255
+        ("main: ldi r24, 1\n ldi r25, 1\n 1: sbiw r24, 1\n brne 1b\n ret", 2 + 256 * 4 + 3 + 4),
+        ("main: ldi r24, 0\n 1: dec r24\n brne 1b\n ret", 1 + 255 * 3 + 2 + 4),
+        ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
+    ],
+    ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "tail call", "while", "nested", "counted",
+         "counted below zero", "two bytes", "256 times", "waits"],
+)  # fmt: skip
+def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
+    assert cycles_of(tmp_path, source) == cycles
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "more"),
+    [
+        ("2: ret", "2: nop\n ret", 1),  # an inserted instruction
+        ("nop\n rjmp", "nop\n lds r24, 256\n rjmp", 5 * 2),  # in the loop
+        ("tst r25", "tst r25\n nop", 6),  # in its test
+        ("bounded 5", "bounded 6", 5),  # a pass more
+        ("nop\n rjmp", "rcall f\n rjmp", 5 * (3 + 4 - 1)),  # a call in place of the nop
+        ("2: ret", "2: sbrs r24, 0\n rcall f\n ret", 1 + 3 + 4),  # a longer path
+    ],
+)
+def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: str, new: str, more: int) -> None:
+    base = WHILE + "\n f: ret"
+    assert base.count(old) == 1
+    assert cycles_of(tmp_path, base.replace(old, new)) == cycles_of(tmp_path, base) + more
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (WHILE.replace("bounded 5", "nop"), "has no bound"),
+        ("main: rcall f\n ret\n f: rcall main\n ret", "recursion at .*: main calls f calls main"),
+        ("main: rjmp main", "has no bound"),
+        ("main: sbrc r24, 0\n rjmp 2f\n 1: bounded 3\n dec r24\n 2: tst r25\n brne 3f\n dec r25\n rjmp 1b\n"
+         " 3: brcs 1b\n tst r24\n brcs 2b\n ret", "entered at two places|passed without"),
+    ],
+)  # fmt: skip
+def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None:
+    with pytest.raises(TimingError, match=words) as caught:
+        cycles_of(tmp_path, source)
+    assert "0x" in str(caught.value)
+
+
+def test_refusal_names_the_line(tmp_path: Path) -> None:
+    source = "#include <stdint.h>\nvolatile uint8_t x;\nint main(void) {\n  while (x != 0) {\n    x--;\n  }\n}\n"
+    program = load_program(build(tmp_path, source, "-gdwarf-2"))
+    with pytest.raises(TimingError, match=r"loop at 0x[0-9A-F]{4} \(.*program\.c:[45]\)"):
+        WorstCase(program).of("main")
+
+
+def test_path_says_how_often_each_block_runs(tmp_path: Path) -> None:
+    program = assembled(tmp_path, LOOP + NESTED)
+    bound = WorstCase(program).of("main")
+    main = program.by_name["main"]
+    inner = 3 * (3 * 5 + 4)
+    assert Visit(main + 6, 3 * 4, inner) in bound.path
+    assert sum(visit.cycles for visit in bound.path) == bound.cycles
+
+
+def test_callees_have_their_share(tmp_path: Path) -> None:
+    program = assembled(tmp_path, LOOP + WHILE.replace("nop", "rcall f") + "\n f: nop\n ret")
+    assert WorstCase(program).of("main").callees == {program.by_name["f"]: 5 * (1 + 4)}
+
+
+def test_library_routines_by_what_they_are_called_with(tmp_path: Path) -> None:
+    source = C_LOOP + "uint8_t a[40], b[40];\nint main(void) {{ memcpy(a, b, {}); return 0; }}\n"
+    of = [WorstCase(compiled(tmp_path, source.format(n), "-fno-builtin")).of("main").cycles for n in (9, 10, 40)]
+    assert of[1] - of[0] == 2 + 2 + 1 + 1 + 2  # ld, st, subi, sbci, brcc
+    assert of[2] - of[1] == 30 * (of[1] - of[0])
+
+
+def test_library_routine_with_an_unknown_number_of_bytes_is_refused(tmp_path: Path) -> None:
+    source = C_LOOP + "uint8_t a[40], b[40];\nvolatile uint8_t n;\nint main(void) { memcpy(a, b, n); return 0; }\n"
+    with pytest.raises(TimingError, match=r"memcpy is called at 0x.* not a constant"):
+        WorstCase(compiled(tmp_path, source)).of("main")
+
+
+def test_what_the_compiler_makes_of_annotated_c(tmp_path: Path) -> None:
+    """Twice the bound, twice the loop: whatever shape the compiler gave it."""
+    source = C_LOOP + (
+        "volatile uint8_t n, x;\nint main(void) {{\n for (uint8_t i = 0; i < n; i++) {{ BOUNDED({0});"
+        "\n  if (x == 7) {{ x = 9; continue; }}\n  if (x == 8) {{ break; }}\n  x = i; }}\n return 0; }}\n"
+    )
+    of = [WorstCase(compiled(tmp_path, source.format(n))).of("main").cycles for n in (10, 20, 40)]
+    assert of[2] - of[1] == 2 * (of[1] - of[0]) > 0
