@@ -94,7 +94,7 @@ def judged(report: budget.Report, **cycles: int) -> budget.Report:
 
 
 def test_tick_that_is_too_full_is_found(report: budget.Report) -> None:
-    """Four slots of 45,000 are more than the tick has; one of 90,000 in slot 1 ends in time, one of 125,000 does not."""
+    """Four slots of 45,000 are more than the tick has; of 90,000 in slot 1 it has time, of 125,000 not."""
     (fault,) = judged(report, first=45_000).faults
     assert fault.startswith("overload: under the load 'figures' tasks and interrupts may take 112.")
     assert judged(report, second=90_000).faults == []

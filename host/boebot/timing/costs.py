@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from boebot.timing.blocked import ENTRY, Blocked
-from boebot.timing.loads import ENCODERS, RECEIVE, Load
+from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
 from boebot.timing.loops import natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Function, Program
@@ -23,6 +23,7 @@ SLOTS_PER_TICK = 4
 SCHEDULER = "schedule_poll"
 ENCODER_POLL, LINK_POLL = "encoder_poll", "link_poll"
 LOOP = "firmware_poll"
+CLOCK = "schedule_now"  # that a poll of the encoders reads, whatever waits
 
 
 class WithoutCallees(WorstCase):
@@ -47,8 +48,9 @@ class Costs:
     latencies: dict[str, int]  # from request to acceptance
     round: int  # of the main loop and the scheduler around a slot's tasks
     quiet_poll: int  # both polls, when nothing waits
-    frame: int  # to work off one frame
+    frames: dict[int, int]  # to work off one frame of so many bytes
     change: int  # to work off one edge
+    storm: int  # to stop a line that comes too often
 
     def sources(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load, and what they leave to the polls."""
@@ -56,13 +58,22 @@ class Costs:
         for row in program.table.interrupts:
             if row.vector == ENCODERS and self.change:
                 found += [replace(one, name="edges worked off") for one in load.sources(row, self.change)]
+                found.append(Source("line stopped", self.storm, TICK))
             if row.vector == RECEIVE and self.frame:
-                # A frame of which all but the last byte has come before may be the first.
-                frames = load.frames
-                found.append(
-                    Source("frames", self.frame, frames.interval, frames.interval - 1, frames.burst, frames.period)
-                )
+                found.append(self._frames(load))
         return found
+
+    @property
+    def frame(self) -> int:
+        """To work off one frame of any length."""
+        return max(self.frames.values())
+
+    def _frames(self, load: Load) -> Source:
+        """Frames of the length that takes most time for each byte; of the first, all but its last byte has come."""
+        length = max(self.frames, key=lambda length: self.frames[length] / length)
+        interval = load.byte_interval * length
+        burst, period = load.frame_burst
+        return Source("frames", self.frames[length], interval, interval - 1, burst, period)
 
     def schedule(self, program: Program) -> Schedule:
         """The slots of a whole cycle."""
@@ -78,7 +89,9 @@ class Costs:
                 if slot % row.period == row.phase
             ]
             slots.append(tuple(pieces))
-        return Schedule(tuple(slots), SLOT_CYCLES, SLOTS_PER_TICK, max(self.frame, self.change) + self.round)
+        return Schedule(
+            tuple(slots), SLOT_CYCLES, SLOTS_PER_TICK, max(self.frame, self.change + self.storm) + self.round
+        )
 
 
 def costs(program: Program, load: Load) -> Costs:
@@ -93,8 +106,10 @@ def costs(program: Program, load: Load) -> Costs:
     tasks = {row.name: worst.of(f"{row.name}_task").cycles for row in table.tasks}
     polls = [name for name in (ENCODER_POLL, LINK_POLL) if name in program.by_name]
     without_polls = WithoutCallees(program, polls)
-    around = WithoutCallees(program, [*(f"{name}_task" for name in tasks), *polls])
+    # Its only loop drops ticks when it has fallen behind by more than two; where no slot is late none is dropped.
+    around = WithoutCallees(_once(program, SCHEDULER), [*(f"{name}_task" for name in tasks), *polls])
     quiet = sum(_quiet(program, name) for name in polls)
+    change, storm = _changes(program)
     scheduler = around.of(SCHEDULER).cycles if SCHEDULER in program.by_name else 0
     return Costs(
         tasks=tasks,
@@ -103,8 +118,9 @@ def costs(program: Program, load: Load) -> Costs:
         latencies={row.name: blocked.latency(row.vector) for row in table.interrupts},
         round=scheduler + 2 * quiet + _loop(program, [*polls, SCHEDULER]),
         quiet_poll=quiet,
-        frame=_frame(program, load.frame_most),
-        change=_change(program),
+        frames={length: _frame(program, length) for length in {load.frame_least, load.frame_most}},
+        change=change,
+        storm=storm,
     )
 
 
@@ -160,13 +176,28 @@ def _frame(program: Program, frame_most: int) -> int:
     return WorstCase(replace(program, bounds=tuple(bounds))).of(LINK_POLL).cycles
 
 
-def _change(program: Program) -> int:
-    """What a poll of the encoders takes when one edge waits; 0: there is none."""
+def _changes(program: Program) -> tuple[int, int]:
+    """What a poll of the encoders takes when one edge waits, and what it takes more when a line was stopped for coming
+    too often: that is done by functions that it calls outside its loop. 0: there is no such poll."""
     if ENCODER_POLL not in program.by_name:
-        return 0
-    blocks = program.functions[program.by_name[ENCODER_POLL]].blocks.values()
+        return 0, 0
+    function = program.functions[program.by_name[ENCODER_POLL]]
+    blocks = function.blocks
+    once = _once(program, ENCODER_POLL)
+    inside = _in_loops(function)
+    outside = {entry for start, block in blocks.items() if start not in inside for entry in block.calls}
+    names = [program.functions[entry].name for entry in outside]
+    calm = WithoutCallees(once, [name for name in names if name != CLOCK]).of(ENCODER_POLL).cycles
+    return calm, WorstCase(once).of(ENCODER_POLL).cycles - calm
+
+
+def _once(program: Program, name: str) -> Program:
+    """The program with each bounded loop of that function passed once."""
+    if name not in program.by_name:
+        return program
+    blocks = program.functions[program.by_name[name]].blocks.values()
     own = {instruction.address for block in blocks for instruction in block.instructions}
     bounds = [
         replace(one, passes=1) if one.address in own and one.passes is not None else one for one in program.bounds
     ]
-    return WorstCase(replace(program, bounds=tuple(bounds))).of(ENCODER_POLL).cycles
+    return replace(program, bounds=tuple(bounds))

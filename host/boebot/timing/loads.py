@@ -41,16 +41,18 @@ class Stream:
 class Load:
     """Streams by vector, several where several lines share one; vectors in `off` are not asked for at all.
 
-    `frames`: of the host's frames; they are at least `frame_least` bytes long and at most `frame_most`.
+    The host's frames are at least `frame_least` bytes long and at most `frame_most`; `frame_burst`: so many in so many
+    cycles, (0, 0): as the line carries them.
     """
 
     name: str
     says: str
     streams: Mapping[int, tuple[Stream, ...]]
-    frames: Stream
+    frame_burst: tuple[int, int]
     frame_least: int
     frame_most: int
     off: frozenset[int] = field(default_factory=frozenset)
+    byte_interval: int = BYTE
 
     def sources(self, row: InterruptRow, cycles: int) -> list[Source]:
         """What asks for an interrupt that takes so many cycles."""
@@ -80,7 +82,7 @@ LOADS: dict[str, Load] = {
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
-        frames=Stream(_SET_POINT * BYTE, 1, TICK),
+        frame_burst=(1, TICK),
         frame_least=_SET_POINT,
         frame_most=_SET_POINT,
         off=_DEVICES_OFF,
@@ -96,7 +98,7 @@ LOADS: dict[str, Load] = {
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
-        frames=Stream(20 * BYTE),
+        frame_burst=(0, 0),
         frame_least=20,
         frame_most=40,
         off=_DEVICES_OFF,
