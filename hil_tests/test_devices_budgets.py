@@ -68,7 +68,7 @@ def worst_cycles(folder: Path, pin_map: str) -> dict[str, int]:
     source, image = folder / "budgets.c", folder / "budgets.elf"
     source.write_text(MAIN.replace("PROBES", probes).replace("TASKS", str(len(names))), encoding="ascii")
     wraps = tuple(f"-Wl,--wrap={name}_task" for name in names)
-    build(image, source, ("-w", *wraps), ENVIRONMENTS[pin_map])
+    build(image, source, ("-w", "-fno-lto", *wraps), ENVIRONMENTS[pin_map])  # only the linker sees what to wrap
     bench = DeviceBench("native", pin_map)
     bench.access = bench.board = avr.create(image).access()
     with DeviceRig("native", pin_map, bench) as rig:

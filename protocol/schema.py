@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 import zlib
 from pathlib import Path
@@ -11,9 +12,10 @@ from typing import Any
 import msgspec
 
 HERE = Path(__file__).resolve().parent
+TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
-NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from")  # keys that both ends need not agree on
+NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from", "each_task")  # keys that both ends need not agree on
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
@@ -95,7 +97,8 @@ class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Named values, counted from 0."""
 
     doc: str
-    values: list[str]
+    values: list[str] = []
+    each_task: str = ""  # names of further values, one for each task of the firmware, whose name replaces {}
 
 
 class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -159,7 +162,7 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
     Raises:
         ValueError: a name or number is used twice, or a field names what is not there.
     """
-    schema = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Schema)
+    schema = _with_tasks(msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Schema))
     _unique("message", [m.name for m in schema.message], [m.id for m in schema.message])
     _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])
     if [p.id for p in schema.parameter] != list(range(len(schema.parameter))):
@@ -197,6 +200,17 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
         if not least <= parameter.min < parameter.max <= greatest:
             raise ValueError(f"parameter {parameter.name}: {parameter.min} to {parameter.max} is no range of its type")
     return schema
+
+
+def _with_tasks(schema: Schema) -> Schema:
+    tasks = re.findall(r"^TASK\((\w+),", TASKS.read_text(encoding="utf-8"), re.MULTILINE)
+    enums = {
+        name: msgspec.structs.replace(enum, values=enum.values + [enum.each_task.format(task) for task in tasks])
+        if enum.each_task
+        else enum
+        for name, enum in schema.enum.items()
+    }
+    return msgspec.structs.replace(schema, enum=enums)
 
 
 def _unique(kind: str, names: list[str], ids: list[int]) -> None:

@@ -22,7 +22,10 @@
 
 #ifdef __AVR__
 
+/* Once, where the whole program is one text for the assembler. */
 __asm__(
+    ".ifndef .Lboebot_macro                                               \n"
+    ".set .Lboebot_macro, 1                                               \n"
     ".macro boebot_loop passes, cycles                                    \n"
     ".Lboebot_loop\\@:                                                    \n"
     ".reloc .Lboebot_loop\\@, R_AVR_NONE, .Lboebot_row\\@                 \n"
@@ -30,7 +33,8 @@ __asm__(
     ".Lboebot_row\\@:                                                     \n"
     ".long .Lboebot_loop\\@, \\passes, \\cycles                           \n"
     ".popsection                                                          \n"
-    ".endm                                                                \n");
+    ".endm                                                                \n"
+    ".endif                                                               \n");
 
 #define BOUNDED_ASM(most) "boebot_loop " most ", 0xFFFFFFFF \n"
 

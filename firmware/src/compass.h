@@ -20,7 +20,7 @@ typedef struct {
 void compass_start(void);
 
 /* Once per tick. */
-void compass_task(void);
+void compass_task(void) __attribute__((noinline));
 
 const compass_reading *compass_read(void);
 

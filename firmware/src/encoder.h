@@ -35,7 +35,7 @@ static inline __attribute__((always_inline)) uint8_t encoder_due(void) {
 }
 
 /* Once per tick: closes the tick's readings and lifts masks. */
-void encoder_task(void);
+void encoder_task(void) __attribute__((noinline));
 
 /* The reading at the start of this tick. */
 const encoder_reading *encoder_read(uint8_t side);

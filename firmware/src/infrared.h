@@ -16,7 +16,7 @@ extern "C" {
 void infrared_start(void);
 
 /* Once per tick: takes over what the last burst found, and decides whether this tick has one. */
-void infrared_task(void);
+void infrared_task(void) __attribute__((noinline));
 
 /* INFRARED_... bits of the last reading. */
 uint8_t infrared_read(void);

@@ -18,7 +18,7 @@ extern "C" {
 void light_start(void);
 
 /* In every slot. */
-void light_task(void);
+void light_task(void) __attribute__((noinline));
 
 /* Decay time of a side in us, 1 to LIGHT_LONGEST (so long or longer); 0: none, or no sensor. */
 uint16_t light_read(uint8_t side);

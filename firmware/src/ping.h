@@ -13,7 +13,7 @@ extern "C" {
 void ping_start(void);
 
 /* Once per tick: ends readings and triggers the next one. */
-void ping_task(void);
+void ping_task(void) __attribute__((noinline));
 
 /* Once per tick, before the next two: takes over an echo that has ended. */
 void ping_collect(void);

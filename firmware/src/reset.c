@@ -8,6 +8,7 @@
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "storage.h"
+#include "task_times.h"
 
 #define MAGIC 0x626Fu
 #define NONCE_MASK 0x1FFFFFul
@@ -20,11 +21,13 @@ typedef struct {
   uint16_t mark;  /* WATCHDOG_MARK: the watchdog is about to reset the chip */
   uint32_t count; /* one more for each nonce; begins anywhere */
   uint32_t check;
+  uint8_t running; /* 1 + number of the task that runs; 0: none */
 } reset_record;
 
 _Static_assert(sizeof(reset_record) <= HAL_NOINIT_SIZE, "the record fits");
 
 static uint8_t cause;
+static uint8_t hung; /* 1 + number of the task that ran at a watchdog reset; 0: none */
 
 static reset_record *record(void) { return (reset_record *)hal_noinit(); }
 
@@ -44,6 +47,8 @@ void reset_start(void) {
   if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
     cause = RESET_CAUSE_WATCHDOG;
   }
+  hung = whole && cause == RESET_CAUSE_WATCHDOG && own->running <= TASKS ? own->running : 0u;
+  own->running = 0;
   own->magic = MAGIC;
   own->mark = 0;
   set_count(whole ? own->count : hal_memory_noise());
@@ -55,6 +60,11 @@ HAL_INTERRUPT_WATCHDOG {
 }
 
 uint8_t reset_cause(void) { return cause; }
+
+uint8_t reset_cause_and_task(void) { return (uint8_t)(cause + hung); }
+_Static_assert(RESET_CAUSE_WATCHDOG_IN_WHISKER == RESET_CAUSE_WATCHDOG + 1u + TASK_whisker, "as in tasks.def");
+
+void reset_note_running(uint8_t task) { record()->running = task; }
 
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
  * undone. Close numbers come out far apart. */

@@ -46,7 +46,7 @@ uint8_t safety_arm(uint8_t latches);
 uint8_t safety_latched(void);
 
 /* In every slot: ends set-points that have outlived themselves, latches when the supply is low. */
-void safety_task(void);
+void safety_task(void) __attribute__((noinline));
 
 /* STATUS_MOTORS_ENABLED, STATUS_DEAD_MAN, STATUS_LATCHED. */
 uint16_t safety_status(void);

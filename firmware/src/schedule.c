@@ -21,6 +21,7 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
+#include "task_times.h"
 #include "turret.h"
 #include "whisker.h"
 
@@ -28,17 +29,10 @@
 #define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
 #define OVERLOAD_TICKS 10u /* ticks in a row that overran: the watchdog ends it */
 
-enum {
-#define TASK(name, period, phase, budget) TASK_##name,
-#include "tasks.def"
-  TASKS
-};
-
 #define TASK(name, period, phase, budget) \
   _Static_assert(256 % (period) == 0 && (phase) < (period), "task " #name ": period and phase");
 #include "tasks.def"
 _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go together");
-_Static_assert(TASKS <= 32, "the due tasks are bits of 32");
 
 #ifdef __AVR__
 /* The timing table as part of the image, so that an image can be judged without its sources: a text for each row, ended by
@@ -51,7 +45,7 @@ _Static_assert(TASKS <= 32, "the due tasks are bits of 32");
 #include "tasks.def"
 #endif
 
-volatile uint8_t schedule_slot;
+HAL_NAMED volatile uint8_t schedule_slot;
 uint8_t schedule_next_slot;
 volatile uint16_t schedule_slot_start;
 
@@ -184,29 +178,24 @@ static void begin_tick(void) {
   overrun_row = !overran ? 0u : overrun_row < OVERLOAD_TICKS ? (uint8_t)(overrun_row + 1u) : OVERLOAD_TICKS;
 }
 
-/* What cannot wait for the end of all tasks. */
+/* A task has ended; and what cannot wait for the end of all tasks. */
 static __attribute__((noinline)) void between_tasks(void) {
+  task_has_ended();
   encoder_poll();
   link_poll();
 }
 
-/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has run, and not in
- * a board that has fallen behind for good: tasks of dropped ticks have not run. */
+/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has returned, and not
+ * in a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
-  uint32_t due = 0;
 #define TASK(name, period, phase, budget)    \
   if (slot % (uint8_t)(period) == (phase)) { \
-    due |= (uint32_t)1u << TASK_##name;      \
+    task_begins(TASK_##name);                \
+    name##_task();                           \
+    between_tasks();                         \
   }
 #include "tasks.def"
-#define TASK(name, period, phase, budget)         \
-  if ((due & (uint32_t)1u << TASK_##name) != 0) { \
-    name##_task();                                \
-    due &= ~((uint32_t)1u << TASK_##name);        \
-    between_tasks();                              \
-  }
-#include "tasks.def"
-  if (due == 0 && overrun_row < OVERLOAD_TICKS) {
+  if (overrun_row < OVERLOAD_TICKS) {
     hal_kick_watchdog();
   }
 }

@@ -44,7 +44,7 @@ uint8_t storage_result(void);
 uint32_t storage_boot_counter(void);
 
 /* In every tick: goes on with what is under way; writes the boot counter when this start has run for 10 s. */
-void storage_task(void);
+void storage_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

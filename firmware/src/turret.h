@@ -20,7 +20,7 @@ void turret_hold(int16_t angle);
 void turret_release(void);
 
 /* Once per servo frame: releases a turret that was switched off. */
-void turret_task(void);
+void turret_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

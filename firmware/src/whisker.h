@@ -22,7 +22,7 @@ typedef struct {
 bool whisker_debounce(whisker_state *state, bool touching);
 
 void whisker_start(void);
-void whisker_task(void);
+void whisker_task(void) __attribute__((noinline));
 
 /* WHISKERS_... bits. */
 uint8_t whisker_read(void);

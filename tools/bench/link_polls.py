@@ -34,7 +34,7 @@ def polls(seconds: float = 10.0) -> Polls:
     """Of that long at saturation; the board's time."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(__file__).with_suffix(".c")
-        image = build(Path(folder) / "link_polls.elf", source, extra=("-Wl,--wrap=link_poll",))
+        image = build(Path(folder) / "link_polls.elf", source, extra=("-fno-lto", "-Wl,--wrap=link_poll"))
         longest, most = (find_symbol(image, name) for name in ("longest_gap", "most_waiting"))
         request = BoardRequest(robot=load_robot("shieldbot"), arena="room", image=str(image))
         with Rig(open_board("avr", request)) as rig:

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 2u
-#define SCHEMA_HASH 0x54219F34ul
+#define SCHEMA_HASH 0x29215B62ul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
@@ -51,6 +51,46 @@ enum {
   RESET_CAUSE_EXTERNAL = 2,
   RESET_CAUSE_BROWN_OUT = 3,
   RESET_CAUSE_WATCHDOG = 4,
+  RESET_CAUSE_WATCHDOG_IN_WHISKER = 5,
+  RESET_CAUSE_WATCHDOG_IN_SAFETY = 6,
+  RESET_CAUSE_WATCHDOG_IN_ANALOG = 7,
+  RESET_CAUSE_WATCHDOG_IN_LIGHT = 8,
+  RESET_CAUSE_WATCHDOG_IN_EVENTS = 9,
+  RESET_CAUSE_WATCHDOG_IN_ENCODER = 10,
+  RESET_CAUSE_WATCHDOG_IN_INFRARED = 11,
+  RESET_CAUSE_WATCHDOG_IN_PING = 12,
+  RESET_CAUSE_WATCHDOG_IN_TELEMETRY = 13,
+  RESET_CAUSE_WATCHDOG_IN_REQUESTS = 14,
+  RESET_CAUSE_WATCHDOG_IN_SESSION = 15,
+  RESET_CAUSE_WATCHDOG_IN_SUPPLY = 16,
+  RESET_CAUSE_WATCHDOG_IN_COUNTERS = 17,
+  RESET_CAUSE_WATCHDOG_IN_STORAGE = 18,
+  RESET_CAUSE_WATCHDOG_IN_TURRET = 19,
+  RESET_CAUSE_WATCHDOG_IN_BUZZER = 20,
+  RESET_CAUSE_WATCHDOG_IN_COMPASS = 21,
+  RESET_CAUSE_WATCHDOG_IN_DEVICES = 22,
+};
+
+/* The tasks of the firmware, from firmware/src/tasks.def. */
+enum {
+  TASK_WHISKER = 0,
+  TASK_SAFETY = 1,
+  TASK_ANALOG = 2,
+  TASK_LIGHT = 3,
+  TASK_EVENTS = 4,
+  TASK_ENCODER = 5,
+  TASK_INFRARED = 6,
+  TASK_PING = 7,
+  TASK_TELEMETRY = 8,
+  TASK_REQUESTS = 9,
+  TASK_SESSION = 10,
+  TASK_SUPPLY = 11,
+  TASK_COUNTERS = 12,
+  TASK_STORAGE = 13,
+  TASK_TURRET = 14,
+  TASK_BUZZER = 15,
+  TASK_COMPASS = 16,
+  TASK_DEVICES = 17,
 };
 
 /* Why the motors are latched off. */
@@ -280,6 +320,14 @@ typedef struct __attribute__((packed)) {
   uint8_t latches; /* as in the telemetry that the host knows; refused (latched_again) if there has been another since */
 } msg_arm;
 
+/* Asks how long a task took at most since this was last asked of it, or since the board started; from now on anew. */
+#define MSG_TAKE_TASK_TIME_ID 0x25u
+#define MSG_TAKE_TASK_TIME_LENGTH 3u
+typedef struct __attribute__((packed)) {
+  uint16_t number; /* of the request */
+  uint8_t task; /* task; another number is out_of_range */
+} msg_take_task_time;
+
 /* The event of this number has arrived. */
 #define MSG_ACKNOWLEDGE_ID 0x28u
 #define MSG_ACKNOWLEDGE_LENGTH 2u
@@ -385,7 +433,7 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the request */
   uint8_t status; /* answer_status */
-  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale */
+  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board */
 } msg_answer;
 
 /* Something happened. Sent again until acknowledged. */
@@ -439,6 +487,8 @@ static inline int16_t message_length_to_board(uint8_t id) {
       return MSG_RESET_PARAMETERS_LENGTH;
     case MSG_ARM_ID:
       return MSG_ARM_LENGTH;
+    case MSG_TAKE_TASK_TIME_ID:
+      return MSG_TAKE_TASK_TIME_LENGTH;
     case MSG_ACKNOWLEDGE_ID:
       return MSG_ACKNOWLEDGE_LENGTH;
     case MSG_CLOCK_PROBE_ID:
@@ -492,7 +542,7 @@ static inline bool message_is_handshake(uint8_t id) {
 }
 
 /* X(id, payload bytes, hash) for each message, in order of ids. */
-#define MESSAGE_COUNT 27u
+#define MESSAGE_COUNT 28u
 #define MESSAGE_LIST(X)     \
   X(0x01, 9, 0xE0471814ul)  \
   X(0x02, 0, 0xBD434780ul)  \
@@ -509,9 +559,10 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x22, 2, 0x1DEAD58Cul)  \
   X(0x23, 2, 0x5C7C21EEul)  \
   X(0x24, 3, 0x7A25B50Eul)  \
+  X(0x25, 3, 0x1ADDF94Dul)  \
   X(0x28, 2, 0x306E772Cul)  \
   X(0x30, 2, 0x1011476Bul)  \
-  X(0x80, 44, 0xE0F2D7FDul) \
+  X(0x80, 44, 0xDFD6FEB4ul) \
   X(0x81, 60, 0xF379E8B5ul) \
   X(0x82, 8, 0xACE09C27ul)  \
   X(0x88, 1, 0x24E076A5ul)  \

@@ -21,7 +21,7 @@ void counters_start(void);
 void counters_count_at(uint8_t offset);
 
 /* In every tick: looks whether received bytes were lost; in a session sends the counters now and then. */
-void counters_task(void);
+void counters_task(void) __attribute__((noinline));
 
 /* Whether received bytes were lost since the last call. */
 bool counters_bytes_lost(void);

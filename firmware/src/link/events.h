@@ -21,7 +21,7 @@ void events_raise(uint8_t kind, uint16_t value);
 void events_acknowledge(uint16_t number);
 
 /* In every slot: sends the event under way when it is its time. */
-void events_task(void);
+void events_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

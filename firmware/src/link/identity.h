@@ -14,7 +14,7 @@ void identity_start(void);
 
 /* Each returns false if there was no room for it. */
 bool identity_send_hello(void);
-bool identity_send(void);
+bool identity_send(void) __attribute__((noinline));
 
 /* The message of that index in order of ids; id 0 beyond the last. */
 bool identity_describe(uint8_t index);

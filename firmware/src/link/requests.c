@@ -10,6 +10,7 @@
 #include "link/send.h"
 #include "safety.h"
 #include "storage.h"
+#include "task_times.h"
 
 /* Beside the statuses that are sent. */
 enum {
@@ -38,26 +39,26 @@ static inline bool must_wait(uint8_t id) {
   return storage_busy();
 }
 
-#define NO_PARAMETER 0xFFu /* its value is 0 */
-
-/* Returns the answer's status and, in `about`, the parameter whose value it tells. */
-static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, uint8_t *about) {
+/* Returns the answer's status and, where it tells one, its value, which is 0 before. */
+static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *value) {
   if (must_wait(id)) {
     return ANSWER_STATUS_BUSY;
   }
   uint8_t status = ANSWER_STATUS_OK;
   switch (id) {
-    case MSG_GET_PARAMETER_ID:
-      *about = payload[offsetof(msg_get_parameter, parameter)];
-      if (*about >= PARAMETER_COUNT) {
+    case MSG_GET_PARAMETER_ID: {
+      const uint8_t parameter = payload[offsetof(msg_get_parameter, parameter)];
+      *value = parameters_get(parameter);
+      if (parameter >= PARAMETER_COUNT) {
         status = ANSWER_STATUS_UNKNOWN_PARAMETER;
       }
       break;
+    }
     case MSG_SET_PARAMETER_ID: {
       msg_set_parameter message;
       memcpy(&message, payload, sizeof message);
-      *about = message.parameter;
       status = parameters_set(message.parameter, message.value);
+      *value = parameters_get(message.parameter);
       break;
     }
     case MSG_SAVE_PARAMETERS_ID:
@@ -69,6 +70,15 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, uint8_t *abo
     case MSG_RESET_PARAMETERS_ID:
       parameters_reset();
       break;
+    case MSG_TAKE_TASK_TIME_ID: {
+      const uint8_t task = payload[offsetof(msg_take_task_time, task)];
+      if (task >= TASKS) {
+        status = ANSWER_STATUS_OUT_OF_RANGE;
+      } else {
+        *value = task_times_take(task);
+      }
+      break;
+    }
     default: /* MSG_ARM_ID */
       status = safety_arm(payload[offsetof(msg_arm, latches)]);
       break;
@@ -84,9 +94,9 @@ bool requests_take(uint8_t id, const uint8_t *payload) {
       counters_count(duplicate);
     }
   } else if (number == (uint16_t)(answer.number + 1u) && answer.status != SAVING) {
-    uint8_t about = NO_PARAMETER;
-    const uint8_t status = carry_out(id, payload, &about);
-    answer = (msg_answer){.number = number, .status = status, .value = parameters_get(about)};
+    int32_t value = 0;
+    const uint8_t status = carry_out(id, payload, &value);
+    answer = (msg_answer){.number = number, .status = status, .value = value};
   } else {
     return false;
   }

@@ -17,7 +17,7 @@ void requests_start(void);
 bool requests_take(uint8_t id, const uint8_t *payload);
 
 /* In every tick: answers what has taken its time. */
-void requests_task(void);
+void requests_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

@@ -32,7 +32,7 @@ uint32_t session_board_nonce(void);
 void session_heard(void);
 
 /* In every tick: says hello now and then, ends the session when the host was silent for too long. */
-void session_task(void);
+void session_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

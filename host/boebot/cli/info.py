@@ -10,7 +10,7 @@ import typer
 from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
 from boebot.errors import BoardError
-from boebot.link import messages
+from boebot.link import messages, reset_cause
 from boebot.link.session import Link, text
 from boebot.robots import load_robot
 
@@ -42,7 +42,7 @@ def info(
             "telemetry_period_ms": round(1000 * hello.telemetry_period / hello.tick_rate, 3),
             "session_time_out_ms": hello.session_time_out,
             "boot_counter": hello.boot_counter,
-            "reset_cause": _name(messages.ResetCause, hello.reset_cause),
+            "reset_cause": reset_cause.in_words(hello.reset_cause),
             "parameters_saved": bool(hello.parameters_saved),
             "devices": [
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
@@ -74,7 +74,7 @@ def _latest(link: Link) -> messages.Telemetry:
     raise BoardError(f"the board at {link.transport.name} sends no telemetry")
 
 
-def _name(kind: type[messages.ResetCause] | type[messages.Latch], value: int) -> str:
+def _name(kind: type[messages.Latch], value: int) -> str:
     try:
         return kind(value).name.lower().replace("_", " ")
     except ValueError:

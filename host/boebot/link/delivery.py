@@ -26,6 +26,7 @@ RequestKind = (
     | type[messages.SaveParameters]
     | type[messages.ResetParameters]
     | type[messages.Arm]
+    | type[messages.TakeTaskTime]
 )
 
 

@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 2
-SCHEMA_HASH = 0x54219F34
+SCHEMA_HASH = 0x29215B62
 
 
 class Whiskers(IntFlag):
@@ -85,6 +85,47 @@ class ResetCause(IntEnum):
     EXTERNAL = 2
     BROWN_OUT = 3
     WATCHDOG = 4
+    WATCHDOG_IN_WHISKER = 5
+    WATCHDOG_IN_SAFETY = 6
+    WATCHDOG_IN_ANALOG = 7
+    WATCHDOG_IN_LIGHT = 8
+    WATCHDOG_IN_EVENTS = 9
+    WATCHDOG_IN_ENCODER = 10
+    WATCHDOG_IN_INFRARED = 11
+    WATCHDOG_IN_PING = 12
+    WATCHDOG_IN_TELEMETRY = 13
+    WATCHDOG_IN_REQUESTS = 14
+    WATCHDOG_IN_SESSION = 15
+    WATCHDOG_IN_SUPPLY = 16
+    WATCHDOG_IN_COUNTERS = 17
+    WATCHDOG_IN_STORAGE = 18
+    WATCHDOG_IN_TURRET = 19
+    WATCHDOG_IN_BUZZER = 20
+    WATCHDOG_IN_COMPASS = 21
+    WATCHDOG_IN_DEVICES = 22
+
+
+class Task(IntEnum):
+    """The tasks of the firmware, from firmware/src/tasks.def."""
+
+    WHISKER = 0
+    SAFETY = 1
+    ANALOG = 2
+    LIGHT = 3
+    EVENTS = 4
+    ENCODER = 5
+    INFRARED = 6
+    PING = 7
+    TELEMETRY = 8
+    REQUESTS = 9
+    SESSION = 10
+    SUPPLY = 11
+    COUNTERS = 12
+    STORAGE = 13
+    TURRET = 14
+    BUZZER = 15
+    COMPASS = 16
+    DEVICES = 17
 
 
 class Latch(IntEnum):
@@ -595,6 +636,31 @@ class Arm(_ArmFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
+class _TakeTaskTimeFields(NamedTuple):
+    number: int  # of the request
+    task: int  # task; another number is out_of_range
+
+
+class TakeTaskTime(_TakeTaskTimeFields):
+    """Asks how long a task took at most since this was last asked of it, or since the board started; from now on anew."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x25
+    NAME: ClassVar[str] = "take_task_time"
+    DELIVERY: ClassVar[str] = "exactly_once"
+    LENGTH: ClassVar[int] = 3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
 class _AcknowledgeFields(NamedTuple):
     number: int  # of the event
 
@@ -787,7 +853,7 @@ class DevicesTelemetry(_DevicesTelemetryFields):
 class _AnswerFields(NamedTuple):
     number: int  # of the request
     status: int  # answer_status
-    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale
+    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board
 
 
 class Answer(_AnswerFields):
@@ -881,6 +947,7 @@ Message = (
     | SaveParameters
     | ResetParameters
     | Arm
+    | TakeTaskTime
     | Acknowledge
     | ClockProbe
     | Stopped
@@ -911,6 +978,7 @@ MESSAGES: dict[int, type[Message]] = {
     0x22: SaveParameters,
     0x23: ResetParameters,
     0x24: Arm,
+    0x25: TakeTaskTime,
     0x28: Acknowledge,
     0x30: ClockProbe,
     0x88: Stopped,
@@ -927,7 +995,7 @@ HASHES: dict[int, int] = {
     0x01: 0xE0471814,
     0x02: 0xBD434780,
     0x03: 0xDDE1C4B0,
-    0x80: 0xE0F2D7FD,
+    0x80: 0xDFD6FEB4,
     0x81: 0xF379E8B5,
     0x82: 0xACE09C27,
     0x08: 0xF533989A,
@@ -942,6 +1010,7 @@ HASHES: dict[int, int] = {
     0x22: 0x1DEAD58C,
     0x23: 0x5C7C21EE,
     0x24: 0x7A25B50E,
+    0x25: 0x1ADDF94D,
     0x28: 0x306E772C,
     0x30: 0x1011476B,
     0x88: 0x24E076A5,

@@ -243,6 +243,25 @@ class Link(Traffic):
         if answer.status != messages.AnswerStatus.OK:
             raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
 
+    def take_task_times(self) -> dict[str, int | None]:
+        """How long each task of the firmware took at most, in cycles of 1/16 us, interrupts on top included, since
+        this was last asked, or since the board started; from now on anew. 65535: so long or longer. None: it has not
+        run, or takes no time (on the native board, where only the Ping's pulse does).
+
+        How many ticks overran is in the telemetry: `overruns`.
+
+        Raises:
+            BoardError: as `request`.
+        """
+        times: dict[str, int | None] = {}
+        for task in messages.Task:
+            what = f"tell the time of its task {task.name.lower()}"
+            answer = self.request(messages.TakeTaskTime, task, what=what)
+            if answer.status != messages.AnswerStatus.OK:
+                raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
+            times[task.name.lower()] = answer.value or None
+        return times
+
     def _request_when_free(
         self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None
     ) -> messages.Answer:

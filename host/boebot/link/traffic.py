@@ -4,7 +4,7 @@ acknowledged, telemetry, clock probes, turret and buzzer (protocol/PROTOCOL.md, 
 from __future__ import annotations
 
 from boebot.errors import BoardError
-from boebot.link import messages
+from boebot.link import messages, reset_cause
 from boebot.link.counters import BoardCounters, HostCounters
 from boebot.link.delivery import Events, LinkTimes, Request, RequestKind, Requests, Stopping
 from boebot.link.line import NEVER
@@ -278,10 +278,23 @@ class Traffic(Opening):
         """Of a session: a count of ticks that has not gone on from that of the session before tells of a reset."""
         tick = int.from_bytes(payload[:4], "little")
         passed = (now - self._last_heard_s) / self._tick_s
-        if self._last_tick >= 0 and tick < passed + self._last_tick / 2:  # after a reset at most `passed`
+        was_reset = self._last_tick >= 0 and tick < passed + self._last_tick / 2  # after a reset at most `passed`
+        if was_reset:
             self.board_resets += 1
             self.board_counters.restarted()
+        if was_reset or self._last_tick < 0:
+            self._tell_watchdog()
         self.clock.expect(tick * self._tick_s, now)
+
+    def _tell_watchdog(self) -> None:
+        assert self.hello is not None
+        cause = self.hello.reset_cause
+        if reset_cause.by_watchdog(cause):
+            where = self.transport.name
+            self.notices.append(
+                f"the last reset of the board at {where} was by its {reset_cause.in_words(cause)}: the firmware hung there, "
+                "or fell behind for good"
+            )
 
     def _hear_answer(self, payload: bytes, now: float) -> None:
         if not self.is_open:

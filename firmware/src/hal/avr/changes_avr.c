@@ -3,8 +3,8 @@
 #include "hal/hal.h"
 #include "pins.h"
 
-hal_change hal_changes[HAL_CHANGES + 1u];
-volatile uint8_t hal_changes_head, hal_changes_tail;
+HAL_NAMED hal_change hal_changes[HAL_CHANGES + 1u];
+HAL_NAMED volatile uint8_t hal_changes_head, hal_changes_tail;
 
 _Static_assert(sizeof(hal_change) == HAL_CHANGE_BYTES && HAL_CHANGES * HAL_CHANGE_BYTES == 256, "indices are bytes");
 _Static_assert(HAL_CHANGES_CLOSE == 256, "what is close shows in the high byte");

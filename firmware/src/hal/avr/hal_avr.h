@@ -38,6 +38,9 @@
   void __vector_two_wire_body(void) __attribute__((interrupt, used, externally_visible)); \
   void __vector_two_wire_body(void)
 
+/* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
+#define HAL_NAMED __attribute__((used, externally_visible))
+
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
 /* Covers what can stand before the edge's interrupt (one that has begun, 51 cycles; a storm of pin changes, 5 x 79 and 16

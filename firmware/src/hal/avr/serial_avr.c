@@ -10,9 +10,9 @@
 /* In sections of their own, so that the linker can put them at the start of RAM, where aligning them wastes nothing
  * (platformio.ini). The end of the name is for the assembler: no bytes in flash, and a comment after it. */
 #define SECTION(name) __attribute__((section(name ",\"aw\",@nobits;")))
-uint8_t hal_receive_ring[256] __attribute__((aligned(256))) SECTION(".ring_receive");
-uint8_t hal_send_ring[HAL_SEND_RING] __attribute__((aligned(HAL_SEND_RING))) SECTION(".ring_send");
-volatile uint8_t hal_send_head;
+HAL_NAMED uint8_t hal_receive_ring[256] __attribute__((aligned(256))) SECTION(".ring_receive");
+HAL_NAMED uint8_t hal_send_ring[HAL_SEND_RING] __attribute__((aligned(HAL_SEND_RING))) SECTION(".ring_send");
+HAL_NAMED volatile uint8_t hal_send_head;
 
 void hal_start_serial(uint32_t baud) {
   GPIOR0 = 0; /* flags and indices: whoever started us may have used them */

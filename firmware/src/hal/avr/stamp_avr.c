@@ -3,8 +3,8 @@
 #include "hal/hal.h"
 #include "schedule.h"
 
-volatile uint8_t hal_stamp_slot;
-volatile uint16_t hal_stamp_time;
+HAL_NAMED volatile uint8_t hal_stamp_slot;
+HAL_NAMED volatile uint16_t hal_stamp_time;
 
 ISR(PCINT2_vect, ISR_NAKED) {
   __asm__ volatile(

@@ -122,6 +122,7 @@ void hal_eeprom_write_start(uint16_t address, uint8_t value);
 void hal_eeprom_interrupt(bool on);
 
 #define HAL_TABLE static const
+#define HAL_NAMED
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
 

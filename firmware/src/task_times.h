@@ -1,0 +1,34 @@
+/* task_times.h: the board times its own tasks: which one runs, and how long each took at most.
+ *
+ * Taken with Timer1, in cycles, from a task's call to its return: interrupts that came on top are in it. */
+#ifndef TASK_TIMES_H
+#define TASK_TIMES_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+#define TASK(name, period, phase, budget) TASK_##name,
+#include "tasks.def"
+  TASKS
+};
+
+void task_times_start(void);
+
+/* Around each task. The number of the task that runs outlives a reset (reset.h). Main loop only. */
+void task_begins(uint8_t task);
+void task_has_ended(void);
+
+#define TASK_TIME_LONGEST 0xFFFFu /* so long or longer; no run is so long on purpose */
+
+/* The longest that a task took since this was last asked of it, or since the start; 0: it has not run. */
+uint16_t task_times_take(uint8_t task);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,25 @@
+"""Why a board started, in words: what its hello tells of the last reset."""
+
+from __future__ import annotations
+
+from boebot.link import messages
+
+_IN_TASK = "WATCHDOG_IN_"
+
+
+def by_watchdog(cause: int) -> bool:
+    """Whether the watchdog reset the board: the firmware hung or fell behind for good."""
+    return cause >= messages.ResetCause.WATCHDOG
+
+
+def in_words(cause: int) -> str:
+    """As in "watchdog, in task encoder"; a cause that this kit does not know is told by its number."""
+    try:
+        name = messages.ResetCause(cause).name
+    except ValueError:
+        return f"unknown ({cause})"
+    if name.startswith(_IN_TASK):
+        return f"watchdog, in task {name.removeprefix(_IN_TASK).lower()}"
+    if cause == messages.ResetCause.WATCHDOG:
+        return "watchdog, outside of its tasks"
+    return name.lower().replace("_", " ")
