@@ -198,15 +198,14 @@ def _board_maxima(port: str | None, robot: RobotDescription) -> Mapping[str, int
         return {}
     from boebot.boards import BoardRequest, open_board
     from boebot.link.session import Link
-    from boebot.timing.on_board import read_maxima
 
     session = open_board(port, BoardRequest(robot=robot, record=False, realtime=True))
     try:
         link = Link(session.transport, record=False)
         link.open()
-        found = read_maxima(link)
+        found = link.take_task_times()
         link.close()
-        return found
+        return {name: cycles for name, cycles in found.items() if cycles}
     finally:
         session.close()
 
@@ -276,7 +275,7 @@ def show_report(report: Report) -> None:
             shown.add_column(title, justify="right")
         for row in rows:
             ends = (row.response,) if kind == "task" else (row.latency, row.latency_limit)
-            style = "bold red" if row.slack < 0 or max(row.emulator or 0, row.board or 0) > row.bound else None
+            style = "bold red" if row.slack < 0 or (row.emulator or 0) > row.bound else None
             cells = (row.bound, row.emulator, row.board, row.budget, row.slack, *ends)
             shown.add_row(row.name, *map(_cell, cells), style=style)
         console.print(shown)
