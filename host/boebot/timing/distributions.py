@@ -1,0 +1,135 @@
+"""Jitter and latency as distributions: what was measured, whoever measured it, and what it may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+CYCLES_PER_US = 16.0
+CYCLES_PER_TICK = 160_000.0
+JITTER_GROUP = "boebot.timing"  # of entry points; the one named "jitter" is a MeasureJitter
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """All values of one quantity under one load, in cycles of the board's clock, in the order in which they came.
+
+    `least` and `most` are what it may be, from the notes of the project or derived from the schedule; None: not said.
+    """
+
+    quantity: str  # "servo width, left"
+    meaning: str  # "of the pulse at pin 13, less what was set"
+    load: str
+    values: NDArray[np.int64] = field(repr=False)
+    least: int | None = None
+    most: int | None = None
+    subject: str = "boebot"  # whose firmware
+
+    @property
+    def count(self) -> int:
+        """How many values there are."""
+        return len(self.values)
+
+    @property
+    def minimum(self) -> float:
+        """The least value (cycles); NaN where there is none."""
+        return float(self.values.min()) if self.count else float("nan")
+
+    @property
+    def maximum(self) -> float:
+        """The greatest value (cycles); NaN where there is none."""
+        return float(self.values.max()) if self.count else float("nan")
+
+    def percentile(self, share: float) -> float:
+        """The smallest value that `share` percent of all do not exceed (cycles); NaN where there is none."""
+        if not self.count:
+            return float("nan")
+        return float(np.percentile(self.values, share, method="inverted_cdf"))
+
+    @property
+    def broken(self) -> int:
+        """How many values are not what they may be."""
+        below = 0 if self.least is None else int(np.sum(self.values < self.least))
+        above = 0 if self.most is None else int(np.sum(self.values > self.most))
+        return below + above
+
+    def summary(self) -> dict[str, Any]:
+        """What a table or a program reads of it: numbers in cycles and, with `_us` and `_ticks`, in those."""
+        numbers = {
+            "min": self.minimum,
+            "p50": self.percentile(50),
+            "p99": self.percentile(99),
+            "max": self.maximum,
+        }
+        said = {name: value if self.count else None for name, value in numbers.items()}
+        us = {f"{name}_us": None if value is None else value / CYCLES_PER_US for name, value in said.items()}
+        ticks = {"max_ticks": None if said["max"] is None else said["max"] / CYCLES_PER_TICK}
+        names = ("subject", "quantity", "meaning", "load", "least", "most")
+        texts = {name: getattr(self, name) for name in names}
+        return {**texts, "count": self.count, **said, **us, **ticks, "broken": self.broken}
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """What got lost under a load, counted by who knows best; all 0 where nothing was."""
+
+    load: str
+    frames: int  # refused at either end, or missing in the sequence numbers
+    bytes: int  # that the receiver or its ring had no room for
+    edges: int  # of encoders, that the counts lack
+    ticks: int  # without telemetry
+    late_ticks: int  # whose work went on when the next tick had begun
+    masked: int  # telemetries that tell of a masked encoder line
+    resets: int
+
+    @property
+    def anything(self) -> bool:
+        """Whether any of it is not 0."""
+        return any(value for name, value in asdict(self).items() if name != "load")
+
+
+@dataclass(frozen=True, slots=True)
+class JitterReport:
+    """All distributions of an image, and what got lost under each load."""
+
+    distributions: tuple[Distribution, ...]
+    losses: tuple[Losses, ...]
+    notes: tuple[str, ...] = ()  # what was not measured, and why
+
+    @property
+    def broken(self) -> list[Distribution]:
+        """Those with a value that may not be."""
+        return [one for one in self.distributions if one.broken]
+
+    def as_json(self) -> dict[str, Any]:
+        """For `--json`."""
+        return {
+            "distributions": [one.summary() for one in self.distributions],
+            "losses": [asdict(one) for one in self.losses],
+            "notes": list(self.notes),
+        }
+
+
+def rows(distributions: Sequence[Distribution]) -> list[tuple[str, ...]]:
+    """A table for people, the first row its head; numbers in cycles, above 10,000 in ms."""
+    head = ("quantity", "load", "count", "min", "p50", "p99", "max", "may be", "")
+    table: list[tuple[str, ...]] = [head]
+    for one in distributions:
+        numbers = (one.minimum, one.percentile(50), one.percentile(99), one.maximum)
+        limits = [number for number in (one.least, one.most) if number is not None]
+        large = max((abs(number) for number in (*numbers, *limits) if number == number), default=0.0) > 10_000.0
+        may = f"{_said(one.least, large)} .. {_said(one.most, large)}" if limits else ""
+        name = one.quantity if one.subject == "boebot" else f"{one.subject}: {one.quantity}"
+        said = (_said(number, large) for number in numbers)
+        table.append((name, one.load, str(one.count), *said, may, f"{one.broken} broken" if one.broken else ""))
+    return table
+
+
+def _said(cycles: float | None, large: bool) -> str:
+    if cycles is None or cycles != cycles:
+        return "-"
+    return f"{cycles / 16_000.0:.3f} ms" if large else f"{cycles:g}"

@@ -1,0 +1,86 @@
+"""A picture of distributions: one histogram for each quantity, all loads and firmwares in it, as SVG, PNG or PDF."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from boebot.errors import BoebotError
+from boebot.report import style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from boebot.timing.distributions import Distribution
+
+COLUMNS = 3
+WIDTH_IN, HEIGHT_IN = 3.9, 2.4  # of one histogram
+BINS = 60
+FORMATS = (".svg", ".png", ".pdf")
+MILLISECONDS_FROM = 10_000.0  # cycles; shorter ones are shown as they are
+
+
+def draw(distributions: Sequence[Distribution], path: Path) -> Path:
+    """Draws them into a file, by quantity in the order in which they come; returns its path.
+
+    Raises:
+        BoebotError: there is nothing to draw, the format is none, or the file cannot be written.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise BoebotError(f"{path}: a picture cannot be written as {path.suffix!r}; expected {', '.join(FORMATS)}")
+    by_quantity: dict[str, list[Distribution]] = {}
+    for one in distributions:
+        if one.count:
+            by_quantity.setdefault(one.quantity, []).append(one)
+    if not by_quantity:
+        raise BoebotError("there are no distributions to draw; expected one value at least")
+    rows = -(-len(by_quantity) // COLUMNS)
+    with rc_context({**style.PLOTS, "svg.hashsalt": "boebot", "text.parse_math": False}):
+        figure = Figure(figsize=(COLUMNS * WIDTH_IN, rows * HEIGHT_IN), layout="constrained")
+        FigureCanvasAgg(figure)
+        fields = list(np.ravel(figure.subplots(rows, COLUMNS, squeeze=False)))
+        for axes, (quantity, found) in zip(fields, by_quantity.items(), strict=False):
+            _histogram(axes, quantity, found)
+        for axes in fields[len(by_quantity) :]:
+            axes.set_visible(False)
+        try:
+            figure.savefig(path, dpi=style.DPI, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
+        except OSError as error:
+            raise BoebotError(f"the picture cannot be written to {path}: {error.strerror or error}") from None
+    return path
+
+
+def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None:
+    """Shares of all values by bins, on a scale where one in a thousand is seen; limits as dashed lines."""
+    values = np.concatenate([one.values for one in found])
+    limits = sorted({limit for one in found for limit in (one.least, one.most) if limit is not None})
+    scale = 16_000.0 if np.abs(values).max() > MILLISECONDS_FROM else 1.0
+    low, high = float(values.min()), float(values.max())
+    each_cycle = scale == 1.0 and high - low < BINS
+    bins = int(np.clip(np.sqrt(len(values)), 8, BINS))  # few values in many bins would show nothing but gaps
+    edges = np.arange(low - 0.5, high + 1.0) if each_cycle else np.linspace(low, high, bins + 1)
+    for one, colour, dashes in zip(found, cycle(style.ROBOTS), cycle(style.DASHES), strict=False):
+        label = one.load if one.subject == "boebot" else f"{one.subject}, {one.load}"
+        shares = np.histogram(one.values, bins=edges)[0] / one.count
+        axes.stairs(shares, edges / scale, label=f"{label} ({one.count})", color=colour, ls=dashes, lw=1.4)
+    span = max(high - low, 1.0)
+    for limit in limits:
+        if low - span <= limit <= high + span:  # else it would squeeze the values
+            axes.axvline(limit / scale, color=style.ESTIMATE, ls=(0, (4, 2)), lw=1.0)
+    axes.set_yscale("log")
+    axes.set_ylim(2e-4, 4.0)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g} %"))
+    if high == low:
+        axes.set_xlim(low - 3.0, high + 3.0)
+    axes.set_title(quantity)
+    axes.set_xlabel("ms" if scale != 1.0 else "cycles")
+    axes.legend(fontsize=6.5, loc="upper right")

@@ -1,0 +1,213 @@
+"""Jitter and latency of an untouched image, as distributions: what its pins and its line show under each load.
+
+A run is made in jitter_run.py; here its record becomes values, one for each pulse, edge, frame or event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from boebot.link import messages
+from boebot.timing.distributions import Distribution, JitterReport, Losses
+from sim_bridge.timing import latency_limits as limits
+from sim_bridge.timing.jitter_run import CENTRE, COUNTERS_TICKS, GAIN, MIRROR, Progress, Run, drive
+from sim_bridge.timing.latency_limits import Limits
+from sim_bridge.timing.line import Heard
+from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, TICK_CYCLES, Bench, Load
+from sim_bridge.timing.stamps import timer_start
+
+SAME_EDGE = 2_000  # cycles that a stamp may be off and still be that edge's: echoes are further apart
+CYCLES_PER_US = 16
+
+
+def measure_jitter(
+    elf: Path, *, seconds: float = 2.0, seed: int = 1, progress: Progress | None = None, loads: Sequence[Load] = LOADS
+) -> JitterReport:
+    """All distributions of an image: `seconds` of the board's time under each load.
+
+    `progress` is called with the share that is done, 0 to 1.
+
+    Raises:
+        BoardError: the image cannot be loaded, does not answer, crashes, or lacks the variables that are read.
+    """
+    start = timer_start(elf)
+    found: list[Distribution] = []
+    losses: list[Losses] = []
+    for number, load in enumerate(loads):
+
+        def share(done: float, number: int = number) -> None:
+            if progress is not None:
+                progress((number + done) / len(loads))
+
+        with Bench(elf) as bench:
+            run = drive(bench, start, load, seconds, seed, share)
+            found += distributions(run)
+            losses.append(lost(run))
+    return JitterReport(tuple(found), tuple(losses))
+
+
+def distributions(run: Run) -> list[Distribution]:
+    """All quantities of a run."""
+    return [
+        *servo_pulses(run),
+        _of(
+            run,
+            "tick start",
+            "from its nominal cycle to its interrupt's count",
+            run.tick_starts.delays,
+            limits.TICK_START,
+        ),
+        *edge_stamps(run),
+        *echo_stamps(run),
+        *reactions(run),
+        *observations(run),
+    ]
+
+
+def _of(run: Run, quantity: str, meaning: str, values: Iterable[int], may: Limits | None = None) -> Distribution:
+    least, most = may or (None, None)
+    return Distribution(quantity, meaning, run.load.name, np.array(list(values), dtype=np.int64), least, most)
+
+
+def width_of(side: str, signals: tuple[int, int]) -> int:
+    """Cycles of the pulse that a set-point asks for: centre + gain x signal (motion.c), exact for `traffic.SIGNALS`."""
+    signal = signals[0] if side == "left" else signals[1]
+    return CENTRE + MIRROR[side] * GAIN * signal // 10_000
+
+
+def servo_pulses(run: Run) -> list[Distribution]:
+    """Width and period of both servos' pulses, less what they should be."""
+    found = []
+    widths = {side: [width_of(side, change.signals) for change in run.traffic.changes] for side in MIRROR}
+    for side in MIRROR:
+        pin = run.pins[f"servo {side}"]
+        pulses = run.bench.pulses(pin, run.begun)
+        pulses = pulses[pulses[:, 0] < run.ended]
+        allowed = np.array(sorted(set(widths[side])) or [CENTRE])
+        errors = [int(width - allowed[np.argmin(np.abs(allowed - width))]) for width in pulses[:, 1]]
+        periods = np.diff(pulses[:, 0]) - SERVO_FRAME_CYCLES
+        found += [
+            _of(run, f"servo width, {side}", f"of the pulse at pin {pin}, less what was set", errors, limits.EXACT),
+            _of(run, f"servo period, {side}", f"from rise to rise at pin {pin}, less 20 ms", periods, limits.EXACT),
+        ]
+    return found
+
+
+def edge_stamps(run: Run) -> list[Distribution]:
+    """How late encoder edges are stamped."""
+    errors: list[int] = []
+    for train in (train for wheel in run.encoders for train in wheel):
+        stamps = run.edge_stamps.changes[train.pin - 14]
+        if len(stamps) == len(train.edges):  # else some were lost, which `lost` tells; nobody knows which
+            errors += [stamp - edge for stamp, edge in zip(stamps, train.edges, strict=True)]
+    return [_of(run, "encoder stamp", "less the cycle of the edge at the pin", errors)]
+
+
+def echo_stamps(run: Run) -> list[Distribution]:
+    """Stamps of echoes against their edges, and their told lengths."""
+    errors, lengths = [], []
+    rises = np.array([rise for rise, _ in run.ping.echoes], dtype=np.int64)
+    for rise, fall in run.echo_stamps.echoes:
+        nearest = int(np.argmin(np.abs(rises - rise)))
+        true_rise, true_fall = run.ping.echoes[nearest]
+        if abs(true_rise - rise) < SAME_EDGE:
+            errors += [rise - true_rise, fall - true_fall]
+            lengths.append(fall - rise - (true_fall - true_rise))
+    told = [heard.message.ping_echo * CYCLES_PER_US - (fall - rise) for (rise, fall), heard in echoes_told(run)]
+    return [
+        _of(run, "echo stamp", "less the cycle of the edge at the pin", errors, limits.ECHO_STAMP),
+        _of(run, "echo length, stamped", "less that of the pulse", lengths, limits.ECHO_STAMP),
+        _of(run, "echo length, told", "in whole microseconds, less that of the pulse", told, limits.ECHO_STAMP),
+    ]
+
+
+def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:
+    """Each echo with the first telemetry that tells of it: the one whose age begins anew."""
+    telemetry = run.line.telemetry
+    for before, heard in pairwise(telemetry):
+        if heard.message.ping_age < before.message.ping_age or before.message.ping_age == 255 != heard.message.ping_age:
+            ended = [echo for echo in run.ping.echoes if run.begun < echo[1] < heard.first]
+            if ended:
+                yield ended[-1], heard
+
+
+def reactions(run: Run) -> list[Distribution]:
+    """From the last byte of a frame to what it brings about."""
+    answers = {
+        heard.message.token: heard.first for heard in run.line.heard if isinstance(heard.message, messages.ClockAnswer)
+    }
+    probes = [answers[probe.token] - probe.arrived for probe in run.traffic.probes if probe.token in answers]
+    found = [
+        _of(
+            run,
+            "byte in to reaction",
+            "from a probe's last byte to the first byte of its answer",
+            probes,
+            limits.BYTE_TO_REACTION,
+        )
+    ]
+    for slot, side in enumerate(MIRROR):
+        pulses = run.bench.pulses(run.pins[f"servo {side}"])
+        delays = []
+        for change in run.traffic.changes[1:]:  # with the first one pulses begin
+            new = pulses[(pulses[:, 0] > change.arrived) & (pulses[:, 1] == width_of(side, change.signals)), 0]
+            if len(new):
+                delays.append(int(new[0]) - change.arrived)
+        meaning = "from a set-point's last byte to the rise of the first pulse of its width"
+        found.append(_of(run, f"set-point to pulse, {side}", meaning, delays, limits.setpoint_to_pulse(slot)))
+    return found
+
+
+def observations(run: Run) -> list[Distribution]:
+    """From an event at a pin to the end of the telemetry that first tells of it."""
+    telemetry = run.line.telemetry
+    found = []
+    for side, bit in (("left", 1), ("right", 2)):
+        for name, field, may in (
+            (f"whisker {side}", "whiskers", limits.WHISKER),
+            (f"ir {side}", "infrared", limits.infrared(2 if side == "left" else 3)),
+        ):
+            delays = []
+            for closed in run.contacts[name].closings:
+                seen = (one.last for one in telemetry if one.last > closed and getattr(one.message, field) & bit)
+                if closed < run.ended and (last := next(seen, None)) is not None:
+                    delays.append(last - closed)
+            found.append(_of(run, f"{name} to observation", "from the pin's fall", delays, may))
+    echoes = [heard.last - fall for (_, fall), heard in echoes_told(run)]
+    found.append(_of(run, "echo to observation", "from the echo's end", echoes, limits.NEXT_TICK))
+    for side, wheel in zip(MIRROR, run.encoders, strict=False):
+        edges = np.sort(np.concatenate([train.edges for train in wheel]))
+        counts = np.array([getattr(one.message, f"encoder_{side}") for one in telemetry])
+        order = np.searchsorted(counts, np.arange(1, len(edges) + 1))  # the first telemetry with that count
+        ends = np.array([one.last for one in telemetry])
+        delays = [int(ends[at] - edge) for at, edge in zip(order, edges, strict=True) if at < len(ends)]
+        found.append(_of(run, f"encoder {side} to observation", "from the edge at the pin", delays, limits.NEXT_TICK))
+    return found
+
+
+def lost(run: Run) -> Losses:
+    """What got lost in a run, by what both ends and the emulator counted. Lets time pass until the board tells."""
+    line, board = run.line, run.bench.access.counters()
+    since = len(line.heard)
+    run.bench.run(COUNTERS_TICKS * TICK_CYCLES)
+    counted = line.wait(messages.Counters, since)
+    telemetry = [heard.message for heard in line.telemetry]
+    edges = sum(len(train.edges) for wheel in run.encoders for train in wheel)
+    told = telemetry[-1].encoder_left + telemetry[-1].encoder_right
+    late = np.diff([message.overruns for message in telemetry]) % 256
+    gaps = np.diff([message.tick for message in telemetry]) - 1
+    masked = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MASKED
+    return Losses(
+        load=run.load.name,
+        frames=counted.bad + counted.dropped + line.decoder.bad + line.decoder.lost,
+        bytes=board["overruns"] + counted.overrun,
+        edges=edges - told,
+        ticks=int(gaps.sum()),
+        late_ticks=int(late.sum()),
+        masked=sum(bool(message.status & masked) for message in telemetry),
+        resets=board["resets"],
+    )

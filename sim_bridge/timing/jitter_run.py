@@ -1,0 +1,118 @@
+"""One run under a load: what acts on the board, and all that is kept of it.
+
+Periods of all that comes from outside share no factor with the control tick, so that a run sweeps the phases; another
+`seed` begins at other ones. Nothing is added to the image; stamps are read from its RAM (stamps.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from boebot.link import messages
+from boebot.robots import RobotDescription, load_robot
+from sim_bridge.boards.board import Level
+from sim_bridge.timing.line import Line
+from sim_bridge.timing.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels
+from sim_bridge.timing.stamps import EchoStamps, EncoderStamps, TickStarts
+from sim_bridge.timing.traffic import EachTick, FullLine, Traffic
+
+Progress = Callable[[float], None]
+
+CENTRE, GAIN = 24_000, 3_200  # cycles of the pulses that stand for signals 0 and 1, set before the run
+MIRROR = {"left": 1, "right": -1}  # the right servo turns the other way round
+PHASE_STEP = 7_919  # cycles from one seed's beginning to the next one's, a prime
+DRAIN_TICKS = 20  # after a run, for what is under way
+COUNTERS_TICKS = 70  # from one message with the board's counters to the next one at most
+# cycles, from one closing to the next: what remains of whole ticks, and of whole sweeps, sweeps both evenly
+CONTACT_PERIODS = {"whisker left": 2_178_887, "whisker right": 2_338_897, "ir left": 2_894_429, "ir right": 2_894_441}
+CONTACT_CLOSED = 1_120_000  # cycles: longer than a sweep
+
+
+@dataclass
+class Run:
+    """What acted on a board and what was seen of it under one load."""
+
+    load: Load
+    bench: Bench
+    line: Line
+    pins: dict[str, int]
+    begun: int
+    ended: int
+    traffic: Traffic
+    encoders: list[list[PulseTrain]]
+    contacts: dict[str, Contact]
+    ping: Ping
+    edge_stamps: EncoderStamps
+    echo_stamps: EchoStamps
+    tick_starts: TickStarts
+
+
+def drive(bench: Bench, start: int, load: Load, seconds: float, seed: int, share: Progress) -> Run:
+    """Runs a board under a load for that long, and then until all that was under way has come."""
+    line = Line(bench)
+    robot = load_robot(line.open().robot.split(b"\0", 1)[0].decode())
+    pins = pins_of(robot)
+    for pin in (pin for name, pin in pins.items() if name.startswith(("whisker", "ir"))):
+        bench.access.drive(pin, Level.HIGH)
+    prepare(line)
+    first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
+    lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]
+    traffic = FullLine(line, first) if load.full_line else EachTick(line, first)
+    run = Run(
+        load=load,
+        bench=bench,
+        line=line,
+        pins=pins,
+        begun=first + TICK_CYCLES,
+        ended=first + TICK_CYCLES + round(seconds * 16e6),
+        traffic=traffic,
+        encoders=wheels([one for one in lines if one], load.edges_per_s, first),
+        contacts={
+            name: Contact(pins[name], period, CONTACT_CLOSED, first + 3 * TICK_CYCLES + number * PHASE_STEP)
+            for number, (name, period) in enumerate(CONTACT_PERIODS.items())
+        },
+        ping=Ping(pins["ping"]),
+        edge_stamps=EncoderStamps(bench, start),
+        echo_stamps=EchoStamps(bench, start),
+        tick_starts=TickStarts(bench, start),
+    )
+    trains = [train for wheel in run.encoders for train in wheel]
+    bench.sources += [*trains, *run.contacts.values(), run.ping, traffic]
+    while bench.now < run.ended:
+        run.tick_starts.watch()
+        share(min(1.0, 1.0 - (run.ended - bench.now) / (seconds * 16e6)))
+    bench.sources[:] = [run.ping]  # an echo ends that has begun
+    bench.run(DRAIN_TICKS * TICK_CYCLES)
+    return run
+
+
+def pins_of(robot: RobotDescription) -> dict[str, int]:
+    """The pins that are looked at or driven, by what is there: "servo left", "encoder left a", "ir right", ..."""
+    found = {}
+    parts = {"": ("pin", "receiver_pin"), " a": ("pin_a",), " b": ("pin_b",)}
+    for name in ("servo", "encoder", "whisker", "infrared"):
+        for side in MIRROR:
+            device = robot.device.get(f"{name}_{side}")
+            for part, fields in parts.items():
+                for pin in (getattr(device, one, None) for one in fields):
+                    if pin is not None:
+                        found[f"{'ir' if name == 'infrared' else name} {side}{part}"] = number_of(pin)
+    found["ping"] = number_of(getattr(robot.device.get("ping"), "pin", 8))
+    return found
+
+
+def number_of(pin: int | str) -> int:
+    """A pin's Arduino number: A0 is 14."""
+    return 14 + int(pin[1:]) if isinstance(pin, str) else pin
+
+
+def prepare(line: Line) -> None:
+    """All that the loads name is on and at its fastest; the motors are armed."""
+    line.set("ping_period", int(messages.PARAMETERS["ping_period"].minimum))
+    line.set("infrared_sweep", 1)
+    line.set("infrared_period", int(messages.PARAMETERS["infrared_period"].minimum))
+    for side, mirror in MIRROR.items():
+        line.set(f"servo_{side}_centre", CENTRE)
+        line.set(f"servo_{side}_gain", mirror * GAIN)
+    line.arm()

@@ -1,0 +1,195 @@
+"""Loads at the pins: an emulated board by itself, and what drives its lines: encoder wheels, echoes, contacts.
+
+A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that
+phases are swept. Bytes are in line.py.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from sim_bridge.boards import avr
+from sim_bridge.boards.board import Edge, Level
+
+CYCLES_PER_US = 16
+SLOT_CYCLES = 40_000  # 2.5 ms (tasks.def)
+TICK_CYCLES = 160_000
+SERVO_FRAME_CYCLES = 320_000
+SLICE_CYCLES = 8_000  # 0.5 ms: shorter than the time from a Ping's trigger to its echo
+AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
+ECHO_DELAY_CYCLES = 750 * CYCLES_PER_US  # from the trigger's end to the echo (Parallax #28015, hold-off)
+ECHO_SHORTEST, ECHO_LONGEST = 2_000, 290_000  # cycles: 0.125 to 18.1 ms (ibid.: 0.115 to 18.5 ms)
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line."""
+
+    name: str
+    edges_per_s: int
+    full_line: bool  # frames back to back both ways, else a set-point and telemetry each tick
+
+
+FIGURES = Load("figures", edges_per_s=1500, full_line=False)
+SATURATED = Load("saturated", edges_per_s=4000, full_line=True)
+LOADS = (FIGURES, SATURATED)
+
+
+class Source(Protocol):
+    """Whatever acts on a board from outside."""
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """Queues what it does up to that cycle; what happened up to now is known."""
+
+
+class Bench:
+    """A board with an image, powered on. Time passes in slices; before each, all sources queue what they do in it."""
+
+    def __init__(self, elf: Path) -> None:
+        """Raises BoardError where the image cannot be loaded."""
+        self.elf = elf
+        self.access = avr.create(elf).access()
+        self.sources: list[Source] = []
+        self.edges: dict[int, list[Edge]] = defaultdict(list)
+        """all that the firmware did to each pin"""
+        self.after_slice: list[Callable[[], None]] = []
+        self._queued = 0
+
+    @property
+    def now(self) -> int:
+        """The cycle up to which the board has run."""
+        return self.access.now
+
+    def run_until(self, until: int) -> None:
+        """Lets time pass. A crash raises BoardError."""
+        while self.now < until:
+            end = min(self.now + SLICE_CYCLES, until)
+            if end + AHEAD_CYCLES > self._queued:
+                self._queued = end + AHEAD_CYCLES
+                for source in self.sources:
+                    source.queue(self, self._queued)
+            self.access.advance(end)
+            for edge in self.access.log():
+                self.edges[edge.pin].append(edge)
+            for look in self.after_slice:
+                look()
+
+    def run(self, cycles: int) -> None:
+        """Lets so many cycles pass."""
+        self.run_until(self.now + cycles)
+
+    def pulses(self, pin: int, since: int = 0) -> np.ndarray:
+        """Start and width, in cycles, of every high pulse on `pin` that began after `since`: shape (n, 2)."""
+        found, rise = [], None
+        for edge in self.edges[pin]:
+            if edge.level == Level.HIGH:
+                rise = edge.cycle
+            elif rise is not None:
+                found.append((rise, edge.cycle - rise))
+                rise = None
+        return np.array([pulse for pulse in found if pulse[0] > since], dtype=np.int64).reshape(-1, 2)
+
+    def close(self) -> None:
+        """Lets go of the board."""
+        self.access.close()
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class PulseTrain:
+    """A pin that changes its level every `period` cycles from `first` on, up to `last`."""
+
+    def __init__(self, pin: int, period: int, first: int, last: int | None = None) -> None:
+        self.pin, self.period, self.last = pin, period, last
+        self.edges: list[int] = []
+        """cycles at which it changed, queued ones included"""
+        self._next = first
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source."""
+        while self._next < until and (self.last is None or self._next <= self.last):
+            bench.access.drive(self.pin, Level.LOW if len(self.edges) % 2 else Level.HIGH, at=self._next)
+            self.edges.append(self._next)
+            self._next += self.period
+
+    def count(self, cycle: int) -> int:
+        """Edges up to that cycle."""
+        return bisect_right(self.edges, cycle)
+
+
+def coprime_periods(edges_per_s: int, count: int) -> list[int]:
+    """That many periods in cycles, none longer than asked for, without a common factor with the tick or each other."""
+    found: list[int] = []
+    period = 16_000_000 // edges_per_s
+    while len(found) < count:
+        if all(np.gcd(period, other) == 1 for other in (TICK_CYCLES, *found)):
+            found.append(period)
+        period -= 1
+    return found
+
+
+def wheels(pins: Sequence[tuple[int, ...]], edges_per_s: int, first: int) -> list[list[PulseTrain]]:
+    """The encoder lines of each wheel, one or two a wheel, at `edges_per_s` a line; with two, A leads B by a quarter
+    turn of the pattern: forward."""
+    periods = coprime_periods(edges_per_s, len(pins))
+    return [
+        [PulseTrain(pin, period, first + line * (period // 2)) for line, pin in enumerate(lines)]
+        for lines, period in zip(pins, periods, strict=True)
+    ]
+
+
+class Contact:
+    """A switch to ground: closed for `closed` cycles every `period`, open between; a pull-up makes it high."""
+
+    def __init__(self, pin: int, period: int, closed: int, first: int) -> None:
+        self.pin, self.period, self.closed = pin, period, closed
+        self.closings: list[int] = []
+        self._next = first
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source. Both ends of a closing are queued at once: the later one replaces nothing earlier."""
+        while self._next < until:
+            bench.access.drive(self.pin, Level.LOW, at=self._next)
+            bench.access.drive(self.pin, Level.HIGH, at=self._next + self.closed)
+            self.closings.append(self._next)
+            self._next += self.period
+
+
+class Ping:
+    """A range finder that answers each trigger with an echo; their lengths sweep the sensor's range."""
+
+    def __init__(self, pin: int, step: int = 23_459) -> None:
+        """`step`: by which each echo is longer than the one before, in cycles; a prime."""
+        self.pin, self.step = pin, step
+        self.echoes: list[tuple[int, int]] = []
+        """cycles of rise and fall of each"""
+        self._seen: int | None = None
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source. Triggers from before the first call get no answer."""
+        del until
+        log = bench.edges[self.pin]
+        for edge in log[self._seen if self._seen is not None else len(log) :]:
+            if edge.level == Level.LOW:
+                self._answer(bench, edge.cycle)
+        self._seen = len(log)
+
+    def _answer(self, bench: Bench, triggered: int) -> None:
+        if self.echoes and triggered < self.echoes[-1][1]:
+            return  # the level that the board's pin had before it let go of it
+        length = ECHO_SHORTEST + len(self.echoes) * self.step % (ECHO_LONGEST - ECHO_SHORTEST)
+        rise = triggered + ECHO_DELAY_CYCLES + len(self.echoes) * 7 % 61
+        bench.access.drive(self.pin, Level.HIGH, at=rise)
+        bench.access.drive(self.pin, Level.LOW, at=rise + length)
+        self.echoes.append((rise, rise + length))
