@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm)$")
-_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs"}
+_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm|cycles|percent)$")
+_UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs", "percent": "%"}
 
 
 def rows(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

@@ -36,6 +36,9 @@ class RunResult:
         error: why the run ended before its time, or None.
         truth: what really happened, where somebody knows (simulated runs); no brain saw it.
         steps: steps of the brain. late_steps: brain periods that passed without one (in real time only).
+        long_steps: steps that took longer than the brain's period, by the wall clock, in any run. longest_step: the
+            longest of all, in s of the wall clock.
+        unrealisable: why sensors, period and line do not go together in time, where the run was forced; else None.
         resets: times the board restarted during the run. sessions_lost: times it had to be opened and armed again,
             those included.
         lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
@@ -81,6 +84,9 @@ class RunResult:
     without: Sequence[str] = ()
     brain_record: BrainRecord | None = None
     odometry_source: str | None = None
+    long_steps: int = 0
+    longest_step: float = 0.0
+    unrealisable: str | None = None
 
     def __repr__(self) -> str:
         """One line; the figures are in `table()`, everything else in the attributes."""
@@ -251,6 +257,9 @@ class RunResult:
             "period_ms": round(self.period * 1000, 3),
             "steps": self.steps,
             "late_steps": self.late_steps,
+            "long_steps": self.long_steps,
+            "longest_step_ms": round(self.longest_step * 1000, 3),
+            "unrealisable": self.unrealisable,
             **self._behavior_figures(),
             "ticks": self.ticks,
             "slow_readings": None if slow_age is None else len(self.record.devices),

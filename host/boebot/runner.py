@@ -17,14 +17,13 @@ from typing import TypeVar, cast
 
 from boebot import interrupts, report
 from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
-from boebot.brains import LoadedBrain
 from boebot.driving import Driver, Progress, Task
 from boebot.driving.board import BoardDriver
 from boebot.driving.direct import DirectDriver
 from boebot.errors import BoebotError
 from boebot.result import RunResult, TogetherResult
 from boebot.robots import RobotDescription
-from boebot.stepping import StepWatch, step_once
+from boebot.stepping import StepTimes, StepWatch, step_once
 from boebot.tasks import Member, Terms, expect, task_of
 
 Result = TypeVar("Result", RunResult, TogetherResult)
@@ -44,6 +43,7 @@ def run(
     without: Sequence[str] = (),
     pose: tuple[float, float, float] | None = None,
     step_timeout: float | None = None,
+    force_timing: bool = False,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -66,6 +66,8 @@ def run(
         step_timeout: seconds by the wall clock after which a step of the brain that has not ended is an error, which
             ends the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points,
             after which its dead-man stops the motors.
+        force_timing: run it even if sensors, period and line are not realisable in time (boebot.timing.realisable);
+            the record then says so.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
@@ -74,7 +76,19 @@ def run(
     """
     return keep(
         lambda: execute(
-            brain, robot, arena, on, seconds, seed, realtime, period, progress, without, pose, step_timeout
+            brain,
+            robot,
+            arena,
+            on,
+            seconds,
+            seed,
+            realtime,
+            period,
+            progress,
+            without,
+            pose,
+            step_timeout,
+            force_timing,
         ),
         out,
     )
@@ -93,6 +107,7 @@ def execute(
     without: Sequence[str] = (),
     pose: tuple[float, float, float] | None = None,
     step_timeout: float | None = None,
+    force_timing: bool = False,
 ) -> RunResult:
     """As `run`, but once the run has begun every end of it, even by an error, is a result: see
     `RunResult.error`.
@@ -108,6 +123,7 @@ def execute(
         realtime=realtime,
         progress=progress,
         step_timeout=step_timeout,
+        force_timing=force_timing,
     )
     terms.check()
     task = task_of(Member(brain=brain, robot=robot, pose=pose, period=period, without=without), terms)
@@ -115,7 +131,7 @@ def execute(
     opening = open_board if task.request.robot.has_board else open_vehicle
     session = opening(task.on, task.request)
     try:
-        return _drive(driver_of(session, task), task.brain)
+        return _drive(driver_of(session, task), task)
     finally:
         session.close()
 
@@ -154,20 +170,30 @@ def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
     return DirectDriver(cast(VehicleSession, session), task)
 
 
-def _drive(driver: Driver, brain: LoadedBrain) -> RunResult:
+def _drive(driver: Driver, task: Task) -> RunResult:
     """The whole run, from the robot made ready to its result."""
     error: BaseException | None = None
+    times = StepTimes()
     started = wall.perf_counter()
     try:
         driver.begin()
         started = wall.perf_counter()
         with StepWatch(driver.step_limit) as watch:
             for _ in driver.steps():
-                step_once(driver.robot, brain, watch)
+                step_once(driver.robot, task.brain, watch, times)
     except (BoebotError, KeyboardInterrupt) as caught:
         error = caught
     finally:
         elapsed_s = wall.perf_counter() - started
         with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
             driver.end()
-    return driver.result(error, elapsed_s)
+    return with_times(driver.result(error, elapsed_s), task, times)
+
+
+def with_times(result: RunResult, task: Task, times: StepTimes) -> RunResult:
+    """Its timing, into the record: how long its brain's steps took, and what of it was forced."""
+    result.longest_step, result.long_steps = times.longest, times.long
+    result.unrealisable = task.unrealisable
+    if task.unrealisable is not None:
+        result.notices.append(f"forced: {task.unrealisable}")
+    return result

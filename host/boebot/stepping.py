@@ -12,6 +12,7 @@ import ctypes
 import signal
 import sys
 import threading
+import time as wall
 from collections.abc import Callable
 from numbers import Real
 from types import FrameType, TracebackType
@@ -37,16 +38,37 @@ class StepLimit(NamedTuple):
     """ends the sentence about a step that took longer"""
 
 
+class StepTimes:
+    """How long the steps of one brain took by the wall clock, however fast its run was.
+
+    Attributes:
+        longest: of them, s.
+        long: how many took longer than the brain's period: a robot would have waited for those.
+    """
+
+    def __init__(self) -> None:
+        self.longest = 0.0
+        self.long = 0
+
+    def add(self, seconds: float, period_s: float) -> None:
+        """One step more."""
+        if seconds > self.longest:
+            self.longest = seconds
+        if seconds > period_s:
+            self.long += 1
+
+
 AT_LEISURE = StepLimit(STEP_LIMIT_S, "expected it to return (step_timeout, --step-timeout: how long to wait)")
 
 
-def step_once(robot: Robot, brain: LoadedBrain, watch: StepWatch) -> None:
-    """One step of the brain.
+def step_once(robot: Robot, brain: LoadedBrain, watch: StepWatch, times: StepTimes) -> None:
+    """One step of the brain; how long it took goes to `times`.
 
     Raises:
         BrainError: whatever goes wrong in it, with its place.
         KeyboardInterrupt: Ctrl-C.
     """
+    begun = wall.perf_counter()
     try:
         answer = watch.call(brain.step, robot)
     except KeyboardInterrupt:
@@ -55,6 +77,8 @@ def step_once(robot: Robot, brain: LoadedBrain, watch: StepWatch) -> None:
         raise BrainError(brains.locate(error, brain.path, watch.sentence)) from None
     except BaseException as error:  # also what asyncio, test tools or the brain itself derive from it
         raise BrainError(brains.explain(error, brain.path)) from error
+    finally:
+        times.add(wall.perf_counter() - begun, robot.period)
     if answer is not None and _is_pair(answer):
         raise BrainError(f"{_where(brain)}: step returned {answer!r}; motors are driven by robot.drive(left, right)")
     command = robot.command

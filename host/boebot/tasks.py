@@ -15,6 +15,7 @@ from boebot.driving.board import check_time_to_live
 from boebot.errors import BoebotError, BrainError
 from boebot.robot import Equipment
 from boebot.robots import RobotDescription, load_robot
+from boebot.timing import realisable
 
 DEFAULT_PERIOD = 0.05  # s
 
@@ -54,6 +55,7 @@ class Terms:
     realtime: bool
     progress: Progress | None
     step_timeout: float | None = None
+    force_timing: bool = False
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -66,6 +68,8 @@ class Terms:
         expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
         if self.step_timeout is not None and not self.step_timeout > 0:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
+        if not isinstance(self.force_timing, bool):
+            raise BoebotError(f"force_timing is {self.force_timing!r}; expected True or False")
 
 
 def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
@@ -76,6 +80,9 @@ def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
     """
     expect("seed", member.seed, "a whole number or None", Integral, type(None))
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
+    verdict = realisable.judge(description, period_s, board=realisable.of_image(description))
+    if not terms.force_timing:
+        realisable.check(verdict)
     request = BoardRequest(
         robot=description,
         arena=None if terms.arena is None else str(terms.arena),
@@ -93,6 +100,7 @@ def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
         progress=terms.progress,
         step_timeout_s=terms.step_timeout,
         brain_seed=terms.seed + number - 1 if member.seed is None else member.seed,
+        unrealisable=None if verdict.is_realisable else verdict.sentence,
     )
 
 

@@ -22,8 +22,8 @@ from boebot.driving import PROGRESS_S, Driver, Progress, Task
 from boebot.driving.strand import PAUSED, Strand
 from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult, TogetherResult
-from boebot.runner import driver_of, keep
-from boebot.stepping import AT_LEISURE, StepWatch, step_once
+from boebot.runner import driver_of, keep, with_times
+from boebot.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.tasks import Member, Terms, expect, task_of
 
 __all__ = ["Member", "StoppedError", "execute_together", "run_together"]
@@ -45,6 +45,7 @@ def run_together(
     out: str | Path | None = None,
     progress: Progress | None = None,
     step_timeout: float | None = None,
+    force_timing: bool = False,
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
@@ -58,7 +59,7 @@ def run_together(
             direct.
         seed: of the world's noise and of the robots' imperfections.
         realtime: slow down to the wall clock.
-        step_timeout: as for `boebot.run`.
+        step_timeout, force_timing: as for `boebot.run`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the seconds that have passed, about ten times a second.
 
@@ -70,7 +71,9 @@ def run_together(
             place). The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    return keep(lambda: execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout), out)
+    return keep(
+        lambda: execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout, force_timing), out
+    )
 
 
 def execute_together(
@@ -82,6 +85,7 @@ def execute_together(
     realtime: bool = False,
     progress: Progress | None = None,
     step_timeout: float | None = None,
+    force_timing: bool = False,
 ) -> TogetherResult:
     """As `run_together`, but once the run has begun every end of it, even by an error, is a result: see
     `TogetherResult.error`.
@@ -91,7 +95,14 @@ def execute_together(
     """
     expect("members", members, "a list of boebot.Member", list, tuple)
     terms = Terms(
-        arena=arena, on=on, seconds=seconds, seed=seed, realtime=realtime, progress=None, step_timeout=step_timeout
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        progress=None,
+        step_timeout=step_timeout,
+        force_timing=force_timing,
     )
     terms.check()
     if not members:
@@ -148,6 +159,7 @@ class _Robot:
         self.result: RunResult | None = None
         self.is_ending = False  # its motors are being stopped
         self.time_s = 0.0
+        self._times = StepTimes()
         self._session = session
         self.strand = Strand(self._work, f"robot {number}")
 
@@ -163,7 +175,7 @@ class _Robot:
         finally:
             self.is_ending = True
             driver.end()
-            self.result = driver.result(None, 0.0)  # now: what comes later is the others' time
+            self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
 
     def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
         """Goes on until it waits for time to pass, or is done; the brain steps meanwhile.
@@ -176,7 +188,7 @@ class _Robot:
             assert self.driver is not None
             try:
                 watch.limit = self.driver.step_limit
-                step_once(self.driver.robot, self.task.brain, watch)
+                step_once(self.driver.robot, self.task.brain, watch, self._times)
             except BaseException as caught:
                 self.error = caught
                 raise

@@ -64,6 +64,9 @@ class Sensor(VehicleDevice, frozen=True, kw_only=True):
     """What every sensor has: between two samples the last one stands, with its age (rule S4 of section 1.3)."""
 
     period_s: NotNegative = 0.0  # 0: every step
+    reading_s: NotNegative = 0.0
+    """what a reading takes the robot's hardware; sensors without a `period_s` are read one after another in each step,
+    and with the brain's step they have to fit into it (section 3.2); 0: no time is said"""
 
 
 class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=True):

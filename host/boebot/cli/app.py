@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import experiment, info, link, new, options, parameters, run, serve, teleop
+from boebot.cli import experiment, info, link, new, options, parameters, run, serve, teleop, timing
 from boebot.link import messages
 
 app = typer.Typer(
@@ -28,6 +28,7 @@ app.command("link")(link.link)
 app.add_typer(parameters.app, name="parameters")
 app.command("new")(new.new)
 app.command("experiment")(experiment.experiment)
+app.command("timing")(timing.timing)
 
 
 def _version(wanted: bool) -> None:

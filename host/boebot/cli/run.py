@@ -73,6 +73,12 @@ def run(
             "the time after which the board's dead-man stops the motors.",
         ),
     ] = None,
+    force_timing: Annotated[
+        bool,
+        typer.Option(
+            "--force-timing", help="Run it even if its sensors, period and line are not realisable; the record says so."
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),
@@ -105,6 +111,7 @@ def run(
                 without=ideal,
                 pose=poses[0] if poses else None,
                 step_timeout=step_timeout,
+                force_timing=force_timing,
             )
         else:
             members = [
@@ -117,7 +124,9 @@ def run(
                 )
                 for index in range(count)
             ]
-            together = execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout)
+            together = execute_together(
+                members, arena, seconds, on, seed, realtime, progress, step_timeout, force_timing
+            )
     if count == 1:
         end(result, out, json)
     else:

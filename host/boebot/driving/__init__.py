@@ -40,6 +40,8 @@ class Task:
     """how long a step of the brain may take by the wall clock; None: the driver's choice"""
     brain_seed: int
     """of the brain's chance"""
+    unrealisable: str | None = None
+    """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
 
 class Driver(Protocol):

@@ -75,6 +75,17 @@ def read_image(path: Path) -> Image:
         raise TimingError(f"{path} is not an ELF file, or is damaged: {reason}") from error
 
 
+def read_table(path: Path) -> Table:
+    """Only the timing table that an image carries; raises TimingError as `read_image`."""
+    try:
+        with path.open("rb") as stream:
+            return _table(path, _section(path, ELFFile(stream), ".boebot.timing"))
+    except OSError as error:
+        raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
+    except DAMAGE as error:
+        raise TimingError(f"{path} is not an ELF file, or is damaged: {error or type(error).__name__}") from error
+
+
 def _image(path: Path, elf: ELFFile) -> Image:
     if elf["e_machine"] != EM_AVR:
         raise TimingError(

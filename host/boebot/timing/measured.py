@@ -41,6 +41,16 @@ class Spans:
 
 
 @dataclass(frozen=True, slots=True)
+class Moment:
+    """One span of one tick: `begin` and `end` in cycles since the tick began, interrupts in between counted."""
+
+    name: str
+    kind: str  # "task" or "interrupt"
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
 class Measurement:
     """Of one or several runs: spans by the names of the timing table, and what the runs were like."""
 
@@ -54,6 +64,7 @@ class Measurement:
     functions: dict[str, Spans] = field(default_factory=dict)  # others that were watched, as the link's poll
     busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
     between_polls: int = 0  # most cycles from one poll of the link to the next, sleep not counted
+    tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
 
     def row(self, name: str) -> Spans:
         """The spans of a task, an interrupt or another function. KeyError if there is none of that name."""
@@ -81,6 +92,7 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
         functions=_together([run.functions for run in runs]),
         busiest_tick=max(run.busiest_tick for run in runs),
         between_polls=max(run.between_polls for run in runs),
+        tick=next((run.tick for run in runs if run.tick), ()),
     )
 
 

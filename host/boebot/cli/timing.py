@@ -1,0 +1,330 @@
+"""`boebot timing`: what a firmware image takes at most, what was measured, and whether both fit the budgets; and
+whether a robot, a brain and a line are realisable in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from boebot import resources
+from boebot.cli import options, output
+from boebot.errors import BoebotError, TimingError
+
+if TYPE_CHECKING:
+    from boebot.robots import RobotDescription
+    from boebot.timing.budget import Report
+    from boebot.timing.realisable import Verdict
+
+EXIT_BROKEN, EXIT_INPUT = 1, 2
+GROUP = "boebot.timing"
+_UNKNOWN = "–"
+_HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
+
+  boebot timing                            the bundled image: bounds, emulator, budgets
+
+  boebot timing --elf F --no-measure       any image, from its machine code alone
+
+  boebot timing --robot R --brain B        are these sensors, this brain and this line realisable?
+
+--out DIR writes the timing diagram, timing.png and timing.svg, and timing.json. Exit code: 1 a budget is broken or the
+robot is not realisable; 2 bad input, or an image whose timing cannot be told."""
+
+
+def timing(
+    elf: Annotated[
+        Path | None, typer.Option("--elf", metavar="F", help="Image to judge. Else that of the robot's pin map.")
+    ] = None,
+    robot: options.RobotName = "shieldbot",
+    load: Annotated[
+        str, typer.Option("--load", metavar="L", help="What interrupts are asked for: figures or saturated.")
+    ] = "figures",
+    measure: Annotated[
+        bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
+    ] = True,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=0.1, help="Of the board's time, of each scenario that is measured.")
+    ] = 1.0,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios.")] = 1,
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="P", help="Board whose own maxima are read: a port, avr or native.")
+    ] = None,
+    brain: Annotated[
+        str | None, typer.Option("--brain", metavar="B", help="Measure the steps of this brain in a simulated run.")
+    ] = None,
+    step: Annotated[
+        float | None, typer.Option("--step", metavar="MS", help="What a step of the brain takes, if it is known.")
+    ] = None,
+    period: options.Period = None,
+    baud: Annotated[
+        int | None, typer.Option("--baud", metavar="RATE", help="Of the line, bit/s. Else as the robot says.")
+    ] = None,
+    jitter: Annotated[
+        bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where to write timing.png, timing.svg and timing.json.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """See `_HELP`."""
+    try:
+        answer = _answer(elf, robot, load, measure, seconds, seed, port, brain, step, period, baud, jitter, out)
+    except BoebotError as error:
+        output.say(str(error))
+        raise typer.Exit(EXIT_INPUT) from None
+    if json:
+        output.print_json(answer.as_dict())
+    else:
+        answer.show()
+    if answer.is_broken:
+        raise typer.Exit(EXIT_BROKEN)
+
+
+timing.__doc__ = _HELP
+
+
+class Answer:
+    """All that was found out."""
+
+    def __init__(self, report: Report | None, verdict: Verdict, jitter: Any, files: Sequence[Path]) -> None:
+        self.report = report
+        self.verdict = verdict
+        self.jitter = jitter
+        self.files = files
+
+    @property
+    def is_broken(self) -> bool:
+        """A budget is broken, or the robot is not realisable."""
+        return bool(self.report and self.report.faults) or not self.verdict.is_realisable
+
+    def as_dict(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "image": None if self.report is None else self.report.as_dict(),
+            "realisable": self.verdict.as_dict(),
+            "jitter": None if self.jitter is None else self.jitter.as_json(),
+            "files": [str(path) for path in self.files],
+        }
+
+    def show(self) -> None:
+        """For people."""
+        if self.report is not None:
+            show_report(self.report)
+        show_verdict(self.verdict)
+        if self.jitter is not None:
+            from boebot.timing.distributions import show
+
+            show(self.jitter)
+        if self.files:
+            print(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
+
+
+def _answer(
+    elf: Path | None,
+    robot: str,
+    load: str,
+    measure: bool,
+    seconds: float,
+    seed: int,
+    port: str | None,
+    brain: str | None,
+    step: float | None,
+    period: float | None,
+    baud: int | None,
+    jitter: bool,
+    out: Path | None,
+) -> Answer:
+    """Raises BoebotError where what was asked for is none."""
+    from boebot import report as files
+    from boebot.robots import load_robot
+    from boebot.tasks import DEFAULT_PERIOD
+    from boebot.timing import budget, loads, realisable
+
+    description = load_robot(robot)
+    asked = loads.load_named(load)
+    if out is not None:
+        files.make_folder(out)
+    image = _image(elf, description)
+    found = None
+    if image is not None:
+        measured = _measured("emulated", image, seconds, seed) if measure else None
+        found = budget.prove(image, asked, measured, _board_maxima(port, description))
+    brain_s, own_period = _brain(brain, step, description, seed)
+    period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
+    board = None if found is None else _board_times(found)
+    verdict = realisable.judge(description, period_s, board=board, brain_s=brain_s, baud=baud)
+    distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
+    answer = Answer(found, verdict, distributions, ())
+    if out is not None:
+        answer.files = _write(answer, out)
+    return answer
+
+
+def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
+    """The image that is meant; None: the robot has no board.
+
+    Raises:
+        TimingError: it has not been built.
+    """
+    if elf is not None or not robot.has_board:
+        return elf
+    image = resources.folder("images") / f"{robot.pin_map}.elf"
+    if not image.is_file():
+        raise TimingError(f"there is no image {image}; expected one built by `make firmware`, or --elf F")
+    return image
+
+
+def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
+    """What the entry point of that name measures of the image; None: it is not installed."""
+    points = [point for point in entry_points(group=GROUP) if point.name == name]
+    if not points:
+        output.say(f"nothing is measured: no emulator is installed that can ({GROUP}: {name})")
+        return None
+    try:
+        work = points[0].load()
+    except ImportError as error:
+        raise TimingError(f"the image cannot be measured here: {error}") from None
+    with output.share_bars([f"measuring {image.name}"]) as watch:
+        return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
+
+
+def _board_maxima(port: str | None, robot: RobotDescription) -> Mapping[str, int]:
+    """What a board has measured of its own tasks, in cycles by their names."""
+    if port is None:
+        return {}
+    from boebot.boards import BoardRequest, open_board
+    from boebot.link.session import Link
+
+    session = open_board(port, BoardRequest(robot=robot, record=False, realtime=True))
+    try:
+        link = Link(session.transport, record=False)
+        link.open()
+        found = link.take_task_times()
+        link.close()
+        return {name: cycles for name, cycles in found.items() if cycles}
+    finally:
+        session.close()
+
+
+def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
+    """What a step of the brain takes at most (s; 0: not known), as given or as measured, and the brain's own period."""
+    if brain is None:
+        return (step_ms or 0.0) / 1000, None
+    from boebot.brains import load_brain
+    from boebot.runner import execute
+
+    own_period = load_brain(brain).period
+    if step_ms is not None:
+        return step_ms / 1000, own_period
+    result = execute(brain, robot=robot, seconds=5.0, seed=seed, force_timing=True)
+    if result.error is not None:
+        raise result.error
+    return result.longest_step, own_period
+
+
+def _board_times(report: Report) -> Any:
+    """Of a board whose image was judged: bounds in place of budgets."""
+    from boebot.timing.graph import load_program
+    from boebot.timing.realisable import BoardTimes
+
+    table = load_program(Path(report.path)).table
+    if report.responses is None:
+        return BoardTimes.of(table)
+    hertz = 16_000_000
+    return BoardTimes(table.sensors, report.responses.pieces.get("telemetry", 0) / hertz, (report.gap or 0) / hertz)
+
+
+def _write(answer: Answer, out: Path) -> list[Path]:
+    import json
+
+    from boebot.report.experiment_files import write
+
+    found: dict[str, bytes] = {}
+    if answer.report is not None:
+        from boebot.timing import diagram
+
+        found |= diagram.files(answer.report, answer.verdict)
+    found["timing.json"] = (json.dumps(answer.as_dict(), indent=1) + "\n").encode()
+    return list(write(out, found))
+
+
+# ---- for people -----------------------------------------------------------------------------------------------------
+
+
+def show_report(report: Report) -> None:
+    """Two tables, the sums, and what is broken."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    console.print(Text.assemble((Path(report.path).name, "bold"), f"  under the load {report.load.name!r}"))
+    console.print(Text(report.load.says, style="dim"))
+    for kind, last in (("task", ("response bound",)), ("interrupt", ("latency bound", "latency limit"))):
+        rows = [row for row in report.rows if row.kind == kind]
+        if not rows:
+            continue
+        shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        shown.add_column(f"{kind} (cycles)")
+        for title in ("bound", "emulator max", "board max", "budget", "slack", *last):
+            shown.add_column(title, justify="right")
+        for row in rows:
+            ends = (row.response,) if kind == "task" else (row.latency, row.latency_limit)
+            style = "bold red" if row.slack < 0 or (row.emulator or 0) > row.bound else None
+            cells = (row.bound, row.emulator, row.board, row.budget, row.slack, *ends)
+            shown.add_row(row.name, *map(_cell, cells), style=style)
+        console.print(shown)
+    console.print(output.table(_sums(report)))
+    for fault in report.faults:
+        console.print(Text(f"broken: {fault}", style="bold red"))
+    if not report.faults:
+        console.print(Text("all budgets are met", style="green"))
+
+
+def _sums(report: Report) -> dict[str, Any]:
+    """Names with units, values."""
+    found, measured, memory = report.responses, report.measured, report.memory
+    return {
+        "tick_work_bound_percent": round(100 * report.tick_work / report.tick_cycles, 1),
+        "tick_response_bound_percent": None if found is None else round(100 * found.tick / report.tick_cycles, 1),
+        "load_bound_percent": round(100 * report.load_bound, 1),
+        "load_in_emulator_percent": None if measured is None else round(100 * measured.load, 1),
+        "poll_gap_bound_cycles": report.gap,
+        "receive_ring_needed_bytes": report.ring,
+        "stack_bound_bytes": memory.stack,
+        "stack_in_emulator_bytes": memory.stack_seen,
+        "static_ram_bytes": memory.static,
+        "ram_and_stack_bytes": memory.static + memory.stack,
+        "flash_bytes": memory.flash,
+    }
+
+
+def _cell(number: int | None) -> str:
+    return _UNKNOWN if number is None else f"{number:,}"
+
+
+def show_verdict(verdict: Verdict) -> None:
+    """The events of a time step, and the answer."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    if verdict.events:
+        shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        shown.add_column(f"{verdict.robot}, one step")
+        for title in ("takes (ms)", "ends (ms)", "own period (ms)"):
+            shown.add_column(title, justify="right")
+        for event in verdict.events:
+            end, own = (_UNKNOWN, f"{event.every * 1000:g}") if event.beside else (f"{event.end * 1000:.3f}", "")
+            shown.add_row(event.name, f"{event.seconds * 1000:.3f}", end, own)
+        console.print(shown)
+    console.print(Text(verdict.sentence, style="green" if verdict.is_realisable else "bold red"))
+    for note in verdict.notes:
+        console.print(Text(note, style="dim"))

@@ -1,0 +1,298 @@
+"""All about an image's timing in one report: bounds, what was measured, budgets, and what is broken.
+
+Bounds come from the machine code alone; they are compared with what the image's own table allows, and with what was
+measured in the emulator or on the board, wherever somebody has. A measured figure above its bound means that the bound
+is wrong, and counts like any broken budget.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from boebot.errors import TimingError
+from boebot.timing.costs import Costs, costs
+from boebot.timing.elf import read_image
+from boebot.timing.graph import load_program
+from boebot.timing.loads import RECEIVE, Load
+from boebot.timing.measured import Measurement, Spans
+from boebot.timing.program import Program
+from boebot.timing.response import Responses, Schedule, Source, load, misses, poll_gap, receive_backlog, responses
+from boebot.timing.stack import Stack
+
+RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
+RAM_BYTES = RAM_END - RAM_START
+FLASH_BYTES = 0x8000
+RECEIVE_RING = 256  # bytes, of which one stays free
+IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A task or an interrupt; cycles, None: not known."""
+
+    name: str
+    kind: str  # "task" or "interrupt"
+    bound: int
+    budget: int
+    emulator: int | None = None
+    board: int | None = None  # with the interrupts that came in between: a board cannot tell them apart
+    response: int | None = None  # of a task: from the beginning of its slot to its end, interrupts included
+    latency: int | None = None  # of an interrupt: from request to acceptance
+    latency_limit: int | None = None
+
+    @property
+    def slack(self) -> int:
+        """What is left of the budget above the bound."""
+        return self.budget - self.bound
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Bytes; `stack_seen` is the deepest that was measured."""
+
+    static: int
+    stack: int
+    stack_seen: int | None
+    flash: int
+
+    @property
+    def left(self) -> int:
+        """For the stack."""
+        return RAM_BYTES - self.static
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Of one image under one load. `responses`, `gap` and `ring`: None where there is overload."""
+
+    path: str
+    load: Load
+    rows: tuple[Row, ...]
+    costs: Costs
+    schedule: Schedule
+    sources: tuple[Source, ...]
+    responses: Responses | None
+    gap: int | None  # cycles between two polls of the link
+    ring: int | None  # bytes that wait in the receive ring
+    memory: Memory
+    measured: Measurement | None = None
+
+    @property
+    def tick_work(self) -> int:
+        """Cycles of all tasks of the fullest tick, with the scheduler around them."""
+        return max(map(self.schedule.tick_work, range(self.schedule.ticks)))
+
+    @property
+    def tick_cycles(self) -> int:
+        """Length of a tick."""
+        return self.schedule.tick_cycles
+
+    @property
+    def load_bound(self) -> float:
+        """Share of all cycles that tasks and interrupts take at most in the long run, 0..1; above 1: overload."""
+        return float(load(self.sources) + self.schedule.mean_load)
+
+    @property
+    def faults(self) -> list[str]:
+        """What is broken, each a sentence without its end."""
+        return [*_rows_broken(self.rows), *_tick_broken(self), *_memory_broken(self.memory)]
+
+    @property
+    def is_met(self) -> bool:
+        """Nothing is broken."""
+        return not self.faults
+
+    def as_dict(self) -> dict[str, Any]:
+        """For programs; units in the keys."""
+        found, measured, memory = self.responses, self.measured, self.memory
+        return {
+            "elf": self.path,
+            "load": self.load.name,
+            "load_says": self.load.says,
+            "tasks": [_row_dict(row) for row in self.rows if row.kind == "task"],
+            "interrupts": [_row_dict(row) for row in self.rows if row.kind == "interrupt"],
+            "tick": {
+                "length_cycles": self.tick_cycles,
+                "work_bound_cycles": self.tick_work,
+                "work_bound_percent": _percent(self.tick_work, self.tick_cycles),
+                "response_bound_cycles": None if found is None else found.tick,
+                "response_bound_percent": None if found is None else _percent(found.tick, self.tick_cycles),
+                "emulator_max_cycles": (measured.worst_tick or None) if measured else None,
+                "slot_response_bound_cycles": None if found is None else list(found.slots),
+            },
+            "load_bound_percent": round(100 * self.load_bound, 2),
+            "load_emulator_percent": None if measured is None else round(100 * measured.load, 2),
+            "interrupt_load_bound_percent": round(100 * float(load(self.sources)), 2),
+            "poll_gap_bound_cycles": self.gap,
+            "receive_ring_needed_bytes": self.ring,
+            "receive_ring_bytes": RECEIVE_RING - 1,
+            "ram_static_bytes": memory.static,
+            "stack_bound_bytes": memory.stack,
+            "stack_emulator_max_bytes": memory.stack_seen,
+            "ram_bytes": RAM_BYTES,
+            "flash_bytes": memory.flash,
+            "measured_seconds": None if measured is None else round(measured.seconds, 3),
+            "scenarios": [] if measured is None else list(measured.scenarios),
+            "faults": self.faults,
+        }
+
+
+def prove(
+    path: Path,
+    asked: Load,
+    measured: Measurement | None = None,
+    board: Mapping[str, int] | None = None,
+    program: Program | None = None,
+) -> Report:
+    """The report of an image.
+
+    Args:
+        path: its ELF file.
+        asked: the load.
+        measured: in the emulator, if at all.
+        board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
+        program: the image's, if it has been read already.
+
+    Raises:
+        TimingError: the file is no image, carries no table, or its timing cannot be told.
+    """
+    program = program or load_program(path)
+    if not program.table.tasks:
+        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    found = costs(program, asked)
+    schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
+    image, deepest = read_image(path), Stack(program).image()
+    seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
+    answers = responses(schedule, sources)
+    return Report(
+        path=str(path),
+        load=asked,
+        rows=tuple(_rows(program, found, answers, measured, board or {})),
+        costs=found,
+        schedule=schedule,
+        sources=sources,
+        responses=answers,
+        gap=poll_gap(schedule, sources),
+        ring=_ring(program, found, schedule, sources, asked),
+        memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
+        measured=measured,
+    )
+
+
+def _rows(
+    program: Program, found: Costs, answers: Responses | None, measured: Measurement | None, board: Mapping[str, int]
+) -> list[Row]:
+    def largest(spans: Mapping[str, Spans], name: str) -> int | None:
+        return spans[name].largest if name in spans and len(spans[name].net) else None
+
+    rows = [
+        Row(
+            name=row.name,
+            kind="task",
+            bound=found.tasks[row.name],
+            budget=row.budget,
+            emulator=largest(measured.tasks, row.name) if measured else None,
+            board=board.get(row.name),
+            response=answers.pieces[row.name] if answers else None,
+        )
+        for row in program.table.tasks
+    ]
+    rows += [
+        Row(
+            name=row.name,
+            kind="interrupt",
+            bound=found.interrupts[row.name],
+            budget=row.budget,
+            emulator=largest(measured.interrupts, row.name) if measured else None,
+            board=board.get(row.name),
+            latency=found.latencies[row.name],
+            latency_limit=row.latency,
+        )
+        for row in program.table.interrupts
+    ]
+    return rows
+
+
+def _ring(program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load) -> int | None:
+    """Bytes that wait in the receive ring at most; 0: the image receives nothing."""
+    row = next((row for row in program.table.interrupts if row.vector == RECEIVE), None)
+    if row is None:
+        return 0
+    (receive,) = asked.sources(row, found.interrupts[row.name])
+    return receive_backlog(schedule, sources, receive, asked.frame_least, IDLE_LEAVES)
+
+
+def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
+    found = []
+    for row in rows:
+        if row.emulator is not None and row.emulator > row.bound:
+            found.append(
+                f"{row.kind} {row.name} took {row.emulator} cycles in the emulator, above its bound of {row.bound}"
+            )
+        if row.board is not None and row.response is not None and row.board > row.response:
+            found.append(
+                f"{row.kind} {row.name} took {row.board} cycles on the board, interrupts included, above its bound of "
+                f"{row.response} with them"
+            )
+        if row.bound > row.budget:
+            found.append(f"{row.kind} {row.name} may take {row.bound} cycles; its budget is {row.budget}")
+        if row.latency is not None and row.latency_limit is not None and row.latency > row.latency_limit:
+            found.append(
+                f"{row.kind} {row.name} may wait {row.latency} cycles; its largest latency is {row.latency_limit}"
+            )
+    return found
+
+
+def _tick_broken(report: Report) -> list[str]:
+    if report.responses is None:
+        return [
+            f"overload: under the load {report.load.name!r} tasks and interrupts may take "
+            f"{100 * report.load_bound:.1f} % of all cycles"
+        ]
+    found = []
+    if report.responses.tick > report.tick_cycles:
+        found.append(
+            f"the work of a tick and its interrupts may take {report.responses.tick} of {report.tick_cycles} cycles"
+        )
+    for slot in misses(report.schedule, report.responses.slots):
+        found.append(
+            f"slot {slot} may end {report.responses.slots[slot]} cycles after it began, when the next tick has begun"
+        )
+    if report.ring is not None and report.ring > RECEIVE_RING - 1:
+        found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {RECEIVE_RING - 1}")
+    worst = report.measured.worst_tick if report.measured else 0
+    if worst > report.responses.tick and report.measured:
+        found.append(f"a tick took {worst} cycles in the emulator, above its bound of {report.responses.tick}")
+    return found
+
+
+def _memory_broken(memory: Memory) -> list[str]:
+    found = []
+    if memory.stack > memory.left:
+        found.append(f"the stack may need {memory.stack} bytes; {memory.left} of {RAM_BYTES} are left for it")
+    if memory.stack_seen is not None and memory.stack_seen > memory.stack:
+        found.append(f"the stack took {memory.stack_seen} bytes in the emulator, above its bound of {memory.stack}")
+    if memory.flash > FLASH_BYTES:
+        found.append(f"the image fills {memory.flash} bytes of flash; there are {FLASH_BYTES}")
+    return found
+
+
+def _row_dict(row: Row) -> dict[str, Any]:
+    common = {
+        "name": row.name,
+        "bound_cycles": row.bound,
+        "emulator_max_cycles": row.emulator,
+        "board_max_cycles": row.board,
+        "budget_cycles": row.budget,
+        "slack_cycles": row.slack,
+    }
+    if row.kind == "task":
+        return common | {"response_bound_cycles": row.response}
+    return common | {"latency_bound_cycles": row.latency, "latency_limit_cycles": row.latency_limit}
+
+
+def _percent(part: int, whole: int) -> float:
+    return round(100 * part / whole, 2)

@@ -1,0 +1,243 @@
+"""Reports of budgets: figures counted by hand, planted faults, the command with its codes, and its pictures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib.image
+import numpy as np
+import pytest
+from timing_program import build
+
+from boebot.cli import timing
+from boebot.errors import BoebotError, TimingError
+from boebot.robots import load_robot
+from boebot.timing import budget, diagram, loads, realisable
+from boebot.timing.graph import load_program
+from boebot.timing.measured import Measurement, Moment, Spans, Worst
+from boebot.timing.program import InterruptRow
+from boebot.timing.response import responses
+from command import boebot as command
+
+FIGURES = loads.LOADS["figures"]
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("program"))
+
+
+@pytest.fixture(scope="module")
+def report(image: Path) -> budget.Report:
+    return budget.prove(image, FIGURES)
+
+
+def spans(name: str, *cycles: int) -> Spans:
+    values = np.array(cycles, dtype=np.uint32)
+    return Spans(name, values, values, Worst("figures", 1, 0))
+
+
+def measurement(first: int = 104, slot: int = 31, lowest_stack: int = 0x8F8, worst_tick: int = 700) -> Measurement:
+    return Measurement(
+        tasks={"first": spans("first", first - 1, first)},
+        interrupts={"slot": spans("slot", slot)},
+        lowest_stack=lowest_stack,
+        seconds=1.0,
+        load=0.1,
+        worst_tick=worst_tick,
+        scenarios=("figures",),
+    )
+
+
+def test_bounds_are_those_counted_by_hand(report: budget.Report) -> None:
+    """Nops and a return of 4; an interrupt has 4 of its entry and 3 of its vector besides."""
+    assert {row.name: row.bound for row in report.rows} == {"first": 104, "second": 204, "slot": 4 + 3 + 20 + 4}
+    assert {row.name: row.slack for row in report.rows} == {"first": 46, "second": 96, "slot": 9}
+    assert report.memory.stack == 2 + 2 + 2 + 2 and report.memory.static == 10
+    assert report.faults == []
+
+
+def test_sums_follow_from_the_bounds(report: budget.Report) -> None:
+    """Four slots with the first task, one with the second; a slot interrupt each. No poll: the program has none."""
+    around = report.costs.round
+    assert report.tick_work == 4 * 104 + 204 + 4 * around
+    assert report.load_bound == pytest.approx((report.tick_work + 4 * 31) / 160_000)
+    assert report.responses is not None
+    assert report.responses.tick == report.tick_work + report.schedule.blocking + 31, "all within one slot"
+    assert report.responses.pieces["second"] == report.schedule.blocking + around + 104 + 204 + 31
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"first_budget": 103}, "task first may take 104 cycles; its budget is 103"),
+        ({"first_nops": 147}, "task first may take 151 cycles; its budget is 150"),
+        ({"interrupt_budget": 30}, "interrupt slot may take 31 cycles; its budget is 30"),
+        ({"reserve": 2041}, "the stack may need 8 bytes; 7 of 2048 are left for it"),
+        ({"first_nops": 9990, "first_budget": 60_000}, None),
+    ],
+)
+def test_planted_faults_are_found(tmp_path: Path, options: dict[str, int], sentence: str | None) -> None:
+    faults = budget.prove(build(tmp_path, **options), FIGURES).faults
+    assert faults == ([] if sentence is None else [sentence])
+
+
+def judged(report: budget.Report, **cycles: int) -> budget.Report:
+    """The same with other tasks."""
+    costs = replace(report.costs, alone=report.costs.alone | cycles)
+    schedule = costs.schedule(load_program(Path(report.path)))
+    answers = responses(schedule, report.sources)
+    return replace(report, costs=costs, schedule=schedule, responses=answers)
+
+
+def test_tick_that_is_too_full_is_found(report: budget.Report) -> None:
+    """Four slots of 45,000 are more than the tick has; of 90,000 in slot 1 it has time, of 125,000 not."""
+    (fault,) = judged(report, first=45_000).faults
+    assert fault.startswith("overload: under the load 'figures' tasks and interrupts may take 112.")
+    assert judged(report, second=90_000).faults == []
+    assert any("slot 1 may end 12" in fault for fault in judged(report, second=125_000).faults)
+
+
+@pytest.mark.parametrize(
+    ("measured", "sentence"),
+    [
+        (measurement(first=105), "task first took 105 cycles in the emulator, above its bound of 104"),
+        (measurement(slot=32), "interrupt slot took 32 cycles in the emulator, above its bound of 31"),
+        (measurement(lowest_stack=0x8F6), "the stack took 9 bytes in the emulator, above its bound of 8"),
+        (measurement(worst_tick=30_000), "a tick took 30000 cycles in the emulator, above its bound of "),
+    ],
+)
+def test_measured_above_its_bound_is_a_fault(image: Path, measured: Measurement, sentence: str) -> None:
+    """The stack begins at 0x8FF: with SP at 0x8F6, 9 bytes are in use."""
+    (fault,) = budget.prove(image, FIGURES, measured).faults
+    assert fault.startswith(sentence)
+
+
+def test_board_above_its_bound_is_a_fault(image: Path, report: budget.Report) -> None:
+    """A board counts the interrupts in between, so its figure stands against the response."""
+    assert report.responses is not None
+    most = report.responses.pieces
+    found = budget.prove(image, FIGURES, board={"first": most["first"] + 1, "second": most["second"]})
+    assert found.faults == [
+        f"task first took {most['first'] + 1} cycles on the board, interrupts included, above its bound of "
+        f"{most['first']} with them"
+    ]
+
+
+def test_image_without_a_table_is_refused(tmp_path: Path) -> None:
+    source, bare = tmp_path / "bare.c", tmp_path / "bare.elf"
+    source.write_text("int main(void) { for (;;) {} }\n")
+    import subprocess
+
+    subprocess.run(["avr-gcc", "-Os", "-mmcu=atmega328p", "-o", str(bare), str(source)], check=True)
+    with pytest.raises(TimingError, match="carries no timing table"):
+        budget.prove(bare, FIGURES)
+
+
+def test_unknown_load_is_refused() -> None:
+    with pytest.raises(BoebotError, match="there is no load 'heavy'; expected figures or saturated"):
+        loads.load_named("heavy")
+
+
+def test_saturated_line_asks_what_it_says() -> None:
+    """50,000 bytes/s are one in 320 cycles; four lines of 4,000 edges/s one in 4,000 each."""
+    row = InterruptRow("receive", loads.RECEIVE, 60, 640, 320)
+    (bytes_,) = loads.LOADS["saturated"].sources(row, 53)
+    assert bytes_.requests(16_000_000) == 50_000
+    edges = loads.LOADS["saturated"].sources(replace(row, vector=loads.ENCODERS), 113)
+    assert sum(one.requests(16_000_000) for one in edges) == 4 * 4_000
+    (tamed,) = FIGURES.sources(row, 53)
+    assert tamed.requests(16_000_000) == 100 * realisable.COMMAND_BYTES
+    assert FIGURES.sources(replace(row, vector=loads.TWO_WIRE), 99) == []
+
+
+# ---- the command ----------------------------------------------------------------------------------------------------
+
+
+def test_command_prints_the_table_and_its_code_says_whether_budgets_are_met(
+    image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure", "--json", "--out", str(tmp_path))
+    answer = json.loads(out)
+    assert code == 0 and answer["image"]["tasks"][0]["bound_cycles"] == 104
+    assert answer["realisable"]["realisable"] and answer["image"]["faults"] == []
+    assert {Path(file).name for file in answer["files"]} == {"timing.png", "timing.svg", "timing.json"}
+    code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure")
+    assert code == 0 and "all budgets are met" in out and "bound" in out
+    (tmp_path / "broken").mkdir()
+    broken = build(tmp_path / "broken", first_budget=90)
+    code, out, _ = command(capsys, "timing", "--elf", str(broken), "--no-measure")
+    assert code == timing.EXIT_BROKEN and "its budget is 90" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--elf", "none.elf"), "none.elf"),
+        (("--elf", __file__), "is not an ELF file"),
+        (("--load", "heavy"), "there is no load 'heavy'"),
+        (("--robot", "nobody"), "nobody"),
+        (("--robot", "arsim", "--baud", "9600"), "robot 'arsim' has no board"),
+        (("--robot", "arsim", "--brain", "nobody"), "nobody"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_code_2(
+    arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = command(capsys, "timing", *arguments, "--no-measure")
+    assert code == timing.EXIT_INPUT and sentence in err and err.count("\n") == 1
+
+
+def test_robot_without_a_board_is_judged_by_its_sensors(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--period", "10", "--step", "12", "--json")
+    answer = json.loads(out)
+    assert code == timing.EXIT_BROKEN and answer["image"] is None
+    assert "brain, 12 ms, ends 12 ms after the step began" in answer["realisable"]["faults"][0]
+
+
+def test_brain_is_measured(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--brain", "wander", "--json", "--period", "1000")
+    (step,) = json.loads(out)["realisable"]["events"]
+    assert code == 0 and step["kind"] == "process" and 0 < step["takes_ms"] < 1000
+
+
+# ---- the diagram ----------------------------------------------------------------------------------------------------
+
+
+def test_diagram_is_to_scale(report: budget.Report) -> None:
+    """The widths of its boxes are the tasks' bounds: in ms above, in cycles below."""
+    verdict = realisable.judge(load_robot("shieldbot"), 0.01, brain_s=0.002)
+    above, below = diagram.figure(report, verdict).axes
+    widths = sorted(round(patch.get_width() * 16_000) for patch in above.patches)  # type: ignore[attr-defined]
+    line = [round(n * 10 / 500_000 * 16e6) for n in (realisable.TELEMETRY_BYTES, realisable.COMMAND_BYTES)]
+    around = report.costs.round
+    assert widths == sorted([104] * 4 + [204] + [around] * 4 + line + [32_000])
+    assert sorted(round(patch.get_width()) for patch in below.patches) == sorted(  # type: ignore[attr-defined]
+        [104] * 4 + [204] + [around] * 4
+    )
+
+
+def test_diagram_of_a_measured_tick(report: budget.Report) -> None:
+    tick = (
+        Moment("first", "task", 50, 185),
+        Moment("slot", "interrupt", 60, 91),
+        Moment("first", "task", 40_050, 40_154),
+    )
+    measured = replace(measurement(), tick=tick)
+    above, below = diagram.figure(replace(report, measured=measured)).axes
+    assert len(above.patches) == len(below.patches) == 3
+    assert [round(patch.get_x() * 16_000) for patch in above.patches] == [50, 60, 40_050]  # type: ignore[attr-defined]
+
+
+def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
+    found = diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05))
+    assert set(found) == {"timing.png", "timing.svg"}
+    assert found == diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05)), "the same again"
+    root = ElementTree.fromstring(found["timing.svg"])
+    texts = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"first", "second", "tasks", "slot 3"} <= texts
+    (tmp_path / "timing.png").write_bytes(found["timing.png"])
+    assert matplotlib.image.imread(tmp_path / "timing.png").shape[1] > 1000

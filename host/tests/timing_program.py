@@ -1,0 +1,54 @@
+"""A small program for the ATmega328P whose times are known by counting: what the tests of budgets judge."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+# Cycles of the tasks: the nops, ret (4). Of the interrupt: entry 4, jmp 3, nops, reti 4. The stack: main calls the
+# scheduler (2), that a task (2), the interrupt's return address (2); main's own return address 2.
+SOURCE = r"""
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#define NOPS(n) __asm__ volatile(".rept " #n "\n nop\n .endr")
+#define ROW(text) __asm__(".pushsection .boebot.timing,\"\",@progbits\n .asciz \"" text "\"\n .popsection")
+
+ROW("TASK first 1 0 FIRST_BUDGET");
+ROW("TASK second 4 1 300");
+ROW("INTERRUPT slot 12 INTERRUPT_BUDGET 1000 40000");
+ROW("SENSOR ping 18500 5 20000");
+
+__attribute__((noinline)) void first_task(void) { NOPS(FIRST_NOPS); }
+__attribute__((noinline)) void second_task(void) { NOPS(200); }
+
+ISR(TIMER1_COMPB_vect, ISR_NAKED) { __asm__ volatile(".rept 20\n nop\n .endr\n reti"); }
+
+__attribute__((noinline)) void schedule_poll(void) {
+  first_task();
+  second_task();
+}
+
+unsigned char reserve[RESERVE];
+
+int main(void) {
+  reserve[0] = PINB;
+  sei();
+  for (;;) {
+    schedule_poll();
+  }
+}
+"""
+
+
+def build(
+    folder: Path, first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10
+) -> Path:
+    """Compiles it; returns its ELF file."""
+    text = SOURCE.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
+    text = text.replace("INTERRUPT_BUDGET", str(interrupt_budget)).replace("RESERVE", str(reserve))
+    source, image = folder / "program.c", folder / "program.elf"
+    source.write_text(text)
+    command = ["avr-gcc", "-Os", "-g", "-mmcu=atmega328p", "-fno-optimize-sibling-calls", "-o", str(image), str(source)]
+    subprocess.run(command, check=True)
+    return image
