@@ -52,7 +52,7 @@ ABLATIONS = {
         )
     ),
     "stuffing": Ablation(
-        (("&& unstuff(bytes, size, ACCEPTED_MAX - 2u)", "&& (unstuff(bytes, size, ACCEPTED_MAX - 2u), true)"),)
+        (("unstuff(bytes, size, ACCEPTED_MAX - 2u)", "(unstuff(bytes, size, ACCEPTED_MAX - 2u), true)"),)
     ),
     "session seed": Ablation(
         (
