@@ -126,7 +126,6 @@ static inline void crc21_take(crc21 *crc, uint8_t byte) {
 }
 
 static inline void crc21_take_all(crc21 *crc, const uint8_t *bytes, uint8_t count, uint8_t most) {
-  (void)most; /* unless it is checked */
   BOUNDED(most, for (; count != 0; count--)) {
     crc21_take(crc, *bytes++);
   }
