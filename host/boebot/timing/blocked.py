@@ -20,7 +20,7 @@ from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
 from boebot.timing.paths import Graph, Mark, Way, longest
 from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import CALL_CLOBBERED, written
+from boebot.timing.registers import CALL_CLOBBERED, halted, written
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -264,9 +264,10 @@ class Blocked:
         if number + 1 < len(block.instructions):
             for following in states:
                 found.append((start, number + 1, following))
-                self._go(flow, node, found[-1], instruction.cycles, instruction.address)
+                self._go(flow, node, found[-1], instruction.cycles + halted(instruction), instruction.address)
             return found
         for callee, edge_cycles, to in _leaving(block):
+            edge_cycles += halted(instruction)
             for following in states:
                 if callee is not None:
                     effect = self._callee(callee, block, function, state.flag is not Flag.OFF)
