@@ -6,9 +6,7 @@ for exact edges, and the line is quiet.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -16,10 +14,12 @@ from boebot.link import messages
 from hil_tests.device_bench import Capacitor, DeviceBench, DeviceRig, TwoWireDevice
 from sim_bridge.boards import avr
 from sim_bridge.tests.symbols import find_symbol
-from tools.bench.avr_program import SOURCES, build
+from tools.bench.avr_program import build
+from tools.timing_table import fullest_slot, read_table
 
 pytestmark = pytest.mark.emulated
 
+TABLE = read_table()
 ENVIRONMENTS = {"shieldbot": "env:uno", "boebot": "env:uno_boebot"}
 MAIN = """
 #include "firmware.h"
@@ -47,23 +47,9 @@ int main(void) {
 """
 
 
-class Task(NamedTuple):
-    """A line of tasks.def."""
-
-    name: str
-    period: int
-    phase: int
-    budget: int
-
-
-def tasks() -> list[Task]:
-    found = re.findall(r"^TASK\((\w+), (\d+), (\d+), (\d+)\)", (SOURCES / "tasks.def").read_text(), re.MULTILINE)
-    return [Task(name, *map(int, numbers)) for name, *numbers in found]
-
-
 def worst_cycles(folder: Path, pin_map: str) -> dict[str, int]:
     """The most cycles that each task took in 1.5 s with everything on."""
-    names = [task.name for task in tasks()]
+    names = [task.name for task in TABLE.tasks]
     probes = "\n".join(f"PROBE({i}, {name})" for i, name in enumerate(names))
     source, image = folder / "budgets.c", folder / "budgets.elf"
     source.write_text(MAIN.replace("PROBES", probes).replace("TASKS", str(len(names))), encoding="ascii")
@@ -98,13 +84,12 @@ def worst_cycles(folder: Path, pin_map: str) -> dict[str, int]:
 @pytest.mark.parametrize("pin_map", ENVIRONMENTS)
 def test_each_task_keeps_its_budget(tmp_path: Path, pin_map: str) -> None:
     worst = worst_cycles(tmp_path, pin_map)
-    print("\n" + "\n".join(f"{pin_map:10} {t.name:10} {worst[t.name]:6} of {t.budget:6}" for t in tasks()))
+    print("\n" + "\n".join(f"{pin_map:10} {t.name:10} {worst[t.name]:6} of {t.budget:6}" for t in TABLE.tasks))
     assert all(worst.values()), "a task has not run"
-    over = {task.name: (worst[task.name], task.budget) for task in tasks() if worst[task.name] > task.budget}
+    over = {task.name: (worst[task.name], task.budget) for task in TABLE.tasks if worst[task.name] > task.budget}
     assert not over
 
 
 def test_budgets_of_the_fullest_slot_leave_half_of_it() -> None:
     """Interrupts of a saturated line take the other half at most (ANCHORS, section 5)."""
-    sums = [sum(t.budget for t in tasks() if slot % t.period == t.phase) for slot in range(64)]
-    assert max(sums) <= 20_000, sums
+    assert fullest_slot(TABLE) <= 20_000

@@ -8,7 +8,8 @@
  *   "1: ... \n" BOUNDED_ASM("%[most]") "... brne 1b \n"         in the body of a loop in assembly; the argument is a number
  *                                                               or an operand [most] "n"(...)
  *
- * On the AVR a bound is a row of the section .boebot.loops, which is not loaded: it takes no flash, no RAM and no time.
+ * On the AVR a bound is a row of the section .boebot.loops, which is not loaded: it takes no flash, no RAM and no time (but
+ * for the one instruction that a loop with an empty body could otherwise have skipped).
  * A row is three little-endian words of 32 bits: byte address in the loop's body, passes, cycles; all ones: not said.
  * What the compiler copies (a loop unrolled or inlined) has a row for each copy. Each row is a group of its own and the
  * code refers to it, so that the linker keeps the rows of what it keeps and drops the others.

@@ -7,6 +7,20 @@
 #error "the board runs at 16 MHz"
 #endif
 
+#define IS_VECTOR(name, vector) _Static_assert(HAL_VECTOR_##name == vector##_num, "tasks.def: vector of " #name)
+IS_VECTOR(changes, PCINT1_vect);
+IS_VECTOR(stamp, PCINT2_vect);
+IS_VECTOR(watchdog, WDT_vect);
+IS_VECTOR(carrier, TIMER2_COMPA_vect);
+IS_VECTOR(capture, TIMER1_CAPT_vect);
+IS_VECTOR(edge, TIMER1_COMPA_vect);
+IS_VECTOR(slot, TIMER1_COMPB_vect);
+IS_VECTOR(tone, TIMER0_COMPA_vect);
+IS_VECTOR(receive, USART_RX_vect);
+IS_VECTOR(send, USART_UDRE_vect);
+IS_VECTOR(eeprom, EE_READY_vect);
+IS_VECTOR(two_wire, TWI_vect);
+
 #define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
 
 void hal_start_timers(void) {

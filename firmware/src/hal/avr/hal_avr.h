@@ -40,9 +40,20 @@
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
-/* Covers what can stand before the edge's interrupt (one that has begun, 51 cycles; a storm of pin changes, 5 x 79 and 16
- * to stop it; a stamped change, 30; a capture, 110) and its own prologue, 50. */
-#define HAL_EDGE_LEAD 672u
+/* The timing table's columns, for this board's code and its assertions. */
+enum {
+#define INTERRUPT(name, vector, budget, latency, interval) \
+  HAL_VECTOR_##name = (vector), HAL_BUDGET_##name = (budget), HAL_LATENCY_##name = (latency),
+#include "tasks.def"
+};
+
+/* Covers what can stand before the edge's interrupt, its latency in the table: one that has begun, a storm of pin changes
+ * (5 x 79 and 16 to stop it), a stamped change and a capture; and its own prologue. */
+#define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 79u + 16u)
+_Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BUDGET_capture <= HAL_LATENCY_edge,
+               "lead");
+#define HAL_EDGE_PROLOGUE 50u
+#define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
 #define HAL_EDGE_CLOSE 150u /* cycles before it from which nothing else is done */
 #define HAL_EDGE_TAKES 35u  /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
