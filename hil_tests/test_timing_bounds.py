@@ -110,6 +110,14 @@ SHIFT = """f: andi r24, 15
 """
 
 
+EEPROM = """f: sbi EECR, EERE
+ nop
+ sbi EECR, EEMPE
+ sbi EECR, EEPE
+ ret
+"""
+
+
 def build(folder: Path, source: str) -> Path:
     """The image of a program in assembler."""
     program, image = folder / "program.S", folder / "program.elf"
@@ -150,8 +158,9 @@ def bound(program: Program) -> int:
         (DIVIDE_LONG, [0xFF, 0xFF, 0xFF, 0xFF, 1, 0, 0, 0]),
         (MULTIPLY, []),
         (SHIFT, [15, 0, 0, 0]),
+        (EEPROM, []),
     ],
-    ids=["crc", "search", "16-bit division", "32-bit division", "multiplication", "shift"],
+    ids=["crc", "search", "16-bit division", "32-bit division", "multiplication", "shift", "EEPROM"],
 )
 def test_bound_is_what_the_worst_input_takes(tmp_path: Path, source: str, worst: list[int]) -> None:
     image = build(tmp_path, source)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from avr_image import assembled, compiled
 from boebot.errors import TimingError
-from boebot.timing.blocked import ENTRY, Blocked
+from boebot.timing.blocked import ENTRY, HORIZON, Blocked
+from boebot.timing.program import InterruptRow, Table
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_3\n"
 JUMP = 3  # of a vector, where the linker does not relax
@@ -99,3 +101,13 @@ def test_planted_instruction_lengthens_the_stretch(tmp_path: Path) -> None:
         for text in ("", "nop\n", "push r2\n pop r2\n")
     ]
     assert [length - lengths[0] for length in lengths] == [0, 1, 4]
+
+
+def test_those_of_higher_priority_may_take_all_the_time(tmp_path: Path) -> None:
+    source = VECTORS + "main: sei\n nop\n ret\n __vector_1: nop\n reti\n __vector_2: reti"
+    program = assembled(tmp_path, source)
+    span = ENTRY + JUMP + 1 + 4
+    for interval, waits in ((span, True), (2 * span, False)):
+        rows = (InterruptRow("first", 1, 0, 0, interval),)
+        latency = Blocked(replace(program, table=Table(interrupts=rows))).latency(2)
+        assert (latency == HORIZON) == waits

@@ -54,6 +54,7 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: sbrc r24, 0\n sts 256, r24\n ret", 1 + 2 + 4),  # as long as the skip of two words
         ("main: call f\n ret\n f: push r24\n pop r24\n ret", 4 + (2 + 2 + 4) + 4),
         ("main: rcall f\n rcall f\n ret\n f: ret", 2 * (3 + 4) + 4),
+        ("main: sbi EECR, EERE\n sbi EECR, EEMPE\n sbi EECR, EEPE\n ret", (2 + 4) + 2 + (2 + 2) + 4),
         ("main: jmp f\n .type f, @function\n f: ret", 3 + 4),
         (WHILE, 1 + 5 * (1 + 1 + 1 + 2) + (1 + 2) + 4),
         (NESTED, 1 + 3 * (1 + 1 + (3 * (2 + 1 + 2) + (2 + 1 + 1)) + 2) + (1 + 2) + 4),
@@ -63,8 +64,8 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: ldi r24, 0\n 1: dec r24\n brne 1b\n ret", 1 + 255 * 3 + 2 + 4),
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
     ],
-    ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "tail call", "while", "nested", "counted",
-         "counted below zero", "two bytes", "256 times", "waits"],
+    ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
+         "nested", "counted", "counted below zero", "two bytes", "256 times", "waits"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles

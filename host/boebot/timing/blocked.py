@@ -7,7 +7,8 @@ are on again, only one interrupt gets in between two stretches.
 
 Taken for granted: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
 not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. While the CPU sleeps, it wakes in
-4 cycles. Requests are as the timing table says; of an interrupt that is not in it, one at a time.
+4 cycles. While an interrupt waits, of stretches in `main` that do not follow each other at once there is one. Requests
+are as the timing table says; of an interrupt that is not in it, one at a time.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
 from boebot.timing.paths import Graph, Mark, Way, longest
 from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import CALL_CLOBBERED, written
+from boebot.timing.registers import CALL_CLOBBERED, halted, written
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -128,7 +129,8 @@ class Blocked:
         """Most cycles from the request of an interrupt to its acceptance.
 
         First what has just begun: another interrupt, which may return to a `cli`. Then interrupts of higher priority,
-        as often as they can come in that time, each with one instruction behind it.
+        as often as they can come in that time, each with one instruction behind it. HORIZON: those of higher priority
+        can take all the time.
         """
         own = self.of("main").cycles
         chained = self.effect(self.program.by_name["main"], on=True).chained.cycles
@@ -150,7 +152,7 @@ class Blocked:
             if longer == wait:
                 return wait
             wait = longer
-        raise TimingError(f"interrupt {vector} may wait for ever: those of higher priority take all the time")
+        return HORIZON
 
     def effect(self, entry: int, on: bool) -> Effect:
         """What a function does to the flag, called with interrupts on or off."""
@@ -262,9 +264,10 @@ class Blocked:
         if number + 1 < len(block.instructions):
             for following in states:
                 found.append((start, number + 1, following))
-                self._go(flow, node, found[-1], instruction.cycles, instruction.address)
+                self._go(flow, node, found[-1], instruction.cycles + halted(instruction), instruction.address)
             return found
         for callee, edge_cycles, to in _leaving(block):
+            edge_cycles += halted(instruction)
             for following in states:
                 if callee is not None:
                     effect = self._callee(callee, block, function, state.flag is not Flag.OFF)

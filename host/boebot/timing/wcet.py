@@ -13,7 +13,7 @@ from boebot.errors import TimingError
 from boebot.timing.marks import marks_of
 from boebot.timing.paths import Graph, Mark, Walk, Way, longest
 from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import before, constant
+from boebot.timing.registers import before, constant, halted
 
 # Library routines with a loop that runs by an argument: its lower register (avr-gcc's calling convention, 16 bits), and
 # how often the loop's header runs more than the argument says.
@@ -95,7 +95,7 @@ class WorstCase:
             cycles = self.callee(entry, block, function).cycles
             if callee is None or cycles > callee_cycles:
                 callee, callee_cycles = entry, cycles
-        own = block.body_cycles + callee_cycles
+        own = block.body_cycles + sum(map(halted, block.instructions)) + callee_cycles
         if not block.edges:
             return [Way(block.start, None, own + block.last_cycles, callee, callee_cycles)]
         edges: dict[int, int] = {}
