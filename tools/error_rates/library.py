@@ -50,7 +50,9 @@ ABLATIONS = {
             ),
         )
     ),
-    "stuffing": Ablation((("&& unstuff(bytes, size, ACCEPTED_MAX - 2u)", "&& (unstuff(bytes, size, ACCEPTED_MAX - 2u), true)"),)),
+    "stuffing": Ablation(
+        (("&& unstuff(bytes, size, ACCEPTED_MAX - 2u)", "&& (unstuff(bytes, size, ACCEPTED_MAX - 2u), true)"),)
+    ),
     "session seed": Ablation(
         (
             ("seed = decoder->seed;", "seed = decoder != 0 ? FRAME_SEED : 0;"),
