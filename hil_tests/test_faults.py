@@ -47,7 +47,7 @@ def rig_with(image: str) -> Rig:
 
 
 def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_path: Path) -> None:
-    """The writing that `save_parameters` asks for hangs: the pulses, made by interrupts, go on until the watchdog ends it."""
+    """The writing to the EEPROM hangs: the pulses, made by interrupts, go on until the watchdog ends it."""
     with rig_with(planted(tmp_path, "begin_record", JUMP_TO_ITSELF)) as rig:
         assert rig.start().reset_cause == messages.ResetCause.POWER
         rig.drive_for(0.5, 0.5, 0.2)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from elftools.elf.elffile import ELFFile
 
-FLASH_LIMIT = 19_456  # bytes, of 32,256 below the boot loader: all devices are built in
+FLASH_LIMIT = 17_152  # bytes, of 32,256 below the boot loader: all devices are built in
 RAM_LIMIT = 1280  # bytes, of 2,048; the rest is for the stack
 
 FLASH_SECTIONS = (".text", ".data")

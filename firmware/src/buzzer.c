@@ -18,9 +18,9 @@ void buzzer_start(void) {
   HAL_PIN_LOW(BUZZER);
   HAL_PIN_OUTPUT(BUZZER);
   hal_tone_stop();
-  left = 0;
-  token = 0;
-  is_start = false;
+  HAL_ZERO(left);
+  HAL_ZERO(token);
+  HAL_ZERO(is_start);
 }
 
 /* Half a period in counts of a clock, clock / (2 * frequency), rounded down: a division of 16 bits and `steps` of a longer

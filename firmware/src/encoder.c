@@ -237,17 +237,17 @@ void encoder_start(void) {
   HAL_PIN_INPUT(ENCODER_LEFT);
   HAL_PIN_INPUT(ENCODER_RIGHT);
 #endif
-  hal_changes_head = hal_changes_tail = 0;
+  HAL_ZERO(hal_changes_head);
+  HAL_ZERO(hal_changes_tail);
   hal_changes_resume();
-  phantoms = 0;
-  awaited = other_bit = 0;
-  other_seen = false;
+  HAL_ZERO(phantoms);
+  HAL_ZERO(awaited);
+  HAL_ZERO(other_bit);
+  HAL_ZERO(other_seen);
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
   }
-  BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
-    fired[line] = 0;
-  }
+  HAL_ZERO(fired);
   limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   before = PORT_BITS();
   watched = lines_on();

@@ -42,13 +42,15 @@ void infrared_start(void) {
   HAL_PIN_OUTPUT(INFRARED_RIGHT_LED);
   HAL_PIN_INPUT(INFRARED_LEFT_RECEIVER);
   HAL_PIN_INPUT(INFRARED_RIGHT_RECEIVER);
-  armed = started = finished = false;
-  seen = 0;
-  reading = 0;
+  HAL_ZERO(armed);
+  HAL_ZERO(started);
+  HAL_ZERO(finished);
+  HAL_ZERO(seen);
+  HAL_ZERO(reading);
   age = AGE_NEVER;
-  wait = 0;
-  band = 0;
-  sweeping = false;
+  HAL_ZERO(wait);
+  HAL_ZERO(band);
+  HAL_ZERO(sweeping);
   zone_age = AGE_NEVER;
 }
 

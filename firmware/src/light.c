@@ -41,7 +41,8 @@ static void let_go(void) {
 
 void light_start(void) {
   let_go();
-  readings[LEFT] = readings[RIGHT] = 0;
+  HAL_ZERO(readings[LEFT]);
+  HAL_ZERO(readings[RIGHT]);
   age = AGE_NEVER;
 }
 

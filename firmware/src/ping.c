@@ -29,8 +29,8 @@ static uint8_t since_trigger; /* ticks, saturating */
 void ping_start(void) {
   HAL_PIN_INPUT(PING);
   hal_capture_stop();
-  state = IDLE;
-  echo = 0;
+  HAL_ZERO(state);
+  HAL_ZERO(echo);
   age = AGE_NEVER;
   since_trigger = 255;
 }

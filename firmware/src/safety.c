@@ -3,6 +3,7 @@
 
 #include "buzzer.h"
 #include "generated/messages.h"
+#include "hal/hal.h"
 #include "link/events.h"
 #include "link/parameters.h"
 #include "motion.h"
@@ -39,9 +40,9 @@ static void stop_all(void) {
 void safety_start(void) {
   latch = LATCH_START;
   latches = 1;
-  state = 0;
-  ticks_are_over = false;
-  last_sequence = 0;
+  HAL_ZERO(state);
+  HAL_ZERO(ticks_are_over);
+  HAL_ZERO(last_sequence);
   motion_off();
 }
 

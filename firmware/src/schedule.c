@@ -62,17 +62,17 @@ static uint8_t overrun_row; /* ticks in a row that overran, at most OVERLOAD_TIC
 
 void schedule_start(uint32_t first_tick) {
   schedule_slot = 0xFF;
-  schedule_slot_start = 0;
-  slot_cycles = 0;
+  HAL_ZERO(schedule_slot_start);
+  HAL_ZERO(slot_cycles);
   tick = first_tick;
   tick_us = first_tick * SCHEDULE_TICK_US;
   slot_us = tick_us - SLOT_US; /* the first slot is still to begin */
-  edge_is_servo = false;
-  schedule_next_slot = 0;
-  overruns = 0;
-  late = false;
-  overran = false;
-  overrun_row = 0;
+  HAL_ZERO(edge_is_servo);
+  HAL_ZERO(schedule_next_slot);
+  HAL_ZERO(overruns);
+  HAL_ZERO(late);
+  HAL_ZERO(overran);
+  HAL_ZERO(overrun_row);
 }
 
 HAL_INTERRUPT_SLOT {

@@ -25,9 +25,8 @@ void servo_start(void) {
   HAL_PIN_OUTPUT(SERVO_LEFT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
   HAL_PIN_OUTPUT(TURRET);
-  BOUNDED(SERVOS, for (uint8_t servo = 0; servo < SERVOS; servo++)) {
-    wanted[servo] = in_force[servo] = 0;
-  }
+  HAL_ZERO(wanted);
+  HAL_ZERO(in_force);
 }
 
 void servo_set(uint16_t left, uint16_t right) {

@@ -266,12 +266,12 @@ static void end_count(uint8_t result) {
 
 void storage_start(void) {
   hal_eeprom_interrupt(false);
-  step = IDLE;
-  write_left = 0;
-  save_wanted = false;
+  HAL_ZERO(step);
+  HAL_ZERO(write_left);
+  HAL_ZERO(save_wanted);
   save_result = ANSWER_STATUS_OK;
-  run_ticks = 0;
-  counted = false;
+  HAL_ZERO(run_ticks);
+  HAL_ZERO(counted);
   find_boots();
 }
 

@@ -5,6 +5,7 @@
 
 #include "analog.h"
 #include "bounds.h"
+#include "hal/hal.h"
 #include "link/parameters.h"
 
 #define HYSTERESIS 100u /* mV */
@@ -16,8 +17,10 @@ static bool was_below;   /* the last measurement was */
 static bool has_settled; /* a measurement since power was given to bandgap and converter is past */
 
 void supply_start(void) {
-  voltage = 0;
-  low = was_below = has_settled = false;
+  HAL_ZERO(voltage);
+  HAL_ZERO(low);
+  HAL_ZERO(was_below);
+  HAL_ZERO(has_settled);
 }
 
 /* bandgap * 1024 / result, rounded down: a division of 16 bits and five steps of a longer one by hand. One of 32 bits

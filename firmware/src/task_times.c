@@ -10,11 +10,7 @@ static uint8_t running;
 static uint16_t began;     /* hal_time() */
 static uint8_t began_slot; /* schedule_slot then */
 
-void task_times_start(void) {
-  for (uint8_t task = 0; task < TASKS; task++) {
-    longest[task] = 0;
-  }
-}
+void task_times_start(void) { HAL_ZERO(longest); }
 
 void task_begins(uint8_t task) {
   running = task;

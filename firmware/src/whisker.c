@@ -28,7 +28,7 @@ bool whisker_debounce(whisker_state *state, bool touching) {
 void whisker_start(void) {
   HAL_PIN_PULL_UP(WHISKER_LEFT);
   HAL_PIN_PULL_UP(WHISKER_RIGHT);
-  states[LEFT] = states[RIGHT] = (whisker_state){false, 0};
+  HAL_ZERO(states);
 }
 
 void whisker_task(void) {

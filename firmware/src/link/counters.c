@@ -16,9 +16,9 @@ static bool bytes_lost;
 static uint16_t ticks; /* since they were sent */
 
 void counters_start(void) {
-  counters = (msg_counters){0};
-  bytes_lost = false;
-  ticks = 0;
+  HAL_ZERO(counters);
+  HAL_ZERO(bytes_lost);
+  HAL_ZERO(ticks);
 }
 
 void counters_count_at(uint8_t offset) {

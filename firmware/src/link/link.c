@@ -17,7 +17,7 @@ static frame_decoder decoder;
 uint8_t link_room;
 
 void link_start(uint16_t baud) {
-  memset(&decoder, 0, sizeof decoder); /* its seed is the session's to set */
+  HAL_ZERO(decoder); /* its seed is the session's to set */
   send_start(baud);
   counters_start();
   telemetry_start_line();

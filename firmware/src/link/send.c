@@ -1,6 +1,7 @@
 /* send.c: see send.h. */
 #include "link/send.h"
 
+#include "hal/hal.h"
 #include "link/counters.h"
 #include "link/session.h"
 
@@ -10,7 +11,7 @@ static uint8_t next_sequence;
 static uint16_t baud_rate; /* 100 bit/s */
 
 void send_start(uint16_t baud) {
-  next_sequence = 0;
+  HAL_ZERO(next_sequence);
   baud_rate = baud;
 }
 

@@ -292,8 +292,8 @@ class Traffic(Opening):
         if reset_cause.by_watchdog(cause):
             where = self.transport.name
             self.notices.append(
-                f"the last reset of the board at {where} was by its {reset_cause.in_words(cause)}: the firmware hung there, "
-                "or fell behind for good"
+                f"the last reset of the board at {where} was by its {reset_cause.in_words(cause)}: the firmware hung "
+                "there, or fell behind for good"
             )
 
     def _hear_answer(self, payload: bytes, now: float) -> None:

@@ -138,9 +138,11 @@ uint32_t hal_image_hash(void) {
   uint32_t crc = 0xFFFFFFFFul;
   const uint16_t size = (uint16_t)hal_image_size();
   BOUNDED(FLASHEND + 1ul, for (uint16_t address = 0; address < size; address++)) {
-    const uint8_t byte = pgm_read_byte(address);
-    crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ byte) & 0x0Fu]);
-    crc = crc >> 4 ^ pgm_read_dword(&table[(crc ^ (byte >> 4)) & 0x0Fu]);
+    uint8_t byte = pgm_read_byte(address);
+    BOUNDED(2, for (uint8_t half = 2; half > 0; half--)) {
+      crc = crc >> 4 ^ pgm_read_dword(&table[((uint8_t)crc ^ byte) & 0x0Fu]);
+      byte = (uint8_t)(byte >> 4);
+    }
   }
   return ~crc;
 }

@@ -41,6 +41,8 @@
 /* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
 #define HAL_NAMED __attribute__((used, externally_visible))
 
+#define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
+
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
 /* The timing table's columns, for this board's code and its assertions. */
