@@ -107,7 +107,10 @@ class FullLine:
         line = self._line
         while (at := max(self._first, line.free, bench.now)) < until:
             line.send(self._message(), at)
-            line.pad(self._bytes - (line.free - at) // BYTE_CYCLES)
+            padding = self._bytes - (line.free - at) // BYTE_CYCLES
+            if padding > 0:
+                bench.access.send(bytes(padding), at=line.free)
+                line.free += padding * BYTE_CYCLES
             self._count += 1
 
     def _message(self) -> messages.SetpointSignal | messages.SetParameter | messages.Identify:
