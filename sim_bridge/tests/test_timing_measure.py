@@ -142,9 +142,9 @@ __attribute__((noinline)) void deeper(uint8_t n) {
   room[n % 40] = n;
   deeper(n + 1); room[0]++;  /* line 5 */
 }
-__attribute__((noinline)) void invalid(void) {
-  __asm__ volatile(".word 1");  /* line 8 */
-}
+__attribute__((noinline)) void invalid(void) { __asm__ volatile(".word 1"); } /* line 7 */
+
+
 __attribute__((noinline)) void wild(void) {
   ((void (*)(void))0x3000)();  /* line 11 */
 }
@@ -159,7 +159,7 @@ int main(void) { FAULT; }
     ("fault", "what", "place"),
     [
         ("deeper(0)", "stack overflows", r"in deeper \(faulty.c:[25]\)"),
-        ("invalid()", "invalid instruction 0x0001", r"in invalid \(faulty.c:8\)"),
+        ("invalid()", "invalid instruction 0x0001", r"in invalid \(faulty.c:7\)"),
         ("wild()", "goes to 0x6000", r"in wild \(faulty.c:11\)"),
         ("stuck()", "hangs", r"in stuck \(faulty.c:14\)"),
     ],
@@ -167,8 +167,8 @@ int main(void) { FAULT; }
 def test_a_fault_has_address_function_and_line(tmp_path: Path, fault: str, what: str, place: str) -> None:
     source, image = tmp_path / "faulty.c", tmp_path / "faulty.elf"
     source.write_text(FAULTY.replace("FAULT", fault), encoding="ascii")
-    command = ["avr-gcc", "-mmcu=atmega328p", "-Og", "-g", "-fno-optimize-sibling-calls", "-o", str(image), str(source)]
-    subprocess.run(command, check=True)
+    flags = ["-mmcu=atmega328p", "-Og", "-gdwarf-2", "-fno-optimize-sibling-calls"]
+    subprocess.run(["avr-gcc", *flags, "-o", str(image), str(source)], check=True)
     board = avr.create(image)
     board.record(Watch(code_end=0x1000, lowest_stack=0x300, patience=50_000))
     with pytest.raises(BoardError, match=rf"{what}.* at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"):
