@@ -148,8 +148,8 @@ class BoardAccess(BoardMemory):
     """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
 
     def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None, elf: Path | None = None) -> None:
-        """Becomes the listener of the board at `pointer`; `owner` is kept alive. `elf`: what it runs, for the place of a
-        fault."""
+        """Becomes the listener of the board at `pointer`; `owner` is kept alive. `elf`: what it runs, for the place
+        of a fault."""
         super().__init__(lib, ffi)
         self._pointer = pointer
         self._lib = lib
@@ -244,7 +244,9 @@ class BoardAccess(BoardMemory):
         text = self._lib.board_access_fault(self._access)
         if text == self._ffi.NULL:
             return None
-        return with_place(self._ffi.string(text).decode(), self._elf, self._lib.board_access_fault_address(self._access))
+        return with_place(
+            self._ffi.string(text).decode(), self._elf, self._lib.board_access_fault_address(self._access)
+        )
 
     def close(self) -> None:
         """Lets go of the board."""

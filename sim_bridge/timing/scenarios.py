@@ -10,7 +10,7 @@ Periods share no factor with the control tick, so that a longer run sweeps the p
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from math import prod
 
@@ -25,7 +25,9 @@ EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "everything": 
 NOISE_PERIOD = 80  # cycles from edge to edge of a 100 kHz square wave
 CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how long one lasts
 DEVICES = messages.Devices
+STUCK, NEVER_AGAIN = 1_600_000, 1 << 60  # cycles for which the two-wire bus is held, once
 SILENCE = 5_600_000  # cycles at the end of "everything": the dead man's 250 ms and the tasks that follow
+CHANGED = ("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain")
 FIGURE_DEVICES = DEVICES.SERVOS | DEVICES.ENCODERS | DEVICES.WHISKERS | DEVICES.INFRARED | DEVICES.PING
 
 
@@ -107,7 +109,10 @@ class FullLine:
         line = self._line
         while (at := max(self._first, line.free, bench.now)) < until:
             line.send(self._message(), at)
-            line.pad(self._bytes - (line.free - at) // BYTE_CYCLES)
+            padding = self._bytes - (line.free - at) // BYTE_CYCLES
+            if padding > 0:
+                bench.access.send(bytes(padding), at=line.free)
+                line.free += padding * BYTE_CYCLES
             self._count += 1
 
     def _message(self) -> messages.SetpointSignal | messages.SetParameter | messages.Identify:
@@ -144,32 +149,52 @@ class AllSorts:
         self._line.free = begin + len(wire) * BYTE_CYCLES
 
     def _endless(self) -> Iterator[object]:
-        pick, line = self._random, self._line
-        known = messages.PARAMETERS
-        yield line.numbered(messages.SaveParameters)
+        yield self._line.numbered(messages.SaveParameters)
         while True:
-            self._token = self._token % 255 + 1
-            signals = pick.randrange(-10_000, 10_001), pick.randrange(-10_000, 10_001)
-            changed = pick.choice(("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain"))
-            value = pick.randrange(known[changed].minimum, known[changed].maximum + 1)
-            kinds: list[Callable[[], object]] = [
-                lambda signals=signals: messages.SetpointSignal(*signals, 250, line.tick),
-                lambda signals=signals: messages.SetpointSpeed(signals[0] // 8, signals[1] // 8, 250, line.tick),
-                lambda: messages.SetpointCoast(250, line.tick),
-                lambda: messages.Buzzer(pick.randrange(40, 8001), pick.randrange(1, 20), self._token),
-                lambda: messages.Turret(pick.randrange(-15_000, 15_001), 1),
-                lambda changed=changed, value=value: line.numbered(messages.SetParameter, known[changed].id, value),
-                lambda changed=changed: line.numbered(messages.SetParameter, known[changed].id, 2**31 - 1),
-                lambda: line.numbered(messages.GetParameter, pick.randrange(40)),
-                lambda: messages.Identify(),
-                lambda: messages.Describe(pick.randrange(30), 0),
-                lambda: messages.ClockProbe(pick.randrange(65_536)),
-                lambda: messages.Open(messages.PROTOCOL_VERSION, 1, 2),
-                lambda: messages.SetpointSignal(0, 0, 250, (line.tick - 400) & 0xFFFF),  # too late
-                lambda: messages.Arm(1, 0),  # out of order
-            ]
-            weights = [6, 4, 1, 2, 2, 3, 2, 3, 1, 1, 2, 1, 1, 1]
-            yield pick.choices(kinds, weights)[0]()
+            make = self._random.choices(
+                [self._setpoint, self._device, self._parameter, self._question, self._refused], [11, 4, 5, 7, 4]
+            )[0]
+            yield make()
+
+    def _setpoint(self) -> object:
+        left, right = (self._random.randrange(-10_000, 10_001) for _ in range(2))
+        kind, tick = self._random.choices(("signal", "speed", "coast"), [6, 4, 1])[0], self._line.tick
+        if kind == "coast":
+            return messages.SetpointCoast(250, tick)
+        if kind == "speed":
+            return messages.SetpointSpeed(left // 8, right // 8, 250, tick)
+        return messages.SetpointSignal(left, right, 250, tick)
+
+    def _device(self) -> object:
+        if self._random.random() < 0.5:
+            return messages.Turret(self._random.randrange(-15_000, 15_001), 1)
+        self._token = self._token % 255 + 1
+        return messages.Buzzer(self._random.randrange(40, 8001), self._random.randrange(1, 20), self._token)
+
+    def _parameter(self) -> object:
+        spec = messages.PARAMETERS[self._random.choice(CHANGED)]
+        value = self._random.randrange(spec.minimum, spec.maximum + 1)
+        if self._random.random() < 0.4:
+            value = 2**31 - 1  # out of range
+        return self._line.numbered(messages.SetParameter, spec.id, value)
+
+    def _question(self) -> object:
+        kind = self._random.choices(("get", "identify", "describe", "probe"), [3, 1, 1, 2])[0]
+        if kind == "get":
+            return self._line.numbered(messages.GetParameter, self._random.randrange(40))
+        if kind == "identify":
+            return messages.Identify()
+        if kind == "describe":
+            return messages.Describe(self._random.randrange(30), 0)
+        return messages.ClockProbe(self._random.randrange(65_536))
+
+    def _refused(self) -> object:
+        kind = self._random.choice(("open", "late", "order"))
+        if kind == "open":
+            return messages.Open(messages.PROTOCOL_VERSION, 1, 2)
+        if kind == "late":
+            return messages.SetpointSignal(0, 0, 250, (self._line.tick - 400) & 0xFFFF)
+        return messages.Arm(1, 0)
 
 
 # ---- preparation -----------------------------------------------------------------------------------------------------
@@ -225,7 +250,13 @@ def load(bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbe
             Contact(robots.pin_number(d.pin), CONTACT_PERIOD + 2 * i, BOUNCE, start + numbers.contact // (i + 1))
             for i, d in enumerate(whiskers)
         ]
-        bench.sources.append(AllSorts(line, numbers, first, max(first, bench.now + cycles - SILENCE)))
+        last = max(first, bench.now + cycles - SILENCE)
+        bench.sources += [
+            Contact(robots.pin_number(d.sda_pin), NEVER_AGAIN, STUCK, last - STUCK)
+            for d in robot.device.values()
+            if isinstance(d, robots.Compass)
+        ]
+        bench.sources.append(AllSorts(line, numbers, first, last))
         return
     for device in robot.device.values():
         if isinstance(device, robots.Ping):

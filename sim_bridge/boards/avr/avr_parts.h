@@ -448,7 +448,7 @@ void eeprom_reset(avr_board *b, bool power_failed);
 void eeprom_due(avr_board *b);
 
 /* avr_spans.c; all but spans_free only while there is a recorder */
-void spans_step(avr_board *b, uint32_t address);                 /* the instruction at `address` has run */
+void run_recorded(avr_board *b, uint64_t until); /* instructions, while nothing wants the core to stop */
 void spans_accept(avr_board *b, uint8_t vector, uint64_t begin); /* an interrupt begins, its flag is still raised */
 void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle);
 void spans_request_gone(avr_board *b, uint8_t vector);
