@@ -23,6 +23,12 @@ const char *board_fault(uintptr_t address) {
   return b->op->fault(b);
 }
 
+int64_t board_fault_address(uintptr_t address) {
+  board *b = (board *)address;
+  const uint32_t *found = b->op->extension(b, BOARD_FAULT_ADDRESS);
+  return found ? (int64_t)*found : -1;
+}
+
 void board_read_counters(uintptr_t address, uint64_t counters[8]) {
   const board *b = (const board *)address;
   board_counters c = {0};

@@ -277,9 +277,9 @@ class Sim:
         if crashed:
             board = self.robot(crashed - 1).board
             whose = f" of robot {crashed}" if len(self.members) > 1 else ""
-            fault = lib.board_fault(board.address)
-            why = "unknown fault" if fault == ffi.NULL else ffi.string(fault).decode()
-            raise BoardError(f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {why}")
+            raise BoardError(
+                f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {board.fault()}"
+            )
 
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had

@@ -60,6 +60,9 @@ typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channe
 #define BOARD_EEPROM "eeprom" /* a board_eeprom */
 #define BOARD_EEPROM_SIZE 1024u
 
+/* uint32_t: byte address in flash of the instruction that crashed the board; NULL: it has not crashed, or nobody knows. */
+#define BOARD_FAULT_ADDRESS "fault address"
+
 /* What a cell of the EEPROM holds after the supply failed while it was being written. */
 typedef enum {
   BOARD_DAMAGE_ERASED, /* 0xFF */

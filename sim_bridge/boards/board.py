@@ -9,9 +9,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from boebot.errors import BoardError
+from sim_bridge.boards.code_places import with_place
 
 CLOCK_HZ = 16_000_000
 DATA_SIZE = 0x900
@@ -145,13 +147,15 @@ def check_range(what: str, address: int, count: int, size: int) -> None:
 class BoardAccess(BoardMemory):
     """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
 
-    def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None) -> None:
-        """Becomes the listener of the board at `pointer`; `owner` is kept alive."""
+    def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None, elf: Path | None = None) -> None:
+        """Becomes the listener of the board at `pointer`; `owner` is kept alive. `elf`: what it runs, for the place
+        of a fault."""
         super().__init__(lib, ffi)
         self._pointer = pointer
         self._lib = lib
         self._ffi = ffi
         self._owner = owner
+        self._elf = elf
         self._access = lib.board_access_open(pointer)
         if self._access == ffi.NULL:
             raise BoardError("This board was built for another version of the board interface; build it again.")
@@ -236,9 +240,13 @@ class BoardAccess(BoardMemory):
 
     @property
     def fault(self) -> str | None:
-        """What is wrong after a crash, or None."""
+        """What is wrong after a crash, with function and line where they are known, or None."""
         text = self._lib.board_access_fault(self._access)
-        return None if text == self._ffi.NULL else self._ffi.string(text).decode()
+        if text == self._ffi.NULL:
+            return None
+        return with_place(
+            self._ffi.string(text).decode(), self._elf, self._lib.board_access_fault_address(self._access)
+        )
 
     def close(self) -> None:
         """Lets go of the board."""

@@ -91,6 +91,11 @@ void board_access_counters(const board_access *self, board_counters *out) {
 
 const char *board_access_fault(const board_access *self) { return self->board->op->fault(self->board); }
 
+int64_t board_access_fault_address(const board_access *self) {
+  const uint32_t *found = self->board->op->extension(self->board, BOARD_FAULT_ADDRESS);
+  return found ? (int64_t)*found : -1;
+}
+
 uint8_t *board_memory(board *self) { return self->op->extension(self, BOARD_DATA); }
 
 board_eeprom *board_eeprom_of(board *self) { return self->op->extension(self, BOARD_EEPROM); }

@@ -53,6 +53,7 @@ void board_access_line_rate(board_access *self, uint32_t baud);
 void board_access_reset(board_access *self, int cause);
 void board_access_counters(const board_access *self, board_counters *out);
 const char *board_access_fault(const board_access *self);
+int64_t board_access_fault_address(const board_access *self); /* see BOARD_FAULT_ADDRESS; -1: not known */
 
 /* Data space of the microcontroller, to be read or written; NULL on a board that has none. */
 uint8_t *board_memory(board *self);

@@ -11,6 +11,7 @@ from typing import Any
 from boebot import resources
 from boebot.errors import BoardError
 from sim_bridge._core import ffi, lib
+from sim_bridge.boards.code_places import with_place
 
 
 class EmulatedBoard:
@@ -23,9 +24,11 @@ class EmulatedBoard:
         release: Callable[[], None],
         keep: Any = None,
         firmware: bytes = b"",
+        elf: Path | None = None,
         again: Callable[[], EmulatedBoard] | None = None,
     ) -> None:
-        """`release` frees the board, `again` makes one more like it; `firmware` is the file that it runs.
+        """`release` frees the board, `again` makes one more like it; `firmware` is what it runs, `elf` the file
+        that says where in the source an address comes from.
 
         Raises:
             BoardError: the board was built for another version of this package.
@@ -33,6 +36,7 @@ class EmulatedBoard:
         self._address = address
         self.description = description
         self.firmware = hashlib.sha256(firmware).hexdigest()
+        self.elf = elf
         self._release: Callable[[], None] | None = release
         self._free = weakref.finalize(self, release)  # for one that is dropped; at the exit its world may still hold it
         self._free.atexit = False
@@ -54,6 +58,12 @@ class EmulatedBoard:
         if self._release is None:
             raise BoardError(f"the {self.description} is closed; expected one that is open")
         return self._address
+
+    def fault(self) -> str:
+        """What is wrong after a crash, with function and line where they are known."""
+        text = lib.board_fault(self.address)
+        why = "unknown fault" if text == ffi.NULL else ffi.string(text).decode()
+        return with_place(why, self.elf, lib.board_fault_address(self.address))
 
     @property
     def can_repeat(self) -> bool:
@@ -139,6 +149,7 @@ def avr_board(image: Path) -> EmulatedBoard:
         board.close,
         keep=board,
         firmware=image.read_bytes(),
+        elf=image,
         again=lambda: avr_board(image),
     )
 

@@ -1,4 +1,4 @@
-"""Where a variable of an AVR image lies, by its name in the ELF file's symbol table."""
+"""Where a variable or a function of an AVR image lies, by its name in the ELF file's symbol table."""
 
 from __future__ import annotations
 
@@ -19,16 +19,27 @@ class Symbol(NamedTuple):
     size: int
 
 
-def find_symbol(image: Path | bytes, name: str) -> Symbol:
-    """The variable of that name in an ELF image; KeyError if there is none, ValueError if the name is not unique."""
+def _symbols(image: Path | bytes) -> list[tuple[str, int, int]]:
+    """Name, value and size of all."""
     elf = ELFFile(io.BytesIO(image if isinstance(image, bytes) else image.read_bytes()))
     table = elf.get_section_by_name(".symtab")
     if not isinstance(table, SymbolTableSection):
+        return []
+    return [(symbol.name, symbol["st_value"], symbol["st_size"]) for symbol in table.iter_symbols()]
+
+
+def entry_of(image: Path | bytes, name: str) -> int:
+    """Where the function, or label, of that name begins: a byte address in flash. KeyError if there is none."""
+    found = {value for label, value, _ in _symbols(image) if label == name and value < DATA_BASE}
+    if len(found) != 1:
         raise KeyError(name)
+    return found.pop()
+
+
+def find_symbol(image: Path | bytes, name: str) -> Symbol:
+    """The variable of that name in an ELF image; KeyError if there is none, ValueError if the name is not unique."""
     found = {
-        Symbol(symbol["st_value"] & 0xFFFF, symbol["st_size"])
-        for symbol in table.iter_symbols()
-        if symbol.name == name and symbol["st_value"] >= DATA_BASE
+        Symbol(value & 0xFFFF, size) for label, value, size in _symbols(image) if label == name and value >= DATA_BASE
     }
     if not found:
         raise KeyError(name)

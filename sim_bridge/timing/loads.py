@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import Edge, Level
+from sim_bridge.boards.board import Edge, Level, SentByte
 
 CYCLES_PER_US = 16
 SLOT_CYCLES = 40_000  # 2.5 ms (tasks.def)
@@ -49,13 +49,29 @@ class Source(Protocol):
         """Queues what it does up to that cycle; what happened up to now is known."""
 
 
+class Access(Protocol):
+    """A board as a bench uses it: BoardAccess, or whatever has these of its operations."""
+
+    @property
+    def now(self) -> int: ...
+    def advance(self, until: int) -> None: ...
+    def drive(self, pin: int, level: Level, at: int = 0) -> None: ...
+    def send(self, data: bytes, at: int = 0) -> None: ...
+    def receive(self) -> list[SentByte]: ...
+    def log(self) -> list[Edge]: ...
+    def read_memory(self, address: int, count: int) -> bytes: ...
+    def counters(self) -> dict[str, int]: ...
+    def close(self) -> None: ...
+
+
 class Bench:
     """A board with an image, powered on. Time passes in slices; before each, all sources queue what they do in it."""
 
-    def __init__(self, elf: Path) -> None:
-        """Raises BoardError where the image cannot be loaded."""
+    def __init__(self, elf: Path, access: Access | None = None) -> None:
+        """`access`: to a board that runs the image, in place of a new one by itself. Raises BoardError where the image
+        cannot be loaded."""
         self.elf = elf
-        self.access = avr.create(elf).access()
+        self.access = avr.create(elf).access() if access is None else access
         self.sources: list[Source] = []
         self.edges: dict[int, list[Edge]] = defaultdict(list)
         """all that the firmware did to each pin"""

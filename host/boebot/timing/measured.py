@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,8 @@ class Spans:
     net: NDArray[np.uint32]
     gross: NDArray[np.uint32]
     worst: Worst
+    latency: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
+    """of an interrupt: from each request to acceptance"""
 
     @property
     def largest(self) -> int:
@@ -57,4 +61,93 @@ class Measurement:
     load: float  # share of cycles in which instructions ran, 0..1
     worst_tick: int = 0  # most cycles of tasks and interrupts in one control tick
     scenarios: tuple[str, ...] = field(default_factory=tuple)
+    functions: dict[str, Spans] = field(default_factory=dict)  # others that were watched, as the link's poll
+    busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
+    between_polls: int = 0  # most cycles from one poll of the link to the next, sleep not counted
     tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
+
+    def row(self, name: str) -> Spans:
+        """The spans of a task, an interrupt or another function. KeyError if there is none of that name."""
+        return {**self.functions, **self.interrupts, **self.tasks}[name]
+
+
+def merged(measurements: Iterable[Measurement]) -> Measurement:
+    """Several runs as one: all their spans, the larger of their maxima, the mean of their loads by time.
+
+    Raises:
+        ValueError: there is none.
+    """
+    runs = list(measurements)
+    if not runs:
+        raise ValueError("no measurement to merge; expected one at least")
+    seconds = sum(run.seconds for run in runs)
+    return Measurement(
+        tasks=_together([run.tasks for run in runs]),
+        interrupts=_together([run.interrupts for run in runs]),
+        lowest_stack=min(run.lowest_stack for run in runs),
+        seconds=seconds,
+        load=sum(run.load * run.seconds for run in runs) / seconds,
+        worst_tick=max(run.worst_tick for run in runs),
+        scenarios=tuple(dict.fromkeys(name for run in runs for name in run.scenarios)),
+        functions=_together([run.functions for run in runs]),
+        busiest_tick=max(run.busiest_tick for run in runs),
+        between_polls=max(run.between_polls for run in runs),
+        tick=next((run.tick for run in runs if run.tick), ()),
+    )
+
+
+def _together(parts: list[dict[str, Spans]]) -> dict[str, Spans]:
+    names = dict.fromkeys(name for part in parts for name in part)
+    return {name: _one([part[name] for part in parts if name in part]) for name in names}
+
+
+def _one(spans: list[Spans]) -> Spans:
+    longest = max(spans, key=lambda one: one.largest)
+    return Spans(
+        name=longest.name,
+        net=np.concatenate([one.net for one in spans]),
+        gross=np.concatenate([one.gross for one in spans]),
+        worst=longest.worst,
+        latency=np.concatenate([one.latency for one in spans]),
+    )
+
+
+def statistics(cycles: NDArray[np.uint32]) -> dict[str, float]:
+    """Count, minimum, mean, 99th percentile and maximum; only the count where there is nothing."""
+    if not len(cycles):
+        return {"count": 0}
+    return {
+        "count": len(cycles),
+        "min": int(cycles.min()),
+        "mean": round(float(cycles.mean()), 1),
+        "p99": int(np.percentile(cycles, 99, method="inverted_cdf")),
+        "max": int(cycles.max()),
+    }
+
+
+def as_json(measurement: Measurement) -> dict[str, Any]:
+    """What was measured as plain numbers, for a file."""
+
+    def rows(spans: dict[str, Spans]) -> dict[str, Any]:
+        return {
+            name: {
+                "net": statistics(one.net),
+                "gross": statistics(one.gross),
+                **({"latency": statistics(one.latency)} if len(one.latency) else {}),
+                "worst": {"scenario": one.worst.scenario, "seed": one.worst.seed, "cycle": one.worst.cycle},
+            }
+            for name, one in spans.items()
+        }
+
+    return {
+        "tasks": rows(measurement.tasks),
+        "interrupts": rows(measurement.interrupts),
+        "functions": rows(measurement.functions),
+        "scenarios": list(measurement.scenarios),
+        "seconds": measurement.seconds,
+        "load": measurement.load,
+        "worst_tick": measurement.worst_tick,
+        "busiest_tick": measurement.busiest_tick,
+        "between_polls": measurement.between_polls,
+        "lowest_stack": measurement.lowest_stack,
+    }

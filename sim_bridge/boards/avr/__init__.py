@@ -5,14 +5,57 @@ The extension behind it contains simavr and is GPL-3.0-or-later; this module imp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from boebot.errors import BoardError
 from sim_bridge.boards.board import BoardAccess
 
 ERROR_SIZE = 200
+FUNCTION_IDS = 64  # id of the first watched function; below are vectors
+
+SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
+    [
+        ("begin", "<u8"),
+        ("executed", "<u8"),
+        ("gross", "<u4"),
+        ("net", "<u4"),
+        ("latency", "<u4"),
+        ("id", "<u2"),
+        ("depth", "<u2"),
+    ]
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What is recorded of a program, and what is a fault of it. Addresses in bytes.
+
+    Attributes:
+        functions: entries of the functions whose spans are recorded; ids are FUNCTION_IDS, FUNCTION_IDS + 1, ...
+        code_end: no instruction stands from here on.
+        lowest_stack: the lowest address in data memory that the stack may write.
+        patience: cycles without sleep after which the program hangs; 0: any number.
+    """
+
+    functions: Sequence[int] = ()
+    code_end: int = 0x8000
+    lowest_stack: int = 0x100
+    patience: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogReset:
+    """Where a program was when the watchdog reset it: byte address of its next instruction, and cycle."""
+
+    address: int
+    cycle: int
 
 
 def _extension() -> Any:
@@ -31,14 +74,15 @@ class AvrBoard:
     object: whoever uses the pointer keeps this object.
     """
 
-    def __init__(self, elf: bytes, name: str) -> None:
-        """Powers on a board whose flash holds the program of an ELF file; `name` is for errors."""
+    def __init__(self, elf: bytes, path: Path) -> None:
+        """Powers on a board whose flash holds the program of an ELF file, which is at `path`."""
         extension = _extension()
         self._ffi, self._lib = extension.ffi, extension.lib
+        self.elf = path
         error = self._ffi.new("char[]", ERROR_SIZE)
         self._board = self._lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
         if self._board == self._ffi.NULL:
-            raise BoardError(f"the firmware image {name} cannot be loaded: {self._ffi.string(error).decode()}")
+            raise BoardError(f"the firmware image {path} cannot be loaded: {self._ffi.string(error).decode()}")
 
     @property
     def pointer(self) -> int:
@@ -49,7 +93,7 @@ class AvrBoard:
 
     def access(self) -> BoardAccess:
         """The board's operations, for use without a simulated world."""
-        return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self)
+        return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self, elf=self.elf)
 
     def data(self, address: int, size: int = 1) -> bytes:
         """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100."""
@@ -57,6 +101,61 @@ class AvrBoard:
             raise ValueError(f"no data at 0x{address:X}..0x{address + size - 1:X}; the data space ends at 0x8FF")
         board = self._ffi.cast("board *", self.pointer)
         return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
+
+    # ---- recorder ----------------------------------------------------------------------------------------------------
+
+    @property
+    def _running(self) -> Any:
+        return self._ffi.cast("board *", self.pointer)
+
+    def record(self, watch: Watch) -> None:
+        """Records from now on, anew if it did already: the board takes longer, and does the same.
+
+        Raises:
+            BoardError: too many functions, or one that begins at no address of flash.
+        """
+        entries = self._ffi.new("uint32_t[]", list(watch.functions))
+        what = self._ffi.new(
+            "avr_watch *",
+            {
+                "entries": entries,
+                "entry_count": len(watch.functions),
+                "code_end": watch.code_end,
+                "lowest_stack": watch.lowest_stack,
+                "patience": watch.patience,
+            },
+        )
+        if not self._lib.avr_board_record(self._running, what):
+            raise BoardError(
+                f"record: {len(watch.functions)} functions; expected even addresses below 0x8000, at most "
+                f"{self._lib.AVR_FUNCTIONS_MAXIMUM} of them"
+            )
+
+    def stop_recording(self) -> None:
+        """Forgets all that was recorded; the board is as fast as before."""
+        self._lib.avr_board_stop_recording(self._running)
+
+    def spans(self) -> NDArray[Any]:
+        """Takes the spans (dtype SPAN) that have ended since the last call, in the order in which they began."""
+        count = self._ffi.new("size_t *")
+        spans = self._lib.avr_board_spans(self._running, count)
+        size = count[0] * SPAN.itemsize
+        found = np.frombuffer(self._ffi.buffer(spans, size)[:] if size else b"", dtype=SPAN)
+        self._lib.avr_board_forget_spans(self._running)
+        return found[np.argsort(found["begin"], kind="stable")]
+
+    @property
+    def lowest_stack(self) -> int:
+        """Lowest value of the stack pointer while it records."""
+        return int(self._lib.avr_board_lowest_stack(self._running))
+
+    @property
+    def watchdog_reset(self) -> WatchdogReset | None:
+        """The first reset by the watchdog while it records."""
+        address, cycle = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
+        if not self._lib.avr_board_watchdog_reset(self._running, address, cycle):
+            return None
+        return WatchdogReset(int(address[0]), int(cycle[0]))
 
     def close(self) -> None:
         """Frees the board."""
@@ -75,4 +174,4 @@ def create(elf: Path) -> AvrBoard:
         image = elf.read_bytes()
     except OSError as error:
         raise BoardError(f"the firmware image {elf} cannot be read: {error.strerror}") from error
-    return AvrBoard(image, str(elf))
+    return AvrBoard(image, elf)

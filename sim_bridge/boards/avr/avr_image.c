@@ -32,6 +32,7 @@ static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, u
   if (address < AVR_BOARD_FLASH_SIZE) {
     if (size > AVR_BOARD_FLASH_SIZE - address) return false;
     memcpy(b->avr->flash + address, bytes, size);
+    if (address + size > b->image_end) b->image_end = address + size;
   } else if (address >= EEPROM_BASE && address < EEPROM_BASE + BOARD_EEPROM_SIZE) {
     if (size > EEPROM_BASE + BOARD_EEPROM_SIZE - address) return false;
     memcpy(b->eeprom.cells + (address - EEPROM_BASE), bytes, size);

@@ -4,7 +4,7 @@
  * here: run loop and interrupts (avr_run.c), registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
  * avr_timer_count.c), USART
  * (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c),
- * program image (avr_image.c).
+ * program image (avr_image.c), recorder (avr_spans.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
@@ -26,6 +26,7 @@
 #include "sim_megax8.h"
 
 #define NEVER UINT64_MAX
+#define NO_ADDRESS UINT32_MAX
 
 /* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
  * (13.2.1, 17.3). */
@@ -342,6 +343,9 @@ typedef struct avr_board {
   uint8_t reset_wanted; /* bits 1 << board_reset_cause */
   bool crashed;
   char fault[160];
+  uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
+  uint32_t image_end;            /* behind the last byte of flash that the image fills */
+  struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
   flag_register flag_registers[FLAG_REGISTERS];
   uint8_t flag_register_count;
@@ -360,6 +364,8 @@ typedef struct avr_board {
 
 /* avr_run.c */
 board_state run_until(avr_board *b, uint64_t until);
+/* The core has stopped, or sleeps, before the instruction at `pc`; false: it cannot go on. */
+bool core_stopped(avr_board *b, uint32_t pc);
 void restart(avr_board *b);   /* for the causes in `reset_wanted` */
 void hear_core(avr_board *b); /* what simavr's core tells, from each of its resets on */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
@@ -368,6 +374,8 @@ void clear_flag(avr_board *b, uint8_t vector);
 void enable_interrupt(avr_board *b, uint8_t vector, bool enabled);
 void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled` */
 void want_reset(avr_board *b, board_reset_cause cause);
+/* The board stops; `address` is that of the instruction to blame, the rest says what it did, without place and time. */
+void crash_at(avr_board *b, uint32_t address, const char *format, ...) __attribute__((format(printf, 3, 4)));
 /* The program asks for a thing that is not built: the board stops, and says so. */
 void refuse(avr_board *b, const char *what);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
@@ -438,6 +446,15 @@ void watchdog_acknowledged(avr_board *b);
 void eeprom_init(avr_board *b);
 void eeprom_reset(avr_board *b, bool power_failed);
 void eeprom_due(avr_board *b);
+
+/* avr_spans.c; all but spans_free only while there is a recorder */
+void spans_step(avr_board *b, uint32_t address);                 /* the instruction at `address` has run */
+void spans_accept(avr_board *b, uint8_t vector, uint64_t begin); /* an interrupt begins, its flag is still raised */
+void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle);
+void spans_request_gone(avr_board *b, uint8_t vector);
+void spans_woke(avr_board *b);
+void spans_restart(avr_board *b, bool by_watchdog);
+void spans_free(avr_board *b);
 
 /* avr_image.c */
 bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size);

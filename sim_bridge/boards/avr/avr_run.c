@@ -110,13 +110,19 @@ void interrupts_changed(avr_board *b) {
 
 void raise_flag(avr_board *b, uint8_t vector) {
   b->raised |= FLAG(vector);
+  if (b->recorder) spans_requested(b, vector, b->clock);
   interrupts_changed(b);
 }
 
-void clear_flag(avr_board *b, uint8_t vector) { b->raised &= ~FLAG(vector); }
+void clear_flag(avr_board *b, uint8_t vector) {
+  b->raised &= ~FLAG(vector);
+  if (b->recorder) spans_request_gone(b, vector);
+}
 
 void enable_interrupt(avr_board *b, uint8_t vector, bool enabled) {
+  uint32_t before = b->enabled;
   b->enabled = enabled ? b->enabled | FLAG(vector) : b->enabled & ~FLAG(vector);
+  if (b->recorder && b->enabled != before) spans_requested(b, vector, b->clock + 1); /* from the write's end on */
   interrupts_changed(b);
 }
 
@@ -139,6 +145,7 @@ static bool enter_interrupt(avr_board *b) {
   if (!pending && !avr_has_pending_interrupts(avr)) return false;
   if (pending) {
     uint8_t vector = (uint8_t)__builtin_ctz(pending);
+    if (b->recorder) spans_accept(b, vector, avr->cycle + (b->sleeping ? WAKE_UP_CYCLES : 0));
     acknowledge(b, vector);
     _avr_push_addr(avr, avr->pc);
     avr_sreg_set(avr, S_I, 0);
@@ -149,7 +156,10 @@ static bool enter_interrupt(avr_board *b) {
     if (avr->sreg[S_I]) return false; /* it was masked meanwhile */
   }
   avr->cycle += INTERRUPT_CYCLES + (b->sleeping ? WAKE_UP_CYCLES : 0);
-  b->sleeping = false;
+  if (b->sleeping) {
+    b->sleeping = false;
+    if (b->recorder) spans_woke(b);
+  }
   b->counters.executed_cycles += INTERRUPT_CYCLES;
   b->counters.interrupts++;
   return true;
@@ -165,24 +175,32 @@ static void on_reti(struct avr_irq_t *irq, uint32_t value, void *param) {
 
 /* ---- faults ---- */
 
-static void crash(avr_board *b, const char *format, ...) {
+void crash_at(avr_board *b, uint32_t address, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  vsnprintf(b->fault, sizeof b->fault, format, arguments);
+  int used = vsnprintf(b->fault, sizeof b->fault, format, arguments);
   va_end(arguments);
+  if (used < 0 || (size_t)used >= sizeof b->fault) used = (int)sizeof b->fault - 1;
+  size_t room = sizeof b->fault - (size_t)used;
+  if (address == NO_ADDRESS) {
+    snprintf(b->fault + used, room, " in cycle %llu", (unsigned long long)b->avr->cycle);
+  } else {
+    snprintf(b->fault + used, room, " at address 0x%04X in cycle %llu", (unsigned)address,
+             (unsigned long long)b->avr->cycle);
+  }
+  b->fault_address = address;
   b->crashed = true;
 }
 
 void refuse(avr_board *b, const char *what) {
-  crash(b, "the program uses %s, which is not built, in cycle %llu", what, (unsigned long long)b->avr->cycle);
+  crash_at(b, (uint32_t)b->avr->pc, "the program uses %s, which is not built,", what);
   stop_core(b);
 }
 
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
   avr_board *b = param;
   (void)irq;
-  crash(b, "the program reached the invalid instruction 0x%04X at address 0x%04X in cycle %llu", (unsigned)opcode,
-        (unsigned)b->avr->pc, (unsigned long long)b->avr->cycle);
+  crash_at(b, (uint32_t)b->avr->pc, "the program reached the invalid instruction 0x%04X", (unsigned)opcode);
   b->avr->state = cpu_Crashed;
 }
 
@@ -224,6 +242,7 @@ void restart(avr_board *b) {
   b->counters.resets++;
   b->crashed = false;
   b->sleeping = false;
+  if (b->recorder) spans_restart(b, causes & (1u << BOARD_RESET_WATCHDOG));
   b->raised = 0;
   b->enabled = 0;
   b->timer_base[0] = b->timer_base[1] = cycle;
@@ -247,25 +266,37 @@ static uint64_t next_of_simavr(const avr_t *avr) {
   return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER;
 }
 
-static void execute(avr_board *b, uint64_t until) {
+bool core_stopped(avr_board *b, uint32_t pc) {
   avr_t *avr = b->avr;
-  uint64_t start = avr->cycle;
-  if (avr->interrupt_state < 0) {
-    avr->interrupt_state = 0;
-    avr->run_cycle_count = 1; /* one instruction */
-  } else {
-    avr->run_cycle_count = until - start;
-  }
-  avr_flashaddr_t pc = avr_run_one(avr);
-  b->counters.executed_cycles += avr->cycle - start;
   if (avr->state == cpu_Sleeping) {
     b->sleeping = avr->data[REG_SMCR] & SLEEP_ENABLED;
     avr->state = cpu_Running;
   } else if (avr->state != cpu_Running) {
-    if (!b->crashed) crash(b, "the program ran off the end of the flash in cycle %llu", (unsigned long long)avr->cycle);
-    return;
+    if (!b->crashed) crash_at(b, NO_ADDRESS, "the program ran off the end of the flash");
+    return false;
   }
   avr->pc = pc;
+  return true;
+}
+
+static void execute(avr_board *b, uint64_t until) {
+  avr_t *avr = b->avr;
+  uint64_t start = avr->cycle;
+  bool alone = avr->interrupt_state < 0; /* one instruction, whatever is pending */
+  if (alone) {
+    avr->interrupt_state = 0;
+    until = start + 1;
+  }
+  if (avr->pc >= b->image_end) {
+    crash_at(b, NO_ADDRESS, "the program ran off the end of its image: it is at 0x%04X, the image ends at 0x%04X",
+             (unsigned)avr->pc, (unsigned)b->image_end);
+  } else if (b->recorder) {
+    run_recorded(b, until);
+  } else {
+    avr->run_cycle_count = until - start;
+    core_stopped(b, (uint32_t)avr_run_one(avr));
+    b->counters.executed_cycles += avr->cycle - start;
+  }
 }
 
 board_state run_until(avr_board *b, uint64_t until) {

@@ -59,10 +59,27 @@ DECLARATIONS = """
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 void avr_board_destroy(board *self);
 uint8_t *avr_board_data(board *self);
+typedef struct { uint64_t begin, executed; uint32_t gross, net, latency; uint16_t id, depth; ...; } avr_span;
+typedef struct {
+  const uint32_t *entries;
+  size_t entry_count;
+  uint32_t code_end, lowest_stack;
+  uint64_t patience;
+  ...;
+} avr_watch;
+#define AVR_FUNCTION_IDS ...
+#define AVR_FUNCTIONS_MAXIMUM ...
+bool avr_board_record(board *self, const avr_watch *watch);
+void avr_board_stop_recording(board *self);
+const avr_span *avr_board_spans(const board *self, size_t *count);
+void avr_board_forget_spans(board *self);
+uint16_t avr_board_lowest_stack(const board *self);
+bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle);
 """
 
 PREAMBLE = """
 #include "avr_board.h"
+#include "avr_spans.h"
 #include "../board_access.h"
 
 static void avr_board_destroy(board *self) { self->op->destroy(self); }

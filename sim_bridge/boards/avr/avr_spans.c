@@ -1,0 +1,275 @@
+/* avr_spans.c: see avr_spans.h.
+ *
+ * What runs lies on a stack of open spans. A span has ended when the stack pointer is above its value at the span's
+ * beginning: RET and RETI take the return address off in one instruction, whatever jumped where before. A program sets
+ * the stack pointer by two OUTs, upper half first (avr-libc, gcc); between them it means nothing.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include "avr_spans.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "avr_board.h"
+#include "avr_parts.h"
+#include "sim_core.h"
+
+#define OPEN_MAXIMUM 64u
+#define NOT_CODE 0xFFu
+#define FLASH_WORDS (AVR_BOARD_FLASH_SIZE / 2u)
+#define OUT_MASK 0xFE0Fu /* OUT A, Rr: 1011 1AAr rrrr AAAA */
+#define OUT_SPH 0xBE0Eu
+#define HALF_WRITTEN_STEPS 3u /* out SPH; out SREG; out SPL */
+
+typedef struct {
+  avr_span span;
+  uint64_t interrupted; /* cycles of interrupts that came in between */
+  uint16_t stack;       /* pointer at its beginning, below the return address */
+} open_span;
+
+typedef struct avr_recorder {
+  uint8_t watched[FLASH_WORDS]; /* by address: 1 + index of the function that begins there, or NOT_CODE */
+  avr_watch watch;
+  avr_span *spans;
+  size_t count, capacity;
+  open_span open[OPEN_MAXIMUM];
+  unsigned open_count;
+  uint64_t request[VECTOR_TWI + 1], next_request[VECTOR_TWI + 1]; /* since when each interrupt is wanted, or NEVER */
+  uint16_t stack, lowest_stack;
+  uint8_t half_written; /* steps for which the stack pointer may be half of an old and half of a new one */
+  uint64_t hangs_at;    /* unless it sleeps before */
+  bool was_reset;       /* by the watchdog */
+  uint32_t reset_address;
+  uint64_t reset_cycle;
+} avr_recorder;
+
+/* ---- spans ---- */
+
+static void keep(avr_recorder *r, const avr_span *span) {
+  if (r->count == r->capacity) {
+    size_t capacity = r->capacity ? 2 * r->capacity : 4096;
+    avr_span *spans = realloc(r->spans, capacity * sizeof *spans);
+    if (!spans) abort(); /* a record with a gap would lie */
+    r->spans = spans;
+    r->capacity = capacity;
+  }
+  r->spans[r->count++] = *span;
+}
+
+static void open_one(avr_board *b, uint16_t id, uint64_t begin, uint32_t latency, uint16_t stack) {
+  avr_recorder *r = b->recorder;
+  if (r->open_count == OPEN_MAXIMUM) {
+    crash_at(b, (uint32_t)b->avr->pc, "more than %u functions and interrupts run in each other", OPEN_MAXIMUM);
+    return;
+  }
+  avr_span span = {.begin = begin, .executed = b->counters.executed_cycles, .latency = latency, .id = id};
+  span.depth = (uint16_t)r->open_count;
+  r->open[r->open_count++] = (open_span){span, 0, stack};
+}
+
+static void close_one(avr_board *b) {
+  avr_recorder *r = b->recorder;
+  open_span *ended = &r->open[--r->open_count];
+  uint64_t gross = b->avr->cycle - ended->span.begin;
+  ended->span.gross = (uint32_t)gross;
+  ended->span.net = (uint32_t)(gross - ended->interrupted);
+  keep(r, &ended->span);
+  if (ended->span.id >= AVR_FUNCTION_IDS) return;
+  /* An interrupt below takes it off itself, and hands on what it takes in all. */
+  for (unsigned i = r->open_count; i-- > 0;) {
+    r->open[i].interrupted += gross;
+    if (r->open[i].span.id < AVR_FUNCTION_IDS) break;
+  }
+}
+
+/* ---- requests of interrupts ---- */
+
+void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle) {
+  avr_recorder *r = b->recorder;
+  if (!(b->raised & b->enabled & FLAG(vector))) {
+    r->request[vector] = NEVER;
+  } else if (r->request[vector] == NEVER) {
+    r->request[vector] = cycle;
+  } else if (r->next_request[vector] == NEVER) {
+    r->next_request[vector] = cycle;
+  }
+}
+
+void spans_request_gone(avr_board *b, uint8_t vector) {
+  b->recorder->request[vector] = b->recorder->next_request[vector] = NEVER;
+}
+
+void spans_accept(avr_board *b, uint8_t vector, uint64_t begin) {
+  avr_recorder *r = b->recorder;
+  uint64_t request = r->request[vector];
+  r->request[vector] = r->next_request[vector]; /* of one whose flag stays: what it was raised for again */
+  r->next_request[vector] = NEVER;
+  r->stack = (uint16_t)(_avr_sp_get(b->avr) - 2u);
+  if (r->stack < r->lowest_stack) r->lowest_stack = r->stack;
+  open_one(b, vector, begin, request < begin ? (uint32_t)(begin - request) : 0, r->stack);
+}
+
+/* ---- what goes wrong ---- */
+
+static void check_stack(avr_board *b, uint32_t address) {
+  const avr_recorder *r = b->recorder;
+  if (r->stack + 1u < r->watch.lowest_stack) {
+    crash_at(b, address, "the stack overflows: it reaches 0x%04X, variables end below 0x%04X", r->stack + 1u,
+             (unsigned)r->watch.lowest_stack);
+  } else if (r->stack >= BOARD_DATA_SIZE) {
+    crash_at(b, address, "the stack pointer leaves the memory: 0x%04X", r->stack);
+  }
+}
+
+static void crash_by_jump(avr_board *b, uint32_t address) {
+  uint32_t pc = (uint32_t)b->avr->pc;
+  if (pc == 0) {
+    crash_at(b, address, "the program jumps to its start without a reset");
+  } else {
+    crash_at(b, address, "the program goes to 0x%04X, but ends at 0x%04X", (unsigned)pc,
+             (unsigned)b->recorder->watch.code_end);
+  }
+}
+
+/* ---- steps ---- */
+
+static bool stack_is_whole(avr_board *b, uint32_t address) {
+  avr_recorder *r = b->recorder;
+  const uint8_t *flash = b->avr->flash;
+  unsigned opcode = flash[address] | (unsigned)flash[address + 1] << 8;
+  if ((opcode & OUT_MASK) == OUT_SPH) r->half_written = HALF_WRITTEN_STEPS;
+  if (r->half_written) r->half_written--;
+  return r->half_written == 0;
+}
+
+static void stack_moved(avr_board *b, uint32_t address) {
+  avr_recorder *r = b->recorder;
+  if (!stack_is_whole(b, address)) return;
+  r->stack = _avr_sp_get(b->avr);
+  if (r->stack < r->lowest_stack) r->lowest_stack = r->stack;
+  while (r->open_count && r->stack > r->open[r->open_count - 1].stack) close_one(b);
+  check_stack(b, address);
+}
+
+static void reached(avr_board *b, uint32_t address) {
+  avr_recorder *r = b->recorder;
+  uint32_t pc = (uint32_t)b->avr->pc;
+  uint8_t found = pc < AVR_BOARD_FLASH_SIZE ? r->watched[pc / 2] : NOT_CODE;
+  if (found == NOT_CODE) {
+    crash_by_jump(b, address);
+    return;
+  }
+  uint16_t id = (uint16_t)(AVR_FUNCTION_IDS + found - 1u), stack = _avr_sp_get(b->avr);
+  const open_span *top = r->open_count ? &r->open[r->open_count - 1] : NULL;
+  if (top && top->span.id == id && top->stack == stack) return; /* a loop that goes back to its first instruction */
+  open_one(b, id, b->avr->cycle, 0, stack);
+}
+
+void run_recorded(avr_board *b, uint64_t until) {
+  avr_t *avr = b->avr;
+  avr_recorder *r = b->recorder;
+  uint64_t counted = avr->cycle;
+  bool goes_on = true;
+  if (until > r->hangs_at) until = r->hangs_at;
+  do {
+    uint32_t address = (uint32_t)avr->pc;
+    avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
+    avr->pc = avr_run_one(avr);
+    b->counters.executed_cycles += avr->cycle - counted;
+    counted = avr->cycle;
+    if (avr->state != cpu_Running) goes_on = core_stopped(b, (uint32_t)avr->pc) && !b->sleeping;
+    if (b->crashed) return;
+    if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
+    if (avr->pc >= AVR_BOARD_FLASH_SIZE || r->watched[avr->pc / 2]) reached(b, address);
+  } while (goes_on && avr->run_cycle_count && !avr->interrupt_state && avr->cycle < until && avr->cycle < b->next_due &&
+           !b->crashed);
+  if (b->sleeping) {
+    r->hangs_at = NEVER;
+  } else if (avr->cycle >= r->hangs_at && !b->crashed) {
+    crash_at(b, (uint32_t)avr->pc, "the program hangs: it has not slept for %llu cycles",
+             (unsigned long long)r->watch.patience);
+  }
+}
+
+static void begin_patience(avr_board *b) {
+  avr_recorder *r = b->recorder;
+  r->hangs_at = r->watch.patience && !b->sleeping ? b->avr->cycle + r->watch.patience : NEVER;
+}
+
+void spans_woke(avr_board *b) { begin_patience(b); }
+
+void spans_restart(avr_board *b, bool by_watchdog) {
+  avr_recorder *r = b->recorder;
+  if (by_watchdog && !r->was_reset) {
+    r->was_reset = true;
+    r->reset_address = (uint32_t)b->avr->pc;
+    r->reset_cycle = b->avr->cycle;
+  }
+  r->open_count = 0; /* cut short: no spans */
+  r->stack = (uint16_t)(BOARD_DATA_SIZE - 1u);
+  r->half_written = 0;
+  begin_patience(b);
+  for (size_t i = 0; i <= VECTOR_TWI; i++) r->request[i] = r->next_request[i] = NEVER;
+}
+
+/* ---- from outside ---- */
+
+void spans_free(avr_board *b) {
+  if (b->recorder) free(b->recorder->spans);
+  free(b->recorder);
+  b->recorder = NULL;
+}
+
+bool avr_board_record(board *self, const avr_watch *watch) {
+  avr_board *b = (avr_board *)self;
+  if (watch->entry_count > AVR_FUNCTIONS_MAXIMUM) return false;
+  avr_recorder *r = calloc(1, sizeof *r);
+  if (!r) return false;
+  for (size_t i = 0; i < watch->entry_count; i++) {
+    if (watch->entries[i] >= AVR_BOARD_FLASH_SIZE || watch->entries[i] % 2) {
+      free(r);
+      return false;
+    }
+    r->watched[watch->entries[i] / 2] = (uint8_t)(i + 1);
+  }
+  r->watched[0] = NOT_CODE; /* nobody jumps to the reset vector */
+  for (uint32_t address = watch->code_end; address < AVR_BOARD_FLASH_SIZE; address += 2) {
+    r->watched[address / 2] = NOT_CODE;
+  }
+  r->watch = *watch;
+  r->watch.entries = NULL; /* the caller's */
+  r->lowest_stack = _avr_sp_get(b->avr);
+  spans_free(b);
+  b->recorder = r;
+  spans_restart(b, false);
+  r->stack = r->lowest_stack;
+  for (uint8_t vector = 1; vector <= VECTOR_TWI; vector++) spans_requested(b, vector, b->avr->cycle);
+  return true;
+}
+
+void avr_board_stop_recording(board *self) { spans_free((avr_board *)self); }
+
+const avr_span *avr_board_spans(const board *self, size_t *count) {
+  const avr_recorder *r = ((const avr_board *)self)->recorder;
+  *count = r ? r->count : 0;
+  return r ? r->spans : NULL;
+}
+
+void avr_board_forget_spans(board *self) {
+  avr_recorder *r = ((avr_board *)self)->recorder;
+  if (r) r->count = 0;
+}
+
+uint16_t avr_board_lowest_stack(const board *self) {
+  const avr_recorder *r = ((const avr_board *)self)->recorder;
+  return r ? r->lowest_stack : 0;
+}
+
+bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle) {
+  const avr_recorder *r = ((const avr_board *)self)->recorder;
+  if (!r || !r->was_reset) return false;
+  *address = r->reset_address;
+  *cycle = r->reset_cycle;
+  return true;
+}

@@ -1,0 +1,54 @@
+/* avr_spans.h: a recorder of what an untouched program does in time: the span of every interrupt and of chosen
+ * functions, the depth of its stack, and where it goes wrong. Off until `avr_board_record`, and then free.
+ *
+ * While it records, the core stops after every instruction; cycles, edges and bytes are the same as without it. An
+ * interrupt's span begins with the first of its four entry cycles, a function's with its first instruction; each ends
+ * with the instruction that takes the return address off the stack.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#ifndef AVR_SPANS_H
+#define AVR_SPANS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "../board.h"
+
+#define AVR_FUNCTION_IDS 64u /* id of the first watched function; below are vectors */
+#define AVR_FUNCTIONS_MAXIMUM 128u
+
+typedef struct {
+  uint64_t begin;    /* cycle */
+  uint64_t executed; /* cycles in which the CPU had executed something, before it */
+  uint32_t gross;    /* cycles */
+  uint32_t net;      /* the same without interrupts that came in between */
+  uint32_t latency;  /* of an interrupt: cycles from its request to `begin` */
+  uint16_t id;       /* vector, or AVR_FUNCTION_IDS + index of the function */
+  uint16_t depth;    /* spans that it came into */
+} avr_span;
+
+typedef struct {
+  const uint32_t *entries; /* byte addresses of functions */
+  size_t entry_count;
+  uint32_t code_end;     /* no instruction stands from here on; byte address */
+  uint32_t lowest_stack; /* lowest address in data memory that the stack may write */
+  uint64_t patience;     /* cycles without sleep after which the program hangs; 0: any number */
+} avr_watch;
+
+/* Begins to record, anew if it did already. False: no memory, or an entry that is no address of flash. */
+bool avr_board_record(board *self, const avr_watch *watch);
+void avr_board_stop_recording(board *self);
+
+/* Spans that have ended, in the order of their ends; valid until the board runs on. */
+const avr_span *avr_board_spans(const board *self, size_t *count);
+void avr_board_forget_spans(board *self);
+
+/* Lowest value of the stack pointer while it records. */
+uint16_t avr_board_lowest_stack(const board *self);
+
+/* Where the watchdog first reset the board while it records: address of the next instruction and cycle; false: never. */
+bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle);
+
+#endif

@@ -1,0 +1,36 @@
+"""Where an address of a program is, for people: its function and source line, out of the image's ELF file."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from pathlib import Path
+
+from boebot.errors import TimingError
+from boebot.timing.elf import Image, read_image
+
+
+def place(image: Image, address: int) -> str:
+    """The function that an address lies in and the line that it came from, as far as the image says:
+    `in safety_task (safety.c:57)`; empty where it says neither."""
+    functions = sorted(
+        (symbol.address, -symbol.size, symbol.strength, symbol.name)
+        for symbol in image.symbols
+        if symbol.kind == "STT_FUNC" or (symbol.kind == "STT_NOTYPE" and not symbol.name.startswith((".", "L")))
+    )
+    at = bisect_right(functions, (address, 1, 0, "")) - 1
+    within = [name for start, size, _, name in functions[: at + 1] if start <= address < start - size]
+    if not within and at >= 0 and functions[at][1] == 0:  # a label of a program in assembler
+        within = [functions[at][3]]
+    line = image.lines.get(address & ~1)
+    parts = [f"in {within[-1]}" if within else "", f"({line})" if line else ""]
+    return " ".join(part for part in parts if part)
+
+
+def with_place(fault: str, elf: Path | None, address: int) -> str:
+    """What went wrong, with the place of that address behind it, by the image's file; without where there is none."""
+    if elf is None or address < 0:
+        return fault
+    try:
+        return f"{fault} {place(read_image(elf), address)}".rstrip()
+    except TimingError:
+        return fault

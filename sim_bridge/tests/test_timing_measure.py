@@ -1,0 +1,175 @@
+"""An untouched image measured in the emulator: what a seed stands for, maxima seen again, faults with their place."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boebot.errors import BoardError
+from boebot.timing.measured import as_json, merged, statistics
+from sim_bridge.boards import avr
+from sim_bridge.boards.avr import Watch
+from sim_bridge.boards.emulated import avr_image
+from sim_bridge.timing.loads import TICK_CYCLES
+from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
+from sim_bridge.timing.scenarios import RANGES, STATES, Numbers, numbers_of, seed_of
+
+IMAGE = avr_image("shieldbot")
+SECONDS = 0.4
+
+
+@pytest.fixture(scope="module")
+def figures() -> Run:
+    return run(IMAGE, robot_of(IMAGE), "figures", SECONDS, 1)
+
+
+def test_a_seed_stands_for_numbers_and_numbers_for_a_seed() -> None:
+    draw = random.Random(1)
+    for seed in [*range(20), *(draw.randrange(STATES) for _ in range(200))]:
+        numbers = numbers_of(seed)
+        assert all(0 <= getattr(numbers, name) < size for name, size in RANGES.items())
+        assert seed_of(numbers) == seed
+    assert numbers_of(seed_of(Numbers(1, 2, 3, 4, 5, 6, 7))) == Numbers(1, 2, 3, 4, 5, 6, 7)
+    assert len({numbers_of(seed).line for seed in range(1, 20)}) > 15  # neighbours differ
+
+
+def test_an_image_says_for_which_robot_it_is() -> None:
+    assert robot_of(IMAGE).name == "shieldbot"
+
+
+def test_every_task_runs_as_often_as_its_period_says(figures: Run) -> None:
+    tasks = figures.measurement().tasks
+    whole = figures.spans[figures.spans["id"] == 12]  # slots
+    for name, period in {"whisker": 1, "safety": 1, "telemetry": 4, "session": 4, "turret": 8}.items():
+        assert abs(len(tasks[name].net) - len(whole) / period) <= 1
+
+
+def test_net_and_gross_differ_by_the_interrupts_in_between(figures: Run) -> None:
+    """Computed here from begin and end of each span, by nothing else."""
+    spans = figures.spans
+    interrupts = spans[spans["id"] < 64]
+    begin, gross = interrupts["begin"].astype(np.int64), interrupts["gross"].astype(np.int64)
+    checked = 0
+    for span in spans[(spans["id"] >= 64) & (spans["net"] != spans["gross"])][:300]:
+        within = (begin >= span["begin"]) & (begin < span["begin"] + span["gross"])
+        outermost = within & (interrupts["depth"] == span["depth"] + 1)
+        assert span["gross"] - span["net"] == gross[outermost].sum()
+        checked += 1
+    assert checked > 100
+
+
+def test_load_and_ticks_are_those_of_the_emulators_own_count(figures: Run) -> None:
+    result = figures.measurement()
+    assert result.load == figures.executed / figures.cycles
+    assert result.load * TICK_CYCLES <= result.busiest_tick <= TICK_CYCLES
+    assert 0 < result.worst_tick <= result.busiest_tick
+    assert 0x100 < result.lowest_stack < 0x8FF
+
+
+def test_a_maximum_is_seen_again(figures: Run) -> None:
+    result = figures.measurement()
+    for name in ("telemetry", next(iter(result.interrupts))):
+        spans = result.row(name)
+        again = span_at(IMAGE, robot_of(IMAGE), name, spans.worst, SECONDS)
+        assert again["begin"] == spans.worst.cycle
+        assert again["net"] == spans.largest
+
+
+def test_nothing_is_lost_in_the_figures(figures: Run) -> None:
+    assert set(figures.lost.values()) == {0}
+
+
+def test_a_saturated_line_is_full_and_nothing_is_lost() -> None:
+    saturated = run(IMAGE, robot_of(IMAGE), "saturated", 0.2, 1)
+    received = len(saturated.spans[(saturated.spans["id"] == 18) & (saturated.spans["begin"] > saturated.loaded_from)])
+    assert received > 0.2 * 50_000 * 0.9  # the first tick is a phase
+    assert set(saturated.lost.values()) == {0}
+
+
+def test_a_search_finds_no_less_than_its_first_run_and_is_repeatable() -> None:
+    robot = robot_of(IMAGE)
+    told: list[float] = []
+    found = search(IMAGE, robot, "figures", seconds=0.05, runs=3, seed=3, progress=told.append)
+    first = measure(IMAGE, robot, "figures", 0.05, 3)
+    assert told == [1 / 3, 2 / 3, 1.0]
+    assert all(found.row(name).largest >= spans.largest for name, spans in first.tasks.items())
+    again = search(IMAGE, robot, "figures", seconds=0.05, runs=3, seed=3)
+    assert as_json(found) == as_json(again)
+
+
+def test_runs_together() -> None:
+    robot = robot_of(IMAGE)
+    one, two = (measure(IMAGE, robot, "figures", 0.05, seed) for seed in (1, 2))
+    both = merged([one, two])
+    assert both.seconds == one.seconds + two.seconds
+    assert both.load == pytest.approx((one.load + two.load) / 2, rel=1e-3)
+    assert both.tasks["safety"].largest == max(one.tasks["safety"].largest, two.tasks["safety"].largest)
+    with pytest.raises(ValueError, match="expected one at least"):
+        merged([])
+
+
+def test_statistics() -> None:
+    assert statistics(np.arange(1, 101, dtype=np.uint32)) == {
+        "count": 100,
+        "min": 1,
+        "mean": 50.5,
+        "p99": 99,
+        "max": 100,
+    }
+    assert statistics(np.empty(0, dtype=np.uint32)) == {"count": 0}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "seconds", "message"),
+    [
+        ("figure", 1.0, "expected one of figures"),
+        ("noise", 0.0, "expected more than 0 s"),
+        ("everything", 0.1, "0.35 s"),
+    ],
+)
+def test_what_cannot_be_run_is_refused(scenario: str, seconds: float, message: str) -> None:
+    with pytest.raises(BoardError, match=message):
+        run(IMAGE, robot_of(IMAGE), scenario, seconds, 1)
+
+
+FAULTY = """#include <avr/io.h>
+__attribute__((noinline)) void deeper(uint8_t n) {
+  volatile uint8_t room[40];
+  room[n % 40] = n;
+  deeper(n + 1); room[0]++;  /* line 5 */
+}
+__attribute__((noinline)) void invalid(void) {
+  __asm__ volatile(".word 1");  /* line 8 */
+}
+__attribute__((noinline)) void wild(void) {
+  ((void (*)(void))0x3000)();  /* line 11 */
+}
+__attribute__((noinline)) void stuck(void) {
+  for (;;) { PINB = 1; }  /* line 14 */
+}
+int main(void) { FAULT; }
+"""
+
+
+@pytest.mark.parametrize(
+    ("fault", "what", "place"),
+    [
+        ("deeper(0)", "stack overflows", r"in deeper \(faulty.c:[25]\)"),
+        ("invalid()", "invalid instruction 0x0001", r"in invalid \(faulty.c:8\)"),
+        ("wild()", "goes to 0x6000", r"in wild \(faulty.c:11\)"),
+        ("stuck()", "hangs", r"in stuck \(faulty.c:14\)"),
+    ],
+)
+def test_a_fault_has_address_function_and_line(tmp_path: Path, fault: str, what: str, place: str) -> None:
+    source, image = tmp_path / "faulty.c", tmp_path / "faulty.elf"
+    source.write_text(FAULTY.replace("FAULT", fault), encoding="ascii")
+    command = ["avr-gcc", "-mmcu=atmega328p", "-Og", "-g", "-fno-optimize-sibling-calls", "-o", str(image), str(source)]
+    subprocess.run(command, check=True)
+    board = avr.create(image)
+    board.record(Watch(code_end=0x1000, lowest_stack=0x300, patience=50_000))
+    with pytest.raises(BoardError, match=rf"{what}.* at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"):
+        board.access().run(1_000_000)

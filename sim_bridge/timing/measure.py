@@ -1,0 +1,198 @@
+"""Measures an image in the emulator, the image untouched: runs scenarios, searches for the inputs that make each task
+longest, and shows a maximum again.
+
+A run is a function of image, scenario, seed and length. What goes wrong in it is an error that names the place.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from boebot import robots
+from boebot.errors import BoardError
+from boebot.link import messages
+from boebot.robots import RobotDescription
+from boebot.timing.elf import read_image
+from boebot.timing.measured import Measurement, Worst, merged
+from sim_bridge.boards import avr
+from sim_bridge.boards.avr import FUNCTION_IDS
+from sim_bridge.boards.code_places import place
+from sim_bridge.timing.line import Line
+from sim_bridge.timing.loads import Bench
+from sim_bridge.timing.scenarios import RANGES, SILENCE, STATES, load, numbers_of, prepare, seed_of
+from sim_bridge.timing.watched import Circumstances, Watched, measurement, watched
+from sim_bridge.timing.world_access import WorldAccess
+
+SCENARIOS = ("figures", "saturated", "noise", "everything")
+CLOCK_HZ = 16_000_000
+RESTART = 0.3  # share of the search's runs that begin anew
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What was recorded from power-on to the end: all spans (dtype SPAN), and the same without the preparations."""
+
+    what: Watched
+    under: Circumstances
+    spans: NDArray[Any]
+    cycles: int
+    executed: int
+    lowest_stack: int
+    loaded_from: int  # cycle at which the load began
+    lost: dict[str, int]  # what the emulator counted that should not be: overruns, framing errors
+
+    def measurement(self) -> Measurement:
+        """Spans and stack of all of it, load and ticks of what came after the preparations."""
+        return measurement(
+            self.what,
+            self.spans,
+            self.under,
+            since=self.loaded_from,
+            cycles=self.cycles,
+            executed=self.executed,
+            lowest_stack=self.lowest_stack,
+        )
+
+
+def robot_of(image: Path) -> RobotDescription:
+    """The robot that an image was built for, as it says itself.
+
+    Raises:
+        BoardError: it does not run, or says nothing.
+        RobotError: there is no such robot.
+    """
+    with Bench(image) as bench:
+        hello = Line(bench).wait(messages.Hello, 0)
+    return robots.load_robot(hello.robot.rstrip(b"\0").decode("ascii", "replace"))
+
+
+def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int) -> Run:
+    """One run of a scenario for that long, of the board's time, after its preparations.
+
+    Raises:
+        BoardError: there is no such scenario or length; the program crashed, hung or was reset by the watchdog, or its
+            stack overflowed: the error names cycle, address, function and line.
+        TimingError: the image is no ELF file of a program.
+    """
+    if scenario not in SCENARIOS:
+        raise BoardError(f"there is no scenario {scenario!r}; expected one of {', '.join(SCENARIOS)}")
+    least = SILENCE / CLOCK_HZ if scenario == "everything" else 0.0
+    if not least < seconds <= 3600:
+        raise BoardError(f"scenario {scenario} for {seconds:g} s; expected more than {least:g} s and at most 3600 s")
+    said = read_image(image)
+    what = watched(said)
+    board = avr.create(image)
+    board.record(what.watch)
+    under = Circumstances(scenario, seed)
+    access = WorldAccess(board, image, robot, seed=1) if scenario == "everything" else board.access()
+    with Bench(image, access) as bench:
+        line = prepare(bench, robot, scenario)
+        loaded_from, before = bench.now, bench.access.counters()
+        load(bench, line, robot, scenario, numbers_of(seed), round(seconds * CLOCK_HZ))
+        bench.run(round(seconds * CLOCK_HZ))
+        after = bench.access.counters()
+        if (reset := board.watchdog_reset) is not None:
+            where = place(said, reset.address)
+            raise BoardError(
+                f"{image.name}, {under.scenario}, seed {seed}: the watchdog reset the program at address "
+                f"0x{reset.address:04X} in cycle {reset.cycle} {where}".rstrip()
+            )
+        return Run(
+            what=what,
+            under=under,
+            spans=board.spans(),
+            cycles=bench.now - loaded_from,
+            executed=after["executed_cycles"] - before["executed_cycles"],
+            lowest_stack=board.lowest_stack,
+            loaded_from=loaded_from,
+            lost={name: after[name] - before[name] for name in ("overruns", "framing_errors")},
+        )
+
+
+def measure(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int = 1) -> Measurement:
+    """What one run of a scenario amounts to; see `run`."""
+    return run(image, robot, scenario, seconds, seed).measurement()
+
+
+def span_at(image: Path, robot: RobotDescription, name: str, worst: Worst, seconds: float) -> dict[str, int]:
+    """Sees a maximum again: the span of task or interrupt `name` that begins at that cycle, as its record says it.
+
+    `seconds`: how long the run took in which it was found, at least.
+
+    Raises:
+        BoardError: there is none; and see `run`.
+    """
+    again = run(image, robot, worst.scenario, seconds, worst.seed)
+    ids = {name: FUNCTION_IDS + i for i, name in enumerate(again.what.names)}
+    ids.update({name: vector for vector, name in again.what.vectors.items()})
+    found = again.spans[(again.spans["id"] == ids.get(name, -1)) & (again.spans["begin"] == worst.cycle)]
+    if len(found) != 1:
+        raise BoardError(f"{image.name}: no span of {name!r} begins in cycle {worst.cycle} of {worst}")
+    return {key: int(found[key][0]) for key in ("begin", "net", "gross", "latency")}
+
+
+def search(
+    image: Path,
+    robot: RobotDescription,
+    scenario: str,
+    *,
+    seconds: float,
+    runs: int,
+    seed: int = 1,
+    progress: Progress | None = None,
+) -> Measurement:
+    """Looks for the longest span of each task and interrupt: random restarts, and hill climbing over one number of the
+    scenario at a time from the best that is known of a task drawn at random.
+
+    Args:
+        seconds: of each run, of the board's time.
+        progress: called with the share of runs that are done, 0 to 1.
+    """
+    draw = random.Random(seed)
+    found: list[Measurement] = []
+    best: dict[str, tuple[int, int]] = {}  # name -> longest, seed
+    for number in range(runs):
+        tried = seed if number == 0 else _next_seed(draw, best)
+        found.append(measure(image, robot, scenario, seconds, tried))
+        for name, spans in {**found[-1].tasks, **found[-1].interrupts}.items():
+            if spans.largest > best.get(name, (0, 0))[0]:
+                best[name] = (spans.largest, tried)
+        if progress:
+            progress((number + 1) / runs)
+    return merged(found)
+
+
+def _next_seed(draw: random.Random, best: dict[str, tuple[int, int]]) -> int:
+    if not best or draw.random() < RESTART:
+        return draw.randrange(STATES)
+    _, seed = best[draw.choice(sorted(best))]
+    name, size = draw.choice(list(RANGES.items()))
+    return seed_of(replace(numbers_of(seed), **{name: draw.randrange(size)}))
+
+
+def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | None = None) -> Measurement:
+    """All scenarios of the robot that an image was built for, `seconds` of the board's time each (entry point
+    `emulated` of the group boebot.timing).
+
+    Args:
+        progress: called with the share that is done, 0 to 1.
+
+    Raises:
+        BoardError, TimingError, RobotError: see `run` and `robot_of`.
+    """
+    robot = robot_of(elf)
+    found = []
+    for number, scenario in enumerate(SCENARIOS):
+        least = 2 * SILENCE / CLOCK_HZ if scenario == "everything" else 0.0
+        found.append(measure(elf, robot, scenario, max(seconds, least), seed))
+        if progress:
+            progress((number + 1) / len(SCENARIOS))
+    return merged(found)

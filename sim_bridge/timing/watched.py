@@ -1,0 +1,147 @@
+"""What is watched of an image in the emulator, by the names in its ELF file, and what the records of a run amount to:
+spans of its tasks and interrupts, its load, its worst tick, its lowest stack.
+
+A task is a function NAME_task, an interrupt whatever stands behind a vector that the program uses. Names are those of
+the image's timing table; an interrupt without a row there is called by its vector (data sheet, table 12-6).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.timing.elf import Image
+from boebot.timing.measured import Measurement, Spans, Worst
+from sim_bridge.boards.avr import FUNCTION_IDS, Watch
+from sim_bridge.timing.loads import TICK_CYCLES
+
+SLOT_VECTOR = 12  # TIMER1_COMPB: begins each slot (hal_avr.h)
+SLOTS_PER_TICK = 4
+PATIENCE = 50 * TICK_CYCLES  # without sleep: the program hangs; longer than its start takes
+TASK = re.compile(r"(\w+)_task\Z")
+POLL = "link_poll"
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """Functions of an image and their names, in the order of their ids; names of interrupts by vector."""
+
+    entries: tuple[int, ...]
+    names: tuple[str, ...]
+    vectors: dict[int, str]
+    lowest_stack: int
+    code_end: int
+
+    @property
+    def watch(self) -> Watch:
+        """For the recorder."""
+        return Watch(self.entries, self.code_end, self.lowest_stack, PATIENCE)
+
+    @property
+    def poll_id(self) -> int | None:
+        """Of the link's poll, if the image has one."""
+        return FUNCTION_IDS + self.names.index(POLL) if POLL in self.names else None
+
+
+def watched(image: Image, margin: int = 0) -> Watched:
+    """What there is to watch in an image. `margin`: bytes above the last variable that the stack shall not use."""
+    functions = {s.name: s.address for s in image.symbols if s.kind in ("STT_FUNC", "STT_NOTYPE")}
+    tasks = {row.name: f"{row.name}_task" for row in image.table.tasks} or {
+        match[1]: match[0] for name in functions if (match := TASK.match(name))
+    }
+    found = {name: functions[symbol] for name, symbol in tasks.items() if symbol in functions}
+    if POLL in functions:
+        found[POLL] = functions[POLL]
+    rows = {row.vector: row.name for row in image.table.interrupts}
+    default = functions.get("__bad_interrupt")
+    vectors = {
+        vector: rows.get(vector, f"vector_{vector}")
+        for vector in range(1, 26)
+        if vector in rows or functions.get(f"__vector_{vector}", default) != default
+    }
+    return Watched(
+        entries=tuple(found.values()),
+        names=tuple(found),
+        vectors=vectors,
+        lowest_stack=image.ram_end + margin,
+        code_end=max(place.stop for place in image.executable),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Circumstances:
+    """Under which a run was made."""
+
+    scenario: str
+    seed: int
+
+
+def measurement(
+    what: Watched,
+    spans: NDArray[Any],
+    under: Circumstances,
+    *,
+    since: int,
+    cycles: int,
+    executed: int,
+    lowest_stack: int,
+) -> Measurement:
+    """What a run's records (dtype SPAN) since power-on amount to. Load and ticks are those of the `cycles` cycles from
+    `since` on, in `executed` of which something was executed."""
+    tasks: dict[str, Spans] = {}
+    others: dict[str, Spans] = {}
+    for index, name in enumerate(what.names):
+        found = _spans(name, spans[spans["id"] == FUNCTION_IDS + index], under)
+        (others if name == POLL else tasks)[name] = found
+    interrupts = {
+        name: _spans(name, spans[spans["id"] == vector], under, latency=True) for vector, name in what.vectors.items()
+    }
+    work, busy = _ticks(what, spans, since)
+    return Measurement(
+        tasks=tasks,
+        interrupts=interrupts,
+        lowest_stack=lowest_stack,
+        seconds=cycles / 16e6,
+        load=executed / cycles,
+        worst_tick=int(work.max(initial=0)),
+        scenarios=(under.scenario,),
+        functions=others,
+        busiest_tick=int(busy.max(initial=0)),
+        between_polls=_between_polls(what, spans),
+    )
+
+
+def _spans(name: str, spans: NDArray[Any], under: Circumstances, latency: bool = False) -> Spans:
+    at = int(spans["begin"][np.argmax(spans["net"])]) if len(spans) else 0
+    return Spans(
+        name=name,
+        net=spans["net"].copy(),
+        gross=spans["gross"].copy(),
+        worst=Worst(under.scenario, under.seed, at),
+        latency=spans["latency"].copy() if latency else np.empty(0, dtype=np.uint32),
+    )
+
+
+def _ticks(what: Watched, spans: NDArray[Any], since: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Cycles of tasks and interrupts in each control tick from `since` on, and all executed cycles of it. The first
+    slot after power-on is slot 0."""
+    starts = spans[spans["id"] == SLOT_VECTOR][::SLOTS_PER_TICK]
+    starts = starts[starts["begin"] >= since]
+    if len(starts) < 2:
+        none = np.empty(0, dtype=np.int64)
+        return none, none
+    counted = spans[(spans["id"] < FUNCTION_IDS) | (spans["id"] != what.poll_id)]
+    tick = np.searchsorted(starts["begin"], counted["begin"], side="right") - 1
+    whole = (tick >= 0) & (tick < len(starts) - 1)
+    work = np.bincount(tick[whole], weights=counted["net"][whole], minlength=len(starts) - 1)
+    return work.astype(np.int64), np.diff(starts["executed"].astype(np.int64))
+
+
+def _between_polls(what: Watched, spans: NDArray[Any]) -> int:
+    """Most cycles from the beginning of one poll of the link to the next, sleep not counted."""
+    polls = spans[spans["id"] == what.poll_id] if what.poll_id is not None else spans[:0]
+    return int(np.diff(polls["executed"].astype(np.int64)).max(initial=0))

@@ -1,0 +1,84 @@
+"""A board in a simulated world, with all devices of its robot built, as a bench uses a board: the parts of the world
+answer at its pins, and others may take some of the pins from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from boebot.robots import RobotDescription
+from sim_bridge.arena import load_arena
+from sim_bridge.boards.avr import AvrBoard
+from sim_bridge.boards.board import Edge, Level, SentByte
+from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.pins import BoardPins
+from sim_bridge.sim import Sim
+
+ARENA = "room"
+
+
+def with_all_devices(robot: RobotDescription) -> RobotDescription:
+    """The robot with every device of its pin map built and on."""
+    device = {name: msgspec.structs.replace(one, on=True) for name, one in robot.device.items()}
+    return msgspec.structs.replace(robot, device=device)
+
+
+class WorldAccess:
+    """See `loads.Access`."""
+
+    def __init__(self, board: AvrBoard, elf: Path, robot: RobotDescription, seed: int) -> None:
+        """Puts the board into a room, without noise. `elf` is what it runs."""
+        self._sim = Sim(load_arena(ARENA), seed=seed, noise=False, record=False)
+        emulated = EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board, elf=elf)
+        self._robot = self._sim.add(emulated, with_all_devices(robot))
+        self._pins = BoardPins(self._robot)
+        self._to_send: list[tuple[int, bytes]] = []
+        self._edges_seen = 0
+
+    @property
+    def now(self) -> int:
+        """The cycle up to which board and world have run."""
+        return self._sim.cycle
+
+    def advance(self, until: int) -> None:
+        """Runs until that cycle. A crash raises BoardError."""
+        while self._sim.cycle < until:
+            while self._to_send and self._to_send[0][0] <= self._sim.cycle:
+                self._robot.send(self._to_send.pop(0)[1])
+            self._sim.run_until(min(until, self._to_send[0][0]) if self._to_send else until)
+
+    def drive(self, pin: int, level: Level, at: int = 0) -> None:
+        """Takes a pin from its part and drives it from cycle `at` on."""
+        self._pins.drive(pin, int(level), at)
+
+    def send(self, data: bytes, at: int = 0) -> None:
+        """Puts bytes on the line towards the board, some cycles after `at`."""
+        self._to_send.append((at, data))
+        self._to_send.sort(key=lambda one: one[0])
+
+    def receive(self) -> list[SentByte]:
+        """Bytes that left the board since the last call; all have the cycle of the last one."""
+        data, cycle = self._robot.receive(), self._robot.last_byte_cycle
+        return [SentByte(cycle, byte) for byte in data]
+
+    def log(self) -> list[Edge]:
+        """The output edges since the last call."""
+        log = self._pins.pin_log()
+        new = log[np.searchsorted(log["cycle"], self._edges_seen, side="right") :]
+        if len(new):
+            self._edges_seen = int(new["cycle"][-1])
+        return [Edge(int(edge["cycle"]), int(edge["pin"]), Level(int(edge["level"]))) for edge in new]
+
+    def read_memory(self, address: int, count: int) -> bytes:
+        """Bytes of the data space."""
+        return self._pins.read_memory(address, count)
+
+    def counters(self) -> dict[str, int]:
+        """What the board counted."""
+        return self._pins.counters()
+
+    def close(self) -> None:
+        """Frees world and board."""
+        self._sim.close()
