@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.timing.elf import Image
-from boebot.timing.measured import Measurement, Spans, Worst
+from boebot.timing.measured import Measurement, Moment, Spans, Worst
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch
 from sim_bridge.timing.loads import TICK_CYCLES
 
@@ -112,6 +112,7 @@ def measurement(
         functions=others,
         busiest_tick=int(busy.max(initial=0)),
         between_polls=_between_polls(what, spans),
+        tick=_fullest_tick(what, spans, since, work),
     )
 
 
@@ -139,6 +140,23 @@ def _ticks(what: Watched, spans: NDArray[Any], since: int) -> tuple[NDArray[Any]
     whole = (tick >= 0) & (tick < len(starts) - 1)
     work = np.bincount(tick[whole], weights=counted["net"][whole], minlength=len(starts) - 1)
     return work.astype(np.int64), np.diff(starts["executed"].astype(np.int64))
+
+
+def _fullest_tick(what: Watched, spans: NDArray[Any], since: int, work: NDArray[Any]) -> tuple[Moment, ...]:
+    """The spans of the tick with the most work, in the order in which they began; none where no tick was whole."""
+    if not len(work):
+        return ()
+    starts = spans[spans["id"] == SLOT_VECTOR][::SLOTS_PER_TICK]["begin"]
+    begin = int(starts[starts >= since][np.argmax(work)])
+    inside = spans[(spans["begin"] >= begin) & (spans["begin"] < begin + TICK_CYCLES)]
+    found = []
+    for span in np.sort(inside, order="begin"):
+        number, first = int(span["id"]), int(span["begin"]) - begin
+        name = what.names[number - FUNCTION_IDS] if number >= FUNCTION_IDS else what.vectors.get(number, "")
+        if name and name != POLL:
+            kind = "task" if number >= FUNCTION_IDS else "interrupt"
+            found.append(Moment(name, kind, first, first + int(span["gross"])))
+    return tuple(found)
 
 
 def _between_polls(what: Watched, spans: NDArray[Any]) -> int:

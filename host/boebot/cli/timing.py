@@ -116,9 +116,10 @@ class Answer:
             show_report(self.report)
         show_verdict(self.verdict)
         if self.jitter is not None:
-            from boebot.timing.distributions import show
+            from boebot.timing.distributions import rows
 
-            show(self.jitter)
+            head, *rest = rows(self.jitter.distributions)
+            output.print_rows(head, rest)
         if self.files:
             print(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
 

@@ -121,7 +121,8 @@ def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
     for span in spans:
         slot = min(span.begin // slot_cycles, count - 1)
         rows[slot].append(span)
-    longest = max((span.end - slot * slot_cycles for slot, row in enumerate(rows) for span in row), default=1)
+    ends = [span.end - slot * slot_cycles for slot, row in enumerate(rows) for span in row if span.kind == "task"]
+    longest = max(ends, default=1)
     width = max(longest * 1.03, 1)
     for slot, row in enumerate(rows):
         for number, span in enumerate(one for one in row if one.kind == "task"):
