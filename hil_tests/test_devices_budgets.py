@@ -8,14 +8,12 @@ import pytest
 from boebot.robots import load_robot
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.measure import measure
-from tools.timing_table import fullest_slot, read
+from tools.timing_table import fullest_slot, read_table
 
 pytestmark = pytest.mark.emulated
 
 SECONDS = 0.8  # of the board; 0.35 of it the host is silent, and the dead man stops the motors
-
-
-TABLE = read()
+TABLE = read_table()
 
 
 @pytest.mark.parametrize("pin_map", ["shieldbot", "boebot"])

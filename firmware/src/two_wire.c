@@ -1,8 +1,7 @@
 /* two_wire.c: see two_wire.h. */
 #include "two_wire.h"
 
-#include <string.h>
-
+#include "bounds.h"
 #include "hal/hal.h"
 
 /* Shared with the interrupt: what a transfer is to do is settled before it begins. */
@@ -23,7 +22,9 @@ void two_wire_stop(void) {
 
 void two_wire_begin(uint8_t address, const uint8_t *bytes, uint8_t writes, uint8_t reads) {
   target = (uint8_t)(address << 1);
-  memcpy(to_write, bytes, writes);
+  BOUNDED(TWO_WIRE_WRITE_MAX, for (uint8_t i = 0; i < writes; i++)) {
+    to_write[i] = bytes[i];
+  }
   write_count = writes;
   read_count = reads;
   written = has_read = 0;
