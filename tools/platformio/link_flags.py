@@ -5,4 +5,4 @@ from SCons.Script import Import
 Import("env")
 env = globals()["env"]
 
-env.AppendUnique(LINKFLAGS=[flag for flag in env["CCFLAGS"] if str(flag).startswith(("-f", "-m"))])
+env.AppendUnique(LINKFLAGS=[flag for flag in env["CCFLAGS"] if str(flag).startswith(("-f", "-g", "-m"))])
