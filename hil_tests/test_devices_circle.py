@@ -116,8 +116,8 @@ def light_mounts(x: float, y: float, heading: float) -> list[tuple[float, float,
 
 
 # The interrupt that stamps the edge waits, on a busy line, for a byte received and one sent (tasks.def: 54 and 50
-# cycles), and reads the time some 30 cycles after it began: 134 cycles, 8.4 us, told in whole us. It never stamps early,
-# but the expected time is rounded too.
+# cycles), and reads the time some 30 cycles after it began: 134 cycles, 8.4 us, told in whole us. It never stamps
+# early, but the expected time is rounded too.
 STAMP_LATE_US = (-1, 9)
 
 
