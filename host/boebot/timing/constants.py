@@ -150,11 +150,8 @@ def step(instruction: Instruction, state: State) -> State:
     if name == "sts" and operands[0] < REGISTERS:
         return State()
     registers = {r: value for r, value in state.registers.items() if r not in written(instruction)}
-    flags = state.flags
-    if name in ("out", "sts") and operands[0] == (SREG_IO if name == "out" else SREG_DATA):
-        flags = {}
-    elif name not in KEEPS and not pushes_only(instruction):
-        flags = {}
+    writes_flags = (name == "out" and operands[0] == SREG_IO) or (name == "sts" and operands[0] == SREG_DATA)
+    flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
     for register, value in _moved(name, operands, state):
         registers[register] = value
     if name in ("sec", "clc"):

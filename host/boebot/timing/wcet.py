@@ -14,7 +14,6 @@ from boebot.timing.constants import Context, Known, known, root
 from boebot.timing.marks import marks_of
 from boebot.timing.paths import Graph, Mark, Walk, Way, longest
 from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import halted
 
 # Library routines with a loop that runs by an argument, of 16 bits: its lower register (avr-gcc's calling convention).
 COUNTS = {"memcpy": 20, "memcpy_P": 20, "memset": 20}
@@ -107,7 +106,7 @@ class WorstCase:
             cycles = self.callee(entry, block, inside).cycles
             if callee is None or cycles > callee_cycles:
                 callee, callee_cycles = entry, cycles
-        own = block.body_cycles + sum(map(halted, block.instructions)) + callee_cycles
+        own = block.body_cycles + callee_cycles
         if not block.edges:
             return [Way(block.start, None, own + block.last_cycles, callee, callee_cycles)]
         edges: dict[int, int] = {}
