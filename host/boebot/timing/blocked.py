@@ -18,7 +18,7 @@ from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Block, Function, Instruction, Program
-from boebot.timing.registers import CALL_CLOBBERED, halted, written
+from boebot.timing.registers import CALL_CLOBBERED, written
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -158,7 +158,7 @@ class Blocked:
 
     def _worked_out(self, entry: int, on: bool) -> Effect:
         if not self._is_plain(entry):
-            return self._effect(self.program.functions[entry], on)
+            return self._effect(self.worst_case.inside(entry).function, on)
         return Effect(on=True, plain=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
 
     def _is_plain(self, entry: int) -> bool:
@@ -210,7 +210,7 @@ class Blocked:
 
     def _longest(self, flow: Flow, start: Node, ends: Callable[[Flow, Node], Iterable[int]]) -> int | None:
         """The longest way from a node, with interrupts off all the way, to one kind of end."""
-        marks = self.worst_case.marks(self.program.functions[flow.entry[0]])
+        marks = self.worst_case.marks(flow.entry[0])
         ways: dict[Node, list[Way[Node]]] = {}
         work = [start]
         while work:
@@ -228,7 +228,7 @@ class Blocked:
     def flow(self, entry: int, on: bool) -> Flow:
         """All ways through a function that is called with interrupts on or off."""
         if (entry, on) not in self._flows:
-            self._flows[entry, on] = self._flow(self.program.functions[entry], on)
+            self._flows[entry, on] = self._flow(self.worst_case.inside(entry).function, on)
         return self._flows[entry, on]
 
     def _flow(self, function: Function, on: bool) -> Flow:
@@ -299,7 +299,8 @@ class Blocked:
     def _callee(self, entry: int, block: Block, function: Function, on: bool) -> Effect:
         """What a callee does to the flag; in time, where it leaves it alone, with the argument that it gets."""
         if self._is_plain(entry) and not on:
-            return Effect(through=self.worst_case.callee(entry, block, function).cycles)
+            inside = self.worst_case.inside(function.entry)
+            return Effect(through=self.worst_case.callee(entry, block, inside).cycles)
         return self.effect(entry, on)
 
     def _call(self, flow: Flow, node: Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[Node]:
@@ -341,7 +342,7 @@ def _cycles(stretch: Stretch) -> int:
 
 def _stops(instruction: Instruction) -> int:
     """Cycles for which the CPU stands after an instruction, before an interrupt that waits is accepted."""
-    return halted(instruction) + (WAKE if instruction.mnemonic == "sleep" else 0)
+    return WAKE if instruction.mnemonic == "sleep" else 0
 
 
 def _ended(flow: Flow, node: Node) -> Iterable[int]:

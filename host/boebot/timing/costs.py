@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import ENTRY, Blocked
+from boebot.timing.constants import Context
 from boebot.timing.latency import Latencies
 from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
 from boebot.timing.loops import Loop, natural_loops, reverse_postorder
@@ -44,9 +45,9 @@ class Given(WorstCase):
         super().__init__(program)
         self._given = cycles
 
-    def bound(self, entry: int, argument: int | None = None) -> Bound:
+    def bound(self, entry: int, context: Context | None = None) -> Bound:
         """See `WorstCase`."""
-        return Bound(self._given[entry], (), {}) if entry in self._given else super().bound(entry, argument)
+        return Bound(self._given[entry], (), {}) if entry in self._given else super().bound(entry, context)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,14 +213,16 @@ def _frame(program: Program, frame_most: int) -> int:
 def _nothing(program: Program, entry: int, calls: Mapping[int, int]) -> int:
     """The longest way through a function that enters no loop and calls nothing but what takes so many cycles: what it
     takes when nothing waits. Where there is none: its bound."""
-    function, worst = program.functions[entry], Given(program, calls)
+    worst = Given(program, calls)
+    known = worst.inside(entry)
+    function = known.function
     inside = _in_loops(function)
     open_ = {
         start for start, block in function.blocks.items() if start not in inside and calls.keys() >= set(block.calls)
     }
     ways: dict[int, list[Way[int]]] = {}
     for start in open_:
-        found = worst.ways(function.blocks[start], function)
+        found = worst.ways(function.blocks[start], known)
         ways[start] = [way for way in found if way.to is None or way.to in open_]
     walk = longest(Graph(entry, ways, program.where)) if entry in open_ else None
     return walk.cycles if walk is not None else WorstCase(program).bound(entry).cycles
@@ -253,11 +256,13 @@ def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> i
     main = _entry(program, "main")
     if main is None:
         return 0
-    function, given = program.functions[main], Given(program, elsewhere)
+    given = Given(program, elsewhere)
+    known = given.inside(main)
+    function = known.function
     loops = [loop for loop in _loops(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
     cycles = 0
     for start in frozenset[int]().union(*(loop.nodes for loop in loops)):
-        cycles += max(way.cycles for way in given.ways(function.blocks[start], function))
+        cycles += max(way.cycles for way in given.ways(function.blocks[start], known))
     return cycles
 
 
