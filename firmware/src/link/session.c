@@ -41,7 +41,7 @@ static void say_hello(void) {
   }
 }
 
-/* Begins anew, with a session or without (FRAME_NO_SESSION). */
+/* Begins anew, with a session or without (FRAME_NO_SESSION). Hello is due. */
 static void begin(uint32_t new_seed) {
   safety_latch(LATCH_SESSION_ENDED);
   seed = new_seed;
@@ -52,6 +52,7 @@ static void begin(uint32_t new_seed) {
   telemetry_start();
   buzzer_start_session();
   session_heard();
+  hello_in = 0;
 }
 
 void session_start(void) {
@@ -93,7 +94,7 @@ void session_heard(void) { silence = 0; }
 void session_task(void) {
   silence = (uint16_t)(silence + TICK_MS); /* rolls over only without a session */
   if (session_is_open() && silence > parameters_u16(PARAMETER_SESSION_TIME_OUT)) {
-    session_start();
+    begin(FRAME_NO_SESSION); /* hello in the next tick: both together would be the longest run by half */
   } else if (hello_in == 0 || --hello_in == 0) {
     say_hello();
   }

@@ -1,11 +1,9 @@
-"""What instructions do beyond the graph: which registers they write, which constants these hold, and who halts the CPU.
+"""What instructions do beyond the graph: which registers they write.
 
 After the AVR instruction set manual, and the register conventions of avr-gcc: https://gcc.gnu.org/wiki/avr-gcc.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterable
 
 from boebot.timing.program import Block, Function, Instruction
 
@@ -15,7 +13,6 @@ def _words(text: str) -> frozenset[str]:
 
 
 ZERO = 1  # holds zero wherever compiled code does not multiply
-EECR, EERE, EEPE = 0x1F, 0, 1  # I/O address, and bits of it
 CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
 NO_RESULT = _words(
     "cpse cpc cp cpi tst out sts st std push nop sleep wdr break spm sei cli sec clc sez clz sen cln sev clv ses cls "
@@ -46,14 +43,6 @@ def written(instruction: Instruction) -> frozenset[int]:
     return frozenset(result)
 
 
-def halted(instruction: Instruction) -> int:
-    """Cycles for which the CPU stands still behind it: 4 where the EEPROM is read, 2 where it is written (data sheet,
-    8.6.3). A write of the whole register EECR may do either."""
-    if instruction.mnemonic == "sbi" and instruction.operands[0] == EECR:
-        return {EERE: 4, EEPE: 2}.get(instruction.operands[1], 0)
-    return 4 if instruction.mnemonic == "out" and instruction.operands[0] == EECR else 0
-
-
 def pushes_only(instruction: Instruction) -> bool:
     """`rcall .+0`: calls the next instruction, so that two bytes are on the stack."""
     return instruction.mnemonic == "rcall" and instruction.operands[0] == instruction.address + instruction.size
@@ -66,33 +55,3 @@ def before(function: Function) -> dict[int, list[Block]]:
         for to in dict.fromkeys(edge.to for edge in block.edges):
             result[to].append(block)
     return result
-
-
-def constant(register: int, block: Block, came_from: dict[int, list[Block]], count: int | None = None) -> int | None:
-    """What a register holds at the end of a block, or before its instruction number `count`, if it is a constant that
-    is loaded in it or on the only way to it."""
-    seen: set[int] = set()
-    instructions: Iterable[Instruction] = reversed(block.instructions[:count])
-    while block.start not in seen:
-        seen.add(block.start)
-        for instruction in instructions:
-            if register not in written(instruction):
-                continue
-            if instruction.mnemonic == "ldi":
-                return instruction.operands[1]
-            if instruction.mnemonic == "mov":
-                register = instruction.operands[1]
-            elif instruction.mnemonic == "movw":
-                register = instruction.operands[1] + register - instruction.operands[0]
-            elif instruction.mnemonic in ("eor", "sub") and instruction.operands == (register, register):
-                return 0
-            else:
-                return None
-            if register == ZERO:
-                return 0
-        previous = came_from[block.start]
-        if len(previous) != 1:
-            return None
-        block = previous[0]
-        instructions = reversed(block.instructions)
-    return None
