@@ -108,6 +108,12 @@ def test_runs_together() -> None:
     assert both.seconds == one.seconds + two.seconds
     assert both.load == pytest.approx((one.load + two.load) / 2, rel=1e-3)
     assert both.tasks["safety"].largest == max(one.tasks["safety"].largest, two.tasks["safety"].largest)
+    assert not both.by_scenario  # one scenario, which is all of it
+    other = measure(IMAGE, robot, "noise", 0.05, 1)
+    scenarios = merged([both, merged([other, one])]).by_scenario
+    assert list(scenarios) == ["figures", "noise"]
+    assert as_json(scenarios["figures"]) == as_json(merged([both, one]))
+    assert as_json(scenarios["noise"]) == as_json(other)
     with pytest.raises(ValueError, match="expected one at least"):
         merged([])
 

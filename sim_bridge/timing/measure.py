@@ -59,6 +59,7 @@ class Run:
             cycles=self.cycles,
             executed=self.executed,
             lowest_stack=self.lowest_stack,
+            losses=self.lost,
         )
 
 
