@@ -53,6 +53,10 @@ class WorldAccess:
         """Takes a pin from its part and drives it from cycle `at` on."""
         self._pins.drive(pin, int(level), at)
 
+    def output(self, pin: int) -> Level:
+        """What the firmware does to a pin now."""
+        return Level(self._pins.output(pin))
+
     def send(self, data: bytes, at: int = 0) -> None:
         """Puts bytes on the line towards the board, some cycles after `at`."""
         self._to_send.append((at, data))
