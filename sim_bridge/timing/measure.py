@@ -175,7 +175,8 @@ def search(
     progress: Progress | None = None,
 ) -> Measurement:
     """Looks for the longest span of each task and interrupt: random restarts, and hill climbing over one number of the
-    scenario at a time from the best that is known of a task drawn at random.
+    scenario at a time from the best that is known of a task drawn at random. Returns the runs in which any was longer,
+    or an interrupt waited longer, than in all before.
 
     Args:
         seconds: of each run, of the board's time.
@@ -184,12 +185,20 @@ def search(
     draw = random.Random(seed)
     found: list[Measurement] = []
     best: dict[str, tuple[int, int]] = {}  # name -> longest, seed
+    longest_wait: dict[str, int] = {}
     for number in range(runs):
         tried = seed if number == 0 else _next_seed(draw, best)
-        found.append(run(image, robot, scenario, seconds, tried, losses=False).measurement())
-        for name, spans in {**found[-1].tasks, **found[-1].interrupts}.items():
+        result = run(image, robot, scenario, seconds, tried, losses=False).measurement()
+        better = not found
+        for name, spans in {**result.tasks, **result.interrupts}.items():
             if spans.largest > best.get(name, (0, 0))[0]:
                 best[name] = (spans.largest, tried)
+                better = True
+            if (wait := int(spans.latency.max(initial=0))) > longest_wait.get(name, 0):
+                longest_wait[name] = wait
+                better = True
+        if better:
+            found.append(result)
         if progress:
             progress((number + 1) / runs)
     return merged(found)
