@@ -89,6 +89,7 @@ def measurement(
     cycles: int,
     executed: int,
     lowest_stack: int,
+    losses: dict[str, int],
 ) -> Measurement:
     """What a run's records (dtype SPAN) since power-on amount to. Load and ticks are those of the `cycles` cycles from
     `since` on, in `executed` of which something was executed."""
@@ -113,6 +114,7 @@ def measurement(
         busiest_tick=int(busy.max(initial=0)),
         between_polls=_between_polls(what, spans),
         tick=_fullest_tick(what, spans, since, work),
+        losses=losses,
     )
 
 

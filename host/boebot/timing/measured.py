@@ -65,6 +65,8 @@ class Measurement:
     busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
     between_polls: int = 0  # most cycles from one poll of the link to the next, sleep not counted
     tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
+    losses: dict[str, int] = field(default_factory=dict)  # what should have come and did not, counted by kind
+    by_scenario: dict[str, Measurement] = field(default_factory=dict)  # where there were several
 
     def row(self, name: str) -> Spans:
         """The spans of a task, an interrupt or another function. KeyError if there is none of that name."""
@@ -72,7 +74,8 @@ class Measurement:
 
 
 def merged(measurements: Iterable[Measurement]) -> Measurement:
-    """Several runs as one: all their spans, the larger of their maxima, the mean of their loads by time.
+    """Several runs as one: all their spans, the larger of their maxima, the mean of their loads by time; and each
+    scenario by itself, where there are several.
 
     Raises:
         ValueError: there is none.
@@ -80,7 +83,12 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
     runs = list(measurements)
     if not runs:
         raise ValueError("no measurement to merge; expected one at least")
+    if len(runs) == 1:
+        return runs[0]
     seconds = sum(run.seconds for run in runs)
+    parts = [part for run in runs for part in (run.by_scenario.values() or [run])]
+    names = tuple(dict.fromkeys(name for part in parts for name in part.scenarios))
+    alone = {name: [part for part in parts if part.scenarios == (name,)] for name in names} if len(names) > 1 else {}
     return Measurement(
         tasks=_together([run.tasks for run in runs]),
         interrupts=_together([run.interrupts for run in runs]),
@@ -88,11 +96,13 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
         seconds=seconds,
         load=sum(run.load * run.seconds for run in runs) / seconds,
         worst_tick=max(run.worst_tick for run in runs),
-        scenarios=tuple(dict.fromkeys(name for run in runs for name in run.scenarios)),
+        scenarios=names,
         functions=_together([run.functions for run in runs]),
         busiest_tick=max(run.busiest_tick for run in runs),
         between_polls=max(run.between_polls for run in runs),
         tick=next((run.tick for run in runs if run.tick), ()),
+        losses={name: sum(run.losses.get(name, 0) for run in runs) for run in runs for name in run.losses},
+        by_scenario={name: merged(some) for name, some in alone.items() if some},
     )
 
 
@@ -150,4 +160,6 @@ def as_json(measurement: Measurement) -> dict[str, Any]:
         "busiest_tick": measurement.busiest_tick,
         "between_polls": measurement.between_polls,
         "lowest_stack": measurement.lowest_stack,
+        "losses": measurement.losses,
+        "by_scenario": {name: as_json(one) for name, one in measurement.by_scenario.items()},
     }
