@@ -17,10 +17,10 @@ from boebot.errors import TimingError
 from boebot.timing.blocked import HORIZON, WAKE
 from boebot.timing.costs import Costs, costs
 from boebot.timing.elf import read_image
-from boebot.timing.graph import load_program
+from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
-from boebot.timing.program import Program
+from boebot.timing.program import Program, Table
 from boebot.timing.response import Responses, Schedule, Source, load, misses, poll_gap, receive_backlog, responses
 from boebot.timing.stack import Stack
 
@@ -77,6 +77,7 @@ class Report:
     """Of one image under one load. `responses`, `gap` and `ring`: None where there is overload."""
 
     path: str
+    table: Table
     load: Load
     rows: tuple[Row, ...]
     costs: Costs
@@ -106,7 +107,7 @@ class Report:
 
     @property
     def executed(self) -> int:
-        """Cycles of a tick in which instructions run at most: each interrupt wakes the main loop for a round besides."""
+        """Cycles of a tick in which instructions run at most: each interrupt also wakes the main loop for a round."""
         names = {row.name for row in self.rows if row.kind == "interrupt"}
         wakes = sum(source.requests(self.tick_cycles) for source in self.sources if source.name in names)
         return min(self.tick_cycles, self.demand + wakes * (WAKE + self.costs.round))
@@ -131,9 +132,9 @@ class Report:
 
     @property
     def notes(self) -> list[str]:
-        """Bounds of tasks that are far above what was measured: nothing is broken, but one of the two could be better."""
+        """Bounds of tasks that are far above what was measured: nothing is broken, but one of both could be better."""
         return [
-            f"{row.kind} {row.name}: its bound of {row.bound} cycles is {row.ratio:.2f} times the {row.emulator} measured"
+            f"task {row.name}: its bound of {row.bound} cycles is {row.ratio:.2f} times the {row.emulator} measured"
             for row in self.rows
             if row.kind == "task" and row.ratio is not None and row.ratio > RATIO_MOST
         ]
@@ -201,16 +202,18 @@ def prove(
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
     """
-    program = program or load_program(path)
+    image = read_image(path)
+    program = program or program_of(image)
     if not program.table.tasks:
         raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
     found = costs(program, asked)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
-    image, deepest = read_image(path), Stack(program).image()
+    deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
     return Report(
         path=str(path),
+        table=program.table,
         load=asked,
         rows=tuple(_rows(program, found, answers, measured, board or {})),
         costs=found,
