@@ -42,15 +42,10 @@ int main(void) {
 
 
 def build(
-    folder: Path,
-    first_nops: int = 100,
-    first_budget: int = 150,
-    interrupt_budget: int = 40,
-    reserve: int = 10,
-    text: str = SOURCE,
+    folder: Path, first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10
 ) -> Path:
     """Compiles it; returns its ELF file."""
-    text = text.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
+    text = SOURCE.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
     text = text.replace("INTERRUPT_BUDGET", str(interrupt_budget)).replace("RESERVE", str(reserve))
     source, image = folder / "program.c", folder / "program.elf"
     source.write_text(text)

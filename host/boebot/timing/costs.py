@@ -116,7 +116,7 @@ def costs(program: Program, load: Load) -> Costs:
         alone={name: without_polls.of(f"{name}_task").cycles + quiet for name in tasks},
         interrupts={row.name: ENTRY + worst.bound(4 * row.vector).cycles for row in table.interrupts},
         latencies={row.name: blocked.latency(row.vector) for row in table.interrupts},
-        round=scheduler + 2 * quiet + _loop(program, [*(f"{name}_task" for name in tasks), *polls, SCHEDULER]),
+        round=scheduler + 2 * quiet + _loop(program, [*polls, SCHEDULER]),
         quiet_poll=quiet,
         frames={length: _frame(program, length) for length in {load.frame_least, load.frame_most}},
         change=change,
@@ -142,24 +142,16 @@ def _quiet(program: Program, name: str) -> int:
     return walk.cycles if walk is not None else WorstCase(program).of(name).cycles
 
 
-def _in_loops(function: Function, endless: bool = False) -> set[int]:
-    """The blocks of all loops of a function, or of those that are never left."""
-
+def _in_loops(function: Function) -> set[int]:
     def successors(start: int) -> list[int]:
         return [edge.to for edge in function.blocks[start].edges]
 
     loops = natural_loops(reverse_postorder(function.entry, successors), successors)
-    return {
-        node
-        for loop in loops
-        if not endless or all(to in loop.nodes for start in loop.nodes for to in successors(start))
-        for node in loop.nodes
-    }
+    return {node for loop in loops for node in loop.nodes}
 
 
 def _loop(program: Program, known: Collection[str]) -> int:
-    """One pass of the main loop, at most: all its blocks once, without what it calls of `known`; not the loops of the
-    start that stand before it."""
+    """One pass of the main loop, at most: all its blocks once, without what it calls of `known`."""
     around = WithoutCallees(program, known)
     if LOOP in program.by_name:
         cycles = around.of(LOOP).cycles
@@ -169,7 +161,7 @@ def _loop(program: Program, known: Collection[str]) -> int:
     if "main" not in program.by_name:
         return cycles
     function = program.functions[program.by_name["main"]]
-    for start in _in_loops(function, endless=True):
+    for start in _in_loops(function):
         block = function.blocks[start]
         cycles += block.body_cycles + max((edge.cycles for edge in block.edges), default=block.last_cycles)
         cycles += max((around.bound(entry).cycles for entry in block.calls), default=0)
