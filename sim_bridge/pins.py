@@ -11,16 +11,13 @@ from numpy.typing import NDArray
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.arguments import number, shown
-from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
+from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
 from sim_bridge.sim import checked_pose
 from sim_bridge.sim_robot import SimRobot
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
-
-EDGE = np.dtype(  # sim_edge of loop.h
-    {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
-)
+EDGES_KEPT = 1 << 20  # SIM_EDGES_KEPT of loop.h
 
 
 class BoardPins(BoardMemory):
@@ -53,9 +50,14 @@ class BoardPins(BoardMemory):
         """Now, in cycles since power-on."""
         return self._sim.cycle
 
-    def pin_log(self) -> NDArray[Any]:
-        """The board's output edges (fields cycle, pin, level), the newest million, oldest first."""
-        count = min(int(lib.sim_edges_seen(self._handle, self._number)), 1 << 20)
+    @property
+    def edge_count(self) -> int:
+        """Output edges of the board so far."""
+        return int(lib.sim_edges_seen(self._handle, self._number))
+
+    def pin_log(self, newest: int = EDGES_KEPT) -> NDArray[Any]:
+        """The board's `newest` output edges (dtype EDGE), a million at most, oldest first."""
+        count = min(self.edge_count, EDGES_KEPT, newest)
         log = np.empty(count, dtype=EDGE)
         lib.sim_edges(self._handle, self._number, ffi.from_buffer("sim_edge[]", log, require_writable=True), count)
         return log

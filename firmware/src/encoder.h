@@ -27,7 +27,7 @@ void encoder_start(void);
 
 /* Works off the changes that the interrupt has stamped: before the clock's 16 bits roll over (4 ms), that is in every
  * slot, and sooner when they pile up. */
-void encoder_poll(void);
+void encoder_poll(void) __attribute__((noinline));
 
 /* Not 0 if they have piled up to an eighth of the ring, or were stopped. */
 static inline __attribute__((always_inline)) uint8_t encoder_due(void) {

@@ -29,7 +29,7 @@ static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
 }
 
 /* Runs the tasks of the next slot that has begun, if any. */
-void schedule_poll(void);
+void schedule_poll(void) __attribute__((noinline));
 
 /* The control tick whose tasks run now; when they all have run, the next one, which may not have begun yet. */
 uint32_t schedule_tick(void);

@@ -19,7 +19,7 @@ enum {
 void task_times_start(void);
 
 /* Around each task. The number of the task that runs outlives a reset (reset.h). Main loop only. */
-void task_begins(uint8_t task);
+void task_begins(uint8_t task) __attribute__((noinline));
 void task_has_ended(void);
 
 #define TASK_TIME_LONGEST 0xFFFFu /* so long or longer; no run is so long on purpose */

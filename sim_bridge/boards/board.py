@@ -12,12 +12,20 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from boebot.errors import BoardError
 from sim_bridge.boards.code_places import with_place
 
 CLOCK_HZ = 16_000_000
 DATA_SIZE = 0x900
 EEPROM_SIZE = 1024
+ROOM = 4096  # bytes that are taken from the line at once
+
+EDGE = np.dtype(  # board_edge of board_access.h, sim_edge of loop.h
+    {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
+)
 
 
 class Level(IntEnum):
@@ -27,6 +35,9 @@ class Level(IntEnum):
     HIGH = 1
     RELEASED = 2
     PULLED_UP = 3
+
+
+LEVELS = tuple(Level)
 
 
 class ResetCause(IntEnum):
@@ -159,6 +170,7 @@ class BoardAccess(BoardMemory):
         self._access = lib.board_access_open(pointer)
         if self._access == ffi.NULL:
             raise BoardError("This board was built for another version of the board interface; build it again.")
+        self._bytes, self._cycles = ffi.new("uint8_t[]", ROOM), ffi.new("uint64_t[]", ROOM)
 
     @property
     def _board(self) -> Any:
@@ -184,6 +196,11 @@ class BoardAccess(BoardMemory):
         """From cycle `at` (or now) on the outside drives `pin`; replaces what was queued for it from then on."""
         self._lib.board_access_drive(self._access, at, pin, level)
 
+    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
+        """Drives `pin` to `level` (LOW or HIGH) at cycle `first`, to the other one `half` cycles later, and so on,
+        `count` times."""
+        self._lib.board_access_drive_wave(self._access, first, half, count, pin, level)
+
     def output(self, pin: int) -> Level:
         """What the firmware does to `pin` now."""
         return Level(self._lib.board_access_output(self._access, pin))
@@ -195,13 +212,16 @@ class BoardAccess(BoardMemory):
 
     def receive(self) -> list[SentByte]:
         """Takes the bytes that left the board since the last call."""
-        result: list[SentByte] = []
-        size = 4096
-        data = self._ffi.new("uint8_t[]", size)
-        cycles = self._ffi.new("uint64_t[]", size)
-        while count := self._lib.board_access_receive(self._access, data, cycles, size):
-            result += [SentByte(int(cycles[i]), data[i]) for i in range(count)]
-        return result
+        data, cycles = self.received()
+        return [SentByte(cycle, byte) for cycle, byte in zip(cycles, data, strict=True)]
+
+    def received(self) -> tuple[bytes, list[int]]:
+        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
+        data, cycles = b"", []
+        while count := self._lib.board_access_receive(self._access, self._bytes, self._cycles, ROOM):
+            data += self._ffi.buffer(self._bytes, count)[:]
+            cycles += self._ffi.unpack(self._cycles, count)
+        return data, cycles
 
     def line_rate(self, baud: int) -> None:
         """Sets the outside's bit rate."""
@@ -213,10 +233,16 @@ class BoardAccess(BoardMemory):
 
     def log(self) -> list[Edge]:
         """Takes the output edges since the last call."""
+        return [Edge(cycle, pin, LEVELS[level]) for cycle, pin, level in self.edges().tolist()]
+
+    def edges(self) -> NDArray[Any]:
+        """The same as an array (dtype EDGE)."""
         log = self._access.log
-        edges = [Edge(int(e.cycle), e.pin, Level(e.level)) for e in log.edges[0 : log.count]] if log.count else []
+        if not log.count:
+            return np.empty(0, dtype=EDGE)
+        found = np.frombuffer(self._ffi.buffer(log.edges, log.count * EDGE.itemsize)[:], dtype=EDGE)
         self._lib.board_log_clear(self._ffi.addressof(self._access, "log"))
-        return edges
+        return found
 
     def analog(self, channel: int, volts: float) -> None:
         """Sets the voltage at analog channel 0..5."""

@@ -69,6 +69,13 @@ void board_access_drive(board_access *self, uint64_t at, uint8_t pin, uint8_t le
   self->board->op->drive(self->board, at, pin, level);
 }
 
+void board_access_drive_wave(board_access *self, uint64_t first, uint64_t half, size_t count, uint8_t pin,
+                             uint8_t level) {
+  for (size_t i = 0; i < count; i++) {
+    self->board->op->drive(self->board, first + i * half, pin, i % 2 ? !level : level);
+  }
+}
+
 uint8_t board_access_output(const board_access *self, uint8_t pin) { return self->board->op->output(self->board, pin); }
 
 void board_access_send(board_access *self, uint64_t at, const uint8_t *bytes, size_t count) {

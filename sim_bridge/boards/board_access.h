@@ -46,6 +46,9 @@ void board_access_close(board_access *self);
 uint64_t board_access_now(const board_access *self);
 int board_access_advance(board_access *self, uint64_t until);
 void board_access_drive(board_access *self, uint64_t at, uint8_t pin, uint8_t level);
+/* Drives `pin` to `level` (LOW or HIGH) at `first`, to the other one `half` cycles later, and so on, `count` times. */
+void board_access_drive_wave(board_access *self, uint64_t first, uint64_t half, size_t count, uint8_t pin,
+                             uint8_t level);
 uint8_t board_access_output(const board_access *self, uint8_t pin);
 void board_access_send(board_access *self, uint64_t at, const uint8_t *bytes, size_t count);
 size_t board_access_receive(board_access *self, uint8_t *bytes, uint64_t *cycles, size_t capacity);

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple, TypeVar
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from sim_bridge.boards.board import SentByte
 from sim_bridge.timing.loads import TICK_CYCLES, Bench
 
 BYTE_CYCLES = 320  # 10 bits at 500,000 baud
@@ -38,8 +37,8 @@ class Line:
         self.free = 0
         """the cycle at which the last byte sent so far has arrived"""
         self._sequence = self._number = 0
-        self._stamps: list[int] = []
-        self._chunk = bytearray()
+        self._bytes = b""  # of a frame that has not ended
+        self._cycles = [bench.now]  # of the same, and of the byte before
         bench.after_slice.append(self._listen)
 
     # ---- to the board ------------------------------------------------------------------------------------------------
@@ -61,22 +60,21 @@ class Line:
     # ---- from the board ----------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        for byte in self.bench.access.receive():
-            self._take(byte)
-
-    def _take(self, byte: SentByte) -> None:
-        self._stamps.append(byte.cycle)
-        self._chunk.append(byte.byte)
-        if byte.byte != 0:
+        data, cycles = self.bench.access.received()
+        if not data:
             return
-        for message_id, _, payload in self.decoder.feed(bytes(self._chunk)):
-            self._hear(messages.MESSAGES[message_id].unpack(payload), len(payload) + frame.FRAME_OVERHEAD)
-        self._chunk.clear()
-        del self._stamps[: -2 * frame.LONGEST_PAYLOAD]
+        *frames, rest = (self._bytes + data).split(b"\0")
+        cycles = self._cycles + cycles
+        begin = 0  # of a frame's bytes without the delimiter before it; the cycles begin with that one
+        for stuffed in frames:
+            end = begin + len(stuffed) + 1
+            for message_id, _, payload in self.decoder.feed(stuffed + b"\0"):
+                self._hear(messages.MESSAGES[message_id].unpack(payload), cycles[begin] - BYTE_CYCLES, cycles[end])
+            begin = end
+        self._bytes, self._cycles = rest, cycles[begin:]
 
-    def _hear(self, message: Any, length: int) -> None:
-        first = self._stamps[-min(length, len(self._stamps))] - BYTE_CYCLES
-        self.heard.append(Heard(first, self._stamps[-1], message))
+    def _hear(self, message: Any, first: int, last: int) -> None:
+        self.heard.append(Heard(first, last, message))
         if isinstance(message, messages.Event):
             self.send(messages.Acknowledge(message.number))
 

@@ -7,16 +7,16 @@ phases are swept. Bytes are in line.py.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import Edge, Level, SentByte
+from sim_bridge.boards.board import LEVELS, Edge, Level
 
 CYCLES_PER_US = 16
 SLOT_CYCLES = 40_000  # 2.5 ms (tasks.def)
@@ -56,13 +56,35 @@ class Access(Protocol):
     def now(self) -> int: ...
     def advance(self, until: int) -> None: ...
     def drive(self, pin: int, level: Level, at: int = 0) -> None: ...
+    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None: ...
     def output(self, pin: int) -> Level: ...
     def send(self, data: bytes, at: int = 0) -> None: ...
-    def receive(self) -> list[SentByte]: ...
-    def log(self) -> list[Edge]: ...
+    def received(self) -> tuple[bytes, list[int]]: ...
+    def edges(self) -> NDArray[Any]: ...
     def read_memory(self, address: int, count: int) -> bytes: ...
     def counters(self) -> dict[str, int]: ...
     def close(self) -> None: ...
+
+
+class PinEdges:
+    """All that the firmware did to each pin; sorted out where somebody asks for a pin."""
+
+    def __init__(self) -> None:
+        self._pieces: list[NDArray[Any]] = []
+        self._found: dict[int, tuple[int, list[Edge]]] = {}
+
+    def add(self, edges: NDArray[Any]) -> None:
+        """Takes edges (dtype EDGE) that are newer than all before."""
+        if len(edges):
+            self._pieces.append(edges)
+
+    def __getitem__(self, pin: int) -> list[Edge]:
+        seen, found = self._found.get(pin, (0, []))
+        for piece in self._pieces[seen:]:
+            of_pin = piece[piece["pin"] == pin]
+            found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
+        self._found[pin] = (len(self._pieces), found)
+        return found
 
 
 class Bench:
@@ -74,8 +96,7 @@ class Bench:
         self.elf = elf
         self.access = avr.create(elf).access() if access is None else access
         self.sources: list[Source] = []
-        self.edges: dict[int, list[Edge]] = defaultdict(list)
-        """all that the firmware did to each pin"""
+        self.edges = PinEdges()
         self.after_slice: list[Callable[[], None]] = []
         self._queued = 0
 
@@ -93,8 +114,7 @@ class Bench:
                 for source in self.sources:
                     source.queue(self, self._queued)
             self.access.advance(end)
-            for edge in self.access.log():
-                self.edges[edge.pin].append(edge)
+            self.edges.add(self.access.edges())
             for look in self.after_slice:
                 look()
 
@@ -128,17 +148,18 @@ class PulseTrain:
     """A pin that changes its level every `period` cycles from `first` on, up to `last`."""
 
     def __init__(self, pin: int, period: int, first: int, last: int | None = None) -> None:
-        self.pin, self.period, self.last = pin, period, last
-        self.edges: list[int] = []
+        self.pin, self.period, self.first, self.last = pin, period, first, last
+        self.edges = range(first, first, period)
         """cycles at which it changed, queued ones included"""
-        self._next = first
 
     def queue(self, bench: Bench, until: int) -> None:
         """See Source."""
-        while self._next < until and (self.last is None or self._next <= self.last):
-            bench.access.drive(self.pin, Level.LOW if len(self.edges) % 2 else Level.HIGH, at=self._next)
-            self.edges.append(self._next)
-            self._next += self.period
+        end = until if self.last is None else min(until, self.last + 1)
+        due = range(self.edges.stop, end, self.period)
+        if due:
+            level = Level.LOW if len(self.edges) % 2 else Level.HIGH
+            bench.access.wave(self.pin, self.period, due.start, len(due), level)
+            self.edges = range(self.first, due[-1] + self.period, self.period)
 
     def count(self, cycle: int) -> int:
         """Edges up to that cycle."""

@@ -4,14 +4,15 @@ answer at its pins, and others may take some of the pins from them."""
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
-import numpy as np
+from numpy.typing import NDArray
 
 from boebot.robots import RobotDescription
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.avr import AvrBoard
-from sim_bridge.boards.board import Edge, Level, SentByte
+from sim_bridge.boards.board import Level
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim
@@ -57,23 +58,25 @@ class WorldAccess:
         """What the firmware does to a pin now."""
         return Level(self._pins.output(pin))
 
+    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
+        """Drives a pin to `level` at cycle `first`, to the other level `half` cycles later, and so on."""
+        for number in range(count):
+            self.drive(pin, Level(int(level) ^ number & 1), first + number * half)
+
     def send(self, data: bytes, at: int = 0) -> None:
         """Puts bytes on the line towards the board, some cycles after `at`."""
         self._to_send.append((at, data))
         self._to_send.sort(key=lambda one: one[0])
 
-    def receive(self) -> list[SentByte]:
+    def received(self) -> tuple[bytes, list[int]]:
         """Bytes that left the board since the last call; all have the cycle of the last one."""
-        data, cycle = self._robot.receive(), self._robot.last_byte_cycle
-        return [SentByte(cycle, byte) for byte in data]
+        data = self._robot.receive()
+        return data, [self._robot.last_byte_cycle] * len(data)
 
-    def log(self) -> list[Edge]:
+    def edges(self) -> NDArray[Any]:
         """The output edges since the last call."""
-        log = self._pins.pin_log()
-        new = log[np.searchsorted(log["cycle"], self._edges_seen, side="right") :]
-        if len(new):
-            self._edges_seen = int(new["cycle"][-1])
-        return [Edge(int(edge["cycle"]), int(edge["pin"]), Level(int(edge["level"]))) for edge in new]
+        seen, self._edges_seen = self._edges_seen, self._pins.edge_count
+        return self._pins.pin_log(self._edges_seen - seen)
 
     def read_memory(self, address: int, count: int) -> bytes:
         """Bytes of the data space."""

@@ -37,27 +37,21 @@ void events_start(void) {
   none_under_way();
 }
 
-static void take_out(msg_event *event) {
-  BOUNDED(PLACES + KINDS - 1u, for (end--; event != end; event++)) {
-    event[0] = event[1];
-  }
-}
-
 void events_raise(uint8_t kind, uint16_t value) {
   if (!session_is_open()) {
     return;
   }
   if (end >= queue + PLACES) {
     counters_count(deferred);
-  }
-  BOUNDED(KINDS, for (msg_event *event = queue + PLACES; event < end; event++)) {
-    if (event->kind == kind) {           /* the new one has the latest value */
-      if (kind == EVENT_KIND_WHISKERS) { /* the high byte: all that closed since */
+    msg_event *kept = queue + PLACES;
+    BOUNDED(KINDS, for (const msg_event *event = kept; event < end; event++)) {
+      if (event->kind != kind) {
+        *kept++ = *event;
+      } else if (kind == EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
         value = (uint16_t)(value | (event->value & 0xFF00u));
       }
-      take_out(event);
-      break;
     }
+    end = kept;
   }
   msg_event *const event = end++;
   event->kind = kind;
@@ -71,7 +65,10 @@ void events_acknowledge(uint16_t arrived) {
   }
   number++;
   none_under_way();
-  take_out(queue);
+  end--;
+  BOUNDED(PLACES + KINDS - 1u, for (msg_event *event = queue; event != end; event++)) {
+    event[0] = event[1];
+  }
 }
 
 /* From one sending to the next, in half milliseconds. */

@@ -25,7 +25,7 @@ bool link_take_frame(void);
 /* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits
  * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of
  * answers. A stop and set-points do not wait themselves. */
-void link_poll(void);
+void link_poll(void) __attribute__((noinline));
 
 extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */
 

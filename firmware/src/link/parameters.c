@@ -10,17 +10,21 @@
 #include "storage.h"
 
 typedef struct {
-  uint16_t minimum, initial; /* as the values are kept */
-  uint16_t span;             /* from minimum to maximum */
+  uint16_t minimum; /* as the values are kept */
+  uint16_t span;    /* from minimum to maximum */
   uint8_t is_signed;
 } parameter_range;
 
 enum { TYPE_u16 = 0, TYPE_i16 = 1 };
 
 #define RANGE(name, type, minimum, maximum, initial) \
-  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)(initial), (uint16_t)((maximum) - (minimum)), TYPE_##type},
+  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)((maximum) - (minimum)), TYPE_##type},
 HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
 #undef RANGE
+
+#define INITIAL(name, type, minimum, maximum, initial) [PARAMETER_##name] = (uint16_t)(initial),
+HAL_TABLE uint16_t initials[PARAMETER_COUNT] = {PARAMETER_LIST(INITIAL)};
+#undef INITIAL
 
 /* Rates that the line can have, in counts of the parameter. */
 HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
@@ -81,18 +85,14 @@ void parameters_start(void) {
   storage_load_parameters();
 }
 
-void parameters_reset(void) {
-  BOUNDED(PARAMETER_COUNT, for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++)) {
-    values[parameter] = range_of(parameter).initial;
-  }
-}
+void parameters_reset(void) { hal_table_copy(values, initials, sizeof values); }
 
 uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
 
 int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
 
 int32_t parameters_get(uint8_t parameter) {
-  return parameter < PARAMETER_COUNT ? meant(values[parameter], range_of(parameter).is_signed) : 0;
+  return parameter < PARAMETER_COUNT ? meant(values[parameter], hal_table_byte(&ranges[parameter].is_signed)) : 0;
 }
 
 uint8_t parameters_set(uint8_t parameter, int32_t value) {

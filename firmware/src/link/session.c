@@ -41,7 +41,8 @@ static void say_hello(void) {
   }
 }
 
-/* Begins anew, with a session or without (FRAME_NO_SESSION). */
+/* Begins anew, with a session or without (FRAME_NO_SESSION). The hello is said by the task: one of both is work enough at
+ * a time. */
 static void begin(uint32_t new_seed) {
   safety_latch(LATCH_SESSION_ENDED);
   seed = new_seed;
@@ -52,12 +53,10 @@ static void begin(uint32_t new_seed) {
   telemetry_start();
   buzzer_start_session();
   session_heard();
+  hello_in = 0;
 }
 
-void session_start(void) {
-  begin(FRAME_NO_SESSION);
-  say_hello();
-}
+void session_start(void) { begin(FRAME_NO_SESSION); }
 
 bool session_open(const msg_open *message) {
   const uint32_t wanted = message->board_nonce ^ message->host_nonce;
@@ -70,7 +69,7 @@ bool session_open(const msg_open *message) {
     }
     begin(wanted);
   }
-  say_hello();
+  hello_in = 0;
   return true;
 }
 

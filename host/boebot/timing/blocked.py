@@ -171,7 +171,7 @@ class Blocked:
 
     def _worked_out(self, entry: int, on: bool) -> Effect:
         if not self._is_plain(entry):
-            return self._effect(self.program.functions[entry], on)
+            return self._effect(self.worst_case.inside(entry).function, on)
         return Effect(on=True, plain=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
 
     def _is_plain(self, entry: int) -> bool:
@@ -200,7 +200,7 @@ class Blocked:
 
     def _effect(self, function: Function, on: bool) -> Effect:
         flow = self._flow(function, on)
-        marks = self.worst_case.marks(function)
+        marks = self.worst_case.marks(function.entry)
         within = [callee.within for callee in flow.callees]
         chained = [callee.chained for callee in flow.callees]
         tails: list[Stretch] = []
@@ -298,7 +298,8 @@ class Blocked:
     def _callee(self, entry: int, block: Block, function: Function, on: bool) -> Effect:
         """What a callee does to the flag; in time, where it leaves it alone, with the argument that it gets."""
         if self._is_plain(entry) and not on:
-            return Effect(through=self.worst_case.callee(entry, block, function).cycles)
+            inside = self.worst_case.inside(function.entry)
+            return Effect(through=self.worst_case.callee(entry, block, inside).cycles)
         return self.effect(entry, on)
 
     def _call(self, flow: _Flow, node: _Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[_Node]:

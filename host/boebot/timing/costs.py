@@ -11,6 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from boebot.timing.blocked import ENTRY, Blocked
+from boebot.timing.constants import Context
 from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
 from boebot.timing.loops import natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
@@ -33,9 +34,9 @@ class WithoutCallees(WorstCase):
         super().__init__(program)
         self._free = {program.by_name[name] for name in names if name in program.by_name}
 
-    def bound(self, entry: int, argument: int | None = None) -> Bound:
+    def bound(self, entry: int, context: Context | None = None) -> Bound:
         """See `WorstCase`."""
-        return Bound(0, (), {}) if entry in self._free else super().bound(entry, argument)
+        return Bound(0, (), {}) if entry in self._free else super().bound(entry, context)
 
 
 @dataclass(frozen=True, slots=True)

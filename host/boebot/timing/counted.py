@@ -1,36 +1,41 @@
 """Bounds of loops that show in the machine code itself: those that the compiler and its library make.
 
 The source has no place for an annotation of them: copies of structures, delays, shifts, divisions. Found are loops
-whose every pass counts a register down that nothing else in the loop writes, from a constant. Shifts by a variable
-count are bounded by the language: a count that is not less than the width of the operand has no meaning (C11, 6.5.7).
+whose every pass counts a register down that nothing else in the loop writes, from what it is known to hold where the
+loop is entered. Shifts by a variable count are bounded by the language: a count that is not less than the width of the
+operand has no meaning (C11, 6.5.7).
 """
 
 from __future__ import annotations
 
+from boebot.timing.constants import Known, State
 from boebot.timing.loops import Loop
 from boebot.timing.program import Block, Function, Instruction
-from boebot.timing.registers import KEEPS_FLAGS, before, constant, written
+from boebot.timing.registers import KEEPS_FLAGS, before, written
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
 SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
 CALLS = frozenset(("call", "rcall", "icall"))
 
 
-def passes(loop: Loop[int], function: Function) -> int | None:
+def passes(loop: Loop[int], known: Known) -> int | None:
     """How often the header runs at most for each entry of the loop; None if its code does not show it."""
-    came_from = before(function)
+    function = known.function
+    entering = [known.behind(block) for block in before(function)[loop.header] if block.start not in loop.nodes]
+    if loop.header == function.entry:
+        entering.append(State(dict(known.context)))
     inner = frozenset(node for each in loop.inner for node in each.nodes)
     found: list[int] = []
     for start in loop.nodes - inner:
         block = function.blocks[start]
-        if any(edge.to not in loop.nodes for edge in block.edges) and _in_every_pass(start, loop, function):
-            count = _counted(block, loop, function, came_from)
+        if any(edge.to not in loop.nodes for edge in block.edges) and in_every_pass(start, loop, function):
+            count = _counted(block, loop, known, entering)
             if count is not None:
                 found.append(count)
     return min(found, default=None)
 
 
-def _in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:
+def in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:
     """Without it there is no way from the header back to the header."""
     if start == loop.header:
         return True
@@ -46,7 +51,7 @@ def _in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:
     return True
 
 
-def _counted(block: Block, loop: Loop[int], function: Function, came_from: dict[int, list[Block]]) -> int | None:
+def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State]) -> int | None:
     branch = block.instructions[-1]
     if branch.mnemonic not in ("brne", "breq", "brpl", "brmi", "brcc", "brcs") or len(block.edges) != 2:
         return None
@@ -56,24 +61,22 @@ def _counted(block: Block, loop: Loop[int], function: Function, came_from: dict[
     register, width, step, instructions = counting
     registers = frozenset(range(register, register + width))
     for start in loop.nodes:
-        for instruction in function.blocks[start].instructions:
+        for instruction in known.function.blocks[start].instructions:
             if instruction in instructions:
                 continue
             if written(instruction) & registers or instruction.mnemonic in CALLS:
                 return None
     stays = branch.operands[-1] in loop.nodes
     counts: list[int] = []
-    for previous in came_from[loop.header]:
-        if previous.start not in loop.nodes:
-            parts = [constant(register + i, previous, came_from) for i in range(width)]
-            known = [part for part in parts if part is not None]
-            if len(known) < width:
-                return _shift(loop, function, instructions)
-            value = sum(part << 8 * i for i, part in enumerate(known))
-            count = _runs(value, step, 8 * width, branch.mnemonic, stays)
-            if count is None:
-                return None
-            counts.append(count)
+    for state in entering:
+        held = state.registers
+        if not registers <= held.keys():
+            return _shift(loop, known.function, instructions)
+        value = sum(held[register + i] << 8 * i for i in range(width))
+        count = _runs(value, step, 8 * width, branch.mnemonic, stays)
+        if count is None:
+            return None
+        counts.append(count)
     return max(counts, default=None)
 
 

@@ -3,42 +3,101 @@
 A row of `.boebot.loops` counts how often its address runs. It belongs to the innermost loop around that address. Copies
 of one loop have the same line of the source, and rows at one address are of different loops, the outer one first: where
 nothing is to be done in the outer loop's body before the inner loop, both bodies begin at the inner loop's header.
-What the code itself shows of a loop (counted.py) takes the place of what is said. Two things no ELF tells:
+Where the code itself shows how often a loop runs (counted.py), the lesser of both holds. Copies of one row that run one
+after the other in one pass are of a loop within, which the compiler unrolled, and bound nothing around it. Two things
+no ELF tells:
 
 * A loop whose body is empty may have its row at its test, which runs once more than the body; count it there.
-* Where a loop without a bound has one with a bound in it that the compiler unrolled, the row seems to be its own. So
-  every loop of the source needs a bound, not only those in which something is refused.
+* Where a loop without a bound has one with a bound in it of which the compiler left one pass only, the row seems to be
+  its own. So every loop of the source needs a bound, not only those in which something is refused.
 """
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 from boebot.timing import counted
+from boebot.timing.constants import Known
 from boebot.timing.loops import IrreducibleError, Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Mark
 from boebot.timing.program import Function, Program
 
 _Marks = dict[int, list[Mark]]
+_Found = list[tuple[Loop[int], Loop[int] | None]]
 
 
-def marks_of(program: Program, function: Function, runs: int | None = None) -> _Marks:
-    """The bounds of a function's loops, by the blocks whose runs they count.
-
-    `runs`: how often the header of its only loop runs, for a library routine whose argument is known.
-    """
+def marks_of(program: Program, function: Function, known: Known) -> _Marks:
+    """The bounds of a function's loops, by the blocks whose runs they count, in the context of `known`."""
     result = _said(program, function)
-    loops = _with_parents(function)
-    for loop, parent in loops:
+    whole = _with_parents(function)
+    for loop, parent in whole:
         if parent is not None:
             _move_out(result, loop, parent)
+    for loop, _ in whole:
+        _drop_unrolled(result, loop, function)
+    loops = _with_parents(known.function)
+    _drop_others(result, whole, loops)
     for loop, _ in loops:
-        shown = counted.passes(loop, function)
-        if shown is None and not loop.inner:
-            shown = runs
+        shown = counted.passes(loop, known)
         if shown is not None:
-            for node in _own(loop):
-                result.pop(node, None)
-            result[loop.header] = [Mark(loop.header, shown, None)]
+            _lesser(result, loop, known.function, shown)
     return result
+
+
+def _drop_unrolled(marks: _Marks, loop: Loop[int], function: Function) -> None:
+    """Rows of which a copy runs after another one in the same pass of a loop."""
+    places: dict[Hashable, set[int]] = {}
+    for node in _own(loop):
+        for mark in marks.get(node, ()):
+            places.setdefault(mark.loop, set()).add(node)
+    for name, nodes in places.items():
+        if len(nodes) > 1 and any(_next(node, nodes, loop, function) for node in nodes):
+            for node in nodes:
+                marks[node] = [mark for mark in marks[node] if mark.loop != name]
+
+
+def _next(start: int, nodes: set[int], loop: Loop[int], function: Function) -> bool:
+    """Whether another of the nodes comes after this one before the loop's header."""
+    seen = {start, loop.header}
+    work = [start]
+    while work:
+        for edge in function.blocks[work.pop()].edges:
+            if edge.to in loop.nodes and edge.to not in seen:
+                if edge.to in nodes:
+                    return True
+                seen.add(edge.to)
+                work.append(edge.to)
+    return False
+
+
+def _drop_others(marks: _Marks, whole: _Found, left: _Found) -> None:
+    """Rows of loops that are none in this context: they bound nothing around them."""
+    before, now = _innermost(whole), _innermost(left)
+    for node in marks:
+        if before.get(node) != now.get(node):
+            marks[node] = []
+
+
+def _innermost(loops: _Found) -> dict[int, int]:
+    """Of each block in a loop, the header of the innermost one."""
+    result: dict[int, int] = {}
+    for loop, _ in loops:  # inner ones first
+        for node in loop.nodes:
+            result.setdefault(node, loop.header)
+    return result
+
+
+def _lesser(marks: _Marks, loop: Loop[int], function: Function, shown: int) -> None:
+    """Of what is said of a loop and what its code shows."""
+    own = _own(loop)
+    rows = [(node, mark) for node in own for mark in marks.get(node, ())]
+    if len(rows) == 1:
+        node, mark = rows[0]
+        if mark.passes is not None and mark.passes < shown and counted.in_every_pass(node, loop, function):
+            return
+    for node in own:
+        marks.pop(node, None)
+    marks[loop.header] = [Mark(loop.header, shown, None)]
 
 
 def _said(program: Program, function: Function) -> _Marks:
@@ -71,7 +130,7 @@ def _own(loop: Loop[int]) -> frozenset[int]:
     return loop.nodes.difference(*(inner.nodes for inner in loop.inner))
 
 
-def _with_parents(function: Function) -> list[tuple[Loop[int], Loop[int] | None]]:
+def _with_parents(function: Function) -> _Found:
     """All loops, inner ones before those around them."""
 
     def successors(start: int) -> list[int]:
@@ -82,7 +141,7 @@ def _with_parents(function: Function) -> list[tuple[Loop[int], Loop[int] | None]
         outermost = natural_loops(order, successors)
     except IrreducibleError:
         return []  # refused by whoever looks for paths
-    found: list[tuple[Loop[int], Loop[int] | None]] = [(loop, None) for loop in outermost]
+    found: _Found = [(loop, None) for loop in outermost]
     for loop, _ in found:  # grows meanwhile
         found += [(inner, loop) for inner in loop.inner]
     return found[::-1]

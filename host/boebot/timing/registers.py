@@ -1,11 +1,9 @@
-"""What instructions do beyond the graph: which registers they write, which constants these hold, and who halts the CPU.
+"""What instructions do beyond the graph: which registers they write, and who halts the CPU.
 
 After the AVR instruction set manual, and the register conventions of avr-gcc: https://gcc.gnu.org/wiki/avr-gcc.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterable
 
 from boebot.timing.program import Block, Function, Instruction
 
@@ -66,33 +64,3 @@ def before(function: Function) -> dict[int, list[Block]]:
         for to in dict.fromkeys(edge.to for edge in block.edges):
             result[to].append(block)
     return result
-
-
-def constant(register: int, block: Block, came_from: dict[int, list[Block]], count: int | None = None) -> int | None:
-    """What a register holds at the end of a block, or before its instruction number `count`, if it is a constant that
-    is loaded in it or on the only way to it."""
-    seen: set[int] = set()
-    instructions: Iterable[Instruction] = reversed(block.instructions[:count])
-    while block.start not in seen:
-        seen.add(block.start)
-        for instruction in instructions:
-            if register not in written(instruction):
-                continue
-            if instruction.mnemonic == "ldi":
-                return instruction.operands[1]
-            if instruction.mnemonic == "mov":
-                register = instruction.operands[1]
-            elif instruction.mnemonic == "movw":
-                register = instruction.operands[1] + register - instruction.operands[0]
-            elif instruction.mnemonic in ("eor", "sub") and instruction.operands == (register, register):
-                return 0
-            else:
-                return None
-            if register == ZERO:
-                return 0
-        previous = came_from[block.start]
-        if len(previous) != 1:
-            return None
-        block = previous[0]
-        instructions = reversed(block.instructions)
-    return None

@@ -1,8 +1,8 @@
 """Worst-case execution time of a function of an image, interrupts not counted, and the path that takes it.
 
 From the function's first instruction to the end of its return, with all that it calls; the call itself is the
-caller's. Every path of the graph counts as possible; loops are bounded by what the image says of them, by their own
-code (counted.py), or, in library routines, by what they are called with (ARGUMENTS).
+caller's. A function is bounded once for each set of constants that calls hand to it (constants.py). Every path that
+these leave counts as possible; loops are bounded by what the image says of them and by their own code (counted.py).
 """
 
 from __future__ import annotations
@@ -10,18 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from boebot.errors import TimingError
+from boebot.timing.constants import Context, Known, known, root
 from boebot.timing.marks import marks_of
 from boebot.timing.paths import Graph, Mark, Walk, Way, longest
 from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import before, constant, halted
 
-# Library routines with a loop that runs by an argument: its lower register (avr-gcc's calling convention, 16 bits), and
-# how often the loop's header runs more than the argument says.
-ARGUMENTS: dict[str, tuple[int, int]] = {
-    "memcpy": (20, 1),  # third argument; `subi, sbci, brcc` at the header borrows in the pass after the last byte
-    "memcpy_P": (20, 1),  # the same
-    "memset": (20, 1),  # the same
-}
+# Library routines with a loop that runs by an argument, of 16 bits: its lower register (avr-gcc's calling convention).
+COUNTS = {"memcpy": 20, "memcpy_P": 20, "memset": 20}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +42,10 @@ class WorstCase:
 
     def __init__(self, program: Program) -> None:
         self.program = program
-        self._bounds: dict[tuple[int, int | None], Bound] = {}
-        self._under_way: list[int] = []
+        self._bounds: dict[tuple[int, Context], Bound] = {}
+        self._inside: dict[int, Known] = {}
         self._marks: dict[int, dict[int, list[Mark]]] = {}
+        self._under_way: list[int] = []
 
     def of(self, function: str | int) -> Bound:
         """The bound of a function, by name or entry.
@@ -63,9 +59,10 @@ class WorstCase:
             function = self.program.by_name[function]
         return self.bound(function)
 
-    def bound(self, entry: int, argument: int | None = None) -> Bound:
-        """The same by entry; `argument` is what a routine of ARGUMENTS is called with."""
-        key = (entry, argument)
+    def bound(self, entry: int, context: Context | None = None) -> Bound:
+        """The same by entry; `context`: registers that hold constants there, else those of any call."""
+        function = self.program.functions[entry]
+        key = (entry, root(function) if context is None else context)
         if key not in self._bounds:
             if entry in self._under_way:
                 names = [self.program.functions[each].name for each in self._under_way]
@@ -75,27 +72,41 @@ class WorstCase:
                 )
             self._under_way.append(entry)
             try:
-                self._bounds[key] = self._bound(self.program.functions[entry], argument)
+                self._bounds[key] = self._bound(function, key[1])
             finally:
                 self._under_way.pop()
         return self._bounds[key]
 
-    def _bound(self, function: Function, argument: int | None) -> Bound:
-        ways = {start: self.ways(block, function) for start, block in function.blocks.items()}
-        graph = Graph(function.entry, ways, self.program.where, self.marks(function, argument))
+    def inside(self, entry: int) -> Known:
+        """A function as any call of it finds it: what is known in it, and the ways that this leaves."""
+        if entry not in self._inside:
+            function = self.program.functions[entry]
+            self._inside[entry] = known(function, root(function))
+        return self._inside[entry]
+
+    def marks(self, entry: int) -> dict[int, list[Mark]]:
+        """What is known of the loops in it, at the blocks whose runs it counts."""
+        if entry not in self._marks:
+            self._marks[entry] = marks_of(self.program, self.program.functions[entry], self.inside(entry))
+        return self._marks[entry]
+
+    def _bound(self, function: Function, context: Context) -> Bound:
+        inside = known(function, context)
+        ways = {start: self.ways(block, inside) for start, block in inside.function.blocks.items()}
+        graph = Graph(function.entry, ways, self.program.where, marks_of(self.program, function, inside))
         walk = longest(graph)
         if walk is None:
             raise TimingError(f"{function.name} at {self.program.where(function.entry)} never returns; no bound")
         return _told(walk)
 
-    def ways(self, block: Block, function: Function) -> list[Way[int]]:
+    def ways(self, block: Block, inside: Known) -> list[Way[int]]:
         """The ways out of a block, with what is called at its end."""
         callee, callee_cycles = None, 0
         for entry in block.calls:
-            cycles = self.callee(entry, block, function).cycles
+            cycles = self.callee(entry, block, inside).cycles
             if callee is None or cycles > callee_cycles:
                 callee, callee_cycles = entry, cycles
-        own = block.body_cycles + sum(map(halted, block.instructions)) + callee_cycles
+        own = block.body_cycles + callee_cycles
         if not block.edges:
             return [Way(block.start, None, own + block.last_cycles, callee, callee_cycles)]
         edges: dict[int, int] = {}
@@ -103,31 +114,16 @@ class WorstCase:
             edges[edge.to] = max(edges.get(edge.to, 0), edge.cycles)
         return [Way(block.start, to, own + cycles, callee, callee_cycles) for to, cycles in edges.items()]
 
-    def callee(self, entry: int, block: Block, function: Function) -> Bound:
-        """Of what a block calls, with the argument that it hands over, where that matters."""
-        called = self.program.functions[entry]
-        if called.name not in ARGUMENTS:
-            return self.bound(entry)
-        register = ARGUMENTS[called.name][0]
-        came_from = before(function)
-        call_itself = len(block.instructions) - 1
-        low = constant(register, block, came_from, call_itself)
-        high = constant(register + 1, block, came_from, call_itself)
-        if low is None or high is None:
+    def callee(self, entry: int, block: Block, inside: Known) -> Bound:
+        """Of what a block calls, with the constants that it hands over."""
+        name = self.program.functions[entry].name
+        if name in COUNTS and inside.before_last(block).word(COUNTS[name]) is None:
             call = self.program.where(block.instructions[-1].address)
             raise TimingError(
-                f"{called.name} is called at {call} with a number of bytes that is not a constant; "
+                f"{name} is called at {call} with a number of bytes that is not a constant; "
                 "expected a constant, or a bounded loop in its place"
             )
-        return self.bound(entry, high << 8 | low)
-
-    def marks(self, function: Function, argument: int | None = None) -> dict[int, list[Mark]]:
-        """What is known of the function's loops, at the blocks whose runs it counts."""
-        if argument is not None:
-            return marks_of(self.program, function, argument + ARGUMENTS[function.name][1])
-        if function.entry not in self._marks:
-            self._marks[function.entry] = marks_of(self.program, function)
-        return self._marks[function.entry]
+        return self.bound(entry, inside.handed(block))
 
 
 def _told(walk: Walk[int]) -> Bound:
