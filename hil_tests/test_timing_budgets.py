@@ -1,8 +1,8 @@
 """The gate of the timing budgets: of every image that is flashed, each task, interrupt, tick and byte of memory against
 its bound, its budget and the figures that were set for it.
 
-What does not hold today stands in KNOWN, with how far it is off and why. The table only ever gets shorter: a figure that
-grows fails, and so does an entry whose figure holds again, so that it is removed.
+What does not hold today stands in KNOWN, with how far it is off and why. The table only ever gets shorter: a figure
+that grows fails, and so does an entry whose figure holds again, so that it is removed.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from boebot.cli import output
-from boebot.timing.response import HORIZON
+from boebot.timing.budget import FOR_EVER
 
 if TYPE_CHECKING:
     from boebot.timing.budget import Report, Row
@@ -77,7 +77,7 @@ def _is_broken(row: Row) -> bool:
 def _cell(number: int | None) -> str:
     if number is None:
         return _UNKNOWN
-    return "∞" if number >= HORIZON else f"{number:,}"
+    return "∞" if number >= FOR_EVER else f"{number:,}"
 
 
 def _sums(report: Report) -> dict[str, Any]:

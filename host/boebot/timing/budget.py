@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from boebot.errors import TimingError
-from boebot.timing.blocked import HORIZON, WAKE
+from boebot.timing.blocked import WAKE
 from boebot.timing.costs import Costs, costs
 from boebot.timing.elf import read_image
 from boebot.timing.graph import program_of
@@ -28,6 +28,7 @@ RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
 FLASH_BYTES = 0x8000
 RECEIVE_RING = 256  # bytes, of which one stays free
+FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
 
@@ -283,14 +284,14 @@ def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
         if row.bound > row.budget:
             found.append(_above(f"{who} may take {row.bound} cycles", row.bound, "budget", row.budget))
         if row.latency is not None and row.latency_limit is not None and row.latency > row.latency_limit:
-            wait = "for ever" if row.latency >= HORIZON else f"{row.latency} cycles"
+            wait = "for ever" if row.latency >= FOR_EVER else f"{row.latency} cycles"
             found.append(_above(f"{who} may wait {wait}", row.latency, "latency limit", row.latency_limit))
     return found
 
 
 def _above(says: str, number: int, what: str, limit: int) -> str:
     """By how much a figure is above what it may be."""
-    more = "more than" if number >= HORIZON else f"{number - limit} above"
+    more = "more than" if number >= FOR_EVER else f"{number - limit} above"
     return f"{says}, {more} its {what} of {limit}"
 
 
