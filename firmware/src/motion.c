@@ -34,17 +34,26 @@ uint16_t motion_pulse(int32_t centre, int32_t gain, int16_t signal) {
   return (uint16_t)clamp(centre + motion_offset(gain, signal), MOTION_PULSE_MIN, MOTION_PULSE_MAX);
 }
 
-/* A division takes 600 cycles, and on a full line there are 5,000 for each set-point: it is made anew only for another
- * maximum. The signal is right to half a count and 2e-6 of it. */
-int16_t motion_signal_of_speed(int16_t speed, int16_t maximum) {
-  static int16_t divisor;  /* the maximum at which */
-  static int32_t quotient; /* is FULL * 2^17 / maximum; at most 2^31 when it is multiplied by a maximum */
+/* Signals per speed at a maximum: FULL * 2^17 / maximum; at most 2^31 when it is multiplied by a maximum. A division takes
+ * 600 cycles, and on a full line there are 5,000 for each set-point: it is made anew only for another maximum. */
+static int32_t signal_per_speed(int16_t maximum) {
+  static int16_t divisor; /* the maximum at which */
+  static int32_t quotient;
   if (maximum != divisor) {
     divisor = maximum;
     quotient = divide((int32_t)FULL << 17, maximum);
   }
+  return quotient;
+}
+
+/* Right to half a count and 2e-6 of it. */
+static __attribute__((noinline)) int16_t signal_of(int16_t speed, int16_t maximum, int32_t quotient) {
   const int16_t within = speed > maximum ? maximum : speed < -maximum ? (int16_t)-maximum : speed;
   return (int16_t)shift(within * quotient, 17);
+}
+
+int16_t motion_signal_of_speed(int16_t speed, int16_t maximum) {
+  return signal_of(speed, maximum, signal_per_speed(maximum));
 }
 
 void motion_signals(int16_t left, int16_t right) {
@@ -55,7 +64,8 @@ void motion_signals(int16_t left, int16_t right) {
 
 void motion_speeds(int16_t left, int16_t right) {
   const int16_t maximum = (int16_t)parameters_u16(PARAMETER_WHEEL_SPEED_MAXIMUM); /* up to 5000 */
-  motion_signals(motion_signal_of_speed(left, maximum), motion_signal_of_speed(right, maximum));
+  const int32_t quotient = signal_per_speed(maximum);
+  motion_signals(signal_of(left, maximum, quotient), signal_of(right, maximum, quotient));
 }
 
 void motion_off(void) { servo_set(0, 0); }

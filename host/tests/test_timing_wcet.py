@@ -125,6 +125,73 @@ def test_callees_have_their_share(tmp_path: Path) -> None:
     assert WorstCase(program).of("main").callees == {program.by_name["f"]: 5 * (1 + 4)}
 
 
+# 60 passes at most; how many, r20 says.
+SHARED = "f: bounded 60\n nop\n dec r20\n brne f\n ret\n"
+PASSES = {n: 4 * n - 1 + 4 for n in (3, 5, 60)}  # a pass 1 + 1 + 2, the last one 1 less; ret
+
+
+@pytest.mark.parametrize(
+    ("source", "cycles"),
+    [
+        ("main: ldi r20, 3\n rcall f\n ldi r20, 5\n rcall f\n ret\n", 1 + 3 + PASSES[3] + 1 + 3 + PASSES[5] + 4),
+        ("main: rcall f\n ret\n", 3 + PASSES[60] + 4),
+        ("main: ldi r20, 3\n rcall g\n rcall f\n ret\n g: ret\n", 1 + 3 + 4 + 3 + PASSES[60] + 4),  # g may write r20
+        ("main: ldi r16, 3\n rcall g\n mov r20, r16\n rcall f\n ret\n g: ret\n", 1 + 7 + 1 + 3 + PASSES[3] + 4),
+        ("main: ldi r20, 3\n sbrc r24, 0\n ldi r20, 5\n rcall f\n ret\n", 1 + 2 + 3 + PASSES[60] + 4),
+        ("main: ldi r20, 3\n sbrc r24, 0\n ldi r20, 3\n rcall f\n ret\n", 1 + 2 + 3 + PASSES[3] + 4),
+        ("main: ldi r20, 3\n jmp f\n .type f, @function\n", 1 + 3 + PASSES[3]),
+        ("main: ldi r20, 3\n sts 20, r24\n rcall f\n ret\n", 1 + 2 + 3 + PASSES[60] + 4),  # data address of r20
+        ("main: ldi r20, 3\n rcall g\n ret\n g: rcall f\n ret\n", 1 + 3 + 3 + PASSES[3] + 4 + 4),  # handed through
+    ],
+    ids=["two calls", "unknown", "clobbered", "kept", "two values", "one value", "tail call", "written", "through"],
+)  # fmt: skip
+def test_loop_by_what_its_function_is_called_with(tmp_path: Path, source: str, cycles: int) -> None:
+    assert cycles_of(tmp_path, source + SHARED) == cycles
+
+
+@pytest.mark.parametrize(
+    ("test", "value", "cycles"),
+    [
+        ("tst r24\n breq 1f", 0, 1 + 2 + 4),
+        ("tst r24\n breq 1f", 1, 1 + 1 + 2 + 4),
+        ("cpi r24, 7\n brcs 1f", 6, 1 + 2 + 4),
+        ("cpi r24, 7\n brcs 1f", 7, 1 + 1 + 2 + 4),
+        ("cpi r24, 7\n brlt 1f", 0x80, 1 + 2 + 4),  # -128
+        ("cpi r24, 7\n brge 1f", 0x80, 1 + 1 + 2 + 4),
+        ("sbrc r24, 3\n rjmp 1f", 8, 1 + 2 + 4),
+        ("sbrc r24, 3\n rjmp 1f", 7, 2 + 2 + 4),
+        ("cpse r24, r1\n rjmp 1f", 0, 2 + 2 + 4),
+        ("cpse r24, r1\n rjmp 1f", 1, 1 + 2 + 4),
+        ("subi r24, 5\n sbc r25, r1\n brcc 1f", 4, 1 + 1 + 1 + 2 + 4),  # r25 is not known
+    ],
+)  # fmt: skip
+def test_ways_that_an_argument_closes_do_not_count(tmp_path: Path, test: str, value: int, cycles: int) -> None:
+    """Behind the test 2 cycles and the return, at 1 the return alone."""
+    source = f"main: ldi r24, {value}\n rcall f\n ret\n f: {test}\n lds r18, 256\n 1: ret\n"
+    assert cycles_of(tmp_path, source) == 1 + 3 + cycles + 4
+
+
+@pytest.mark.parametrize(("said", "passes"), [(4, 4), (10, 7), (7, 7)])
+def test_lesser_of_a_loops_bound_and_its_count_holds(tmp_path: Path, said: int, passes: int) -> None:
+    source = f"main: ldi r20, 7\n 1: bounded {said}\n sbic 5, 0\n rjmp 2f\n dec r20\n brne 1b\n 2: ret"
+    a_pass = 2 + 1 + 2  # sbic skips
+    leaves = max(1 + 2, 2 + 1 + 1)  # by the jump, by the branch
+    assert cycles_of(tmp_path, source) == 1 + (passes - 1) * a_pass + leaves + 4
+
+
+def test_bound_of_an_unrolled_loop_is_not_that_of_the_loop_around(tmp_path: Path) -> None:
+    """The compiler leaves two copies of the inner loop's body, and no loop of it, in the outer one."""
+    source = C_LOOP + (
+        "volatile uint8_t n, x;\nint main(void) {{ while (n) {{ {0}\n"
+        "  for (uint8_t i = 0; i < 2; i++) {{\n    BOUNDED(2); x = i; }} }}\n return 0; }}\n"
+    )
+    flags = ("-gdwarf-2", "-O3")
+    with pytest.raises(TimingError, match="has no bound"):
+        WorstCase(compiled(tmp_path, source.format(""), *flags)).of("main")
+    of = [WorstCase(compiled(tmp_path, source.format(f"BOUNDED({n});"), *flags)).of("main").cycles for n in (3, 6, 9)]
+    assert of[2] - of[1] == of[1] - of[0] > 3 * 2 * 2
+
+
 def test_library_routines_by_what_they_are_called_with(tmp_path: Path) -> None:
     source = C_LOOP + "uint8_t a[40], b[40];\nint main(void) {{ memcpy(a, b, {}); return 0; }}\n"
     of = [WorstCase(compiled(tmp_path, source.format(n), "-fno-builtin")).of("main").cycles for n in (9, 10, 40)]

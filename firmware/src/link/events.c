@@ -47,7 +47,8 @@ void events_raise(uint8_t kind, uint16_t value) {
     BOUNDED(KINDS, for (const msg_event *event = kept; event < end; event++)) {
       if (event->kind != kind) {
         *kept++ = *event;
-      } else if (kind == EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
+      } else if (kind ==
+                 EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
         value = (uint16_t)(value | (event->value & 0xFF00u));
       }
     }

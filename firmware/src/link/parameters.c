@@ -43,7 +43,7 @@ _Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a
 
 static uint16_t values[PARAMETER_COUNT];
 
-static parameter_range range_of(uint8_t parameter) {
+static __attribute__((noinline)) parameter_range range_of(uint8_t parameter) {
   parameter_range range;
   hal_table_copy(&range, &ranges[parameter], sizeof range);
   return range;
@@ -91,7 +91,7 @@ uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
 
 int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
 
-int32_t parameters_get(uint8_t parameter) {
+__attribute__((noinline)) int32_t parameters_get(uint8_t parameter) {
   return parameter < PARAMETER_COUNT ? meant(values[parameter], hal_table_byte(&ranges[parameter].is_signed)) : 0;
 }
 

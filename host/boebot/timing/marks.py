@@ -46,12 +46,13 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
 
 def _drop_unrolled(marks: _Marks, loop: Loop[int], function: Function) -> None:
     """Rows of which a copy runs after another one in the same pass of a loop."""
-    places: dict[Hashable, set[int]] = {}
+    places: dict[Hashable, list[int]] = {}
     for node in _own(loop):
         for mark in marks.get(node, ()):
-            places.setdefault(mark.loop, set()).add(node)
-    for name, nodes in places.items():
-        if len(nodes) > 1 and any(_next(node, nodes, loop, function) for node in nodes):
+            places.setdefault(mark.loop, []).append(node)
+    for name, found in places.items():
+        nodes = set(found)
+        if len(nodes) < len(found) or any(_next(node, nodes, loop, function) for node in nodes):
             for node in nodes:
                 marks[node] = [mark for mark in marks[node] if mark.loop != name]
 
