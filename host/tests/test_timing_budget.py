@@ -244,29 +244,37 @@ def test_brain_is_measured(capsys: pytest.CaptureFixture[str]) -> None:
 # ---- the diagram ----------------------------------------------------------------------------------------------------
 
 
+def boxes(axes: Any) -> list[tuple[float, float]]:
+    """Left edge and width of each, in the units of their axis."""
+    return sorted((patch.get_x(), patch.get_width()) for patch in axes.patches)
+
+
 def test_diagram_is_to_scale(report: budget.Report) -> None:
-    """The widths of its boxes are the tasks' bounds: in ms above, in cycles below."""
+    """The widths of its boxes are the tasks' bounds: in ms of a tick, in cycles below, none of them left out."""
     verdict = realisable.judge(load_robot("shieldbot"), 0.01, brain_s=0.002)
-    above, below = diagram.figure(report, verdict).axes
-    widths = sorted(round(patch.get_width() * 16_000) for patch in above.patches)  # type: ignore[attr-defined]
-    line = [round(n * 10 / 500_000 * 16e6) for n in (realisable.TELEMETRY_BYTES, realisable.COMMAND_BYTES)]
-    around = report.costs.round
-    assert widths == sorted([104] * 4 + [204] + [around] * 4 + line + [32_000])
-    assert sorted(round(patch.get_width()) for patch in below.patches) == sorted(  # type: ignore[attr-defined]
-        [104] * 4 + [204] + [around] * 4
-    )
+    step, tick, slots = diagram.figure(report, verdict).axes
+    byte_ms = 10 / 500
+    telemetry, command_ms = realisable.TELEMETRY_BYTES * byte_ms, realisable.COMMAND_BYTES * byte_ms
+    expected = [(0, telemetry), (telemetry, 2), (telemetry + 2, command_ms)]
+    assert np.array(boxes(step)) == pytest.approx(np.array(expected))
+    tasks = sorted([104] * 4 + [204] + [report.costs.round] * 4)
+    assert sorted(round(width * 16_000) for _, width in boxes(tick)) == tasks
+    assert sorted(round(width) for _, width in boxes(slots)) == tasks
+    assert [text.get_text() for text in step.texts if "Δt" in text.get_text()] == ["Δt = 10 ms"]
 
 
 def test_diagram_of_a_measured_tick(report: budget.Report) -> None:
+    """Of the report's own load; the time between two tasks of a slot is marked, 1000 cycles here."""
     tick = (
         Moment("first", "task", 50, 185),
         Moment("slot", "interrupt", 60, 91),
+        Moment("first", "task", 1185, 1289),
         Moment("first", "task", 40_050, 40_154),
     )
-    measured = replace(measurement(), tick=tick)
+    measured = merged([replace(measurement(), scenarios=("noise",)), replace(measurement(), tick=tick)])
     above, below = diagram.figure(replace(report, measured=measured)).axes
-    assert len(above.patches) == len(below.patches) == 3
-    assert [round(patch.get_x() * 16_000) for patch in above.patches] == [50, 60, 40_050]  # type: ignore[attr-defined]
+    assert [round(begin * 16_000) for begin, _ in boxes(above)] == [50, 60, 1185, 40_050]
+    assert boxes(below) == [(50, 104), (50, 135), (60, 31), (185, 1000), (1185, 104)]
 
 
 def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
@@ -275,6 +283,6 @@ def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
     assert found == diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05)), "the same again"
     root = ElementTree.fromstring(found["timing.svg"])
     texts = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"first", "second", "tasks", "slot 3"} <= texts
+    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "bytes on the line"} <= texts
     (tmp_path / "timing.png").write_bytes(found["timing.png"])
     assert matplotlib.image.imread(tmp_path / "timing.png").shape[1] > 1000
