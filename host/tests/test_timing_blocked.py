@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from avr_image import assembled, compiled
 from boebot.errors import TimingError
-from boebot.timing.blocked import ENTRY, HORIZON, Blocked
-from boebot.timing.program import InterruptRow, Table
+from boebot.timing.blocked import ENTRY, WAKE, Blocked
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_3\n"
 JUMP = 3  # of a vector, where the linker does not relax
@@ -34,6 +32,7 @@ JUMP = 3  # of a vector, where the linker does not relax
         ("main: cli\n sei\n nop\n cli\n nop\n sei\n nop\n ret", 4),  # an interrupt comes between the two
         ("main: cli\n sei\n nop\n nop\n cli\n nop\n sei\n nop\n ret", 4),
         ("main: cli\n sei\n cli\n sei\n nop\n ret", 5),  # it never was on
+        ("main: cli\n sei\n sleep\n ret", 1 + 1 + 1 + WAKE),
         ("main: in r18, SREG\n cli\n push r18\n nop\n pop r18\n out SREG, r18\n nop\n ret", 1 + 2 + 1 + 2 + 1 + 1),
         ("main: cli\n tst r24\n breq 1f\n sei\n nop\n ret\n 1: adiw r24, 1\n sei\n nop\n ret", 1 + 1 + 2 + 2 + 1 + 1),
     ],
@@ -76,22 +75,6 @@ def test_interrupts(tmp_path: Path) -> None:
     assert blocked.interrupt(2) == (second, 1 + 3 + 4)
     assert blocked.interrupt(3) == (third, None)
     assert blocked.image().cycles == third
-    # The longest has just begun and returns to main's `cli`; then those of higher priority, each with an instruction
-    # behind it.
-    assert blocked.latency(1) == third + main
-    assert blocked.latency(2) == third + main + (first + 4)
-    assert blocked.latency(3) == third + main + (first + 4) + (second + 4)
-
-
-def test_only_one_interrupt_comes_before_a_cli_at_once(tmp_path: Path) -> None:
-    """So each of higher priority is followed by all of that stretch, not by one instruction only."""
-    source = VECTORS + (
-        "main: cli\n sei\n nop\n {} cli\n nop\n nop\n nop\n sei\n nop\n ret\n __vector_1: reti\n __vector_2: reti"
-    )
-    interrupt, stretch = ENTRY + JUMP + 4, 1 + 3 + 1 + 1
-    for between, behind in (("", stretch), ("nop\n", 4)):
-        blocked = Blocked(assembled(tmp_path, source.format(between)))
-        assert blocked.latency(2) == (interrupt + stretch) + (interrupt + behind)
 
 
 def test_planted_instruction_lengthens_the_stretch(tmp_path: Path) -> None:
@@ -101,13 +84,3 @@ def test_planted_instruction_lengthens_the_stretch(tmp_path: Path) -> None:
         for text in ("", "nop\n", "push r2\n pop r2\n")
     ]
     assert [length - lengths[0] for length in lengths] == [0, 1, 4]
-
-
-def test_those_of_higher_priority_may_take_all_the_time(tmp_path: Path) -> None:
-    source = VECTORS + "main: sei\n nop\n ret\n __vector_1: nop\n reti\n __vector_2: reti"
-    program = assembled(tmp_path, source)
-    span = ENTRY + JUMP + 1 + 4
-    for interval, waits in ((span, True), (2 * span, False)):
-        rows = (InterruptRow("first", 1, 0, 0, interval),)
-        latency = Blocked(replace(program, table=Table(interrupts=rows))).latency(2)
-        assert (latency == HORIZON) == waits

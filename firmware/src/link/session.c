@@ -41,8 +41,7 @@ static void say_hello(void) {
   }
 }
 
-/* Begins anew, with a session or without (FRAME_NO_SESSION). The hello is said by the task: one of both is work enough at
- * a time. */
+/* Begins anew, with a session or without (FRAME_NO_SESSION). Hello is due. */
 static void begin(uint32_t new_seed) {
   safety_latch(LATCH_SESSION_ENDED);
   seed = new_seed;
@@ -56,7 +55,10 @@ static void begin(uint32_t new_seed) {
   hello_in = 0;
 }
 
-void session_start(void) { begin(FRAME_NO_SESSION); }
+void session_start(void) {
+  begin(FRAME_NO_SESSION);
+  say_hello();
+}
 
 bool session_open(const msg_open *message) {
   const uint32_t wanted = message->board_nonce ^ message->host_nonce;
@@ -69,7 +71,7 @@ bool session_open(const msg_open *message) {
     }
     begin(wanted);
   }
-  hello_in = 0;
+  say_hello();
   return true;
 }
 
@@ -92,7 +94,7 @@ void session_heard(void) { silence = 0; }
 void session_task(void) {
   silence = (uint16_t)(silence + TICK_MS); /* rolls over only without a session */
   if (session_is_open() && silence > parameters_u16(PARAMETER_SESSION_TIME_OUT)) {
-    session_start();
+    begin(FRAME_NO_SESSION); /* hello in the next tick: both together would be the longest run by half */
   } else if (hello_in == 0 || --hello_in == 0) {
     say_hello();
   }

@@ -1,14 +1,12 @@
-"""The longest time in which no interrupt is accepted: of a function, of a whole image, and what each interrupt waits.
+"""The longest time in which no interrupt is accepted, of a function and of a whole image.
 
 A stretch begins with the first cycle of `cli`, or with the acceptance of an interrupt, whose entry takes 4 cycles
-(data sheet, 7.7.1). It ends with the instruction behind the one that sets the flag. When an interrupt returns, one
-instruction runs before the next one is accepted, and that may be a `cli`. So where a `cli` comes as soon as interrupts
-are on again, only one interrupt gets in between two stretches.
+(data sheet, 7.7.1). It ends with the instruction behind the one that sets the flag; where that is `sleep`, the CPU
+wakes in 4 cycles more (10.1).
 
 Taken for granted: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
-not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. While the CPU sleeps, it wakes in
-4 cycles. While an interrupt waits, of stretches in `main` that do not follow each other at once there is one. Requests
-are as the timing table says; of an interrupt that is not in it, one at a time.
+not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. What an interrupt waits, all in
+all, is in latency.py.
 """
 
 from __future__ import annotations
@@ -18,16 +16,14 @@ from dataclasses import dataclass, field
 
 from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
-from boebot.timing.paths import Graph, Mark, Way, longest
-from boebot.timing.program import Block, Function, Program
-from boebot.timing.registers import CALL_CLOBBERED, halted, written
+from boebot.timing.paths import Graph, Way, longest
+from boebot.timing.program import Block, Function, Instruction, Program
+from boebot.timing.registers import CALL_CLOBBERED, written
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
 ENTRY = 4  # cycles from acceptance to the vector's jump
-LONGEST_INSTRUCTION = 4  # cycles: call, ret, reti
 WAKE = 4  # cycles from a request in sleep to its acceptance
-HORIZON = 1 << 24  # cycles; who waits longer waits for ever
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +47,6 @@ class Effect:
         head: cycles from entry until interrupts can come.
         tail: the longest stretch that lasts from within until its return.
         on: whether it can return with interrupts on.
-        chained: the longest stretch within that begins when only one interrupt could come since the one before.
     """
 
     within: Stretch = NONE
@@ -59,25 +54,45 @@ class Effect:
     head: int | None = None
     tail: Stretch | None = None
     on: bool = False
-    chained: Stretch = NONE
     plain: bool = False  # leaves the flag alone
 
 
-_Node = tuple[int, int, State]  # block, number of the instruction in it, state before it
+Node = tuple[int, int, State]  # block, number of the instruction in it, state before it
 
 
 @dataclass(frozen=True, slots=True)
-class _Flow:
-    """All ways from (block, instruction, state) to the next that belong to a stretch. Besides those that go on: its end
-    (`ended`), and the function's return (`returned`)."""
+class Begin:
+    """A stretch begins: the first node in it, cycles before that, where, and the node before (None: in a callee)."""
 
-    entry: _Node
-    goes: dict[_Node, list[tuple[_Node, int]]] = field(default_factory=dict)
-    ended: dict[_Node, list[int]] = field(default_factory=dict)  # cycles until interrupts can come
-    returned: dict[_Node, list[tuple[bool, int]]] = field(default_factory=dict)  # whether off, cycles
-    # First node, cycles before it, where, whether interrupts had just come on
-    begins: list[tuple[_Node, int, Stretch, bool]] = field(default_factory=list)
+    node: Node
+    before: int
+    at: Stretch
+    source: Node | None
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call, or a jump into another function (`to` None), of so many cycles; `to` is what comes behind it."""
+
+    callee: int
+    cycles: int
+    to: Node | None
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """All ways from (block, instruction, state) to the next: within stretches (`goes`; `ended` where interrupts can
+    come again, `returned` with the function) and outside of them (`steps`, `calls`, `returns`)."""
+
+    entry: Node
+    goes: dict[Node, list[tuple[Node, int]]] = field(default_factory=dict)
+    ended: dict[Node, list[int]] = field(default_factory=dict)  # cycles until interrupts can come
+    returned: dict[Node, list[tuple[bool, int]]] = field(default_factory=dict)  # whether off, cycles
+    begins: list[Begin] = field(default_factory=list)
     callees: list[Effect] = field(default_factory=list)
+    steps: dict[Node, list[tuple[Node, int]]] = field(default_factory=dict)
+    calls: dict[Node, list[Call]] = field(default_factory=dict)
+    returns: dict[Node, int] = field(default_factory=dict)  # cycles, wherever interrupts can come by its end
 
 
 class Blocked:
@@ -87,6 +102,7 @@ class Blocked:
         self.program = program
         self.worst_case = worst_case or WorstCase(program)
         self._effects: dict[tuple[int, bool], Effect] = {}
+        self._flows: dict[tuple[int, bool], Flow] = {}
         self._plain: dict[int, bool] = {}
         self._written: dict[int, frozenset[int]] = {}
         self._under_way: set[tuple[int, bool]] = set()
@@ -124,35 +140,6 @@ class Blocked:
     def vectors(self) -> list[int]:
         """Numbers of the interrupts in use, the highest priority first."""
         return [number for number in VECTORS if 4 * number in self.program.functions]
-
-    def latency(self, vector: int) -> int:
-        """Most cycles from the request of an interrupt to its acceptance.
-
-        First what has just begun: another interrupt, which may return to a `cli`. Then interrupts of higher priority,
-        as often as they can come in that time, each with one instruction behind it. HORIZON: those of higher priority
-        can take all the time.
-        """
-        own = self.of("main").cycles
-        chained = self.effect(self.program.by_name["main"], on=True).chained.cycles
-        between = max(chained, LONGEST_INSTRUCTION)
-        rows = {row.vector: row.interval for row in self.program.table.interrupts}
-        spans = {number: self.interrupt(number) for number in self.vectors()}
-        begun = [own, WAKE]
-        for number, (first, second) in spans.items():
-            if number == vector and rows.get(number, 0) > first + own:
-                continue  # its next request comes when it has long returned
-            begun += [each + max(own, LONGEST_INSTRUCTION) for each in (first, second) if each is not None]
-        higher = {number: first for number, (first, _) in spans.items() if number < vector}
-        wait = start = max(begun)
-        while wait < HORIZON:
-            longer = start
-            for number, first in higher.items():
-                interval = rows.get(number, 0)
-                longer += (wait // interval + 1 if interval > 0 else 1) * (first + between)
-            if longer == wait:
-                return wait
-            wait = longer
-        return HORIZON
 
     def effect(self, entry: int, on: bool) -> Effect:
         """What a function does to the flag, called with interrupts on or off."""
@@ -199,32 +186,32 @@ class Blocked:
         return self._written[entry]
 
     def _effect(self, function: Function, on: bool) -> Effect:
-        flow = self._flow(function, on)
-        marks = self.worst_case.marks(function.entry)
+        flow = self.flow(function.entry, on)
         within = [callee.within for callee in flow.callees]
-        chained = [callee.chained for callee in flow.callees]
         tails: list[Stretch] = []
-        for node, before, at, just_on in flow.begins:
-            ended = self._longest(flow, node, marks, _ended)
-            within += [] if ended is None else [Stretch(before + ended, at.begin)]
-            chained += within[-1:] if just_on and ended is not None else []
-            returned = self._longest(flow, node, marks, _returned)
-            tails += [] if returned is None else [Stretch(before + returned, at.begin)]
+        for begin in flow.begins:
+            ended, returned = self.stretch(flow, begin)
+            within += [] if ended is None else [Stretch(ended, begin.at.begin)]
+            tails += [] if returned is None else [Stretch(returned, begin.at.begin)]
         returns = [off for each in flow.returned.values() for off, _ in each]
         return Effect(
             within=max(within, key=_cycles, default=NONE),
-            through=None if on else self._longest(flow, flow.entry, marks, _returned),
-            head=None if on else self._longest(flow, flow.entry, marks, _ended),
+            through=None if on else self._longest(flow, flow.entry, _returned),
+            head=None if on else self._longest(flow, flow.entry, _ended),
             tail=max(tails, key=_cycles, default=None),
             on=not all(returns),
-            chained=max(chained, key=_cycles, default=NONE),
         )
 
-    def _longest(
-        self, flow: _Flow, start: _Node, marks: dict[int, list[Mark]], ends: Callable[[_Flow, _Node], Iterable[int]]
-    ) -> int | None:
+    def stretch(self, flow: Flow, begin: Begin) -> tuple[int | None, int | None]:
+        """The most cycles of a stretch that begins there: until interrupts can come, until the function returns."""
+        ended = self._longest(flow, begin.node, _ended)
+        returned = self._longest(flow, begin.node, _returned)
+        return tuple(None if each is None else begin.before + each for each in (ended, returned))  # type: ignore[return-value]
+
+    def _longest(self, flow: Flow, start: Node, ends: Callable[[Flow, Node], Iterable[int]]) -> int | None:
         """The longest way from a node, with interrupts off all the way, to one kind of end."""
-        ways: dict[_Node, list[Way[_Node]]] = {}
+        marks = self.worst_case.marks(flow.entry[0])
+        ways: dict[Node, list[Way[Node]]] = {}
         work = [start]
         while work:
             node = work.pop()
@@ -238,9 +225,15 @@ class Blocked:
         walk = longest(Graph(start, ways, lambda node: self.program.where(node[0]), counted))
         return None if walk is None else walk.cycles
 
-    def _flow(self, function: Function, on: bool) -> _Flow:
+    def flow(self, entry: int, on: bool) -> Flow:
+        """All ways through a function that is called with interrupts on or off."""
+        if (entry, on) not in self._flows:
+            self._flows[entry, on] = self._flow(self.worst_case.inside(entry).function, on)
+        return self._flows[entry, on]
+
+    def _flow(self, function: Function, on: bool) -> Flow:
         entry = (function.entry, 0, State(Flag.ON if on else Flag.OFF))
-        flow = _Flow(entry)
+        flow = Flow(entry)
         seen = {entry}
         work = [entry]
         while work:
@@ -251,7 +244,7 @@ class Blocked:
                     work.append(to)
         return flow
 
-    def _step(self, function: Function, node: _Node, flow: _Flow) -> list[_Node]:
+    def _step(self, function: Function, node: Node, flow: Flow) -> list[Node]:
         """Adds the ways out of a node to the flow; the nodes that they lead to."""
         start, number, state = node
         block = function.blocks[start]
@@ -260,18 +253,22 @@ class Blocked:
         if block.calls and number + 1 == len(block.instructions):
             clobbered = frozenset[int]().union(*(self._clobbers(callee) for callee in block.calls))
         states = after(instruction, state, clobbered)
-        found: list[_Node] = []
+        found: list[Node] = []
         if number + 1 < len(block.instructions):
             for following in states:
                 found.append((start, number + 1, following))
-                self._go(flow, node, found[-1], instruction.cycles + halted(instruction), instruction.address)
+                self._go(flow, node, found[-1], instruction.cycles + _stops(instruction), instruction.address)
             return found
         for callee, edge_cycles, to in _leaving(block):
-            edge_cycles += halted(instruction)
+            edge_cycles += _stops(instruction)
             for following in states:
                 if callee is not None:
                     effect = self._callee(callee, block, function, state.flag is not Flag.OFF)
-                    found += self._call(flow, node, following, effect, edge_cycles, to)
+                    behind = self._call(flow, node, following, effect, edge_cycles, to)
+                    if state.flag is not Flag.OFF:
+                        on = next((each for each in behind if each[2].flag is not Flag.OFF), None)
+                        flow.calls.setdefault(node, []).append(Call(callee, edge_cycles, on))
+                    found += behind
                 elif to is not None:
                     found.append((to, 0, following))
                     self._go(flow, node, found[-1], edge_cycles, instruction.address)
@@ -279,7 +276,7 @@ class Blocked:
                     self._return(flow, node, edge_cycles)
         return found
 
-    def _go(self, flow: _Flow, node: _Node, to: _Node, cycles: int, address: int) -> None:
+    def _go(self, flow: Flow, node: Node, to: Node, cycles: int, address: int) -> None:
         """From one instruction to the next: within a stretch, at its begin, at its end, or outside."""
         flag, following = node[2].flag, to[2].flag
         if flag is Flag.JUST_ON:
@@ -287,13 +284,17 @@ class Blocked:
         if flag.blocks:
             flow.goes.setdefault(node, []).append((to, cycles))
         elif following is Flag.OFF:
-            flow.begins.append((to, cycles, Stretch(0, address), flag is Flag.JUST_ON))
+            flow.begins.append(Begin(to, cycles, Stretch(0, address), node))
+        else:
+            flow.steps.setdefault(node, []).append((to, cycles))
 
-    def _return(self, flow: _Flow, node: _Node, cycles: int) -> None:
+    def _return(self, flow: Flow, node: Node, cycles: int) -> None:
         flag = node[2].flag
         if flag in (Flag.ONE_MORE, Flag.JUST_ON):
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
         flow.returned.setdefault(node, []).append((flag is Flag.OFF, cycles))
+        if flag is not Flag.OFF:
+            flow.returns[node] = cycles
 
     def _callee(self, entry: int, block: Block, function: Function, on: bool) -> Effect:
         """What a callee does to the flag; in time, where it leaves it alone, with the argument that it gets."""
@@ -302,7 +303,7 @@ class Blocked:
             return Effect(through=self.worst_case.callee(entry, block, inside).cycles)
         return self.effect(entry, on)
 
-    def _call(self, flow: _Flow, node: _Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[_Node]:
+    def _call(self, flow: Flow, node: Node, state: State, effect: Effect, cycles: int, to: int | None) -> list[Node]:
         """A call, or a jump into another function (`to` None)."""
         flag = node[2].flag
         flow.callees.append(effect)
@@ -310,7 +311,7 @@ class Blocked:
             flow.ended.setdefault(node, []).append(cycles if flag is Flag.ONE_MORE else 0)
         if effect.head is not None:
             flow.ended.setdefault(node, []).append(cycles + effect.head)
-        found: list[_Node] = []
+        found: list[Node] = []
         tail = effect.tail
         if to is None:
             if effect.through is not None:
@@ -318,7 +319,7 @@ class Blocked:
             if tail is not None:
                 ret = (node[0], node[1], State(Flag.OFF, frozenset(), -1))
                 flow.returned.setdefault(ret, []).append((True, 0))
-                flow.begins.append((ret, tail.cycles, tail, False))
+                flow.begins.append(Begin(ret, tail.cycles, tail, None))
             if effect.on:
                 flow.returned.setdefault(node, []).append((False, 0))
             return found
@@ -327,7 +328,7 @@ class Blocked:
             flow.goes.setdefault(node, []).append((behind_off, cycles + effect.through))
             found.append(behind_off)
         if tail is not None:
-            flow.begins.append((behind_off, tail.cycles, tail, False))
+            flow.begins.append(Begin(behind_off, tail.cycles, tail, None))
             found.append(behind_off)
         if effect.on:
             behind = Flag.ON if effect.plain else Flag.JUST_ON
@@ -339,11 +340,16 @@ def _cycles(stretch: Stretch) -> int:
     return stretch.cycles
 
 
-def _ended(flow: _Flow, node: _Node) -> Iterable[int]:
+def _stops(instruction: Instruction) -> int:
+    """Cycles for which the CPU stands after an instruction, before an interrupt that waits is accepted."""
+    return WAKE if instruction.mnemonic == "sleep" else 0
+
+
+def _ended(flow: Flow, node: Node) -> Iterable[int]:
     return flow.ended.get(node, ())
 
 
-def _returned(flow: _Flow, node: _Node) -> Iterable[int]:
+def _returned(flow: Flow, node: Node) -> Iterable[int]:
     return [cycles for off, cycles in flow.returned.get(node, ()) if off]
 
 

@@ -8,7 +8,7 @@ encoder lines can bring.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from boebot.errors import BoebotError
 from boebot.link import messages
@@ -18,8 +18,10 @@ from boebot.timing.response import Source
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s
+CHANGES_CLOSE, CHANGES_STORM = 256, 4  # so close, and so often in a row: the encoders' interrupt masks itself (hal.h)
+LIMIT = 80  # edges of a line in a tick above which it is masked (messages.toml, encoder_limit)
 # Vectors of the ATmega328P (data sheet, table 12-6), numbered as in __vector_N.
-ENCODERS, STAMP, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 7, 10, 11, 12, 14
+ENCODERS, STAMP, WATCHDOG, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 6, 7, 10, 11, 12, 14
 RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
 
 _TELEMETRY = messages.Telemetry.LENGTH + FRAME_OVERHEAD
@@ -30,11 +32,17 @@ _SET_POINT = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 @dataclass(frozen=True, slots=True)
 class Stream:
     """Requests at least `interval` cycles apart, where given at most `burst` in each `period`; interval 0: the table's
-    own."""
+    own. So many as `close` more may come at once, early by so many intervals."""
 
     interval: int = 0
     burst: int = 0
     period: int = 0
+    close: int = 0
+
+    def source(self, row: InterruptRow, cycles: int) -> Source:
+        """As what asks for an interrupt of so many cycles."""
+        interval = self.interval or row.interval
+        return Source(row.name, cycles, interval, self.close * interval, self.burst, self.period)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +66,28 @@ class Load:
         """What asks for an interrupt that takes so many cycles."""
         if row.vector in self.off:
             return []
-        return [
-            Source(row.name, cycles, one.interval or row.interval, 0, one.burst, one.period)
-            for one in self.streams.get(row.vector, (Stream(),))
-        ]
+        return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]
+
+    def is_calm(self, latency: int) -> bool:
+        """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of
+        more changes than there are lines two are of one line, and a tick has no more of a line than the limit."""
+        lines = self.streams.get(ENCODERS, ())
+        storm = CHANGES_STORM * CHANGES_CLOSE + latency
+        return 0 < len(lines) <= CHANGES_STORM and all(line.interval > max(storm, TICK // LIMIT) for line in lines)
 
 
-_SERVOS_AND_BURSTS = Stream(0, 10, 2 * TICK)  # two edges of two wheels and the turret, two ends of IR bursts a tick
-_SWEEP = Stream(0, 2 * 85, TICK)  # two bursts of 1 ms in each tick, at the highest of its frequencies 85 toggles each
-_ECHOES = Stream(0, 2, 4 * TICK)  # rise and fall; the Ping's shortest period is four ticks
+_EDGE_TO_EDGE = 8_000  # of servo pulses and ends of bursts, where they are closest: above it (servo.c, infrared.c)
+_ECHO = 115 * 16  # the shortest, from rise to fall
+_HALF_PERIOD = 190  # of the carrier's highest frequency
+_BUS_STEP = 160  # the shortest of the two-wire bus, a bit at 100 kHz
+_COMPASS = Stream(_BUS_STEP, 11, 4 * TICK)
+_SERVOS_AND_BURSTS = Stream(
+    _EDGE_TO_EDGE, 10, 2 * TICK
+)  # two edges of two wheels and the turret, two ends of IR bursts a tick
+_SWEEP = Stream(
+    _HALF_PERIOD, 2 * 85, TICK
+)  # two bursts of 1 ms in each tick, at the highest of its frequencies 85 toggles each
+_ECHOES = Stream(_ECHO, 2, 4 * TICK)  # rise and fall; the Ping's shortest period is four ticks
 _DEVICES_OFF = frozenset({STAMP, BUZZER, EEPROM, TWO_WIRE})
 
 LOADS: dict[str, Load] = {
@@ -104,6 +125,41 @@ LOADS: dict[str, Load] = {
         off=_DEVICES_OFF,
     ),
 }
+LOADS["everything"] = replace(
+    LOADS["figures"],
+    name="everything",
+    says="the load of the figures with every device built in: light, a tone of 8 kHz, compass, parameters being stored",
+    streams={
+        **LOADS["figures"].streams,
+        STAMP: (Stream(0, 1, 2 * TICK),),
+        BUZZER: (Stream(),),
+        EEPROM: (Stream(),),
+        TWO_WIRE: (_COMPASS,),
+    },
+    off=frozenset(),
+)
+
+
+# What can come at the worst, whatever the load, where the table's interval is not the least.
+_DENSEST: dict[int, Stream] = {
+    ENCODERS: Stream(close=CHANGES_STORM),  # with the first five, before it masks itself
+    CARRIER: _SWEEP,
+    CAPTURE: _ECHOES,
+    EDGE: _SERVOS_AND_BURSTS,
+    SEND: Stream(close=1),  # the first byte goes on to the shift register at once
+    EEPROM: Stream(close=1),  # ready when it is first asked
+    TWO_WIRE: _COMPASS,
+}
+
+
+# Never together, by the slots of a servo frame (tasks.def): an exact edge of the wheels' servos meets no burst and no
+# slot's begin. (Others of the same interrupt do, and may be late: the turret's edge, the end of a burst.)
+APART = {EDGE: frozenset({CARRIER, SLOT})}
+
+
+def densest(row: InterruptRow) -> list[Source]:
+    """The most requests of an interrupt in any time, one by one."""
+    return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 
 def load_named(name: str) -> Load:

@@ -1,4 +1,4 @@
-"""What instructions do beyond the graph: which registers they write, and who halts the CPU.
+"""What instructions do beyond the graph: which registers they write.
 
 After the AVR instruction set manual, and the register conventions of avr-gcc: https://gcc.gnu.org/wiki/avr-gcc.
 """
@@ -13,7 +13,6 @@ def _words(text: str) -> frozenset[str]:
 
 
 ZERO = 1  # holds zero wherever compiled code does not multiply
-EECR, EERE, EEPE = 0x1F, 0, 1  # I/O address, and bits of it
 CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
 NO_RESULT = _words(
     "cpse cpc cp cpi tst out sts st std push nop sleep wdr break spm sei cli sec clc sez clz sen cln sev clv ses cls "
@@ -42,14 +41,6 @@ def written(instruction: Instruction) -> frozenset[int]:
     if name == "st" and operands[1] in (1, -1):
         result |= {operands[0], operands[0] + 1}
     return frozenset(result)
-
-
-def halted(instruction: Instruction) -> int:
-    """Cycles for which the CPU stands still behind it: 4 where the EEPROM is read, 2 where it is written (data sheet,
-    8.6.3). A write of the whole register EECR may do either."""
-    if instruction.mnemonic == "sbi" and instruction.operands[0] == EECR:
-        return {EERE: 4, EEPE: 2}.get(instruction.operands[1], 0)
-    return 4 if instruction.mnemonic == "out" and instruction.operands[0] == EECR else 0
 
 
 def pushes_only(instruction: Instruction) -> bool:

@@ -85,12 +85,14 @@ class Schedule:
     """A cyclic executive: the pieces of each slot of a whole cycle, in their order.
 
     `blocking` is what the main loop may be at when a slot begins and it was idle, as a poll that it does not leave.
+    Where a piece ends later than `latest` after its slot began, the executive does something else than this; 0: never.
     """
 
     slots: tuple[tuple[Piece, ...], ...]
     slot_cycles: int
     slots_per_tick: int
     blocking: int = 0
+    latest: int = 0
 
     def work(self, slot: int) -> int:
         """Cycles of a slot's pieces."""
@@ -127,7 +129,7 @@ class Responses:
 
 
 def responses(schedule: Schedule, sources: Sequence[Source]) -> Responses | None:
-    """Bounds of all pieces, slots and of the tick; None: overload.
+    """Bounds of all pieces, slots and of the tick; None: overload, or later than the schedule holds.
 
     A slot's work waits for that of earlier slots. So each slot is taken as the one that found the processor idle, and
     its busy period is followed through the slots after it for as long as they find it busy.
@@ -144,7 +146,7 @@ def responses(schedule: Schedule, sources: Sequence[Source]) -> Responses | None
             for piece in schedule.slots[slot % count]:
                 work += piece.cycles
                 ended = response(work, sources)
-                if ended is None:
+                if ended is None or 0 < schedule.latest < ended - due:
                     return None
                 done = max(due, ended)
                 pieces[piece.name] = max(pieces.get(piece.name, 0), done - due)

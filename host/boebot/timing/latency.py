@@ -1,0 +1,81 @@
+"""The longest time from the request of an interrupt to its acceptance: response-time analysis without preemption.
+
+An interrupt that is requested waits for what runs: an instruction, a stretch of the main program with interrupts off,
+or another interrupt, which lets no other in. Take the last moment before its acceptance at which none of higher
+priority (lower vector) was waiting or running. What then runs is one that has just begun, of lower priority or its own
+kind if it can come again so soon, of B cycles at most, or nothing but the main program. Up to its acceptance there come
+those of higher priority, each as often as it can in that time, and after the return of each, and of the first, the main
+program goes one step (steps.py): one instruction or, if that switches interrupts off, all until they can come again. If
+none had begun, that step is the one under way. So its wait is not above the least L with
+
+    L = B + steps(1 + sum of N_i(L)) + sum of N_i(L) * C_i        over those of higher priority
+
+where N_i(L) is the most requests of i in L + 1 cycles; after A. Burns, A. Wellings, "Real-Time Systems and Programming Languages", 11.8 (blocking by what cannot be preempted).
+C_i runs from acceptance (entry: 4 cycles) to the end of RETI; of an interrupt that lets others in, to where it does so.
+No interrupt has more than one request waiting (data sheet: one flag each); so those of its own kind do not pile up.
+
+How often they come is said in loads.py, of each load or (`densest`) of any. That is not the rate in the long run: edges
+of the IR carrier come 190 cycles apart within bursts, and a few changes of the encoders all at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from boebot.errors import TimingError
+from boebot.timing.blocked import Blocked
+from boebot.timing.loads import APART, densest
+from boebot.timing.response import Source
+from boebot.timing.steps import Steps
+
+HORIZON = 1 << 20  # cycles, 65 ms: who waits longer waits for ever
+
+
+class Latencies:
+    """Of the interrupts of an image, each worked out when it is asked for.
+
+    `requests`: by vector, what asks for it, at most; those of `densest`, where not given.
+    """
+
+    def __init__(self, blocked: Blocked, requests: Mapping[int, Sequence[Source]] | None = None) -> None:
+        self.blocked = blocked
+        self.steps = Steps(blocked)
+        self.spans = {vector: blocked.interrupt(vector) for vector in blocked.vectors()}
+        rows = blocked.program.table.interrupts
+        self.requests = {row.vector: densest(row) for row in rows} if requests is None else requests
+
+    def of(self, vector: int) -> int:
+        """Most cycles from the request of an interrupt to its acceptance. HORIZON: those of higher priority can take
+        all the time.
+
+        Raises:
+            TimingError: one of higher priority is in use, and the image does not say how often it can come.
+        """
+        others = [number for number in self.spans if number not in APART.get(vector, ())]
+        higher = [number for number in others if number < vector]
+        for number in higher:
+            if number not in self.requests:
+                raise TimingError(
+                    f"{self.blocked.program.path}: interrupt {number} goes before interrupt {vector}, and how often it "
+                    "comes is not said; expected an INTERRUPT row of it"
+                )
+        begun = [self.spans[number][0] for number in others if number > vector or self._again(number, vector)]
+        wait, longer = -1, max(begun, default=0)
+        while longer > wait:
+            if longer >= HORIZON:
+                return HORIZON
+            wait, longer = longer, max(begun, default=0) + self._meanwhile(higher, longer)
+        return wait
+
+    def _again(self, number: int, vector: int) -> bool:
+        """It is this one, and can be requested again before it has returned."""
+        again = self.requests.get(number, ())
+        return number == vector and (not again or sum(one.requests(self.spans[number][0] + 1) for one in again) > 1)
+
+    def _meanwhile(self, higher: Sequence[int], wait: int) -> int:
+        """What those of higher priority and the main program run in that time."""
+        counts = {number: sum(one.requests(wait + 1) for one in self.requests[number]) for number in higher}
+        inner = sum(count for number, count in counts.items() if self.spans[number][1] is not None)
+        return self.steps.most(1 + sum(counts.values()), inner) + sum(
+            count * self.spans[number][0] for number, count in counts.items()
+        )
