@@ -14,10 +14,11 @@ import numpy as np
 from boebot.link import messages
 from boebot.timing.distributions import Distribution, JitterReport, Losses
 from sim_bridge.timing import latency_limits as limits
-from sim_bridge.timing.jitter_run import CENTRE, COUNTERS_TICKS, GAIN, MIRROR, Progress, Run, drive
+from sim_bridge.timing.jitter_run import CENTRE, GAIN, MIRROR, Progress, Run, drive
 from sim_bridge.timing.latency_limits import Limits
 from sim_bridge.timing.line import Heard
-from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, TICK_CYCLES, Bench, Load
+from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
+from sim_bridge.timing.losses import losses
 from sim_bridge.timing.stamps import timer_start
 
 SAME_EDGE = 2_000  # cycles that a stamp may be off and still be that edge's: echoes are further apart
@@ -36,7 +37,7 @@ def measure_jitter(
     """
     start = timer_start(elf)
     found: list[Distribution] = []
-    losses: list[Losses] = []
+    missing: list[Losses] = []
     for number, load in enumerate(loads):
 
         def share(done: float, number: int = number) -> None:
@@ -46,8 +47,8 @@ def measure_jitter(
         with Bench(elf) as bench:
             run = drive(bench, start, load, seconds, seed, share)
             found += distributions(run)
-            losses.append(lost(run))
-    return JitterReport(tuple(found), tuple(losses))
+            missing.append(lost(run))
+    return JitterReport(tuple(found), tuple(missing))
 
 
 def distributions(run: Run) -> list[Distribution]:
@@ -190,24 +191,5 @@ def observations(run: Run) -> list[Distribution]:
 
 
 def lost(run: Run) -> Losses:
-    """What got lost in a run, by what both ends and the emulator counted. Lets time pass until the board tells."""
-    line, board = run.line, run.bench.access.counters()
-    since = len(line.heard)
-    run.bench.run(COUNTERS_TICKS * TICK_CYCLES)
-    counted = line.wait(messages.Counters, since)
-    telemetry = [heard.message for heard in line.telemetry]
-    edges = sum(len(train.edges) for wheel in run.encoders for train in wheel)
-    told = telemetry[-1].encoder_left + telemetry[-1].encoder_right
-    late = np.diff([message.overruns for message in telemetry]) % 256
-    gaps = np.diff([message.tick for message in telemetry]) - 1
-    masked = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MASKED
-    return Losses(
-        load=run.load.name,
-        frames=counted.bad + counted.dropped + line.decoder.bad + line.decoder.lost,
-        bytes=board["overruns"] + counted.overrun,
-        edges=edges - told,
-        ticks=int(gaps.sum()),
-        late_ticks=int(late.sum()),
-        masked=sum(bool(message.status & masked) for message in telemetry),
-        resets=board["resets"],
-    )
+    """What got lost in a run. Lets time pass until the board tells."""
+    return losses(run.line, run.encoders, run.load.name)

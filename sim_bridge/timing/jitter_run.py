@@ -23,7 +23,6 @@ CENTRE, GAIN = 24_000, 3_200  # cycles of the pulses that stand for signals 0 an
 MIRROR = {"left": 1, "right": -1}  # the right servo turns the other way round
 PHASE_STEP = 7_919  # cycles from one seed's beginning to the next one's, a prime
 DRAIN_TICKS = 20  # after a run, for what is under way
-COUNTERS_TICKS = 70  # from one message with the board's counters to the next one at most
 # cycles, from one closing to the next: what remains of whole ticks, and of whole sweeps, sweeps both evenly
 CONTACT_PERIODS = {"whisker left": 2_178_887, "whisker right": 2_338_897, "ir left": 2_894_429, "ir right": 2_894_441}
 CONTACT_CLOSED = 1_120_000  # cycles: longer than a sweep

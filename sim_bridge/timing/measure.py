@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,15 @@ from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
 from sim_bridge.boards.code_places import place
 from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import Bench
+from sim_bridge.timing.loads import TICK_CYCLES, Bench, Ping, PulseTrain
+from sim_bridge.timing.losses import losses as losses_of
 from sim_bridge.timing.scenarios import RANGES, SILENCE, STATES, load, numbers_of, prepare, seed_of
 from sim_bridge.timing.watched import Circumstances, Watched, measurement, watched
 from sim_bridge.timing.world_access import WorldAccess
 
 SCENARIOS = ("figures", "saturated", "noise", "everything")
 CLOCK_HZ = 16_000_000
+DRAIN_TICKS = 3  # after a run, for what is under way
 RESTART = 0.3  # share of the search's runs that begin anew
 
 Progress = Callable[[float], None]
@@ -47,7 +49,9 @@ class Run:
     executed: int
     lowest_stack: int
     loaded_from: int  # cycle at which the load began
-    lost: dict[str, int]  # what the emulator counted that should not be: overruns, framing errors
+    lost: dict[str, int]  # what should have come and did not (Losses), as far as it was asked for
+    sent: int  # bytes to the board and from it under the load
+    received: int
 
     def measurement(self) -> Measurement:
         """Spans and stack of all of it, load and ticks of what came after the preparations."""
@@ -75,8 +79,11 @@ def robot_of(image: Path) -> RobotDescription:
     return robots.load_robot(hello.robot.rstrip(b"\0").decode("ascii", "replace"))
 
 
-def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int) -> Run:
+def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int, *, losses: bool = True) -> Run:
     """One run of a scenario for that long, of the board's time, after its preparations.
+
+    Args:
+        losses: afterwards the board is asked what it lost; else only the bytes are known.
 
     Raises:
         BoardError: there is no such scenario or length; the program crashed, hung or was reset by the watchdog, or its
@@ -97,7 +104,7 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     with Bench(image, access) as bench:
         line = prepare(bench, robot, scenario)
         loaded_from, before = bench.now, bench.access.counters()
-        load(bench, line, robot, scenario, numbers_of(seed), round(seconds * CLOCK_HZ))
+        wheels = load(bench, line, robot, scenario, numbers_of(seed), round(seconds * CLOCK_HZ))
         bench.run(round(seconds * CLOCK_HZ))
         after = bench.access.counters()
         if (reset := board.watchdog_reset) is not None:
@@ -106,16 +113,33 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
                 f"{image.name}, {under.scenario}, seed {seed}: the watchdog reset the program at address "
                 f"0x{reset.address:04X} in cycle {reset.cycle} {where}".rstrip()
             )
+        record = board.spans()
+        lowest_stack = board.lowest_stack
+        board.stop_recording()
+        cycles = bench.now - loaded_from
         return Run(
             what=what,
             under=under,
-            spans=board.spans(),
-            cycles=bench.now - loaded_from,
+            spans=record,
+            cycles=cycles,
             executed=after["executed_cycles"] - before["executed_cycles"],
-            lowest_stack=board.lowest_stack,
+            lowest_stack=lowest_stack,
             loaded_from=loaded_from,
-            lost={name: after[name] - before[name] for name in ("overruns", "framing_errors")},
+            lost=_lost(line, wheels, scenario, after) if losses else {"bytes": after["overruns"]},
+            sent=after["bytes_in"] - before["bytes_in"],
+            received=after["bytes_out"] - before["bytes_out"],
         )
+
+
+def _lost(line: Line, wheels: list[list[PulseTrain]], scenario: str, after: dict[str, int]) -> dict[str, int]:
+    """Of "everything", which damages frames, turns parameters of the encoders and holds the bus, only what no host and
+    no pin may bring about."""
+    if scenario == "everything":
+        return {"bytes": after["overruns"], "resets": after["resets"]}
+    line.bench.sources[:] = [source for source in line.bench.sources if isinstance(source, Ping)]
+    line.bench.run(DRAIN_TICKS * TICK_CYCLES)
+    found = asdict(losses_of(line, wheels, scenario))
+    return {name: count for name, count in found.items() if name != "load"}
 
 
 def measure(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int = 1) -> Measurement:
@@ -131,7 +155,7 @@ def span_at(image: Path, robot: RobotDescription, name: str, worst: Worst, secon
     Raises:
         BoardError: there is none; and see `run`.
     """
-    again = run(image, robot, worst.scenario, seconds, worst.seed)
+    again = run(image, robot, worst.scenario, seconds, worst.seed, losses=False)
     ids = {name: FUNCTION_IDS + i for i, name in enumerate(again.what.names)}
     ids.update({name: vector for vector, name in again.what.vectors.items()})
     found = again.spans[(again.spans["id"] == ids.get(name, -1)) & (again.spans["begin"] == worst.cycle)]
@@ -151,7 +175,8 @@ def search(
     progress: Progress | None = None,
 ) -> Measurement:
     """Looks for the longest span of each task and interrupt: random restarts, and hill climbing over one number of the
-    scenario at a time from the best that is known of a task drawn at random.
+    scenario at a time from the best that is known of a task drawn at random. Returns the runs in which any was longer,
+    or an interrupt waited longer, than in all before.
 
     Args:
         seconds: of each run, of the board's time.
@@ -160,12 +185,20 @@ def search(
     draw = random.Random(seed)
     found: list[Measurement] = []
     best: dict[str, tuple[int, int]] = {}  # name -> longest, seed
+    longest_wait: dict[str, int] = {}
     for number in range(runs):
         tried = seed if number == 0 else _next_seed(draw, best)
-        found.append(measure(image, robot, scenario, seconds, tried))
-        for name, spans in {**found[-1].tasks, **found[-1].interrupts}.items():
+        result = run(image, robot, scenario, seconds, tried, losses=False).measurement()
+        better = not found
+        for name, spans in {**result.tasks, **result.interrupts}.items():
             if spans.largest > best.get(name, (0, 0))[0]:
                 best[name] = (spans.largest, tried)
+                better = True
+            if (wait := int(spans.latency.max(initial=0))) > longest_wait.get(name, 0):
+                longest_wait[name] = wait
+                better = True
+        if better:
+            found.append(result)
         if progress:
             progress((number + 1) / runs)
     return merged(found)

@@ -12,15 +12,16 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from math import prod
+from itertools import count
+from math import gcd, prod
 
 from boebot import robots
 from boebot.link import frame, messages
 from boebot.robots import RobotDescription
 from sim_bridge.timing.line import BYTE_CYCLES, Line
 from sim_bridge.timing.loads import Bench, Contact, Ping, PulseTrain, wheels
+from sim_bridge.timing.traffic import EachTick, FullLine
 
-SETPOINT_PERIOD = 159_979  # cycles: a prime just below the control tick
 EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "everything": 1500}
 NOISE_PERIOD = 80  # cycles from edge to edge of a 100 kHz square wave
 CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how long one lasts
@@ -40,8 +41,7 @@ class Numbers:
     contact: int  # to the first touch of a whisker
     echo: int  # by how much the first echo is longer than the shortest, cycles
     signal: int  # left motor signal + 10,000, in 1/10,000
-    frame: int  # bytes on a full line of each frame, less 20
-    mix: int  # what the host asks for
+    mix: int  # what the host asks for in "everything"
 
 
 RANGES = {
@@ -50,11 +50,11 @@ RANGES = {
     "contact": 800_000,
     "echo": 288_000,
     "signal": 20_001,
-    "frame": 21,
     "mix": 65_536,
 }
 STATES = prod(RANGES.values())
-SPREAD = pow(2**61 - 1, 1, STATES)  # shares no factor with STATES: neighbouring seeds are as different as any
+GOLDEN = STATES * 6_180_339_887_498_948_482 // 10**19
+SPREAD = next(n for n in count(GOLDEN) if gcd(n, STATES) == 1)  # neighbouring seeds differ in all numbers
 BACK = pow(SPREAD, -1, STATES)
 
 
@@ -75,50 +75,6 @@ def seed_of(numbers: Numbers) -> int:
 
 
 # ---- hosts -----------------------------------------------------------------------------------------------------------
-
-
-class Setpoints:
-    """A set-point each tick; see Source."""
-
-    def __init__(self, line: Line, numbers: Numbers, first: int) -> None:
-        self._line, self._next = line, first
-        self._signals = (numbers.signal - 10_000, 10_000 - numbers.signal // 2)
-
-    def queue(self, bench: Bench, until: int) -> None:
-        """See Source."""
-        del bench
-        while self._next < until:
-            self._line.send(messages.SetpointSignal(*self._signals, 250, self._line.tick), self._next)
-            self._next += SETPOINT_PERIOD
-
-
-class FullLine:
-    """50,000 bytes/s both ways: each frame takes 20 to 40 bytes of the line, delimiters behind it included; answers
-    and telemetry fill the way back. See Source."""
-
-    def __init__(self, line: Line, numbers: Numbers, first: int) -> None:
-        self._line, self._first = line, first
-        self._bytes = 20 + numbers.frame
-        self._signals = (numbers.signal - 10_000, 10_000 - numbers.signal // 2)
-        self._identify = 2 + numbers.mix % 9
-        self._count = 0
-        self._request = line.numbered(messages.SetParameter, messages.PARAMETERS["track_width"].id, 10_000)
-
-    def queue(self, bench: Bench, until: int) -> None:
-        """See Source. The board answers a request that comes again as it answered the first time."""
-        line = self._line
-        while (at := max(self._first, line.free, bench.now)) < until:
-            line.send(self._message(), at)
-            padding = self._bytes - (line.free - at) // BYTE_CYCLES
-            if padding > 0:
-                bench.access.send(bytes(padding), at=line.free)
-                line.free += padding * BYTE_CYCLES
-            self._count += 1
-
-    def _message(self) -> messages.SetpointSignal | messages.SetParameter | messages.Identify:
-        if self._count % 10 == 0:
-            return messages.SetpointSignal(*self._signals, 250, self._line.tick)
-        return messages.Identify() if self._count % self._identify == 1 else self._request
 
 
 class AllSorts:
@@ -235,13 +191,19 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     return line
 
 
-def load(bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbers: Numbers, cycles: int) -> None:
-    """Begins what the scenario does to a board that is prepared, for so many cycles from now."""
+def load(
+    bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbers: Numbers, cycles: int
+) -> list[list[PulseTrain]]:
+    """Begins what the scenario does to a board that is prepared, for so many cycles from now.
+
+    Returns the encoder lines of each wheel; a noisy wheel has none.
+    """
     start = bench.now + 2_000
-    lines = encoder_pins(robot)
-    trains = [train for wheel in wheels(lines, EDGES_PER_S[scenario], start + numbers.wheels) for train in wheel]
+    turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], start + numbers.wheels)
+    trains = [train for wheel in turning for train in wheel]
     if scenario == "noise" and trains:
         trains[0] = PulseTrain(trains[0].pin, NOISE_PERIOD, start + numbers.wheels)
+        turning[0] = []
     bench.sources += trains
     first = start + numbers.line
     if scenario == "everything":
@@ -257,8 +219,10 @@ def load(bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbe
             if isinstance(d, robots.Compass)
         ]
         bench.sources.append(AllSorts(line, numbers, first, last))
-        return
+        return turning
     for device in robot.device.values():
         if isinstance(device, robots.Ping):
             bench.sources.append(Ping(robots.pin_number(device.pin), step=23_459 + numbers.echo))
-    bench.sources.append((FullLine if scenario == "saturated" else Setpoints)(line, numbers, first))
+    signals = [(numbers.signal - 10_000, 10_000 - numbers.signal // 2)]
+    bench.sources.append((FullLine if scenario == "saturated" else EachTick)(line, first, signals, probes=False))
+    return turning

@@ -1,4 +1,4 @@
-"""What a host sends while jitter is measured: a set-point each tick, or frames without a gap; and probes of the clock.
+"""What a host sends while times are measured: a set-point each tick, or frames without a gap; and probes of the clock.
 
 The protocol's frames to the board have 10 to 16 bytes on the wire, most answers 15: a full line carries more of them
 than of longer ones, and the board has work with each.
@@ -6,6 +6,7 @@ than of longer ones, and the board has work with each.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from boebot.link import messages
@@ -37,9 +38,12 @@ class Probe(NamedTuple):
 class Traffic:
     """What all hosts do; see Source for `queue`."""
 
-    def __init__(self, line: Line, first: int) -> None:
-        """Begins at cycle `first`."""
+    def __init__(
+        self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
+    ) -> None:
+        """Begins at cycle `first`. `signals`: of the motors, one after the other; `probes`: the clock is asked for."""
         self.line = line
+        self._choice, self._probing = signals, probes
         self.changes: list[Change] = []
         self.probes: list[Probe] = []
         self._change_at = self._probe_at = first
@@ -51,14 +55,14 @@ class Traffic:
         if changed:
             self._change_at += HOLD
             self._signals += 1
-        signals = SIGNALS[self._signals % len(SIGNALS)]
+        signals = self._choice[self._signals % len(self._choice)]
         arrived = self.line.send(messages.SetpointSignal(*signals, TIME_TO_LIVE_MS, self.line.tick), at)
         if changed:
             self.changes.append(Change(arrived, signals))
 
     def probe(self, at: int) -> bool:
         """A probe, if it is time for one."""
-        if at < self._probe_at:
+        if not self._probing or at < self._probe_at:
             return False
         self._probe_at += PROBE_PERIOD
         token = len(self.probes) & 0xFFFF
@@ -69,8 +73,10 @@ class Traffic:
 class EachTick(Traffic):
     """A set-point each tick."""
 
-    def __init__(self, line: Line, first: int) -> None:
-        super().__init__(line, first)
+    def __init__(
+        self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
+    ) -> None:
+        super().__init__(line, first, signals, probes)
         self._next = first
 
     def queue(self, bench: Bench, until: int) -> None:
@@ -85,8 +91,10 @@ class EachTick(Traffic):
 class FullLine(Traffic):
     """Frames back to back: set-points and requests, and as many answers."""
 
-    def __init__(self, line: Line, first: int) -> None:
-        super().__init__(line, first)
+    def __init__(
+        self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
+    ) -> None:
+        super().__init__(line, first, signals, probes)
         self._first = first
         self._count = 0
         self._request = line.numbered(messages.SetParameter, messages.PARAMETERS["track_width"].id, 10_000)

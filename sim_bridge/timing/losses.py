@@ -1,0 +1,43 @@
+"""What gets lost in a run, by what both ends of the line, the encoders' counts and the emulator say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from boebot.link import messages
+from boebot.timing.distributions import Losses
+from sim_bridge.timing.line import Line
+from sim_bridge.timing.loads import TICK_CYCLES, PulseTrain
+
+COUNTERS_TICKS = 70  # from one message with the board's counters to the next one at most
+SIDES = ("left", "right")
+MASKED = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MASKED
+
+
+def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]], load: str) -> Losses:
+    """Since power-on, of a board that nothing acts on any more. Lets time pass until the board tells.
+
+    `wheels`: the encoder lines of the left and the right wheel; one whose line is noisy may be left empty: its edges
+    are masked, and not counted as lost.
+    """
+    bench = line.bench
+    board, since = bench.access.counters(), len(line.heard)
+    bench.run(COUNTERS_TICKS * TICK_CYCLES)
+    counted = line.wait(messages.Counters, since)
+    telemetry = [heard.message for heard in line.telemetry]
+    edges = 0
+    for side, trains in zip(SIDES, wheels, strict=False):
+        if trains:
+            edges += sum(len(train.edges) for train in trains) - getattr(telemetry[-1], f"encoder_{side}")
+    return Losses(
+        load=load,
+        frames=counted.bad + counted.dropped + line.decoder.bad + line.decoder.lost,
+        bytes=board["overruns"] + counted.overrun,
+        edges=edges,
+        ticks=int((np.diff([message.tick for message in telemetry]) - 1).sum()),
+        late_ticks=int((np.diff([message.overruns for message in telemetry]) % 256).sum()),
+        masked=sum(bool(message.status & MASKED) for message in telemetry),
+        resets=board["resets"],
+    )
