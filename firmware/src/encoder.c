@@ -35,190 +35,304 @@ static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {0, 0};
 
 #define LINES (LINES_PER_SIDE * SIDES)
 
-/* Noise is blamed on the lines that did this much of it. */
-#define SHARE_OF_STORM 2u /* of at least HAL_CHANGES_STORM changes in 0.05 ms */
-#define SHARE_OF_RING 8u  /* of the ring's changes */
+/* The lines of one wheel among bits of the port. `side` is a constant; neighbours are but shifted. */
+enum { A = 1, B = 2 };
+static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint8_t bits) {
+#if ENCODER_LINES == 2
+  const uint8_t a = line_bit[2u * side];
+  const uint8_t b = line_bit[2u * side + 1u];
+  return b == (uint8_t)(a << 1) ? (uint8_t)(bits / a & (A | B))
+                                : (uint8_t)(((bits & a) != 0 ? A : 0u) | ((bits & b) != 0 ? B : 0u));
+#else
+  return (bits & line_bit[side]) != 0 ? A : 0u;
+#endif
+}
 
-/* Main loop only. */
+/* The port's other line whose fall can be awaited: the left light sensor's, where there is one. */
+#ifdef PIN_LIGHT_LEFT
+#define OTHER_BIT HAL_PIN_BIT(LIGHT_LEFT)
+#else
+#define OTHER_BIT 0u
+#endif
+
+#define POLL_MOST 8u /* changes that one call works off: as many as make it due */
+_Static_assert(POLL_MOST *HAL_CHANGE_BYTES <= ENCODER_DUE_BYTES, "what is not due leaves nothing behind");
+
+/* Noise is blamed on the lines that did this much of the last changes. */
+#define LOOKED_AT 16u
+#define SHARE_OF_STORM 2u /* of at least HAL_CHANGES_STORM changes in 0.05 ms */
+#define SHARE_OF_RING 4u  /* of LOOKED_AT */
+
+/* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
-  uint32_t last, previous; /* schedule_now() of the last two edges */
-  uint16_t edges;          /* in this tick, all lines */
-  uint8_t silence;         /* ticks since the last edge, at most SILENT_TICKS */
-  encoder_reading reading;
+  uint16_t stamp, stamp_before;  /* of the last two edges */
+  uint8_t stamped;               /* edges since encoder_update() */
+  int8_t steps;                  /* and by how much they change the count */
+  uint8_t edges;                 /* in this tick, at most 2 */
+  uint8_t silence;               /* ticks since the last edge, at most SILENT_TICKS */
+  uint8_t fired[LINES_PER_SIDE]; /* edges of the line in this tick */
+  uint32_t last, gap;            /* time of the last edge, and since the edge before */
   int32_t count;
+  encoder_reading reading;
 } wheel;
 
 static wheel wheels[SIDES];
-static uint8_t fired[LINES]; /* edges of the line in this tick */
-static uint8_t before;       /* port bits of the last change worked off */
-static uint8_t watched;      /* port bits of the lines that count */
-static uint8_t limit;        /* edges of a line in a tick above which it is masked */
-static uint8_t phantoms;     /* interrupts of this tick without a change to be seen: pulses too short */
-static uint8_t awaited;      /* port bit of the other line whose change is awaited, or 0 */
-static uint8_t other_bit;    /* the same, also when it has come */
-static bool other_seen;      /* it has come, */
-static uint32_t other_edge;  /* at that schedule_now() */
+static uint8_t before;    /* port bits of the last change worked off */
+static uint8_t watched;   /* port bits of the lines that count */
+static uint8_t returning; /* port bits of those that do again as soon as take_back() can */
+static uint8_t limit;     /* edges of a line in a tick above which it is masked */
+static uint8_t phantoms;  /* interrupts of this tick without a change to be seen: pulses too short */
+
+/* The fall of the other line: */
+static enum { NOT_AWAITED, AWAITED, STAMPED, SEEN } other;
+static uint16_t other_stamp;
+static uint32_t other_from; /* what came before that schedule_now() does not count */
+static uint32_t other_edge;
 
 /* Lets the lines that count interrupt, unless the interrupt has just masked them. */
-static void listen(void) {
+static __attribute__((noinline)) void listen(void) {
+  const uint8_t lines = (uint8_t)(watched | (other == AWAITED ? OTHER_BIT : 0u));
   HAL_ATOMIC {
     if (!hal_changes_stopped()) {
-      hal_pin_change_mask(watched | awaited);
+      hal_pin_change_mask(lines);
     }
   }
 }
 
-void encoder_await_other(uint8_t bit) {
-  encoder_poll();
-  other_seen = false;
-  awaited = other_bit = bit;
-  before = (uint8_t)((before & (uint8_t)~bit) | (PORT_BITS() & bit));
+void encoder_await_other(void) {
+  other_from = schedule_now();
+  other = AWAITED;
+  before |= OTHER_BIT;
   listen();
 }
 
-bool encoder_saw_other(void) { return other_seen; }
+void encoder_forget_other(void) {
+  other = NOT_AWAITED;
+  listen();
+}
+
+bool encoder_awaits_other(void) { return other == AWAITED || other == STAMPED; }
+
+bool encoder_saw_other(void) { return other == SEEN; }
 
 uint32_t encoder_other_edge(void) { return other_edge; }
 
-/* The edge that was awaited: the line is masked again. */
-static __attribute__((noinline)) void see_other(uint32_t time) {
-  awaited = 0;
-  other_seen = true;
-  other_edge = time;
+/* It has come: the line is masked again. */
+static __attribute__((noinline)) void stamp_other(uint16_t time) {
+  other = STAMPED;
+  other_stamp = time;
   listen();
 }
 
-static __attribute__((noinline)) void mask_line(uint8_t line) {
-  watched = (uint8_t)(watched & (uint8_t)~line_bit[line]);
-  listen();
-}
-
-/* Counts one edge of a line; masks the line when it fires too often. */
-static inline __attribute__((always_inline)) void count_line(uint8_t line) {
-  if (fired[line] >= limit) {
-    mask_line(line);
-  }
-  fired[line]++;
-}
-
-static void count_wheel(wheel *w, int8_t step, uint32_t time) {
-  w->count += step;
-  w->edges++;
-  w->previous = w->last;
-  w->last = time;
-}
-
-/* What a change of the port means to one wheel. Inlined for each side, so that the bits are constants. */
-static inline __attribute__((always_inline)) void see_wheel(uint8_t side, uint8_t bits, uint8_t changed,
-                                                            uint32_t time) {
+/* What a change of the port means to one wheel, of whose lines `changed` have changed and `bits` are high. Forward are the
+ * edges of A after which the lines differ and those of B after which they do not; an edge of both is a step of 0. Returns
+ * whether a line has fired too often. */
+static __attribute__((noinline)) bool see_wheel(wheel *w, uint8_t changed, uint8_t bits, uint16_t time) {
+  const uint8_t most = limit;
+  bool over = false;
+  w->stamp_before = w->stamp;
+  w->stamp = time;
+  w->stamped++;
 #if ENCODER_LINES == 2
-  const uint8_t a = line_bit[2u * side];
-  const uint8_t b = line_bit[2u * side + 1u];
-  if ((changed & (a | b)) == 0) {
-    return;
+  if (changed != (A | B)) {
+    if (((bits ^ bits >> 1 ^ changed) & A) == 0) {
+      w->steps++;
+    } else {
+      w->steps--;
+    }
   }
-  if ((changed & a) != 0) {
-    count_line((uint8_t)(2u * side));
+  if ((changed & A) != 0) {
+    over = ++w->fired[0] > most;
   }
-  if ((changed & b) != 0) {
-    count_line((uint8_t)(2u * side + 1u));
+  if ((changed & B) != 0 && ++w->fired[1] > most) {
+    over = true;
   }
-  const uint8_t from = (uint8_t)(((before & a) != 0 ? 2u : 0u) | ((before & b) != 0 ? 1u : 0u));
-  const uint8_t to = (uint8_t)(((bits & a) != 0 ? 2u : 0u) | ((bits & b) != 0 ? 1u : 0u));
-  count_wheel(&wheels[side], encoder_quadrature_step(from, to), time);
 #else
-  (void)bits;
-  if ((changed & line_bit[side]) != 0) {
-    count_line(side);
-    count_wheel(&wheels[side], 1, time);
-  }
+  (void)changed, (void)bits;
+  w->steps++;
+  over = ++w->fired[0] > most;
 #endif
-}
-
-/* In line in the loop that takes every change. */
-static inline __attribute__((always_inline)) void work_off(uint8_t bits, uint32_t time) {
-  const uint8_t changed = (uint8_t)((bits ^ before) & watched);
-  if (changed == 0) {
-    phantoms = (uint8_t)(phantoms + (bits == before && phantoms < 255u));
-  } else {
-    see_wheel(LEFT, bits, changed, time);
-    see_wheel(RIGHT, bits, changed, time);
-  }
-  if (((bits ^ before) & awaited) != 0) {
-    see_other(time);
-  }
-  before = bits;
+  return over;
 }
 
 /* Masks lines until the next tick and has them reported. */
-static void convict(uint8_t lines) {
-  BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
-    if ((lines & line_bit[line]) != 0) {
-      fired[line] = (uint8_t)(limit + 1u);
+static __attribute__((noinline)) void convict(uint8_t lines) {
+  BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
+    BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+      if ((lines & line_bit[side * LINES_PER_SIDE + i]) != 0) {
+        wheels[side].fired[i] = (uint8_t)(limit + 1u);
+      }
     }
   }
   watched = (uint8_t)(watched & (uint8_t)~lines);
   listen();
 }
 
-/* The lines whose noise stopped the interrupt, from the changes up to `head`. The other line is told from them like one of
- * theirs, and gets no mask: it is awaited no more. */
+/* Masks the lines that have fired too often in this tick. */
+static __attribute__((noinline)) void keep_limit(void) {
+  uint8_t lines = 0;
+  BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
+    BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+      if (wheels[side].fired[i] > limit) {
+        lines |= line_bit[side * LINES_PER_SIDE + i];
+      }
+    }
+  }
+  if (phantoms > limit) { /* nobody knows whose */
+    lines = watched;
+    phantoms = 0;
+  }
+  convict(lines);
+}
+
+/* Adds the edges of each line between two changes. The other line is told from them like one of theirs. */
+static inline __attribute__((always_inline)) void add_edges(uint8_t edges[LINES + 1u], uint8_t changed) {
+  BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
+    edges[line] = (uint8_t)(edges[line] + ((changed & line_bit[line]) != 0));
+  }
+  edges[LINES] = (uint8_t)(edges[LINES] + ((changed & OTHER_BIT) != 0));
+}
+
+/* The lines whose noise stopped the interrupt, from the last changes up to `head`: those that did their share of it; if
+ * pulses too short to be seen leave none, those that did most. The other line gets no mask: it is awaited no more. */
 static uint8_t noisy_lines(uint8_t head) {
   uint8_t at = (uint8_t)(head - HAL_CHANGE_BYTES);
   const uint8_t run = hal_change_after(at)->close;
   const bool storm = run >= HAL_CHANGES_STORM;
-  const uint8_t share = storm ? SHARE_OF_STORM : SHARE_OF_RING;
-  uint8_t left = storm && run < HAL_CHANGES - 2u ? run : HAL_CHANGES - 2u;
-  uint8_t edges[LINES] = {0};
-  uint8_t other_edges = 0;
-  uint8_t lines = 0;
+  uint8_t edges[LINES + 1u] = {0};
   uint8_t bits = hal_change_after(at)->bits;
-  BOUNDED(HAL_CHANGES - 2u, for (; left > 0; left--)) {
+  BOUNDED(LOOKED_AT, for (uint8_t left = storm && run < LOOKED_AT ? run : LOOKED_AT; left > 0; left--)) {
     at = (uint8_t)(at - HAL_CHANGE_BYTES);
     const uint8_t earlier = hal_change_after(at)->bits;
-    BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
-      if (((bits ^ earlier) & line_bit[line]) != 0 && ++edges[line] >= share) {
-        lines |= line_bit[line];
-      }
-    }
-    other_edges = (uint8_t)(other_edges + (((bits ^ earlier) & other_bit) != 0));
+    add_edges(edges, bits ^ earlier);
     bits = earlier;
   }
-  lines &= watched;
-  return lines != 0 || other_edges >= share ? lines : watched;
+  uint8_t lines = 0;
+  BOUNDED(SHARE_OF_RING + 1u, for (uint8_t share = storm ? SHARE_OF_STORM : SHARE_OF_RING; lines == 0; share--)) {
+    BOUNDED(LINES, for (uint8_t line = 0; line < LINES; line++)) {
+      if (edges[line] >= share) {
+        lines |= line_bit[line] & watched;
+      }
+    }
+    if (edges[LINES] >= share) { /* none of them, or all of none */
+      break;
+    }
+  }
+  return lines;
 }
 
-/* After a stop: masks the noise and listens to the rest. */
+/* After a stop: masks the noise and listens to the rest. What the others did meanwhile is a change like any other, with
+ * room in the ring, which is empty. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
-  awaited = 0;
+  volatile hal_change *const missed = hal_change_after(head);
+  missed->time = (uint16_t)schedule_now();
+  missed->bits = PORT_BITS();
+  missed->close = 0;
+  head = (uint8_t)(head + HAL_CHANGE_BYTES);
+  if (head == 0) { /* the last place is also the first */
+    hal_changes[0] = hal_changes[HAL_CHANGES];
+  }
+  hal_changes_head = head;
+  other = NOT_AWAITED;
   hal_changes_resume();
   convict(lines);
-  work_off(PORT_BITS(), schedule_now()); /* what the others did meanwhile */
+}
+
+/* Lines that were masked count again, from their present level on: changes that wait for it show their noise, and have it
+ * taken out; if too many wait, later. */
+static __attribute__((noinline)) void take_back(void) {
+  uint8_t tail = hal_changes_tail;
+  const uint8_t head = hal_changes_head;
+  if ((uint8_t)(head - tail) > POLL_MOST * HAL_CHANGE_BYTES) {
+    return;
+  }
+  const uint8_t others = (uint8_t)~returning;
+  const uint8_t level = PORT_BITS() & returning;
+  BOUNDED(POLL_MOST, for (; tail != head; tail = (uint8_t)(tail + HAL_CHANGE_BYTES))) {
+    volatile hal_change *const change = hal_change_after(tail);
+    change->bits = (change->bits & others) | level;
+  }
+  before = (before & others) | level;
+  watched |= returning;
+  returning = 0;
+}
+
+/* Works off up to POLL_MOST of the changes from `tail` to `head`, and returns the new tail. */
+static inline __attribute__((always_inline)) uint8_t work_off(uint8_t tail, uint8_t head) {
+  const uint8_t counts = watched;
+  const uint8_t end =
+      (uint8_t)(head - tail) < POLL_MOST * HAL_CHANGE_BYTES ? head : (uint8_t)(tail + POLL_MOST * HAL_CHANGE_BYTES);
+  uint8_t was = before;
+  bool over = false;
+  BOUNDED(POLL_MOST, while (tail != end)) {
+    const volatile hal_change *const change = hal_change_after(tail);
+    const uint16_t time = change->time;
+    const uint8_t bits = change->bits;
+    tail = (uint8_t)(tail + HAL_CHANGE_BYTES);
+    const uint8_t changed = bits ^ was;
+    if (changed == 0 && ++phantoms > limit) {
+      over = true;
+    }
+    const uint8_t edges = changed & counts;
+    if ((edges & SIDE_BITS(LEFT)) != 0) {
+      over |= see_wheel(&wheels[LEFT], lines_of(LEFT, edges), lines_of(LEFT, bits), time);
+    }
+    if ((edges & SIDE_BITS(RIGHT)) != 0) {
+      over |= see_wheel(&wheels[RIGHT], lines_of(RIGHT, edges), lines_of(RIGHT, bits), time);
+    }
+    if ((changed & was & OTHER_BIT) != 0 && other == AWAITED) {
+      stamp_other(time);
+    }
+    was = bits;
+  }
+  before = was;
+  if (over) {
+    keep_limit();
+  }
+  return tail;
 }
 
 void encoder_poll(void) {
-  const bool stopped = hal_changes_stopped(); /* before the head is read: no change comes after it */
-  uint8_t tail = hal_changes_tail;
-  const uint8_t head = hal_changes_head; /* before the time is read: every change up to it is in the past */
+  const uint8_t stopped = hal_changes_stopped(); /* before the head is read: no change comes after it */
+  const uint8_t tail = hal_changes_tail;
+  const uint8_t head = hal_changes_head;
   if (tail != head) {
-    const uint32_t now = schedule_now();
-    /* Equal indices are an empty ring: it holds one change less than it has places. */
-    BOUNDED(HAL_CHANGES - 1u, while (tail != head)) {
-      const volatile hal_change *oldest = hal_change_after(tail);
-      const uint16_t age = (uint16_t)((uint16_t)now - oldest->time);
-      const uint8_t bits = oldest->bits;
-      tail = (uint8_t)(tail + HAL_CHANGE_BYTES);
-      hal_changes_tail = tail;
-      work_off(bits, now - age);
-    }
-    if (phantoms > limit) { /* nobody knows whose */
-      convict(watched);
-      phantoms = 0;
-    }
-  }
-  if (stopped) {
+    hal_changes_tail = work_off(tail, head);
+  } else if (stopped) {
     go_on(head);
+  }
+}
+
+/* The schedule_now() of a stamp: not later than `now`, and less than 2^16 cycles before it. */
+static uint32_t time_of(uint16_t stamp, uint32_t now) { return now - (uint16_t)((uint16_t)now - stamp); }
+
+static __attribute__((noinline)) void update_wheel(wheel *w, uint32_t now) {
+  if (w->stamped == 0) {
+    return;
+  }
+  const uint32_t last = time_of(w->stamp, now);
+  w->gap = w->stamped >= 2 ? (uint16_t)(w->stamp - w->stamp_before) : last - w->last;
+  w->last = last;
+  w->count += w->steps;
+  w->edges = w->edges == 0 && w->stamped == 1 ? 1u : 2u;
+  w->stamped = 0;
+  w->steps = 0;
+}
+
+void encoder_update(void) {
+  encoder_poll();
+  const uint32_t now = schedule_now();
+  update_wheel(&wheels[LEFT], now);
+  update_wheel(&wheels[RIGHT], now);
+  if (OTHER_BIT != 0 && other == STAMPED) {
+    other_edge = time_of(other_stamp, now);
+    other = (int32_t)(other_edge - other_from) >= 0 ? SEEN : AWAITED;
+    listen();
+  }
+  if (returning != 0) {
+    take_back();
+    listen();
   }
 }
 
@@ -241,22 +355,20 @@ void encoder_start(void) {
   HAL_ZERO(hal_changes_tail);
   hal_changes_resume();
   HAL_ZERO(phantoms);
-  HAL_ZERO(awaited);
-  HAL_ZERO(other_bit);
-  HAL_ZERO(other_seen);
+  HAL_ZERO(returning);
+  HAL_ZERO(other);
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
   }
-  HAL_ZERO(fired);
   limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   before = PORT_BITS();
   watched = lines_on();
   listen();
 }
 
-/* The time between two edges in 16 us, 0 if it is 0.5 s or more. */
-static uint16_t period_of(uint32_t from, uint32_t to) {
-  const uint32_t units = (to - from) / PERIOD_UNIT;
+/* A time between two edges in 16 us, 0 if it is 0.5 s or more. */
+static uint16_t period_of(uint32_t gap) {
+  const uint32_t units = gap / PERIOD_UNIT;
   return units == 0 ? 1u : units >= PERIOD_LONGEST ? 0u : (uint16_t)units;
 }
 
@@ -266,7 +378,7 @@ static void close_wheel(uint8_t side) {
   w->reading.count = w->count;
   if (w->edges != 0) {
     /* After a long silence the edge before the first is too old for its stamp to tell. */
-    w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->previous, w->last) : 0u;
+    w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->gap) : 0u;
     w->silence = 0;
   } else if (w->silence < SILENT_TICKS) {
     w->silence++;
@@ -276,9 +388,8 @@ static void close_wheel(uint8_t side) {
   w->edges = 0;
   w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    uint8_t *count = &fired[(uint8_t)(side * LINES_PER_SIDE + i)];
-    w->reading.masked = w->reading.masked || *count > limit;
-    *count = 0;
+    w->reading.masked = w->reading.masked || w->fired[i] > limit;
+    w->fired[i] = 0;
   }
   if (w->reading.masked) {
     w->reading.period = 0;
@@ -293,17 +404,17 @@ static void forget_gap(uint8_t side, uint8_t back, uint8_t lines) {
 }
 
 void encoder_task(void) {
-  encoder_poll();
+  encoder_update();
   close_wheel(LEFT);
   close_wheel(RIGHT);
   limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   const uint8_t lines = lines_on();
-  const uint8_t back = (uint8_t)(lines & (uint8_t)~watched); /* these begin at their present level */
-  before = (uint8_t)((before & (uint8_t)~back) | (PORT_BITS() & back));
-  watched = lines;
-  forget_gap(LEFT, back, lines);
-  forget_gap(RIGHT, back, lines);
+  returning = (uint8_t)(lines & (uint8_t)~watched);
+  forget_gap(LEFT, returning, lines);
+  forget_gap(RIGHT, returning, lines);
+  watched &= lines;
   phantoms = 0;
+  take_back();
   listen();
 }
 

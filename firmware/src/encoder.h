@@ -25,13 +25,18 @@ typedef struct {
 
 void encoder_start(void);
 
-/* Works off the changes that the interrupt has stamped: before the clock's 16 bits roll over (4 ms), that is in every
- * slot, and sooner when they pile up. */
+/* Works off some of the changes that the interrupt has stamped, the oldest ones, as many as make it due. Whenever it is
+ * due. */
 void encoder_poll(void) __attribute__((noinline));
 
-/* Not 0 if they have piled up to an eighth of the ring, or were stopped. */
+/* The same, and tells from the clock when the edges were: before its 16 bits roll over (4 ms), that is in every slot. */
+void encoder_update(void) __attribute__((noinline));
+
+/* Not 0 if changes have piled up to an eighth of the ring, or were stopped. */
+#define ENCODER_DUE_BYTES 0x20u
 static inline __attribute__((always_inline)) uint8_t encoder_due(void) {
-  return (uint8_t)(hal_changes_stopped() | ((uint8_t)(hal_changes_head - hal_changes_tail) & 0xE0u));
+  return (uint8_t)(hal_changes_stopped() |
+                   ((uint8_t)(hal_changes_head - hal_changes_tail) & (uint8_t) ~(ENCODER_DUE_BYTES - 1u)));
 }
 
 /* Once per tick: closes the tick's readings and lifts masks. */
@@ -50,11 +55,14 @@ static inline int8_t encoder_quadrature_step(uint8_t from, uint8_t to) {
   return (from >> 1) == (to & 1u) ? 1 : -1;
 }
 
-/* The next change of another line of the port, `bit` of it, is stamped, once; 0: none is awaited. Noise that stops the
- * interrupt ends the waiting. */
-void encoder_await_other(uint8_t bit);
+/* The next fall of the left light sensor's line, which is on the same port, is stamped, once; it is high now. Noise that
+ * stops the interrupt ends the waiting. */
+void encoder_await_other(void);
+void encoder_forget_other(void);
 
-/* Whether that change has come, and when: as schedule_now(). After encoder_poll(). */
+/* Whether it is still awaited, or has come and encoder_update() has not; whether it has come, and when: as
+ * schedule_now(). */
+bool encoder_awaits_other(void);
 bool encoder_saw_other(void);
 uint32_t encoder_other_edge(void);
 

@@ -32,7 +32,7 @@ static uint8_t age;
 static void let_go(void) {
   hal_stamp_disarm();
 #ifdef PIN_LIGHT_LEFT
-  encoder_await_other(0);
+  encoder_forget_other();
   HAL_PIN_INPUT(LIGHT_LEFT);
 #endif
   HAL_PIN_INPUT(LIGHT_RIGHT);
@@ -58,7 +58,7 @@ static void charge(void) {
 
 static void release(void) {
 #ifdef PIN_LIGHT_LEFT
-  encoder_await_other(HAL_PIN_BIT(LIGHT_LEFT));
+  encoder_await_other();
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_LEFT);
     released_at[LEFT] = schedule_now();
@@ -81,9 +81,17 @@ static uint16_t decay_time(uint8_t side, uint32_t edge) {
 /* Without an edge: still high, or low and the edge was not seen. */
 static uint16_t without_edge(uint8_t level) { return level != 0 ? LIGHT_LONGEST : 0u; }
 
+/* Whether the left edge is among the encoders' changes that are still to be worked off: the pin is low. */
+static bool must_wait(void) {
+#ifdef PIN_LIGHT_LEFT
+  return encoder_awaits_other() && HAL_PIN_READ(LIGHT_LEFT) == 0;
+#else
+  return false;
+#endif
+}
+
 static void collect(void) {
 #ifdef PIN_LIGHT_LEFT
-  encoder_poll();
   readings[LEFT] =
       encoder_saw_other() ? decay_time(LEFT, encoder_other_edge()) : without_edge(HAL_PIN_READ(LIGHT_LEFT));
 #endif
@@ -105,10 +113,13 @@ void light_task(void) {
     readings[LEFT] = readings[RIGHT] = 0;
     age = AGE_NEVER;
   } else if (slot == CHARGE) {
+    if (state == DECAYING) { /* had to wait; no longer, the line may be one that never was high */
+      collect();
+    }
     charge();
   } else if (slot == RELEASE && state == CHARGING) {
     release();
-  } else if (slot == COLLECT && state == DECAYING) {
+  } else if (slot == COLLECT && state == DECAYING && !must_wait()) {
     collect();
   }
 }

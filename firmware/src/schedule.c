@@ -181,13 +181,16 @@ static void begin_tick(void) {
 /* A task has ended; and what cannot wait for the end of all tasks. */
 static __attribute__((noinline)) void between_tasks(void) {
   task_has_ended();
-  encoder_poll();
+  if (encoder_due() != 0) {
+    encoder_poll();
+  }
   link_poll();
 }
 
 /* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has returned, and not
  * in a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
+  encoder_update();
 #define TASK(name, period, phase, budget)    \
   if (slot % (uint8_t)(period) == (phase)) { \
     task_begins(TASK_##name);                \
@@ -195,6 +198,7 @@ static void run_tasks(uint8_t slot) {
     between_tasks();                         \
   }
 #include "tasks.def"
+  encoder_update();
   if (overrun_row < OVERLOAD_TICKS) {
     hal_kick_watchdog();
   }
