@@ -36,6 +36,7 @@ MODULES = (
     "world",
     "precision",
     "calibration",
+    "timing",
     "setup_time",
 )
 
