@@ -64,7 +64,7 @@ typedef struct {
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed);
 
 /* A delimiter came: whether what was collected is a message. */
-bool frame_decode_end(frame_decoder *decoder);
+bool frame_decode_end(frame_decoder *decoder) __attribute__((noinline));
 
 /* Takes one byte; true when it completes an accepted message. Until the next call its parts are in id, sequence and
  * payload below. */

@@ -20,7 +20,7 @@ void link_start(uint16_t baud);
 void link_use_seed(uint32_t seed);
 
 /* Takes received bytes, up to the end of one frame; false unless it is accepted. A part of link_poll(). */
-bool link_take_frame(void);
+bool link_take_frame(void) __attribute__((noinline));
 
 /* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits
  * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of

@@ -2,8 +2,8 @@
 
 Polls are taken apart. What one costs when nothing waits comes after each task; what it takes more to work off bytes, a
 frame or an edge comes as often as these do, and so is counted with the interrupts that bring them: otherwise each of
-some forty polls in a tick would be taken to find its ring full. Bytes or edges that come more often than polls cannot be
-found by more than each poll, so what does not grow with their number is then counted with the polls.
+some forty polls in a tick would be taken to find its ring full. Where bytes or edges come more often than polls, what
+does not grow with their number is counted with the polls: no more than each can find some.
 
 For this some functions of the firmware must be functions of the image too (SCHEDULER is refused otherwise, the others
 are then counted with all that they can find): they are kept from being in line where they are declared. What a compiler

@@ -10,9 +10,14 @@ none had begun, that step is the one under way. So its wait is not above the lea
 
     L = B + steps(1 + sum of N_i(L)) + sum of N_i(L) * C_i        over those of higher priority
 
-where N_i(L) is the most requests of i in L + 1 cycles; after A. Burns, A. Wellings, "Real-Time Systems and Programming Languages", 11.8 (blocking by what cannot be preempted).
-C_i runs from acceptance (entry: 4 cycles) to the end of RETI; of an interrupt that lets others in, to where it does so.
-No interrupt has more than one request waiting (data sheet: one flag each); so those of its own kind do not pile up.
+where N_i(L) is the most requests of i in L + 1 cycles; after A. Burns, A. Wellings, "Real-Time Systems and Programming
+Languages", 11.8 (blocking by what cannot be preempted). C_i runs from acceptance (entry: 4 cycles) to the end of RETI;
+of an interrupt that lets others in, to where it does so.
+
+Each has one flag (data sheet, 11): those of its own kind do not pile up. But the last moment at which none of higher
+priority was waiting may be the one at which the request before this one was accepted: then B is its own time. That
+was at most L after the request before; so it need not be heeded where no two of its requests come within L and the time
+that passes, by the same formula, from that acceptance on.
 
 How often they come is said in loads.py, of each load or (`densest`) of any. That is not the rate in the long run: edges
 of the IR carrier come 190 cycles apart within bursts, and a few changes of the encoders all at once.
@@ -59,18 +64,20 @@ class Latencies:
                     f"{self.blocked.program.path}: interrupt {number} goes before interrupt {vector}, and how often it "
                     "comes is not said; expected an INTERRUPT row of it"
                 )
-        begun = [self.spans[number][0] for number in others if number > vector or self._again(number, vector)]
-        wait, longer = -1, max(begun, default=0)
+        lower = max((self.spans[number][0] for number in others if number > vector), default=0)
+        wait, after_own = self._behind(lower, higher), self._behind(self.spans[vector][0], higher)
+        own = self.requests.get(vector)
+        again = own is None or sum(one.requests(wait + after_own + 1) for one in own) > 1
+        return max(wait, after_own) if again else wait
+
+    def _behind(self, begun: int, higher: Sequence[int]) -> int:
+        """The wait where one that takes so long has just begun."""
+        wait, longer = -1, begun
         while longer > wait:
             if longer >= HORIZON:
                 return HORIZON
-            wait, longer = longer, max(begun, default=0) + self._meanwhile(higher, longer)
+            wait, longer = longer, begun + self._meanwhile(higher, longer)
         return wait
-
-    def _again(self, number: int, vector: int) -> bool:
-        """It is this one, and can be requested again before it has returned."""
-        again = self.requests.get(number, ())
-        return number == vector and (not again or sum(one.requests(self.spans[number][0] + 1) for one in again) > 1)
 
     def _meanwhile(self, higher: Sequence[int], wait: int) -> int:
         """What those of higher priority and the main program run in that time."""

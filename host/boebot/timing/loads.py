@@ -88,7 +88,7 @@ _SWEEP = Stream(
     _HALF_PERIOD, 2 * 85, TICK
 )  # two bursts of 1 ms in each tick, at the highest of its frequencies 85 toggles each
 _ECHOES = Stream(_ECHO, 2, 4 * TICK)  # rise and fall; the Ping's shortest period is four ticks
-_DEVICES_OFF = frozenset({STAMP, BUZZER, EEPROM, TWO_WIRE})
+_DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
     "figures": Load(
@@ -97,7 +97,7 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, _SET_POINT, TICK),),
-            SEND: (Stream(BYTE, 2 * _TELEMETRY + _DEVICES, 2 * TICK),),
+            SEND: (Stream(BYTE, _TELEMETRY, TICK), Stream(BYTE, _DEVICES, 2 * TICK)),
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),
@@ -136,7 +136,7 @@ LOADS["everything"] = replace(
         EEPROM: (Stream(),),
         TWO_WIRE: (_COMPASS,),
     },
-    off=frozenset(),
+    off=frozenset({WATCHDOG}),
 )
 
 
