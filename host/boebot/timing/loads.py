@@ -97,7 +97,7 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, _SET_POINT, TICK),),
-            SEND: (Stream(BYTE, 2 * _TELEMETRY + _DEVICES, 2 * TICK),),
+            SEND: (Stream(BYTE, _TELEMETRY, TICK), Stream(BYTE, _DEVICES, 2 * TICK)),
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),

@@ -52,8 +52,9 @@ enum {
 #include "tasks.def"
 };
 
-/* Covers what can stand before the edge's interrupt, its latency in the table: one that has begun, a storm of pin changes
- * (5 x 79 and 16 to stop it), a stamped change and a capture; and its own prologue. */
+/* Covers what can stand before the edge's interrupt, its latency in the table, which the analysis of the image shows for
+ * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 79 and 16 to stop it), a stamped
+ * change and a capture; and its own prologue. */
 #define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 79u + 16u)
 _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BUDGET_capture <= HAL_LATENCY_edge,
                "lead");
