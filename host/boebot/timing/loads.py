@@ -76,7 +76,7 @@ class Load:
         return 0 < len(lines) <= CHANGES_STORM and all(line.interval > max(storm, TICK // LIMIT) for line in lines)
 
 
-_EDGE_TO_EDGE = 8_000  # of servo pulses and ends of bursts, where they are closest: above it (servo.c, infrared.c)
+_EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
 _ECHO = 115 * 16  # the shortest, from rise to fall
 _HALF_PERIOD = 190  # of the carrier's highest frequency
 _BUS_STEP = 160  # the shortest of the two-wire bus, a bit at 100 kHz
