@@ -115,11 +115,22 @@ def light_mounts(x: float, y: float, heading: float) -> list[tuple[float, float,
     return mounts
 
 
+# The interrupt that stamps the edge waits, on a busy line, for a byte received and one sent (tasks.def: 54 and 50
+# cycles), and reads the time some 30 cycles after it began: 134 cycles, 8.4 us, told in whole us. It never stamps
+# early, but the expected time is rounded too.
+STAMP_LATE_US = (-1, 9)
+
+
+def is_punctual(told: int, true: float) -> bool:
+    """Whether a decay time (us) is right but for what its stamp may be late."""
+    return STAMP_LATE_US[0] <= told - true <= STAMP_LATE_US[1]
+
+
 def assert_light(rig: CircleRig, pose: tuple[float, float, float], lamps: list[Light]) -> None:
     rig.place(*pose)
     told = rig.devices(after_s=0.15)
     left, right = (decay_us(*mount, lamps) for mount in light_mounts(*pose))
-    assert abs(told.light_left - left) <= 4 and abs(told.light_right - right) <= 4
+    assert is_punctual(told.light_left, left) and is_punctual(told.light_right, right)
     assert told.light_age <= 4
 
 
@@ -142,7 +153,7 @@ def test_light_sensors_are_where_the_description_has_them(board_url: str) -> Non
     mount = {"position_m": (0.0, 0.0), "heading_rad": math.pi / 2}
     with circle(board_url, arena_of(light=lamps), robot_of(light_left=mount)) as rig:
         told = rig.devices(after_s=0.15)
-        assert abs(told.light_left - decay_us(0.0, 0.0, math.pi / 2, lamps)) <= 4
+        assert is_punctual(told.light_left, decay_us(0.0, 0.0, math.pi / 2, lamps))
 
 
 # ---- compass ---------------------------------------------------------------------------------------------------------
