@@ -118,7 +118,7 @@ bool encoder_saw_other(void) { return other == SEEN; }
 uint32_t encoder_other_edge(void) { return other_edge; }
 
 /* It has come: the line is masked again. */
-static __attribute__((noinline)) void stamp_other(uint16_t time) {
+static __attribute__((noinline)) void see_other(uint16_t time) {
   other = STAMPED;
   other_stamp = time;
   listen();
@@ -282,7 +282,7 @@ static inline __attribute__((always_inline)) uint8_t work_off(uint8_t tail, uint
       over |= see_wheel(&wheels[RIGHT], lines_of(RIGHT, edges), lines_of(RIGHT, bits), time);
     }
     if ((changed & was & OTHER_BIT) != 0 && other == AWAITED) {
-      stamp_other(time);
+      see_other(time);
     }
     was = bits;
   }

@@ -183,8 +183,8 @@ uint32_t hal_image_hash(void);
  *   void hal_serial_queue(uint8_t count)          sends what was written from the first such place on
  *   bool hal_serial_room(uint8_t count)           whether `count` more bytes can be queued for sending; if not, the CPU
  *                                                 is woken when more can
- *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt with
- *                                                 interrupts off
+ *   void hal_sleep_until(bool (*due)(void))       sleeps until something is due, asked after each interrupt. It
+ *                                                 becomes due with a slot, a stamped change or a byte
  *   HAL_EEPROM_SIZE                               bytes of EEPROM. A write takes 3.4 ms and goes on through a reset. Before
  *                                                 interrupts are on hal_eeprom_wait() waits for its end; later only one
  *                                                 part of the firmware reads and writes.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output
+from boebot.cli import options, output, timing_tables
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 GROUP = "boebot.timing"
-_UNKNOWN = "–"
+_LOOK_S = 0.05
+_CYCLES_PER_S = 16_000_000
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
   boebot timing                            the bundled image: bounds, emulator, budgets
@@ -30,8 +31,8 @@ _HELP = """What the firmware may take, what it took, and whether that fits its b
 
   boebot timing --robot R --brain B        are these sensors, this brain and this line realisable?
 
---out DIR writes the timing diagram, timing.png and timing.svg, and timing.json. Exit code: 1 a budget is broken or the
-robot is not realisable; 2 bad input, or an image whose timing cannot be told."""
+--out DIR writes the timing diagram, timing.png and timing.svg, and timing.json. Exit code: 1 a budget or a limit is
+broken, or the robot is not realisable; 2 bad input, or an image whose timing cannot be told."""
 
 
 def timing(
@@ -66,7 +67,7 @@ def timing(
         bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Where to write timing.png, timing.svg and timing.json.")
+        Path | None, typer.Option(metavar="DIR", help="Where to write the timing diagram and timing.json.")
     ] = None,
     json: options.Json = False,
 ) -> None:
@@ -98,8 +99,9 @@ class Answer:
 
     @property
     def is_broken(self) -> bool:
-        """A budget is broken, or the robot is not realisable."""
-        return bool(self.report and self.report.faults) or not self.verdict.is_realisable
+        """A budget or a limit of the jitter is broken, or the robot is not realisable."""
+        late = self.jitter is not None and bool(self.jitter.broken)
+        return late or bool(self.report and self.report.faults) or not self.verdict.is_realisable
 
     def as_dict(self) -> dict[str, Any]:
         """For programs."""
@@ -113,13 +115,10 @@ class Answer:
     def show(self) -> None:
         """For people."""
         if self.report is not None:
-            show_report(self.report)
-        show_verdict(self.verdict)
+            timing_tables.show_report(self.report)
+        timing_tables.show_verdict(self.verdict)
         if self.jitter is not None:
-            from boebot.timing.distributions import rows
-
-            head, *rest = rows(self.jitter.distributions)
-            output.print_rows(head, rest)
+            timing_tables.show_jitter(self.jitter)
         if self.files:
             print(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
 
@@ -153,7 +152,7 @@ def _answer(
     found = None
     if image is not None:
         measured = _measured("emulated", image, seconds, seed) if measure else None
-        found = budget.prove(image, asked, measured, _board_maxima(port, description))
+        found = budget.prove(image, asked, measured, _board_maxima(port, description, seconds))
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
     board = None if found is None else _board_times(found)
@@ -193,8 +192,9 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
 
 
-def _board_maxima(port: str | None, robot: RobotDescription) -> Mapping[str, int]:
-    """What a board has measured of its own tasks, in cycles by their names."""
+def _board_maxima(port: str | None, robot: RobotDescription, seconds: float) -> Mapping[str, int]:
+    """What a board measures of its own tasks, in cycles by their names: since it was last asked, and so long from now
+    on. Nothing moves."""
     if port is None:
         return {}
     from boebot.boards import BoardRequest, open_board
@@ -204,11 +204,16 @@ def _board_maxima(port: str | None, robot: RobotDescription) -> Mapping[str, int
     try:
         link = Link(session.transport, record=False)
         link.open()
-        found = link.take_task_times()
+        end = link.transport.now() + seconds
+        while link.transport.now() < end:
+            link.poll(_LOOK_S)
+        found = {name: cycles for name, cycles in link.take_task_times().items() if cycles}
         link.close()
-        return {name: cycles for name, cycles in found.items() if cycles}
     finally:
         session.close()
+    if not found:
+        output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
+    return found
 
 
 def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
@@ -229,14 +234,12 @@ def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, se
 
 def _board_times(report: Report) -> Any:
     """Of a board whose image was judged: bounds in place of budgets."""
-    from boebot.timing.graph import load_program
     from boebot.timing.realisable import BoardTimes
 
-    table = load_program(Path(report.path)).table
     if report.responses is None:
-        return BoardTimes.of(table)
-    hertz = 16_000_000
-    return BoardTimes(table.sensors, report.responses.pieces.get("telemetry", 0) / hertz, (report.gap or 0) / hertz)
+        return BoardTimes.of(report.table)
+    telemetry, gap = report.responses.pieces.get("telemetry", 0), report.gap or 0
+    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, gap / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:
@@ -249,83 +252,9 @@ def _write(answer: Answer, out: Path) -> list[Path]:
         from boebot.timing import diagram
 
         found |= diagram.files(answer.report, answer.verdict)
+    if answer.jitter is not None:
+        from boebot.timing import histograms
+
+        found |= histograms.files(answer.jitter.distributions)
     found["timing.json"] = (json.dumps(answer.as_dict(), indent=1) + "\n").encode()
     return list(write(out, found))
-
-
-# ---- for people -----------------------------------------------------------------------------------------------------
-
-
-def show_report(report: Report) -> None:
-    """Two tables, the sums, and what is broken."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(highlight=False)
-    console.print(Text.assemble((Path(report.path).name, "bold"), f"  under the load {report.load.name!r}"))
-    console.print(Text(report.load.says, style="dim"))
-    for kind, last in (("task", ("response bound",)), ("interrupt", ("latency bound", "latency limit"))):
-        rows = [row for row in report.rows if row.kind == kind]
-        if not rows:
-            continue
-        shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        shown.add_column(f"{kind} (cycles)")
-        for title in ("bound", "emulator max", "board max", "budget", "slack", *last):
-            shown.add_column(title, justify="right")
-        for row in rows:
-            ends = (row.response,) if kind == "task" else (row.latency, row.latency_limit)
-            style = "bold red" if row.slack < 0 or (row.emulator or 0) > row.bound else None
-            cells = (row.bound, row.emulator, row.board, row.budget, row.slack, *ends)
-            shown.add_row(row.name, *map(_cell, cells), style=style)
-        console.print(shown)
-    console.print(output.table(_sums(report)))
-    for fault in report.faults:
-        console.print(Text(f"broken: {fault}", style="bold red"))
-    if not report.faults:
-        console.print(Text("all budgets are met", style="green"))
-
-
-def _sums(report: Report) -> dict[str, Any]:
-    """Names with units, values."""
-    found, measured, memory = report.responses, report.measured, report.memory
-    return {
-        "tick_work_bound_percent": round(100 * report.tick_work / report.tick_cycles, 1),
-        "tick_response_bound_percent": None if found is None else round(100 * found.tick / report.tick_cycles, 1),
-        "load_bound_percent": round(100 * report.load_bound, 1),
-        "load_in_emulator_percent": None if measured is None else round(100 * measured.load, 1),
-        "poll_gap_bound_cycles": report.gap,
-        "receive_ring_needed_bytes": report.ring,
-        "stack_bound_bytes": memory.stack,
-        "stack_in_emulator_bytes": memory.stack_seen,
-        "static_ram_bytes": memory.static,
-        "ram_and_stack_bytes": memory.static + memory.stack,
-        "flash_bytes": memory.flash,
-    }
-
-
-def _cell(number: int | None) -> str:
-    return _UNKNOWN if number is None else f"{number:,}"
-
-
-def show_verdict(verdict: Verdict) -> None:
-    """The events of a time step, and the answer."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(highlight=False)
-    if verdict.events:
-        shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        shown.add_column(f"{verdict.robot}, one step")
-        for title in ("takes (ms)", "ends (ms)", "own period (ms)"):
-            shown.add_column(title, justify="right")
-        for event in verdict.events:
-            end, own = (_UNKNOWN, f"{event.every * 1000:g}") if event.beside else (f"{event.end * 1000:.3f}", "")
-            shown.add_row(event.name, f"{event.seconds * 1000:.3f}", end, own)
-        console.print(shown)
-    console.print(Text(verdict.sentence, style="green" if verdict.is_realisable else "bold red"))
-    for note in verdict.notes:
-        console.print(Text(note, style="dim"))

@@ -2,7 +2,8 @@
 
 Bounds come from the machine code alone; they are compared with what the image's own table allows, and with what was
 measured in the emulator or on the board, wherever somebody has. A measured figure above its bound means that the bound
-is wrong, and counts like any broken budget.
+is wrong, and counts like any broken budget. What a task or an interrupt takes by itself, and the stack, hold for every
+scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from boebot.errors import TimingError
+from boebot.timing.blocked import WAKE
 from boebot.timing.costs import Costs, costs
 from boebot.timing.elf import read_image
-from boebot.timing.graph import load_program
+from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
-from boebot.timing.measured import Measurement, Spans
-from boebot.timing.program import Program
+from boebot.timing.measured import Measurement, Spans, as_json
+from boebot.timing.program import Program, Table
 from boebot.timing.response import Responses, Schedule, Source, load, misses, poll_gap, receive_backlog, responses
 from boebot.timing.stack import Stack
 
@@ -26,6 +28,8 @@ RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
 FLASH_BYTES = 0x8000
 RECEIVE_RING = 256  # bytes, of which one stays free
+FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
+RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
 
 
@@ -48,6 +52,11 @@ class Row:
         """What is left of the budget above the bound."""
         return self.budget - self.bound
 
+    @property
+    def ratio(self) -> float | None:
+        """The bound to the longest that was measured in the emulator; None: nothing was."""
+        return self.bound / self.emulator if self.emulator else None
+
 
 @dataclass(frozen=True, slots=True)
 class Memory:
@@ -69,6 +78,7 @@ class Report:
     """Of one image under one load. `responses`, `gap` and `ring`: None where there is overload."""
 
     path: str
+    table: Table
     load: Load
     rows: tuple[Row, ...]
     costs: Costs
@@ -91,6 +101,27 @@ class Report:
         return self.schedule.tick_cycles
 
     @property
+    def demand(self) -> int:
+        """Cycles of all tasks and interrupts that can come in one tick, whether they fit into it or not."""
+        coming = sum(source.cycles * source.requests(self.tick_cycles) for source in self.sources)
+        return self.schedule.blocking + self.tick_work + coming
+
+    @property
+    def executed(self) -> int:
+        """Cycles of a tick in which instructions run at most: each interrupt also wakes the main loop for a round."""
+        names = {row.name for row in self.rows if row.kind == "interrupt"}
+        wakes = sum(source.requests(self.tick_cycles) for source in self.sources if source.name in names)
+        return min(self.tick_cycles, self.demand + wakes * (WAKE + self.costs.round))
+
+    @property
+    def own(self) -> Measurement | None:
+        """What was measured under the report's own load; None: nothing."""
+        if self.measured is None:
+            return None
+        alone = self.measured if self.measured.scenarios == (self.load.name,) else None
+        return self.measured.by_scenario.get(self.load.name, alone)
+
+    @property
     def load_bound(self) -> float:
         """Share of all cycles that tasks and interrupts take at most in the long run, 0..1; above 1: overload."""
         return float(load(self.sources) + self.schedule.mean_load)
@@ -98,7 +129,16 @@ class Report:
     @property
     def faults(self) -> list[str]:
         """What is broken, each a sentence without its end."""
-        return [*_rows_broken(self.rows), *_tick_broken(self), *_memory_broken(self.memory)]
+        return [*_rows_broken(self.rows), *_tick_broken(self), *_measured_broken(self), *_memory_broken(self.memory)]
+
+    @property
+    def notes(self) -> list[str]:
+        """Bounds of tasks that are far above what was measured: nothing is broken, but one of both could be better."""
+        return [
+            f"task {row.name}: its bound of {row.bound} cycles is {row.ratio:.2f} times the {row.emulator} measured"
+            for row in self.rows
+            if row.kind == "task" and row.ratio is not None and row.ratio > RATIO_MOST
+        ]
 
     @property
     def is_met(self) -> bool:
@@ -107,7 +147,7 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         """For programs; units in the keys."""
-        found, measured, memory = self.responses, self.measured, self.memory
+        found, measured, own, memory = self.responses, self.measured, self.own, self.memory
         return {
             "elf": self.path,
             "load": self.load.name,
@@ -120,13 +160,17 @@ class Report:
                 "work_bound_percent": _percent(self.tick_work, self.tick_cycles),
                 "response_bound_cycles": None if found is None else found.tick,
                 "response_bound_percent": None if found is None else _percent(found.tick, self.tick_cycles),
-                "emulator_max_cycles": (measured.worst_tick or None) if measured else None,
+                "demand_bound_cycles": self.demand,
+                "demand_emulator_max_cycles": own.worst_tick if own else None,
+                "executed_bound_cycles": self.executed,
+                "executed_emulator_max_cycles": own.busiest_tick if own else None,
                 "slot_response_bound_cycles": None if found is None else list(found.slots),
             },
             "load_bound_percent": round(100 * self.load_bound, 2),
-            "load_emulator_percent": None if measured is None else round(100 * measured.load, 2),
+            "load_emulator_percent": None if own is None else round(100 * own.load, 2),
             "interrupt_load_bound_percent": round(100 * float(load(self.sources)), 2),
             "poll_gap_bound_cycles": self.gap,
+            "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
             "receive_ring_bytes": RECEIVE_RING - 1,
             "ram_static_bytes": memory.static,
@@ -134,9 +178,9 @@ class Report:
             "stack_emulator_max_bytes": memory.stack_seen,
             "ram_bytes": RAM_BYTES,
             "flash_bytes": memory.flash,
-            "measured_seconds": None if measured is None else round(measured.seconds, 3),
-            "scenarios": [] if measured is None else list(measured.scenarios),
+            "measured": None if measured is None else as_json(measured),
             "faults": self.faults,
+            "notes": self.notes,
         }
 
 
@@ -159,16 +203,18 @@ def prove(
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
     """
-    program = program or load_program(path)
+    image = read_image(path)
+    program = program or program_of(image)
     if not program.table.tasks:
         raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
     found = costs(program, asked)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
-    image, deepest = read_image(path), Stack(program).image()
+    deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
     return Report(
         path=str(path),
+        table=program.table,
         load=asked,
         rows=tuple(_rows(program, found, answers, measured, board or {})),
         costs=found,
@@ -228,22 +274,25 @@ def _ring(program: Program, found: Costs, schedule: Schedule, sources: tuple[Sou
 def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
     found = []
     for row in rows:
+        who = f"{row.kind} {row.name}"
         if row.emulator is not None and row.emulator > row.bound:
-            found.append(
-                f"{row.kind} {row.name} took {row.emulator} cycles in the emulator, above its bound of {row.bound}"
-            )
+            found.append(_above(f"{who} took {row.emulator} cycles in the emulator", row.emulator, "bound", row.bound))
         if row.board is not None and row.response is not None and row.board > row.response:
             found.append(
-                f"{row.kind} {row.name} took {row.board} cycles on the board, interrupts included, above its bound of "
-                f"{row.response} with them"
+                _above(f"{who} took {row.board} cycles on the board", row.board, "bound with interrupts", row.response)
             )
         if row.bound > row.budget:
-            found.append(f"{row.kind} {row.name} may take {row.bound} cycles; its budget is {row.budget}")
+            found.append(_above(f"{who} may take {row.bound} cycles", row.bound, "budget", row.budget))
         if row.latency is not None and row.latency_limit is not None and row.latency > row.latency_limit:
-            found.append(
-                f"{row.kind} {row.name} may wait {row.latency} cycles; its largest latency is {row.latency_limit}"
-            )
+            wait = "for ever" if row.latency >= FOR_EVER else f"{row.latency} cycles"
+            found.append(_above(f"{who} may wait {wait}", row.latency, "latency limit", row.latency_limit))
     return found
+
+
+def _above(says: str, number: int, what: str, limit: int) -> str:
+    """By how much a figure is above what it may be."""
+    more = "more than" if number >= FOR_EVER else f"{number - limit} above"
+    return f"{says}, {more} its {what} of {limit}"
 
 
 def _tick_broken(report: Report) -> list[str]:
@@ -254,19 +303,29 @@ def _tick_broken(report: Report) -> list[str]:
         ]
     found = []
     if report.responses.tick > report.tick_cycles:
-        found.append(
-            f"the work of a tick and its interrupts may take {report.responses.tick} of {report.tick_cycles} cycles"
-        )
+        says = f"the work of a tick and its interrupts may take {report.responses.tick} cycles"
+        found.append(_above(says, report.responses.tick, "length", report.tick_cycles))
     for slot in misses(report.schedule, report.responses.slots):
         found.append(
             f"slot {slot} may end {report.responses.slots[slot]} cycles after it began, when the next tick has begun"
         )
     if report.ring is not None and report.ring > RECEIVE_RING - 1:
         found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {RECEIVE_RING - 1}")
-    worst = report.measured.worst_tick if report.measured else 0
-    if worst > report.responses.tick and report.measured:
-        found.append(f"a tick took {worst} cycles in the emulator, above its bound of {report.responses.tick}")
     return found
+
+
+def _measured_broken(report: Report) -> list[str]:
+    """What the scenario of the report's own load took, against the bounds under that load."""
+    own = report.own
+    if own is None or report.responses is None:
+        return []
+    figures = [
+        (f"tasks and interrupts of a tick took {own.worst_tick} cycles", own.worst_tick, report.demand),
+        (f"instructions ran in {own.busiest_tick} cycles of a tick", own.busiest_tick, report.executed),
+    ]
+    if report.gap is not None:
+        figures.append((f"{own.between_polls} cycles passed between two polls", own.between_polls, report.gap))
+    return [_above(f"{says} in the emulator", took, "bound", most) for says, took, most in figures if took > most]
 
 
 def _memory_broken(memory: Memory) -> list[str]:
@@ -274,7 +333,8 @@ def _memory_broken(memory: Memory) -> list[str]:
     if memory.stack > memory.left:
         found.append(f"the stack may need {memory.stack} bytes; {memory.left} of {RAM_BYTES} are left for it")
     if memory.stack_seen is not None and memory.stack_seen > memory.stack:
-        found.append(f"the stack took {memory.stack_seen} bytes in the emulator, above its bound of {memory.stack}")
+        says = f"the stack took {memory.stack_seen} bytes in the emulator"
+        found.append(_above(says, memory.stack_seen, "bound", memory.stack))
     if memory.flash > FLASH_BYTES:
         found.append(f"the image fills {memory.flash} bytes of flash; there are {FLASH_BYTES}")
     return found
@@ -285,6 +345,7 @@ def _row_dict(row: Row) -> dict[str, Any]:
         "name": row.name,
         "bound_cycles": row.bound,
         "emulator_max_cycles": row.emulator,
+        "ratio": None if row.ratio is None else round(row.ratio, 3),
         "board_max_cycles": row.board,
         "budget_cycles": row.budget,
         "slack_cycles": row.slack,

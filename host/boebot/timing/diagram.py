@@ -1,20 +1,23 @@
 """The timing diagram of the notes (Fig. 3.2), drawn to scale: what fills a time step, and how much of it is left.
 
-Above, one control tick as a whole: tasks, interrupts, the line, and what sensors do in hardware of their own meanwhile.
-Below, the work of each slot, enlarged so that its tasks can be read. Spans come from a tick that was measured; where
-none was, tasks are drawn as long as they can take by their bounds.
+From above: the time step of the brain with all that follows one another in it, and what devices do beside it in
+hardware of their own; one control tick of the board within it; the tasks of each slot of that tick, enlarged so that
+they can be read. Spans come from the fullest tick that was measured; where none was, tasks are drawn as long as they
+can take by their bounds.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.report import style
 from boebot.timing.budget import Report
 from boebot.timing.measured import Moment
-from boebot.timing.realisable import Verdict
+from boebot.timing.realisable import TICK_S, Event, Verdict, ms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,14 +26,24 @@ if TYPE_CHECKING:
 NAME = "timing"
 _CYCLES_PER_MS = 16_000
 _COLOURS = {"task": "#0072b2", "interrupt": "#d55e00", "line": "#cc79a7", "process": "#009e73", "sense": "#e69f00"}
+_COLOURS["command"] = _COLOURS["task"]
+_LEGEND = {
+    "task": "task",
+    "interrupt": "interrupt",
+    "line": "bytes on the line",
+    "process": "brain",
+    "sense": "reading, in hardware of its own",
+}
+_BETWEEN = "#d9dee5"  # scheduler and polls
 _HEIGHT = 0.66  # of a box, in lanes
-_LETTER = 0.011  # width of a letter, as a share of the axes
+_LANE_IN, _SLOT_IN, _FRAME_IN = 0.24, 0.98, 1.0  # heights
+_APART = 0.024  # of the names of tasks, as a share of the axes
 
 
 def moments(report: Report) -> tuple[Moment, ...]:
     """Spans of one tick: those that were measured, or the tasks of the first tick by their bounds."""
-    if report.measured is not None and report.measured.tick:
-        return report.measured.tick
+    if measured := _measured(report):
+        return measured
     found = []
     busy = 0
     for slot in range(report.schedule.slots_per_tick):
@@ -41,23 +54,42 @@ def moments(report: Report) -> tuple[Moment, ...]:
     return tuple(found)
 
 
+def _measured(report: Report) -> tuple[Moment, ...]:
+    """Under the report's own load, else under another; none where no tick was measured."""
+    run = report.own or report.measured
+    return run.tick if run is not None else ()
+
+
 def figure(report: Report, verdict: Verdict | None = None) -> Figure:
-    """The diagram; `verdict` adds the line, the brain and the sensors of a robot."""
+    """The diagram; `verdict` adds the step of the brain, with the line and the sensors of a robot."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     spans = moments(report)
+    events = verdict.events if verdict is not None else ()
+    lanes = (len(events) + 2.5, 3.2)
+    heights = [*([_LANE_IN * lanes[0] + 0.5] if events else []), _LANE_IN * lanes[1] + 0.5]
+    heights.append(_SLOT_IN * report.schedule.slots_per_tick + 0.8)
     with rc_context(style.PLOTS):
-        drawn = Figure(figsize=(style.WIDTH_IN, 7.4), dpi=style.DPI, layout="constrained")
+        drawn = Figure(figsize=(style.WIDTH_IN, sum(heights) + _FRAME_IN), dpi=style.DPI, layout="constrained")
         FigureCanvasAgg(drawn)
-        above, below = drawn.subplots(2, 1, height_ratios=(1, 1.25))
-        _tick(above, spans, report, verdict)
-        _slots(below, spans, report)
-        measured = report.measured is not None and bool(report.measured.tick)
-        how = "as measured" if measured else "by bounds: no tick was measured"
-        drawn.suptitle(f"One control tick, drawn to scale, {how}", color=style.INK, fontsize=12)
+        axes = list(drawn.subplots(len(heights), 1, height_ratios=heights))
+        if verdict is not None and events:
+            _step(axes[0], verdict)
+        _tick(axes[-2], spans, report)
+        _slots(axes[-1], spans, report)
+        _legend(drawn, {span.kind for span in spans} | {event.kind for event in events})
+        drawn.suptitle(f"{Path(report.path).name}: {_how(report)}", color=style.INK, fontsize=12)
     return drawn
+
+
+def _how(report: Report) -> str:
+    if not _measured(report):
+        return "tasks as long as their bounds, drawn to scale"
+    run = report.own or report.measured
+    assert run is not None
+    return f"the fullest tick that was measured ({run.scenarios[0]}), drawn to scale"
 
 
 def files(report: Report, verdict: Verdict | None = None) -> dict[str, bytes]:
@@ -74,44 +106,80 @@ def files(report: Report, verdict: Verdict | None = None) -> dict[str, bytes]:
     return found
 
 
-def _tick(axes: Axes, spans: Sequence[Moment], report: Report, verdict: Verdict | None) -> None:
-    """The whole tick, a lane for each kind of event."""
-    period_ms = report.tick_cycles / _CYCLES_PER_MS
-    boxes = [(span.name, span.kind, span.begin / _CYCLES_PER_MS, span.end / _CYCLES_PER_MS) for span in spans]
-    lanes = ["tasks"] + (["interrupts"] if any(kind == "interrupt" for _, kind, _, _ in boxes) else [])
-    rows = [("tasks" if kind == "task" else "interrupts", *rest) for rest in boxes for kind in (rest[1],)]
-    if verdict is not None:
-        period_ms = max(period_ms, verdict.period_s * 1000)
-        for event in verdict.events:
-            if event.kind == "command" or (event.kind == "sense" and not event.beside):
-                continue  # work of tasks, which are drawn
-            lane = event.name.partition(",")[0]
-            rows.append((lane, event.name, event.kind, event.begin * 1000, event.end * 1000))
-            lanes += [] if lane in lanes else [lane]
-    for lane, name, kind, begin, end in rows:
-        place = lanes.index(lane)
-        axes.barh(place, end - begin, _HEIGHT, left=begin, color=_COLOURS[kind], linewidth=0)
-        if lane not in ("tasks", "interrupts"):
-            _label(axes, f"{name}  {end - begin:.3g} ms", begin, end, place, period_ms)
-    axes.axvline(period_ms, color=style.INK, linewidth=1.2)
-    axes.annotate("", (period_ms, -0.75), (0, -0.75), arrowprops={"arrowstyle": "<->", "color": style.INK})
-    axes.text(period_ms / 2, -0.85, f"Δt = {period_ms:g} ms", ha="center", va="bottom", color=style.INK)
-    axes.set_yticks(range(len(lanes)), lanes)
-    axes.set_ylim(len(lanes) - 0.5, -1.35)
-    longest = max([period_ms, *(end for *_, end in rows)])
+def _legend(drawn: Figure, kinds: set[str]) -> None:
+    from matplotlib.patches import Patch
+
+    shown = [Patch(color=_COLOURS[kind], label=label) for kind, label in _LEGEND.items() if kind in kinds]
+    shown.insert(1, Patch(color=_BETWEEN, label="scheduler and polls of the link"))
+    drawn.legend(handles=shown, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)
+
+
+# ---- the step of the brain ------------------------------------------------------------------------------------------
+
+
+def _step(axes: Axes, verdict: Verdict) -> None:
+    """A lane for each event of the time step, in their order; what is left of it; devices below."""
+    period = verdict.period_s * 1000
+    ticks = range(1, round(verdict.period_s / TICK_S))
+    for tick in ticks:
+        axes.axvline(tick * TICK_S * 1000, color=style.INK, linewidth=0.5, linestyle=(0, (1, 3)))
+    longest = max([period, *(event.end * 1000 for event in verdict.events)])
+    path = [event for event in verdict.events if not event.beside]
+    beside = [event for event in verdict.events if event.beside]
+    for lane, event in [*enumerate(path), *enumerate(beside, len(path) + 1)]:
+        _event(axes, lane, event, longest)
+    if verdict.is_realisable:
+        _span(axes, verdict.seconds * 1000, period, len(path), ms(verdict.period_s - verdict.seconds))
+    axes.axvline(period, color=style.INK, linewidth=1.2)
+    _span(axes, 0, period, -1, f"Δt = {period:g} ms")
+    names = [*(event.name for event in path), "what is left", *(event.name for event in beside)]
+    axes.set_yticks(range(len(names)), names, fontsize=8.5)
+    axes.set_ylim(len(names) - 0.5, -1.7)
     axes.set_xlim(0, longest * 1.02)
-    axes.set_xlabel("time since the tick began (ms)")
-    axes.grid(axis="y", visible=False)
+    axes.set_xlabel("time since the step of the brain began (ms); dotted: control ticks of 10 ms", fontsize=9)
+    axes.set_title(f"Step of the brain, robot {verdict.robot}", loc="left", fontsize=10)
+    axes.grid(visible=False)
 
 
-def _label(axes: Axes, text: str, begin: float, end: float, place: float, width: float) -> None:
-    """In the box where it fits, else beside it."""
-    if (end - begin) / width > _LETTER * len(text):
-        axes.text((begin + end) / 2, place, text, ha="center", va="center", color="white", fontsize=8.5)
-    elif end / width < 0.7:
-        axes.text(end + 0.006 * width, place, text, ha="left", va="center", color=style.INK, fontsize=8.5)
+def _event(axes: Axes, lane: int, event: Event, longest: float) -> None:
+    """Its box; how long it takes stands beside it, or in it where it is long."""
+    begin, length = event.begin * 1000, event.seconds * 1000
+    kind = event.kind if event.beside or event.kind != "sense" else "task"
+    axes.barh(lane, length, _HEIGHT, left=begin, color=_COLOURS[kind], linewidth=0)
+    text = ms(event.seconds) + (f", every {ms(event.every)}" if event.beside else "")
+    if length > 0.3 * longest:
+        axes.text(begin + length / 2, lane, text, ha="center", va="center", color="white", fontsize=8)
     else:
-        axes.text(begin - 0.006 * width, place, text, ha="right", va="center", color=style.INK, fontsize=8.5)
+        axes.text(begin + length + 0.007 * longest, lane, text, ha="left", va="center", color=style.INK, fontsize=8)
+
+
+def _span(axes: Axes, begin: float, end: float, lane: float, text: str) -> None:
+    """A length with arrows at both ends, and what it is in its middle."""
+    arrow = {"arrowstyle": "<->", "color": style.INK, "shrinkA": 0, "shrinkB": 0, "linewidth": 0.8}
+    axes.annotate("", (end, lane), (begin, lane), arrowprops=arrow)
+    paper = {"facecolor": axes.get_facecolor(), "edgecolor": "none", "pad": 1.5}
+    axes.text((begin + end) / 2, lane, text, ha="center", va="center", color=style.INK, fontsize=8.5, bbox=paper)
+
+
+# ---- the tick and its slots -----------------------------------------------------------------------------------------
+
+
+def _tick(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
+    """The whole tick with its slots: tasks, and interrupts below them."""
+    slot_ms = report.schedule.slot_cycles / _CYCLES_PER_MS
+    kinds = [kind for kind in ("task", "interrupt") if any(span.kind == kind for span in spans)]
+    for span in spans:
+        begin, length = span.begin / _CYCLES_PER_MS, (span.end - span.begin) / _CYCLES_PER_MS
+        axes.barh(kinds.index(span.kind), length, _HEIGHT, left=begin, color=_COLOURS[span.kind], linewidth=0)
+    for slot in range(report.schedule.slots_per_tick):
+        axes.axvline(slot * slot_ms, color=style.INK, linewidth=0.5, linestyle=(0, (1, 3)))
+        axes.text((slot + 0.5) * slot_ms, -0.75, f"slot {slot}", ha="center", va="center", fontsize=8, color=style.INK)
+    axes.set_yticks(range(len(kinds)), [f"{kind}s" for kind in kinds], fontsize=8.5)
+    axes.set_ylim(len(kinds) - 0.5, -1.1)
+    axes.set_xlim(0, max([report.tick_cycles, *(span.end for span in spans)]) / _CYCLES_PER_MS)
+    axes.set_xlabel("time since the tick began (ms)", fontsize=9)
+    axes.set_title(f"Control tick, {report.tick_cycles / _CYCLES_PER_MS:g} ms", loc="left", fontsize=10)
+    axes.grid(visible=False)
 
 
 def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
@@ -120,36 +188,55 @@ def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
     rows: list[list[Moment]] = [[] for _ in range(count)]
     for span in spans:
         slot = min(span.begin // slot_cycles, count - 1)
-        rows[slot].append(span)
-    ends = [span.end - slot * slot_cycles for slot, row in enumerate(rows) for span in row if span.kind == "task"]
-    longest = max(ends, default=1)
-    width = max(longest * 1.03, 1)
+        begin, end = span.begin - slot * slot_cycles, span.end - slot * slot_cycles
+        rows[slot].append(Moment(span.name, span.kind, begin, end))
+    longest = max((span.end for row in rows for span in row if span.kind == "task"), default=1)
+    width = max(longest * 1.06, 1)
     for slot, row in enumerate(rows):
-        for number, span in enumerate(one for one in row if one.kind == "task"):
-            begin, end = span.begin - slot * slot_cycles, span.end - slot * slot_cycles
-            shade = 1.0 if number % 2 == 0 else 0.72  # neighbours differ
-            axes.barh(slot, end - begin, 0.34, left=begin, color=_COLOURS["task"], alpha=shade, linewidth=0)
-        _names(axes, [one for one in row if one.kind == "task"], slot, slot_cycles, width)
-        for span in row:
-            if span.kind == "interrupt":
-                begin, length = span.begin - slot * slot_cycles, span.end - span.begin
-                axes.barh(slot + 0.27, length, 0.16, left=begin, color=_COLOURS["interrupt"], linewidth=0)
-    axes.set_yticks(range(count), [f"slot {slot}" for slot in range(count)])
-    axes.set_ylim(count - 0.5, -0.75)
+        _slot(axes, slot, row, width)
+    axes.set_yticks(range(count), [f"slot {slot}" for slot in range(count)], fontsize=8.5)
+    axes.set_ylim(count - 0.55, -0.85)
     axes.set_xlim(0, width)
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.set_xlabel("cycles of 1/16 µs since the slot began", fontsize=9)
     share = 100 * width / slot_cycles
-    axes.set_xlabel(f"cycles since the slot began ({share:.0f} % of a slot's {slot_cycles:,} are shown)")
+    text = f"Slots, enlarged: the first {width / 16:,.0f} µs, {share:.0f} % of each slot's {slot_cycles / 16:,.0f} µs"
+    axes.set_title(text, loc="left", fontsize=10)
     axes.grid(axis="y", visible=False)
 
 
-def _names(axes: Axes, row: Sequence[Moment], slot: int, slot_cycles: int, width: float) -> None:
-    """The names of tasks above their boxes, slanted; those of the shortest are left out where they would collide."""
+def _slot(axes: Axes, slot: int, row: Sequence[Moment], width: float) -> None:
+    tasks = [span for span in row if span.kind == "task"]
+    for before, after in pairwise(tasks):
+        if after.begin > before.end:
+            axes.barh(slot, after.begin - before.end, 0.14, left=before.end, color=_BETWEEN, linewidth=0)
+    for number, span in enumerate(tasks):
+        shade = 1.0 if number % 2 == 0 else 0.72  # neighbours differ
+        axes.barh(slot, span.end - span.begin, 0.26, left=span.begin, color=_COLOURS["task"], alpha=shade, linewidth=0)
+    for span in row:
+        if span.kind == "interrupt" and span.begin < width:
+            length = span.end - span.begin
+            axes.barh(slot + 0.24, length, 0.1, left=span.begin, color=_COLOURS["interrupt"], linewidth=0)
+    _names(axes, tasks, slot, width)
+
+
+def _names(axes: Axes, row: Sequence[Moment], slot: int, width: float) -> None:
+    """The names of tasks above their boxes, slanted; each as near as the one before it lets it."""
     last = -width
-    by_length = sorted(row, key=lambda span: span.begin - span.end)
-    kept: list[float] = []
-    for span in by_length:
-        middle = (span.begin + span.end) / 2 - slot * slot_cycles
-        if all(abs(middle - other) > 0.017 * width for other in kept):
-            kept.append(middle)
-            axes.text(middle, slot - 0.19, span.name, rotation=38, ha="left", va="bottom", fontsize=7, color=style.INK)
-        last = max(last, middle)
+    for span in row:
+        middle = (span.begin + span.end) / 2
+        place = max(middle, last + _APART * width)
+        last = place
+        axes.annotate(
+            span.name,
+            (middle, slot - 0.14),
+            (place, slot - 0.22),
+            rotation=40,
+            rotation_mode="anchor",
+            ha="left",
+            va="bottom",
+            fontsize=7.5,
+            color=style.INK,
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": style.INK, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0},
+        )

@@ -87,9 +87,14 @@ class Losses:
     resets: int
 
     @property
+    def counts(self) -> dict[str, int]:
+        """By their names."""
+        return {name: value for name, value in asdict(self).items() if name != "load"}
+
+    @property
     def anything(self) -> bool:
         """Whether any of it is not 0."""
-        return any(value for name, value in asdict(self).items() if name != "load")
+        return any(self.counts.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +120,8 @@ class JitterReport:
 
 
 def rows(distributions: Sequence[Distribution]) -> list[tuple[str, ...]]:
-    """A table for people, the first row its head; numbers in cycles, above 10,000 in ms."""
-    head = ("quantity", "load", "count", "min", "p50", "p99", "max", "may be", "")
+    """A table for people, the first row its head; numbers in cycles, above 10,000 cycles in ms."""
+    head = ("quantity", "load", "count", "unit", "min", "p50", "p99", "max", "may be", "")
     table: list[tuple[str, ...]] = [head]
     for one in distributions:
         numbers = (one.minimum, one.percentile(50), one.percentile(99), one.maximum)
@@ -125,11 +130,12 @@ def rows(distributions: Sequence[Distribution]) -> list[tuple[str, ...]]:
         may = f"{_said(one.least, large)} .. {_said(one.most, large)}" if limits else ""
         name = one.quantity if one.subject == "boebot" else f"{one.subject}: {one.quantity}"
         said = (_said(number, large) for number in numbers)
-        table.append((name, one.load, str(one.count), *said, may, f"{one.broken} broken" if one.broken else ""))
+        unit, late = "ms" if large else "cycles", f"{one.broken} broken" if one.broken else ""
+        table.append((name, one.load, str(one.count), unit, *said, may, late))
     return table
 
 
 def _said(cycles: float | None, large: bool) -> str:
     if cycles is None or cycles != cycles:
         return "-"
-    return f"{cycles / 16_000.0:.3f} ms" if large else f"{cycles:g}"
+    return f"{cycles / 16_000.0:.2f}" if large else f"{cycles:g}"

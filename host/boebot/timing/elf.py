@@ -16,8 +16,9 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import TimingError
-from boebot.timing.program import InterruptRow, LoopBound, SensorRow, Table, TaskRow
+from boebot.timing.program import LoopBound, Table
 from boebot.timing.source_lines import source_lines
+from boebot.timing.table import SECTION, table_of
 
 FLASH_SIZE = 0x8000  # bytes
 RAM_START = 0x800100  # avr-gcc gives data memory the addresses from 0x800000
@@ -75,17 +76,6 @@ def read_image(path: Path) -> Image:
         raise TimingError(f"{path} is not an ELF file, or is damaged: {reason}") from error
 
 
-def read_table(path: Path) -> Table:
-    """Only the timing table that an image carries; raises TimingError as `read_image`."""
-    try:
-        with path.open("rb") as stream:
-            return _table(path, _section(path, ELFFile(stream), ".boebot.timing"))
-    except OSError as error:
-        raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
-    except DAMAGE as error:
-        raise TimingError(f"{path} is not an ELF file, or is damaged: {error or type(error).__name__}") from error
-
-
 def _image(path: Path, elf: ELFFile) -> Image:
     if elf["e_machine"] != EM_AVR:
         raise TimingError(
@@ -107,7 +97,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
         stack_start=stack_start,
         lines=source_lines(elf, len(code)),
-        table=_table(path, _section(path, elf, ".boebot.timing")),
+        table=table_of(path, _section(path, elf, SECTION)),
         bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
     )
 
@@ -179,36 +169,6 @@ def _section(path: Path, elf: ELFFile, name: str) -> bytes:
     if len(data) < section["sh_size"]:
         raise TimingError(f"{path} is cut off: section {name} is not whole")
     return data
-
-
-ROWS: dict[str, tuple[type[TaskRow] | type[InterruptRow] | type[SensorRow], int]] = {
-    "TASK": (TaskRow, 3),
-    "INTERRUPT": (InterruptRow, 4),
-    "SENSOR": (SensorRow, 3),
-}
-
-
-def _table(path: Path, data: bytes) -> Table:
-    """The rows of `.boebot.timing`: lines as "TASK whisker 1 0 200", each ended by a zero byte."""
-    rows = [_table_row(path, text) for text in data.split(b"\0") if text]
-    return Table(
-        tasks=tuple(row for row in rows if isinstance(row, TaskRow)),
-        interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
-        sensors=tuple(row for row in rows if isinstance(row, SensorRow)),
-    )
-
-
-def _table_row(path: Path, data: bytes) -> TaskRow | InterruptRow | SensorRow:
-    text = data.decode("ascii", "backslashreplace")
-    kind, *words = text.split() or [""]
-    row, numbers = ROWS.get(kind, (None, 0))
-    if row is None:
-        raise TimingError(
-            f"{path}: row {text!r} of its timing table is of no known kind: {', '.join(ROWS)} are expected"
-        )
-    if len(words) != 1 + numbers or not all(word.isascii() and word.isdigit() for word in words[1:]):
-        raise TimingError(f"{path}: row {text!r} of its timing table: a name and {numbers} whole numbers are expected")
-    return row(words[0], *(int(word) for word in words[1:]))
 
 
 def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:

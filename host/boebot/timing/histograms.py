@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from itertools import cycle
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from boebot.timing.distributions import Distribution
 
+NAME = "jitter"
 COLUMNS = 3
 WIDTH_IN, HEIGHT_IN = 3.9, 2.4  # of one histogram
 BINS = 60
@@ -37,6 +39,22 @@ def draw(distributions: Sequence[Distribution], path: Path) -> Path:
     """
     if path.suffix.lower() not in FORMATS:
         raise BoebotError(f"{path}: a picture cannot be written as {path.suffix!r}; expected {', '.join(FORMATS)}")
+    drawn = _drawn(distributions, path.suffix.lower().removeprefix("."))
+    try:
+        path.write_bytes(drawn)
+    except OSError as error:
+        raise BoebotError(f"the picture cannot be written to {path}: {error.strerror or error}") from None
+    return path
+
+
+def files(distributions: Sequence[Distribution]) -> dict[str, bytes]:
+    """The picture as jitter.png and jitter.svg; none where there is nothing to draw."""
+    if not any(one.count for one in distributions):
+        return {}
+    return {f"{NAME}.{kind}": _drawn(distributions, kind) for kind in ("png", "svg")}
+
+
+def _drawn(distributions: Sequence[Distribution], kind: str) -> bytes:
     by_quantity: dict[str, list[Distribution]] = {}
     for one in distributions:
         if one.count:
@@ -44,6 +62,7 @@ def draw(distributions: Sequence[Distribution], path: Path) -> Path:
     if not by_quantity:
         raise BoebotError("there are no distributions to draw; expected one value at least")
     rows = -(-len(by_quantity) // COLUMNS)
+    target = io.BytesIO()
     with rc_context({**style.PLOTS, "svg.hashsalt": "boebot", "text.parse_math": False}):
         figure = Figure(figsize=(COLUMNS * WIDTH_IN, rows * HEIGHT_IN), layout="constrained")
         FigureCanvasAgg(figure)
@@ -52,11 +71,8 @@ def draw(distributions: Sequence[Distribution], path: Path) -> Path:
             _histogram(axes, quantity, found)
         for axes in fields[len(by_quantity) :]:
             axes.set_visible(False)
-        try:
-            figure.savefig(path, dpi=style.DPI, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
-        except OSError as error:
-            raise BoebotError(f"the picture cannot be written to {path}: {error.strerror or error}") from None
-    return path
+        figure.savefig(target, format=kind, dpi=style.DPI, metadata={"Date": None} if kind == "svg" else None)
+    return target.getvalue()
 
 
 def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None:

@@ -21,6 +21,7 @@ from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
 from boebot.robots import RobotDescription, Uart
 from boebot.timing.program import SensorRow, Table
+from boebot.timing.table import read_table
 from boebot.vehicle_devices import Sensor
 
 TICK_S = 0.01
@@ -188,8 +189,6 @@ def telemetry_ticks(baud: int, telemetry_bytes: int = TELEMETRY_BYTES) -> int:
 
 def of_image(robot: RobotDescription) -> BoardTimes | None:
     """What the image of the robot's pin map says of its times; None: there is none that can be read."""
-    from boebot.timing.elf import read_table  # takes a while
-
     image = resources.folder("images") / f"{robot.pin_map}.elf"
     if not robot.has_board or not image.is_file():
         return None

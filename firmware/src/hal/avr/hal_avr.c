@@ -109,19 +109,18 @@ void hal_tone_stop(void) {
 
 /* ---- Ping ---- */
 
+/* The pulse may be longer by the interrupts in it; the sensor answers 750 us after its end. */
 void hal_ping_trigger(void) {
-  HAL_ATOMIC {
-    hal_capture_stop();
-    HAL_PIN_LOW(PING);
-    HAL_PIN_OUTPUT(PING);
-    HAL_PIN_HIGH(PING);
-    __builtin_avr_delay_cycles(PING_TRIGGER_CYCLES - 2u);
-    HAL_PIN_LOW(PING);
-    HAL_PIN_MAKE_INPUT(PING);
-    TCCR1B = _BV(ICES1) | _BV(CS10);
-    TIFR1 = _BV(ICF1);
-    TIMSK1 = (uint8_t)(TIMSK1 | _BV(ICIE1));
-  }
+  HAL_ATOMIC { hal_capture_stop(); }
+  HAL_PIN_LOW(PING);
+  HAL_PIN_OUTPUT(PING);
+  HAL_PIN_HIGH(PING);
+  __builtin_avr_delay_cycles(PING_TRIGGER_CYCLES - 2u);
+  HAL_PIN_LOW(PING);
+  HAL_PIN_MAKE_INPUT(PING);
+  TCCR1B = _BV(ICES1) | _BV(CS10);
+  TIFR1 = _BV(ICF1);
+  HAL_ATOMIC { TIMSK1 = (uint8_t)(TIMSK1 | _BV(ICIE1)); }
 }
 
 /* ---- image ---- */

@@ -1,0 +1,164 @@
+"""What `boebot timing` shows to people: tables that fit 80 columns, and in words what is broken and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from boebot.cli import output
+from boebot.timing.budget import FOR_EVER
+
+if TYPE_CHECKING:
+    from boebot.timing.budget import Report, Row
+    from boebot.timing.distributions import JitterReport
+    from boebot.timing.realisable import Verdict
+
+_UNKNOWN = "–"
+_BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
+
+
+def show_report(report: Report) -> None:
+    """Two tables, the sums, and what is broken."""
+    console = Console(highlight=False)
+    console.print(Text.assemble((Path(report.path).name, "bold"), f"  under the load {report.load.name!r}"))
+    console.print(Text(report.load.says, style=_ASIDE))
+    measured, board = report.measured is not None, any(row.board is not None for row in report.rows)
+    console.print(_rows(report, "task", measured, board))
+    console.print(_rows(report, "interrupt", measured, False))
+    console.print(output.table(_sums(report)))
+    for note in report.notes:
+        console.print(Text(f"note: {note}", style=_ASIDE))
+    for fault in report.faults:
+        console.print(Text(f"broken: {fault}", style=_BROKEN))
+    if not report.faults:
+        console.print(Text("all budgets are met", style=_FINE))
+
+
+def _rows(report: Report, kind: str, measured: bool, board: bool) -> Table:
+    """Tasks or interrupts; columns of which nothing is known are left out."""
+    shown = _table(f"{kind} (cycles)")
+    titles = ["bound", *(["emulator", "ratio"] if measured else []), *(["board"] if board else []), "budget", "slack"]
+    titles += ["response"] if kind == "task" else ["latency", "limit"]
+    for title in titles:
+        shown.add_column(title, justify="right", no_wrap=True)
+    for row in (row for row in report.rows if row.kind == kind):
+        shown.add_row(row.name, *_cells(row, titles), style=_BROKEN if _is_broken(row) else None)
+    return shown
+
+
+def _cells(row: Row, titles: Iterable[str]) -> list[str]:
+    numbers = {
+        "bound": row.bound,
+        "emulator": row.emulator,
+        "board": row.board,
+        "budget": row.budget,
+        "slack": row.slack,
+        "response": row.response,
+        "latency": row.latency,
+        "limit": row.latency_limit,
+    }
+    cells = {title: _cell(number) for title, number in numbers.items()}
+    cells["ratio"] = _UNKNOWN if row.ratio is None else f"{row.ratio:.2f}"
+    return [cells[title] for title in titles]
+
+
+def _is_broken(row: Row) -> bool:
+    late = row.latency is not None and row.latency_limit is not None and row.latency > row.latency_limit
+    slow = row.board is not None and row.response is not None and row.board > row.response
+    return row.slack < 0 or (row.emulator or 0) > row.bound or late or slow
+
+
+def _cell(number: int | None) -> str:
+    if number is None:
+        return _UNKNOWN
+    return "∞" if number >= FOR_EVER else f"{number:,}"
+
+
+def _sums(report: Report) -> dict[str, Any]:
+    """Names with units, values."""
+    found, own, memory, tick = report.responses, report.own, report.memory, report.tick_cycles
+
+    def percent(cycles: int | None) -> float | None:
+        return None if cycles is None else round(100 * cycles / tick, 1)
+
+    return {
+        "work_of_the_fullest_tick_bound_percent": percent(report.tick_work),
+        "response_of_the_tick_bound_percent": percent(None if found is None else found.tick),
+        "tasks_and_interrupts_of_a_tick_bound_percent": percent(report.demand),
+        "tasks_and_interrupts_of_a_tick_in_emulator_percent": percent(own.worst_tick if own else None),
+        "busiest_tick_in_emulator_percent": percent(own.busiest_tick if own else None),
+        "load_bound_percent": round(100 * report.load_bound, 1),
+        "load_in_emulator_percent": None if own is None else round(100 * own.load, 1),
+        "poll_gap_bound_cycles": report.gap,
+        "poll_gap_in_emulator_cycles": own.between_polls if own else None,
+        "receive_ring_needed_bytes": report.ring,
+        "stack_bound_bytes": memory.stack,
+        "stack_in_emulator_bytes": memory.stack_seen,
+        "static_ram_bytes": memory.static,
+        "ram_and_stack_bytes": memory.static + memory.stack,
+        "flash_bytes": memory.flash,
+    }
+
+
+def show_verdict(verdict: Verdict) -> None:
+    """The events of a time step, and the answer."""
+    console = Console(highlight=False)
+    if verdict.events:
+        shown = _table(f"{verdict.robot}, one step")
+        for title in ("takes (ms)", "ends (ms)", "own period (ms)"):
+            shown.add_column(title, justify="right")
+        for event in verdict.events:
+            end, own = (_UNKNOWN, f"{event.every * 1000:g}") if event.beside else (f"{event.end * 1000:.3f}", "")
+            shown.add_row(event.name, f"{event.seconds * 1000:.3f}", end, own)
+        console.print(shown)
+    console.print(Text(verdict.sentence, style=_FINE if verdict.is_realisable else _BROKEN))
+    for note in verdict.notes:
+        console.print(Text(f"note: {note}", style=_ASIDE))
+
+
+def show_jitter(report: JitterReport) -> None:
+    """A table of distributions for each load; what broke its limit, and what was lost."""
+    from boebot.timing.distributions import rows
+
+    console = Console(highlight=False)
+    for load in dict.fromkeys(one.load for one in report.distributions):
+        found = [one for one in report.distributions if one.load == load]
+        head, *cells = ((row[0], *row[2:-1]) for row in rows(found))
+        shown = _table(f"jitter and latency, {load}")
+        for title in head[1:]:
+            shown.add_column(title, justify="right", no_wrap=True)
+        for row, one in zip(cells, found, strict=True):
+            shown.add_row(*row, style=_BROKEN if one.broken else None)
+        console.print(shown)
+    _show_broken(console, report)
+
+
+def _show_broken(console: Console, report: JitterReport) -> None:
+    for one in report.broken:
+        says = f"{one.quantity}, {one.load}: {one.broken} of {one.count} values are not {_limits(one.summary())}"
+        console.print(Text(f"broken: {says}", style=_BROKEN))
+    for losses in report.losses:
+        lost = [f"{number} {name.replace('_', ' ')}" for name, number in losses.counts.items() if number]
+        says = f"{losses.load}: {', '.join(lost)}" if lost else f"{losses.load}: nothing was lost"
+        console.print(Text(says, style="" if lost else _FINE))
+    for note in report.notes:
+        console.print(Text(f"note: {note}", style=_ASIDE))
+
+
+def _limits(summary: dict[str, Any]) -> str:
+    least, most = summary["least"], summary["most"]
+    if least is None or most is None:
+        return f"at most {most} cycles" if least is None else f"at least {least} cycles"
+    return f"from {least} to {most} cycles"
+
+
+def _table(title: str) -> Table:
+    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    shown.add_column(title)
+    return shown

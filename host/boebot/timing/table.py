@@ -1,0 +1,83 @@
+"""The timing table that an image carries, from its section `.boebot.timing` alone.
+
+Every run with a board reads it, so the file's section headers are read here and not by a library that knows all of ELF
+and takes longer to load than the table to read. Format: "Tool Interface Standard, Executable and Linking Format",
+version 1.2, book I: the file's header, its section headers, and the table of their names.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from boebot.errors import TimingError
+from boebot.timing.program import InterruptRow, SensorRow, Table, TaskRow
+
+SECTION = ".boebot.timing"
+MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
+_HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
+_SECTION = struct.Struct("<10I")
+
+ROWS: dict[str, tuple[type[TaskRow] | type[InterruptRow] | type[SensorRow], int]] = {
+    "TASK": (TaskRow, 3),
+    "INTERRUPT": (InterruptRow, 4),
+    "SENSOR": (SensorRow, 3),
+}
+
+
+def read_table(path: Path) -> Table:
+    """The timing table of an ELF file; empty where it carries none.
+
+    Raises:
+        TimingError: it cannot be read, is no ELF file of 32 bits, or is damaged.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
+    if not data.startswith(MAGIC):
+        raise TimingError(f"{path} is not an ELF file, or is damaged: expected one of 32 bits, little-endian")
+    return table_of(path, _section(path, data))
+
+
+def table_of(path: Path, data: bytes) -> Table:
+    """The rows of `.boebot.timing`: lines as "TASK whisker 1 0 200", each ended by a zero byte."""
+    rows = [_row(path, text) for text in data.split(b"\0") if text]
+    return Table(
+        tasks=tuple(row for row in rows if isinstance(row, TaskRow)),
+        interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
+        sensors=tuple(row for row in rows if isinstance(row, SensorRow)),
+    )
+
+
+def _section(path: Path, data: bytes) -> bytes:
+    """The contents of the section; empty where there is none."""
+    try:
+        header = _HEADER.unpack_from(data)
+        start, size, count, names = header[6], header[11], header[12], header[13]
+        if not count:
+            return b""
+        headers = [_SECTION.unpack_from(data, start + size * number) for number in range(count)]
+        first = headers[names][4]
+    except (struct.error, IndexError) as error:
+        raise TimingError(f"{path} is not an ELF file, or is damaged: {error}") from error
+    wanted = SECTION.encode() + b"\0"
+    for name, _, _, _, offset, length, *_ in headers:
+        if data[first + name : first + name + len(wanted)] == wanted:
+            if offset + length > len(data):
+                raise TimingError(f"{path} is cut off: section {SECTION} is not whole")
+            return data[offset : offset + length]
+    return b""
+
+
+def _row(path: Path, data: bytes) -> TaskRow | InterruptRow | SensorRow:
+    text = data.decode("ascii", "backslashreplace")
+    kind, *words = text.split() or [""]
+    row, numbers = ROWS.get(kind, (None, 0))
+    if row is None:
+        raise TimingError(
+            f"{path}: row {text!r} of its timing table is of no known kind: {', '.join(ROWS)} are expected"
+        )
+    if len(words) != 1 + numbers or not all(word.isascii() and word.isdigit() for word in words[1:]):
+        raise TimingError(f"{path}: row {text!r} of its timing table: a name and {numbers} whole numbers are expected")
+    return row(words[0], *(int(word) for word in words[1:]))
