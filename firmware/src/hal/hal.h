@@ -36,8 +36,8 @@
  *
  * The interrupt outranks all others, so it must not come back to back for long. When HAL_CHANGES_STORM changes in a row
  * were closer to the one before than HAL_CHANGES_CLOSE cycles, or when the ring is full, it masks all lines, which
- * hal_changes_stopped() tells. Wheels that turn never do that: among four lines of which each changes once in 1664 cycles
- * or slower (96 edges in a tick), four gaps add up to more than four close ones, even if other interrupts took 640 cycles
+ * hal_changes_stopped() tells. Wheels that turn never do that: among four lines of which each changes once in 2300 cycles
+ * or slower (69 edges in a tick), four gaps add up to more than four close ones, even if other interrupts took 1269 cycles
  * of them. */
 #define HAL_CHANGES_CLOSE 256u
 #define HAL_CHANGES_STORM 4u
