@@ -69,9 +69,7 @@ KNOWN = (
     Known("task safety: bound to measured", 3.28, PATH),
     Known("task encoder: bound <= budget", 3_270, PATH),
     Known("task encoder: bound to measured", 4.22, PATH),
-    Known(
-        "task light: bound to measured", 5.46, "without a left light sensor only short paths were driven", PIN_MAPS[2:]
-    ),
+    Known("task light: bound to measured", 5.46, "without a left light sensor few paths are driven", PIN_MAPS[2:]),
     Known("saturated: load bound in percent", 168.9, "a frame of 20 bytes in 6,400 cycles, each at its bound"),
     Known("goal: work of a tick", 42_399, "sum of the bounds above"),
     Known("goal: flash", 17_026, "all devices built in; the image is to lose 400 to 700 bytes yet"),
