@@ -368,6 +368,9 @@ static inline __attribute__((always_inline)) void hal_sleep_until(bool (*due)(vo
   while (!due()) {
     sei(); /* takes effect after the next instruction: no interrupt slips in before the sleep */
     sleep_cpu();
+    /* One instruction runs after each interrupt (data sheet, 7.7): those that wait by now come in turn, before due() is
+     * asked again with interrupts off. */
+    __asm__ volatile("nop\n nop\n nop\n nop\n nop" ::: "memory");
     cli();
   }
   sei();
