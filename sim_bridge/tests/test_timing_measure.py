@@ -16,7 +16,7 @@ from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import TICK_CYCLES
 from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
-from sim_bridge.timing.scenarios import RANGES, STATES, Numbers, numbers_of, seed_of
+from sim_bridge.timing.scenarios import EDGES_PER_S, RANGES, STATES, Numbers, numbers_of, seed_of
 
 IMAGE = avr_image("shieldbot")
 SECONDS = 0.4
@@ -97,7 +97,9 @@ def test_a_noisy_line_is_masked_and_told_without_a_missed_tick() -> None:
     ticks = 50
     noise = run(IMAGE, robot_of(IMAGE), "noise", ticks / 100, 1)
     assert ticks - 3 <= noise.lost["masked"] <= ticks + 4, "told from the tick on in which it began"
-    assert {name for name, count in noise.lost.items() if count} == {"masked"}
+    assert {name for name, count in noise.lost.items() if count} <= {"masked", "edges"}
+    # While noise has stopped the interrupt, edges of the other wheel go unseen: at some phases a few.
+    assert noise.lost["edges"] < 0.01 * EDGES_PER_S["noise"] * ticks / 100
     counted = noise.spans[noise.spans["id"] == 4]  # pin changes of the encoders' port
     assert len(counted) < ticks / 100 * 200_000 / 20, "the line still interrupts"
 
