@@ -80,7 +80,7 @@ ROWS = (
     Row("an event is sent again", "link/events.c", "wait = retry_time();", "wait = UINT16_MAX;", "events"),
     Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
     Row("what finds the queue full is told later", "link/events.c", "counters_count(deferred);", "return;", "events"),
-    Row("touches that were merged", "link/events.c", "kind ==\n                 EVENT_KIND_WHISKERS", "false", "events"),
+    Row("touches that were merged", "link/events.c", "EVENT_KIND_WHISKERS) {", "UINT8_MAX) {", "events"),
     Row("cells of the EEPROM are read back", "storage.c", "!= record.bytes[step_first]", "< 0", "storage"),
     Row("the mark is void during a write", "storage.c", "= MARK_VOID;", "= MARK_VALID;", "storage"),
     Row("a record's checksum", "storage.c", "&& crc == expected", "", "storage"),
