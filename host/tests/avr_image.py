@@ -33,8 +33,8 @@ def build(folder: Path, source: str, *flags: str, assembler: bool = False) -> Pa
 
 
 def disassembly(image: Path, *options: str) -> dict[int, str]:
-    """Instruction text by address, as `avr-objdump` writes it, less its comment."""
-    command = ["avr-objdump", *(options or ("-d",)), str(image)]
+    """Instruction text by address, as `avr-objdump` writes it, zeros too, less its comment."""
+    command = ["avr-objdump", "-z", *(options or ("-d",)), str(image)]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     found = (LINE.match(line) for line in text.replace("; undefined", "").splitlines())
     return {int(match[1], 16): match[2] for match in found if match}
