@@ -39,6 +39,8 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     _drop_others(result, whole, loops)
     for loop, _ in loops:
         shown = counted.passes(loop, known)
+        if shown is None and not any(result.get(node) for node in _own(loop)):
+            shown = counted.worked(loop, known)
         if shown is not None:
             _lesser(result, loop, known.function, shown)
     return result
