@@ -113,25 +113,27 @@ uint8_t safety_arm(uint8_t known_latches) {
 uint8_t safety_latched(void) { return latch; }
 
 void safety_task(void) {
-  if (supply_low()) {
-    safety_latch(LATCH_SUPPLY_LOW);
-  }
   if ((uint16_t)((uint16_t)schedule_tick() - last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
     ticks_are_over = false;
+  }
+  if (supply_low()) { /* ends a set-point too: nothing else is to be done then */
+    safety_latch(LATCH_SUPPLY_LOW);
+    return;
   }
   if ((state & STATUS_MOTORS_ENABLED) == 0) {
     return;
   }
   if (!parameters_device_on(DEVICES_SERVOS)) {
     state = 0;
-    end_ticks(last_tick);
     motion_off();
   } else if ((int32_t)(schedule_time() - deadline) >= 0) {
     state = STATUS_DEAD_MAN;
-    end_ticks(last_tick);
     stop_all();
     events_raise(EVENT_KIND_DEAD_MAN, last_tick);
+  } else {
+    return;
   }
+  end_ticks(last_tick);
 }
 
 uint16_t safety_status(void) { return (uint16_t)(state | (latch != LATCH_NONE ? STATUS_LATCHED : 0u)); }
