@@ -133,7 +133,7 @@ enum {
   HAL_TWO_WIRE_LAST_READ = 0x58,
 };
 
-/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 50 ms. */
+/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 0.1 s. */
 uint32_t hal_image_size(void);
 uint32_t hal_image_hash(void);
 
