@@ -78,8 +78,8 @@ void *hal_noinit(void);
 /* A hash of memory that nobody has written since the start: what RAM held when the power came, if it just came. */
 uint32_t hal_memory_noise(void);
 
-/* Line at that rate (9600 ... 1000000 bit/s, as near as the clock allows), 8N1. Call once, before the timers. */
-void hal_start_serial(uint32_t baud);
+/* Line at that rate (96 ... 10000, in 100 bit/s; as near as the clock allows), 8N1. Call once, before the timers. */
+void hal_start_serial(uint16_t baud);
 
 /* Starts the time and the slots. Interrupts are enabled from here on. */
 void hal_start_timers(void);
