@@ -193,7 +193,7 @@ uint32_t hal_image_hash(void);
  *   void hal_eeprom_write_start(uint16_t address, uint8_t value)   returns at once; not while it is busy
  *   void hal_eeprom_interrupt(bool on)            whether HAL_INTERRUPT_EEPROM runs when it is ready
  *   void hal_eeprom_wait(void)
- *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
+ *   HAL_TABLE, hal_table_byte(p), hal_table_word(p), hal_table_copy   constant tables in flash
  *   HAL_ZERO(variable)                            once, at the start: makes it zero, where the start-up code has not
  *   HAL_NAMED                                     in front of a variable that the board's assembly names
  */

@@ -33,8 +33,8 @@ HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
 #define LIMIT_MIN_i16 INT16_MIN
 #define LIMIT_MIN_MAX_i16 (-1)
 #define LIMIT_MAX_i16 INT16_MAX
-#define WITHIN(name, type, minimum, maximum, initial)                                                                  \
-  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);                               \
+#define WITHIN(name, type, minimum, maximum, initial)                                                                 \
+  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);                              \
   _Static_assert((minimum) >= LIMIT_MIN_##type && (minimum) <= LIMIT_MIN_MAX_##type && (maximum) <= LIMIT_MAX_##type, \
                  "type of " #name);
 PARAMETER_LIST(WITHIN)
@@ -44,9 +44,7 @@ _Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a
 static uint16_t values[PARAMETER_COUNT];
 
 static __attribute__((noinline)) parameter_range range_of(uint8_t parameter) {
-  parameter_range range;
-  hal_table_copy(&range, &ranges[parameter], sizeof range);
-  return range;
+  return (parameter_range){hal_table_word(&ranges[parameter].minimum), hal_table_word(&ranges[parameter].span)};
 }
 
 static int32_t meant(uint16_t kept, parameter_range range) {
@@ -58,9 +56,7 @@ static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUI
 
 static bool is_baud_rate(uint16_t value) {
   BOUNDED(BAUD_RATES, for (uint8_t i = 0; i < BAUD_RATES; i++)) {
-    uint16_t rate = 0;
-    hal_table_copy(&rate, &baud_rates[i], sizeof rate);
-    if (value == rate) {
+    if (value == hal_table_word(&baud_rates[i])) {
       return true;
     }
   }
