@@ -224,11 +224,7 @@ static __attribute__((noinline)) void go_on(uint8_t head) {
   missed->time = (uint16_t)schedule_now();
   missed->bits = PORT_BITS();
   missed->close = 0;
-  head = (uint8_t)(head + HAL_CHANGE_BYTES);
-  if (head == 0) { /* the last place is also the first */
-    hal_changes[0] = hal_changes[HAL_CHANGES];
-  }
-  hal_changes_head = head;
+  hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
   other = NOT_AWAITED;
   hal_changes_resume();
   convict(lines);
@@ -349,6 +345,8 @@ void encoder_start(void) {
     begin_tick(&wheels[side]);
   }
   before = PORT_BITS();
+  hal_change_at(0)->bits = before; /* the change before the first one; the start-up code has not made the ring zero */
+  hal_change_at(0)->close = 0;
   watched = lines_on();
   listen();
 }
