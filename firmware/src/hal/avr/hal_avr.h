@@ -41,6 +41,13 @@
 /* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
 #define HAL_NAMED __attribute__((used, externally_visible))
 
+/* The compiler shall not see that it is a constant. */
+#define HAL_NEAR(pointer)                  \
+  ({                                       \
+    __typeof__(pointer) near_ = (pointer); \
+    __asm__("" : [near_] "+b"(near_));     \
+    near_;                                 \
+  })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
