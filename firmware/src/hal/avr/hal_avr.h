@@ -189,7 +189,7 @@ static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
   }
 }
 
-static inline void hal_eeprom_interrupt(bool on) {
+static inline __attribute__((always_inline)) void hal_eeprom_interrupt(bool on) {
   if (on) {
     EECR |= _BV(EERIE);
   } else {
