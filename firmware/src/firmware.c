@@ -40,7 +40,7 @@ void firmware_start(void) {
   task_times_start();
   safety_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
-  hal_start_serial(100ul * baud);
+  hal_start_serial(baud);
   link_start(baud);
   hal_start_timers();
   buzzer_start_beep();

@@ -145,12 +145,9 @@ uint32_t schedule_tick(void) { return tick; }
 
 uint32_t schedule_tick_time(void) { return tick_us; }
 
-schedule_instant schedule_instant_now(void) {
-  const uint32_t since = schedule_time() - tick_us;
-  if ((int32_t)since < 0) { /* the next tick's tasks are awaited, but it has not begun */
-    return (schedule_instant){tick - 1u, since + SCHEDULE_TICK_US};
-  }
-  return (schedule_instant){tick, since};
+uint16_t schedule_begun_tick(void) {
+  const bool is_awaited = (int32_t)(schedule_time() - tick_us) < 0; /* its tasks are, but it has not begun */
+  return (uint16_t)((uint16_t)tick - is_awaited);
 }
 
 static void next_tick(void) {

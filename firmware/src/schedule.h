@@ -39,11 +39,8 @@ uint32_t schedule_tick(void);
 uint32_t schedule_time(void);
 uint32_t schedule_tick_time(void);
 
-/* The tick that has begun, and how long ago in us. Main loop only. */
-typedef struct {
-  uint32_t tick, since;
-} schedule_instant;
-schedule_instant schedule_instant_now(void);
+/* The low half of the number of the tick that has begun. Main loop only. */
+uint16_t schedule_begun_tick(void);
 
 /* Cycles since the timers started, modulo 2^32 (268 s); the low half is hal_time(). Main loop only. */
 uint32_t schedule_now(void);

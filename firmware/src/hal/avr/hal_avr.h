@@ -77,6 +77,7 @@ _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BU
 
 #define HAL_TABLE static const __attribute__((__progmem__))
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return pgm_read_byte(byte); }
+static inline uint16_t hal_table_word(const uint16_t *word) { return pgm_read_word(word); }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy_P(to, from, size); }
 
 /* Interrupt context or HAL_ATOMIC: the two halves of the count share a latch. */

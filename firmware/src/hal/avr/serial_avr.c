@@ -14,11 +14,11 @@ HAL_NAMED uint8_t hal_receive_ring[256] __attribute__((aligned(256))) SECTION(".
 HAL_NAMED uint8_t hal_send_ring[HAL_SEND_RING] __attribute__((aligned(HAL_SEND_RING))) SECTION(".ring_send");
 HAL_NAMED volatile uint8_t hal_send_head;
 
-void hal_start_serial(uint32_t baud) {
+void hal_start_serial(uint16_t baud) {
   GPIOR0 = 0; /* flags and indices: whoever started us may have used them */
   HAL_RECEIVE_HEAD = HAL_RECEIVE_TAIL = 0;
   HAL_SEND_TAIL = hal_send_head = (uint8_t)(uintptr_t)hal_send_ring;
-  UBRR0 = (uint16_t)((F_CPU / DOUBLE_SPEED + baud / 2u) / baud - 1u);
+  UBRR0 = (uint16_t)((uint16_t)(F_CPU / DOUBLE_SPEED / 100u + baud / 2u) / baud - 1u);
   UCSR0A = _BV(U2X0);
   UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
   UCSR0B = SENDER_IDLE;
