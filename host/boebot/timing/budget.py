@@ -288,8 +288,8 @@ def _of_link(
 ) -> tuple[int | None, int | None]:
     """The longest time between two polls of the link, and the bytes that wait in its ring then; None: overload.
 
-    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or at
-    the encoders may have left some bytes of a frame that had not ended.
+    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or
+    at the encoders may have left some bytes of a frame that had not ended.
     """
     after = found.loop + found.edges + found.loop  # edges that are due go before
     gap = longest_gap(schedule, sources, found.blocking, after)
