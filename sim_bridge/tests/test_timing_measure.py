@@ -16,6 +16,7 @@ from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import TICK_CYCLES, Bench
+from sim_bridge.timing.losses import MASKED
 from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
 from sim_bridge.timing.scenarios import EDGES_PER_S, RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
 
@@ -105,7 +106,7 @@ def test_a_noisy_line_is_masked_and_told_without_a_missed_tick() -> None:
     assert len(counted) < ticks / 100 * 200_000 / 20, "the line still interrupts"
 
 
-def test_faults_overflow_the_queue_of_events_with_every_kind() -> None:
+def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
     """The queue holds 4 (PROTOCOL.md); what comes then waits, one of a kind."""
     robot = robot_of(IMAGE)
     with Bench(IMAGE) as bench:
@@ -116,6 +117,7 @@ def test_faults_overflow_the_queue_of_events_with_every_kind() -> None:
         line.acknowledges = True
         bench.sources.clear()
         bench.run(40 * TICK_CYCLES)
+        seen = {heard.message.status & MASKED for heard in line.telemetry}
         events = {
             heard.message.number: heard.message for heard in line.heard[since:] if isinstance(heard.message, Event)
         }
@@ -124,6 +126,7 @@ def test_faults_overflow_the_queue_of_events_with_every_kind() -> None:
     waited = kinds[4 : 4 + len(EventKind)]
     assert sorted(waited) == sorted(EventKind), kinds
     assert told.deferred > 3 * len(EventKind)
+    assert MASKED in seen, "noise of both wheels in one tick"
 
 
 def test_a_search_finds_no_less_than_its_first_run_and_is_repeatable() -> None:

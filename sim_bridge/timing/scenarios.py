@@ -19,11 +19,12 @@ from boebot import robots
 from boebot.link import frame, messages
 from boebot.robots import RobotDescription
 from sim_bridge.timing.line import BYTE_CYCLES, Line
-from sim_bridge.timing.loads import Bench, Contact, Ping, PulseTrain, wheels
+from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels
 from sim_bridge.timing.traffic import EachTick, FullLine
 
 EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "faults": 1500, "everything": 1500}
 NOISE_PERIOD = 80  # cycles from edge to edge of a 100 kHz square wave
+BURSTS = ((10, 120, 101_009), (110, 300, 397_001))  # edges, cycles apart and to the next burst: too close; too many
 BOUNCE_PERIOD, BOUNCE_CLOSED = 283_007, 90_001  # "faults": two slots are a touch, four without one its end
 CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how long one lasts
 SHORT_LIFE_MS = 18  # of a set-point in "faults": telemetry is a tick old at most when it is answered
@@ -231,6 +232,20 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     return line
 
 
+def turn(bench: Bench, robot: RobotDescription, scenario: str, numbers: Numbers, start: int) -> list[list[PulseTrain]]:
+    """Turns the wheels. Returns the encoder lines of each; a noisy wheel has none."""
+    first = start + numbers.wheels
+    turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], first)
+    noise: list[Source] = []
+    if scenario == "noise":
+        noise = [PulseTrain(wheel[0].pin, NOISE_PERIOD, first) for wheel in turning[:1]]
+    elif scenario == "faults":
+        noise = [Bursts(wheel[0].pin, *burst, first) for wheel, burst in zip(turning, BURSTS, strict=False)]
+    lines = [train for number, wheel in enumerate(turning) for train in wheel[number < len(noise) :]]
+    bench.sources += [*noise, *lines]
+    return [[] if number < len(noise) else wheel for number, wheel in enumerate(turning)]
+
+
 def load(
     bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbers: Numbers, cycles: int
 ) -> list[list[PulseTrain]]:
@@ -239,12 +254,7 @@ def load(
     Returns the encoder lines of each wheel; a noisy wheel has none.
     """
     start = bench.now + 2_000
-    turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], start + numbers.wheels)
-    trains = [train for wheel in turning for train in wheel]
-    if scenario == "noise" and trains:
-        trains[0] = PulseTrain(trains[0].pin, NOISE_PERIOD, start + numbers.wheels)
-        turning[0] = []
-    bench.sources += trains
+    turning = turn(bench, robot, scenario, numbers, start)
     first = start + numbers.line
     whiskers = [d for d in robot.device.values() if isinstance(d, robots.Whisker)]
     if scenario == "everything":
