@@ -70,7 +70,6 @@ KNOWN = (
     Known("task light: bound to measured", 5.46, "without a left light sensor few paths are driven", PIN_MAPS[2:]),
     Known("saturated: load bound in percent", 168.9, "a frame of 20 bytes in 6,400 cycles, each at its bound"),
     Known("goal: work of a tick", 42_419, "the changes of the encoders are looked after twice in each slot"),
-    Known("goal: flash", 17_036, "all devices, task times and the bounds' few instructions are built in"),
 )
 
 
