@@ -222,20 +222,24 @@ static uint8_t noisy_lines(uint8_t head) {
 }
 
 /* After a stop: masks the noise and listens to the rest. What the others did meanwhile is a change like any other, with
- * room in the ring, which is empty. */
+ * room in the ring, which is empty. It is looked at when the interrupt already listens: an edge in between would be seen
+ * by neither, and the next one, back to the level before, would not be one. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
   volatile hal_change *const missed = hal_change_after(head);
   missed->time = (uint16_t)schedule_now();
-  missed->bits = PORT_BITS();
   missed->close = 0;
   head = (uint8_t)(head + HAL_CHANGE_BYTES);
-  if (head == 0) { /* the last place is also the first */
-    hal_changes[0] = hal_changes[HAL_CHANGES];
-  }
-  hal_changes_head = head;
   other = NOT_AWAITED;
   hal_changes_resume();
+  HAL_ATOMIC {
+    hal_pin_change_mask((uint8_t)(watched & (uint8_t)~lines));
+    missed->bits = PORT_BITS();
+    if (head == 0) { /* the last place is also the first */
+      hal_changes[0] = hal_changes[HAL_CHANGES];
+    }
+    hal_changes_head = head;
+  }
   convict(lines);
 }
 

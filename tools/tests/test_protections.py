@@ -49,13 +49,7 @@ ROWS = (
     Row(
         "set-points from before arming", "safety.c", "ticks_are_over && (int16_t)(answers_tick", "false && (0", "safety"
     ),
-    Row(
-        "copies from before a dead-man stop",
-        "safety.c",
-        "STATUS_DEAD_MAN;\n    end_ticks(last_tick);",
-        "STATUS_DEAD_MAN;",
-        "safety",
-    ),
+    Row("copies from before a dead-man stop", "safety.c", "  end_ticks(last_tick);\n", "", "safety"),
     Row("latch", "safety.c", "latch != LATCH_NONE || ", "", "safety"),
     Row("longest time to live", "safety.c", "time_to_live > TIME_TO_LIVE_MAX", "false", "safety"),
     Row("arm names the latch that it ends", "safety.c", "known_latches != latches", "false", "safety"),
