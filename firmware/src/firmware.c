@@ -48,11 +48,13 @@ void firmware_start(void) {
 }
 
 void firmware_poll(void) {
-  if (encoder_due() != 0) {
+  if (schedule_waiting() != 0) {
+    schedule_poll();
+  } else if (encoder_due() != 0) {
     encoder_poll();
+  } else {
+    link_poll();
   }
-  link_poll();
-  schedule_poll();
 }
 
 bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() != 0 || link_due(); }

@@ -28,7 +28,7 @@ static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
   return (uint8_t)(schedule_slot + 1u - schedule_next_slot);
 }
 
-/* Runs the tasks of the next slot that has begun, if any. */
+/* Runs the tasks of the next slot that has begun; one is waiting. */
 void schedule_poll(void) __attribute__((noinline));
 
 /* The control tick whose tasks run now; when they all have run, the next one, which may not have begun yet. */

@@ -8,6 +8,7 @@ instructions say, so nothing depends on the compiler:
 * `rcall .+0` makes room for two bytes on the stack and is no call: an instruction like others, which ends no block.
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
 * Where `ijmp` and `icall` lead is found by `jumps`, or refused.
+* Loops with several entries get one each, by copies of blocks (split.py).
 
 The vectors are functions too: that of interrupt N is at address 4·N, with the jump to `__vector_N` as its tail call, so
 that its time is that of the interrupt from the end of the entry's four cycles.
@@ -25,6 +26,7 @@ from boebot.timing.elf import Image, Symbol, read_image
 from boebot.timing.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
 from boebot.timing.jumps import NotProvenError, Step, targets_of
 from boebot.timing.program import Block, Edge, Function, Instruction, Program
+from boebot.timing.split import reducible
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
@@ -42,7 +44,7 @@ def program_of(image: Image) -> Program:
     explorer = _Explorer(image, names, program)
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
-        program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
+        program.functions[entry] = Function(names.of(entry), entry, reducible(_blocks(draft), entry))
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+COPY = 0x10000  # behind all addresses: what a copy of a block has above its own (split.py)
+
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
@@ -39,7 +41,7 @@ class Block:
 
     A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
     call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
-    instruction takes then.
+    instruction takes then. A copy (split.py) has `start` above its first instruction's address.
     """
 
     start: int
@@ -134,5 +136,6 @@ class Program:
 
     def where(self, address: int) -> str:
         """A place for people: `0x1A2C (safety.c:57)`."""
+        address %= COPY
         line = self.lines.get(address)
         return f"0x{address:04X}" + (f" ({line})" if line else "")

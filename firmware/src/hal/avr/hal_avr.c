@@ -43,7 +43,7 @@ void hal_start_timers(void) {
 enum { CARRIER_LEFT = 0, CARRIER_RIGHT = 1 }; /* bits of GPIOR0 */
 
 /* Toggles the LEDs that GPIOR0 names, 13 cycles with entry and return; neither flags nor registers change. */
-ISR(TIMER2_COMPA_vect, ISR_NAKED) {
+HAL_ISR(TIMER2_COMPA_vect) {
   __asm__ volatile(
       "sbic %[which], %[left]            \n"
       "sbi %[left_pin], %[left_bit]      \n"
@@ -82,7 +82,7 @@ void hal_carrier_stop(void) {
 
 /* 13 cycles with entry, vector and return; neither flags nor registers change. Compare B is somebody else's (hal_avr.h), and in this
  * mode it may be anything. */
-ISR(TIMER0_COMPA_vect, ISR_NAKED) {
+HAL_ISR(TIMER0_COMPA_vect) {
   __asm__ volatile(
       "sbi %[pin], %[bit] \n"
       "reti               \n"

@@ -70,6 +70,7 @@ static inline uint16_t hal_edge_delay(uint16_t time) {
 uint16_t hal_capture_time(void);
 void hal_capture_falling(void);
 void hal_capture_stop(void);
+static inline volatile hal_change *hal_change_at(uint8_t index) { return &hal_changes[index / sizeof(hal_change)]; }
 uint8_t hal_changes_stopped(void);
 void hal_changes_resume(void);
 void hal_pin_change_mask(uint8_t bits);
