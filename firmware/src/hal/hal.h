@@ -201,6 +201,8 @@ uint32_t hal_image_hash(void);
  *   void hal_eeprom_wait(void)
  *   HAL_TABLE, hal_table_byte(p), hal_table_word(p), hal_table_copy   constant tables in flash
  *   HAL_ZERO(variable)                            once, at the start: makes it zero, where the start-up code has not
+ *   HAL_NEAR(pointer)                             the same pointer; what a function reads and writes by it is then reached
+ *                                                 from there, half of the flash of an address for each
  *   HAL_NAMED                                     in front of a variable that the board's assembly names
  */
 

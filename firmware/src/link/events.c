@@ -45,12 +45,12 @@ void events_start(void) {
 }
 
 /* Frees the place of the event that is there in the order. */
-static void forget(uint8_t at) {
-  const uint8_t place = order[at];
-  BOUNDED(PLACES - 1u, for (; at < PLACES - 1u; at++)) {
-    order[at] = order[at + 1u];
+static void forget(uint8_t *at) {
+  const uint8_t place = *at;
+  BOUNDED(PLACES - 1u, for (; at != &order[PLACES - 1u]; at++)) {
+    at[0] = at[1];
   }
-  order[PLACES - 1u] = place;
+  *at = place;
   count--;
 }
 
@@ -61,13 +61,13 @@ void events_raise(uint8_t kind, uint16_t value) {
   if (count >= QUEUE) {
     counters_count(deferred);
   }
-  BOUNDED(KINDS, for (uint8_t i = QUEUE; i < count; i++)) {
-    const msg_event *const before = &events[order[i]];
+  BOUNDED(KINDS, for (uint8_t *at = &order[QUEUE]; at < &order[count]; at++)) {
+    const msg_event *const before = &events[*at];
     if (before->kind == kind) {
       if (kind == EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
         value = (uint16_t)(value | (before->value & 0xFF00u));
       }
-      forget(i);
+      forget(at);
       break;
     }
   }
@@ -84,7 +84,7 @@ void events_acknowledge(uint16_t arrived) {
   }
   number++;
   none_under_way();
-  forget(0);
+  forget(order);
 }
 
 /* From one sending to the next, in half milliseconds. */

@@ -46,6 +46,13 @@
 /* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
 #define HAL_NAMED __attribute__((used, externally_visible))
 
+/* The compiler shall not see that it is a constant. */
+#define HAL_NEAR(pointer)                  \
+  ({                                       \
+    __typeof__(pointer) near_ = (pointer); \
+    __asm__("" : [near_] "+b"(near_));     \
+    near_;                                 \
+  })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
@@ -196,7 +203,7 @@ static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
   }
 }
 
-static inline void hal_eeprom_interrupt(bool on) {
+static inline __attribute__((always_inline)) void hal_eeprom_interrupt(bool on) {
   if (on) {
     EECR |= _BV(EERIE);
   } else {
