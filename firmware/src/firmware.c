@@ -18,7 +18,6 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
-#include "task_times.h"
 #include "whisker.h"
 
 void firmware_start(void) {
@@ -37,7 +36,6 @@ void firmware_start(void) {
   compass_start();
   buzzer_start();
   schedule_start(0);
-  task_times_start();
   safety_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
   hal_start_serial(baud);

@@ -51,7 +51,7 @@ static uint16_t status_bits(const encoder_reading *left, const encoder_reading *
   if (counters_bytes_lost()) {
     status |= STATUS_RECEIVE_OVERRUN;
   }
-  if (reset_cause() == RESET_CAUSE_WATCHDOG) {
+  if (reset_cause() >= RESET_CAUSE_WATCHDOG) {
     status |= STATUS_WATCHDOG_RESET;
   }
   if (supply_low()) {

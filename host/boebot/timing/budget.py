@@ -25,7 +25,7 @@ from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
 from boebot.timing.program import Program, Table
 from boebot.timing.response import Responses, Schedule, Source, background, load, longest_gap, misses, responses
-from boebot.timing.stack import Stack
+from boebot.timing.stack import VECTORS, Stack
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
@@ -221,8 +221,7 @@ def prove(
     """
     image = read_image(path)
     program = program or program_of(image)
-    if not program.table.tasks:
-        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    _check(path, program)
     found = costs(program, asked)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
@@ -247,6 +246,26 @@ def prove(
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
+
+
+def _check(path: Path, program: Program) -> None:
+    """Raises TimingError: it is not a program with a schedule, or its table not that of this program."""
+    if not program.table.tasks:
+        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    if "main" not in program.by_name:
+        raise TimingError(f"{path} has no function main; expected an image with its symbols (not stripped)")
+    for row in program.table.interrupts:
+        if 4 * row.vector not in program.functions:
+            raise TimingError(
+                f"{path}: row {row.name!r} of its timing table is of interrupt {row.vector}; expected one that is used"
+            )
+    said = {row.vector for row in program.table.interrupts}
+    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in said]
+    if unsaid:
+        raise TimingError(
+            f"{path} uses interrupt {unsaid[0]} at {program.where(4 * unsaid[0])}, of which its timing table does not "
+            "say how often it comes; expected an INTERRUPT row of it"
+        )
 
 
 def _rows(
@@ -288,8 +307,8 @@ def _of_link(
 ) -> tuple[int | None, int | None]:
     """The longest time between two polls of the link, and the bytes that wait in its ring then; None: overload.
 
-    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or at
-    the encoders may have left some bytes of a frame that had not ended.
+    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or
+    at the encoders may have left some bytes of a frame that had not ended.
     """
     after = found.loop + found.edges + found.loop  # edges that are due go before
     gap = longest_gap(schedule, sources, found.blocking, after)

@@ -14,6 +14,7 @@ appends to a name (`.lto_priv.3`) does not matter.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
@@ -280,8 +281,7 @@ def _passed(program: Program, entry: int, passes: int, above: int = 0) -> Progra
 
 def _slots(program: Program) -> int:
     """Slots of a whole cycle of the schedule."""
-    count = max((row.period for row in program.table.tasks), default=SLOTS_PER_TICK)
-    return count + -count % SLOTS_PER_TICK
+    return math.lcm(SLOTS_PER_TICK, *(row.period for row in program.table.tasks))
 
 
 def _entry(program: Program, name: str) -> int | None:

@@ -76,8 +76,8 @@ class Load:
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
-# Cycles in which three of them can be: the left wheel's longest pulse ends 35,200 into slot 0, the right wheel's shortest
-# begins 8,000 into slot 1 and ends 28,800 into it; four: and the burst ends 16,000 into slot 2.
+# Cycles in which three of them can be: the left wheel's longest pulse ends 35,200 into slot 0, the right wheel's
+# shortest begins 8,000 into slot 1 and ends 28,800 into it; four: and the burst ends 16,000 into slot 2.
 _THREE_EDGES, _FOUR_EDGES = 33_600, 60_800
 _ECHO = 115 * 16  # the shortest, from rise to fall
 _HALF_PERIOD = 190  # of the carrier's highest frequency

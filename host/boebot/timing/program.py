@@ -135,7 +135,10 @@ class Program:
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
 
     def where(self, address: int) -> str:
-        """A place for people: `0x1A2C (safety.c:57)`."""
+        """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""
         address %= COPY
-        line = self.lines.get(address)
-        return f"0x{address:04X}" + (f" ({line})" if line else "")
+        text = f"0x{address:04X}"
+        if line := self.lines.get(address):
+            return f"{text} ({line})"
+        entry = max((entry for entry in self.functions if entry <= address), default=None)
+        return text if entry is None else f"{text} (in {self.functions[entry].name})"
