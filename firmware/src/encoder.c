@@ -365,7 +365,7 @@ static uint16_t period_of(uint32_t gap) {
 static void close_wheel(uint8_t side) {
   wheel *w = &wheels[side];
   w->reading.count = w->count;
-  if (w->edges != 0) {
+  if (ENCODER_LINES != 0 && w->edges != 0) {
     /* After a long silence the edge before the first is too old for its stamp to tell. */
     w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->gap) : 0u;
     w->silence = 0;
@@ -377,7 +377,7 @@ static void close_wheel(uint8_t side) {
   w->edges = 0;
   w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    if (w->left[i] == 0) {
+    if (ENCODER_LINES != 0 && w->left[i] == 0) {
       w->reading.masked = true;
       w->reading.period = 0;
     }
