@@ -30,7 +30,7 @@ static uint8_t ages[ANALOG_INPUTS]; /* ticks */
 static uint8_t input;               /* to which the converter is joined */
 static uint8_t last_device;         /* the input before the bandgap */
 static bool converting;
-static bool tick_begins; /* and the ages are still to grow by it */
+static bool tick_begins;   /* and the ages are still to grow by it */
 static uint16_t joined_at; /* hal_time() */
 
 static uint16_t now(void) {

@@ -62,15 +62,15 @@ static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint
 
 /* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
-  uint16_t stamp, stamp_before;  /* of the last two edges */
-  uint8_t stamped;               /* edges since encoder_update() */
+  uint16_t stamp, stamp_before; /* of the last two edges */
+  uint8_t stamped;              /* edges since encoder_update() */
 #if ENCODER_LINES == 2
   int8_t steps; /* and by how much they change the count */
 #endif
-  uint8_t edges;                 /* in this tick, at most 2 */
-  uint8_t silence;               /* ticks since the last edge, at most SILENT_TICKS */
-  uint8_t left[LINES_PER_SIDE];  /* edges of the line in this tick after which it is masked; 0: it is */
-  uint32_t last, gap;            /* time of the last edge, and since the edge before */
+  uint8_t edges;                /* in this tick, at most 2 */
+  uint8_t silence;              /* ticks since the last edge, at most SILENT_TICKS */
+  uint8_t left[LINES_PER_SIDE]; /* edges of the line in this tick after which it is masked; 0: it is */
+  uint32_t last, gap;           /* time of the last edge, and since the edge before */
   int32_t count;
   encoder_reading reading;
 } wheel;
@@ -326,7 +326,9 @@ static uint8_t lines_on(void) {
 /* A wheel's lines may make as many edges again as the parameter allows; one more masks them. */
 static void begin_tick(wheel *w) {
   phantoms = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
-  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) { w->left[i] = phantoms; }
+  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+    w->left[i] = phantoms;
+  }
 }
 
 void encoder_start(void) {
