@@ -30,6 +30,7 @@ static uint8_t ages[ANALOG_INPUTS]; /* ticks */
 static uint8_t input;               /* to which the converter is joined */
 static uint8_t last_device;         /* the input before the bandgap */
 static bool converting;
+static bool tick_begins;   /* and the ages are still to grow by it */
 static uint16_t joined_at; /* hal_time() */
 
 static uint16_t now(void) {
@@ -68,6 +69,7 @@ void analog_start(void) {
     ages[i] = AGE_NEVER;
   }
   last_device = ANALOG_INFRARED;
+  HAL_ZERO(tick_begins);
   join(ANALOG_BANDGAP);
 }
 
@@ -80,20 +82,25 @@ static inline __attribute__((always_inline)) void grow_older(uint8_t device) {
   }
 }
 
+/* Takes what the converter has, or does all else: so no slot has both, however long the converter has been kept waiting. */
 void analog_task(void) {
   if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
-    grow_older(ANALOG_BATTERY);
-    grow_older(ANALOG_INFRARED);
+    tick_begins = true;
   }
-  if (!converting) {
-    if ((uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
-      converting = true;
-      hal_analog_convert();
-    }
-  } else if (!hal_analog_busy()) {
+  if (converting && !hal_analog_busy()) {
     results[input] = hal_analog_result();
     ages[input] = 0;
     join(next_input());
+    return;
+  }
+  if (tick_begins) {
+    tick_begins = false;
+    grow_older(ANALOG_BATTERY);
+    grow_older(ANALOG_INFRARED);
+  }
+  if (!converting && (uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
+    converting = true;
+    hal_analog_convert();
   }
 }
 
