@@ -18,17 +18,14 @@ _Static_assert(PIN_PING == 8, "the timer captures on pin 8");
 enum { IDLE, RISING, FALLING, ENDED }; /* what is awaited */
 
 typedef struct {
-  /* Shared with the capture interrupt. `rise` and `fall` are settled when `state` is ENDED. */
-  volatile uint8_t state;
-  schedule_moment rise, fall;
-
-  /* Main loop only. */
+  volatile uint8_t state; /* shared with the capture interrupt; the others are the main loop's only */
   uint16_t echo;
   uint8_t age;
   uint8_t since_trigger; /* ticks, saturating */
 } ping_state;
 
 static ping_state own;
+static schedule_moment rise, fall; /* the interrupt's stamps, settled when the state is ENDED */
 
 void ping_start(void) {
   ping_state *const self = HAL_NEAR(&own);
@@ -44,11 +41,11 @@ HAL_INTERRUPT_CAPTURE {
   ping_state *const self = HAL_NEAR(&own);
   const schedule_moment now = schedule_moment_at(hal_capture_time());
   if (self->state == RISING) {
-    self->rise = now;
+    rise = now;
     self->state = FALLING;
     hal_capture_falling();
   } else {
-    self->fall = now;
+    fall = now;
     self->state = ENDED;
     hal_capture_stop();
   }
@@ -61,13 +58,13 @@ void ping_collect(void) {
   }
   if (self->state == ENDED) {
     self->state = IDLE;
-    self->echo = (uint16_t)((uint32_t)(schedule_between(self->rise, self->fall) + (int32_t)HAL_CYCLES_PER_US / 2) /
-                            HAL_CYCLES_PER_US);
+    self->echo =
+        (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
     if (self->echo < ECHO_MIN) {
       self->echo = 0;
     }
     /* Whole ticks between the tick in which it ended and this one. */
-    self->age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - self->fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
+    self->age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
   }
   if (!parameters_device_on(DEVICES_PING)) {
     self->echo = 0;

@@ -26,11 +26,11 @@
 /* Interrupts stand near the vectors, whose jumps then take a cycle less. Those that come most are written out, and need not
  * save what they use: the registers r2 to r7 are theirs alone, for the compiler is told to leave them (platformio.ini).
  *   r2  0      r3  scratch, and UCSR0A for who jumps to hal_receive_rest      r4, r5  Z      r6  SREG      r7  scratch */
-#define HAL_NEAR __attribute__((section(".lowtext")))
-#define HAL_ISR(vector) ISR(vector, ISR_NAKED HAL_NEAR)
-#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect, HAL_NEAR)
-#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect, HAL_NEAR)
-#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect, HAL_NEAR)
+#define HAL_BY_VECTORS __attribute__((section(".lowtext")))
+#define HAL_ISR(vector) ISR(vector, ISR_NAKED HAL_BY_VECTORS)
+#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect, HAL_BY_VECTORS)
 #define HAL_INTERRUPT_WATCHDOG ISR(WDT_vect)
 
 /* Runs with interrupts on; that of the EEPROM itself is off until asked for again (eeprom_avr.c). */

@@ -60,7 +60,7 @@ HAL_ISR(USART_RX_vect) {
       : HAL_TAKE_OPERANDS);
 }
 
-HAL_NAMED HAL_NEAR __attribute__((naked)) void hal_serial_take(void) {
+HAL_NAMED HAL_BY_VECTORS __attribute__((naked)) void hal_serial_take(void) {
   __asm__ volatile("movw r4, r30                      \n" HAL_TAKE_BYTE
                    "ret                               \n"
                    "sbi %[flags], %[zero]             \n"
