@@ -3,7 +3,7 @@ whether a robot, a brain and a line are realisable in time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output, timing_tables
+from boebot.cli import options, output, timing_board, timing_tables
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -150,12 +150,13 @@ def _answer(
     image = _image(elf, description)
     found = None
     if image is not None:
+        board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
         measured = _measured("emulated", image, seconds, seed) if measure else None
-        found = budget.prove(image, asked, measured, _board_maxima(port, description, seconds))
+        found = budget.prove(image, asked, measured, board)
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
-    board = None if found is None else _board_times(found)
-    verdict = realisable.judge(description, period_s, board=board, brain_s=brain_s, baud=baud)
+    times = None if found is None else _board_times(found)
+    verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
     distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
     answer = Answer(found, verdict, distributions, ())
     if out is not None:
@@ -189,31 +190,6 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
         raise TimingError(f"the image cannot be measured here: {error}") from None
     with output.share_bars([f"measuring {image.name}"]) as watch:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
-
-
-def _board_maxima(port: str | None, robot: RobotDescription, seconds: float) -> Mapping[str, int]:
-    """What a board measures of its own tasks in a session of so long, in cycles by their names. Nothing moves."""
-    if port is None:
-        return {}
-    from boebot.boards import BoardRequest, open_board
-    from boebot.link.session import Link
-
-    session = open_board(port, BoardRequest(robot=robot, record=False, realtime=True))
-    try:
-        link = Link(session.transport, record=False)
-        link.open()
-        for notice in link.notices:
-            output.say(notice)
-        label = f"listening to {port}"
-        with output.share_bars([label]) as watch:
-            found = link.measure_task_times(seconds, lambda share: watch({label: share}))
-        link.close()
-    finally:
-        session.close()
-    measured = {name: cycles for name, cycles in found.items() if cycles}
-    if not measured:
-        output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
-    return measured
 
 
 def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
