@@ -38,7 +38,7 @@ void firmware_start(void) {
   schedule_start(0);
   safety_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
-  hal_start_serial(100ul * baud);
+  hal_start_serial(baud);
   link_start(baud);
   hal_start_timers();
   buzzer_start_beep();
@@ -46,11 +46,13 @@ void firmware_start(void) {
 }
 
 void firmware_poll(void) {
-  if (encoder_due() != 0) {
+  if (schedule_waiting() != 0) {
+    schedule_poll();
+  } else if (encoder_due() != 0) {
     encoder_poll();
+  } else {
+    link_poll();
   }
-  link_poll();
-  schedule_poll();
 }
 
 bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() != 0 || link_due(); }

@@ -1,4 +1,4 @@
-"""The notes' timing rule: sums by hand, the specification's worked Boe-Bot, and runs that are refused or forced."""
+"""The notes' timing rule: sums by hand, a worked Boe-Bot, and runs that are refused or forced."""
 
 from __future__ import annotations
 
@@ -111,9 +111,9 @@ def test_faster_line_is_named_where_it_would_do() -> None:
     ).is_realisable
 
 
-def test_worked_example_of_the_specification() -> None:
-    """THEORY section 3.2: with a sonar of 19.5 ms in the step the sum is 24 ms: 50 ms do, 20 ms not; without it they
-    do. Its readings in turn, as by one processor; the line as time of the first and last event."""
+def test_worked_example_of_a_boe_bot() -> None:
+    """The rule of Fig. 3.2 by hand: with a sonar of 19.5 ms in the step the sum is 24 ms: 50 ms do, 20 ms not;
+    without it they do. Its readings in turn, as by one processor; the line as time of the first and last event."""
     times = {"whiskers": 0.1, "infrared": 0.4, "sonar": 19.5, "telemetry": 2.1, "command": 0.9}
     template = load_robot("arsim").device["infrared_left"]
 

@@ -232,11 +232,17 @@ TEST_CASE("telemetry fills half of the line at most, at every rate") {
 TEST_CASE("the time of bytes on the line follows from its rate") {
   native_bench bench;
   line_of(96);
-  CHECK(send_time(96) == 100000);
+  CHECK(send_ticks(96) == 10); /* 100 ms */
+  CHECK(send_ticks(97) == 11);
+  CHECK(send_half_ms(96) == 200);
   line_of(5000);
-  CHECK(send_time(200) == 4000);
+  CHECK(send_ticks(500) == 1); /* 10 ms */
+  CHECK(send_ticks(501) == 2);
+  CHECK(send_half_ms(200) == 8);
   line_of(10000);
-  CHECK(send_time(1) == 10);
+  CHECK(send_ticks(1) == 1);
+  CHECK(send_half_ms(49) == 0); /* 0.49 ms */
+  CHECK(send_half_ms(50) == 1);
 }
 
 TEST_CASE("the parameter makes telemetry rarer, never more frequent than the line allows") {

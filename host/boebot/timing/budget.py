@@ -4,6 +4,9 @@ Bounds come from the machine code alone; they are compared with what the image's
 measured in the emulator or on the board, wherever somebody has. A measured figure above its bound means that the bound
 is wrong, and counts like any broken budget. What a task or an interrupt takes by itself, and the stack, hold for every
 scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
+
+What must end in time is the tick: tasks, interrupts, edges. Frames are worked off in what they leave, and never keep a
+slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
 from boebot.timing.program import Program, Table
-from boebot.timing.response import Responses, Schedule, Source, load, misses, poll_gap, receive_backlog, responses
+from boebot.timing.response import Responses, Schedule, Source, background, load, longest_gap, misses, responses
 from boebot.timing.stack import VECTORS, Stack
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
@@ -85,8 +88,10 @@ class Report:
     schedule: Schedule
     sources: tuple[Source, ...]
     responses: Responses | None
-    gap: int | None  # cycles between two polls of the link
-    ring: int | None  # bytes that wait in the receive ring
+    gap: int | None  # cycles between two polls of the link, while slots wait
+    ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
+    frames: Source  # that the host sends
+    frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
     memory: Memory
     measured: Measurement | None = None
 
@@ -102,16 +107,23 @@ class Report:
 
     @property
     def demand(self) -> int:
-        """Cycles of all tasks and interrupts that can come in one tick, whether they fit into it or not."""
+        """Cycles of all slots and interrupts that can come in one tick, whether they fit into it or not."""
         coming = sum(source.cycles * source.requests(self.tick_cycles) for source in self.sources)
         return self.schedule.blocking + self.tick_work + coming
 
     @property
     def executed(self) -> int:
-        """Cycles of a tick in which instructions run at most: each interrupt also wakes the main loop for a round."""
+        """Cycles of a tick in which instructions run at most: with frames, and a pass of the main loop for whatever
+        wakes it."""
         names = {row.name for row in self.rows if row.kind == "interrupt"}
         wakes = sum(source.requests(self.tick_cycles) for source in self.sources if source.name in names)
-        return min(self.tick_cycles, self.demand + wakes * (WAKE + self.costs.round))
+        frames = self.frames.cycles * (self.frames.requests(self.tick_cycles) + 1)  # one may have waited
+        return min(self.tick_cycles, self.demand + frames + wakes * (WAKE + self.costs.loop + self.costs.edges))
+
+    @property
+    def frames_coming(self) -> float:
+        """The host's frames in a tick, in the long run."""
+        return float(self.frames.load / self.frames.cycles * self.tick_cycles) if self.frames.cycles else 0.0
 
     @property
     def own(self) -> Measurement | None:
@@ -123,7 +135,7 @@ class Report:
 
     @property
     def load_bound(self) -> float:
-        """Share of all cycles that tasks and interrupts take at most in the long run, 0..1; above 1: overload."""
+        """Share of all cycles that slots and interrupts take at most in the long run, 0..1; above 1: overload."""
         return float(load(self.sources) + self.schedule.mean_load)
 
     @property
@@ -173,6 +185,10 @@ class Report:
             "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
             "receive_ring_bytes": RECEIVE_RING - 1,
+            "frame_bound_cycles": self.frames.cycles,
+            "frames_coming_per_tick": round(self.frames_coming, 2),
+            "frames_proven_per_tick": round(self.frames_proven, 2),
+            "losses_in_emulator": None if own is None else own.losses,
             "ram_static_bytes": memory.static,
             "stack_bound_bytes": memory.stack,
             "stack_emulator_max_bytes": memory.stack_seen,
@@ -211,6 +227,9 @@ def prove(
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
+    between = (*sources, *found.between(program, asked))
+    frames = found.of_frames(asked)
+    gap, ring = _of_link(program, found, schedule, between, asked)
     return Report(
         path=str(path),
         table=program.table,
@@ -220,8 +239,10 @@ def prove(
         schedule=schedule,
         sources=sources,
         responses=answers,
-        gap=poll_gap(schedule, sources),
-        ring=_ring(program, found, schedule, sources, asked),
+        gap=gap,
+        ring=ring,
+        frames=frames,
+        frames_proven=_proven(schedule, between, frames),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
@@ -281,13 +302,32 @@ def _rows(
     return rows
 
 
-def _ring(program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load) -> int | None:
-    """Bytes that wait in the receive ring at most; 0: the image receives nothing."""
+def _of_link(
+    program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load
+) -> tuple[int | None, int | None]:
+    """The longest time between two polls of the link, and the bytes that wait in its ring then; None: overload.
+
+    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or
+    at the encoders may have left some bytes of a frame that had not ended.
+    """
+    after = found.loop + found.edges + found.loop  # edges that are due go before
+    gap = longest_gap(schedule, sources, found.blocking, after)
+    idle = longest_gap(schedule, sources, found.idle, after)
     row = next((row for row in program.table.interrupts if row.vector == RECEIVE), None)
-    if row is None:
-        return 0
-    (receive,) = asked.sources(row, found.interrupts[row.name])
-    return receive_backlog(schedule, sources, receive, asked.frame_least, IDLE_LEAVES)
+    if gap is None or idle is None or row is None:
+        return gap, None if row is not None else 0
+    bytes_ = asked.sources(row, found.interrupts[row.name])
+
+    def come(window: int) -> int:
+        return sum(source.requests(window + 1) for source in bytes_)
+
+    return gap, max(come(gap), IDLE_LEAVES + come(idle))
+
+
+def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:
+    """Frames that slots and interrupts leave time for in a tick."""
+    left = background(schedule, sources) * schedule.tick_cycles
+    return float(left / frames.cycles) if frames.cycles else 0.0
 
 
 def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
@@ -317,7 +357,7 @@ def _above(says: str, number: int, what: str, limit: int) -> str:
 def _tick_broken(report: Report) -> list[str]:
     if report.responses is None:
         return [
-            f"overload: under the load {report.load.name!r} tasks and interrupts may take "
+            f"overload: under the load {report.load.name!r} the tick and interrupts may take "
             f"{100 * report.load_bound:.1f} % of all cycles"
         ]
     found = []

@@ -174,11 +174,10 @@ def step(instruction: Instruction, state: State) -> State:
     """What is known behind an instruction; behind a call, when its callee has returned."""
     name, operands = instruction.mnemonic, instruction.operands
     if name in ("call", "rcall", "icall") and not pushes_only(instruction):
-        kept = {r: value for r, value in state.registers.items() if r not in written(instruction)}
-        return State(kept | {ZERO: 0})
+        return State(_without(state.registers, written(instruction)) | {ZERO: 0})
     if name == "sts" and operands[0] < REGISTERS:
         return State()
-    registers = {r: value for r, value in state.registers.items() if r not in written(instruction)}
+    registers = _without(state.registers, written(instruction))
     writes_flags = (name == "out" and operands[0] == SREG_IO) or (name == "sts" and operands[0] == SREG_DATA)
     flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
     for register, value in _moved(name, operands, state):
@@ -205,6 +204,13 @@ def _stored(operands: tuple[int, ...], state: State) -> dict[str, bool]:
     kept = {f: value for f, value in state.flags.items() if f != "T"}
     held = state.registers.get(operands[0])
     return kept if held is None else kept | {"T": held >> operands[1] & 1 == 1}
+
+
+def _without(registers: dict[int, int], changed: frozenset[int]) -> dict[int, int]:
+    kept = registers.copy()
+    for register in changed:
+        kept.pop(register, None)
+    return kept
 
 
 def _moved(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple[int, int]]:
