@@ -46,6 +46,7 @@ HAL_INTERRUPT_CAPTURE {
     state = ENDED;
     hal_capture_stop();
   }
+  hal_serial_look();
 }
 
 void ping_collect(void) {
