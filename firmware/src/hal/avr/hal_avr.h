@@ -59,11 +59,11 @@ enum {
 
 /* Covers what can stand before the edge's interrupt, its latency in the table, which the analysis of the image shows for
  * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 81 and 12 to stop it), a stamped
- * change and a capture; and its own prologue, with a received byte. */
+ * change and a capture; and its own prologue up to the reading of the time. */
 #define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 81u + 12u)
 _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BUDGET_capture <= HAL_LATENCY_edge,
                "lead");
-#define HAL_EDGE_PROLOGUE 95u
+#define HAL_EDGE_PROLOGUE 65u
 #define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
 #define HAL_EDGE_CLOSE 70u /* cycles before it from which nothing else is done */
 #define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
@@ -346,7 +346,6 @@ void hal_serial_queue(uint8_t count);
  * are taken meanwhile, for the receiver holds two and no more. Then, within HAL_EDGE_CLOSE cycles of it, the fine loop
  * takes the rest three by three, the branches after it the last 0 to 2. */
 static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
-  hal_serial_look();
   BOUNDED_TIME(HAL_EDGE_LEAD - HAL_EDGE_CLOSE, while ((int16_t)(time - TCNT1) > (int16_t)HAL_EDGE_CLOSE)) {
     hal_serial_look();
   }
