@@ -1,11 +1,10 @@
-"""The longest time that a received byte waits in the UART, where other interrupts than its own take bytes too (taken.py).
+"""The longest time that a received byte waits in the UART, where others than its own interrupt take it too (taken.py).
 
 Bytes queue in the receiver, so they are looked at in their order (after R. Davis, A. Burns, R. Bril, J. Lukkien,
 "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007)).
 Byte 0 comes when none waits; from then until byte q is taken one always does. In that time there run
 
-- the rest of what had begun: an interrupt of lower priority, or one of higher that has just found no byte; or a step of
-  the main program;
+- the rest of what had begun: an interrupt of lower priority, or of higher; or a step of the main program;
 - interrupts of higher priority, each as often as it can have been asked for; they take at most q bytes in all, and
   who takes none, or few, has a shorter run;
 - for each of the q bytes that none of these took, the receive interrupt;
@@ -13,9 +12,10 @@ Byte 0 comes when none waits; from then until byte q is taken one always does. I
 - up to the load that takes byte q: the beginning of the receive interrupt, or of one more of higher priority.
 
 W(q) is the least fixed point of the sum of these, as in latency.py, the bytes shared among them so that it is longest.
-The request of an interrupt that runs in this time came in it, or before it by no more than it waits and runs. The byte waits W(q) less the least time that it comes after byte 0; once byte q is taken before byte q + 1 can have come, the
-queue is empty and all repeats. Told is the wait up to the acceptance of the receive interrupt that would take the byte at
-the same time, so that it can be compared with its latency elsewhere.
+The request of an interrupt that runs in this time came in it; only the first one's may have waited, or run, already.
+The byte waits W(q) less the least time that it comes after byte 0; once byte q is taken before byte q + 1 can come,
+the queue is empty and all repeats. Told is the wait up to the acceptance of the receive interrupt that would take the
+byte at the same time, so that it can be compared with a latency.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ QUEUE_MOST = 16  # bytes without a moment at which none waits: more are overload
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """An interrupt of higher priority: what it takes, what asks for it, how long it waits itself, and its longest run."""
+    """An interrupt of higher priority: what it takes, what asks for it, how long it waits itself, its longest run."""
 
     taken: Taken
     requests: Sequence[Source]

@@ -1,14 +1,14 @@
 """Where an interrupt takes received bytes, and how long it may run until it has taken so many.
 
-A byte that waits is taken by whoever reads the UART's data register: the receive interrupt, or one that keeps it waiting
-and looks after the line meanwhile. Where it does shows in its machine code: a load of UDR0. While a byte waits, a test of
-RXC (a skip on bit 7 of a register just loaded from UCSR0A) goes one way only, so the other one is left out (data sheet,
-20.11: the bit is set when unread data exist in the receive buffer).
+A byte that waits is taken by whoever reads the UART's data register: the receive interrupt, or one that keeps it
+waiting and looks after the line meanwhile. Where it does shows in its machine code: a load of UDR0. While a byte waits,
+a test of RXC (a skip on bit 7 of a register just loaded from UCSR0A) goes one way only, so the other one is left out:
+the bit is set when unread data exist in the receive buffer (data sheet, 20.11).
 
-Of an interrupt's run, from its acceptance (entry: 4 cycles) to the end of its RETI, these times are told, in cycles, for
-bytes that wait all the time: with at most n bytes taken the longest whole run (`run`); from acceptance to the end of the
-load that takes byte n + 1 (`until`); and of a run that has just found none, or taken the last, likewise the longest rest
-(`rest`, `next`). None: there is no such run. `charged` is for sums over many runs.
+Of an interrupt's run, from its acceptance (entry: 4 cycles) to the end of its RETI, these times are told, in cycles,
+for bytes that wait all the time: with at most n bytes taken the longest whole run (`run`); from acceptance to the end
+of the load that takes byte n + 1 (`until`); and of a run that has just found none, or taken the last, likewise the
+longest rest (`rest`, `next`). None: there is no such run. `charged` is for sums over many runs.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from boebot.timing.wcet import WorstCase
 LOAD = 2  # cycles of such a load, within which it sees the byte or not
 STATUS, COMPLETE, DATA = 0xC0, 7, 0xC6  # UCSR0A, RXC0 in it, UDR0: addresses in data space
 
-# Calls that led here (where each goes on: the caller's block, or None behind a tail call), a block, and how many loads of
-# the data register in it have been passed.
+# A function, the calls that led there (each by its caller and the block behind it; None: a tail call), a block, and how
+# many loads of the data register in it have been passed.
 _Calls = tuple[tuple[int, int | None], ...]
 _Place = tuple[int, _Calls, int, int]
 _Node = tuple[int, _Place]  # bytes taken, place
@@ -165,7 +165,7 @@ class Taken:
         last = len(block.instructions) - 1
         takes = part < len(loads)
         if takes and loads[part] < last:
-            to = (function, calls, start, part + 1)
+            to: _Place | None = (function, calls, start, part + 1)
             cycles = sum(each.cycles for each in block.instructions[first : loads[part] + 1])
             self._idle.append((to, LOAD))
             return [_Step(to, cycles, True)]
@@ -185,7 +185,8 @@ class Taken:
         """Behind a block's last instruction: the place, cycles with what is called, and the block of the edge."""
         function, calls, _, _ = place
         found: list[tuple[_Place | None, int, int | None]] = []
-        edges = [(edge.to, edge.cycles) for edge in block.edges] or [(None, block.last_cycles)]
+        edges: list[tuple[int | None, int]] = [(edge.to, edge.cycles) for edge in block.edges]
+        edges = edges or [(None, block.last_cycles)]
         for to, cycles in edges:
             if not block.calls:
                 found.append((self._returned(calls) if to is None else (function, calls, to, 0), cycles, to))
