@@ -35,7 +35,7 @@ help:
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
 	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.html"
-	@echo "make pictures  the pictures of the documentation, and the pages of experiments"
+	@echo "make pictures  the pictures of the documentation, and the pages of the experiments and of the timing"
 	@echo "make format    format all sources"
 	@echo "make setup     only what run, test and check need; do no more"
 	@echo "make clean     remove everything that was built"
@@ -91,6 +91,7 @@ pictures:
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(PYTHON_VENV) -m tools.experiment_pages
+	@$(PYTHON_VENV) -m tools.timing_page --page docs/reference/timing.md
 
 firmware: ready-firmware
 

@@ -24,7 +24,7 @@ PROGRAM = """
 volatile uint8_t rounds[3];
 int main(void) {
   uint8_t bytes[SEND + 1];
-  hal_start_serial(500000);
+  hal_start_serial(5000);
   TCCR1B = _BV(CS10);
   hal_serial_send(bytes, SEND);
   while (TCNT1 < 25000) { /* the count begins at the same time, however much is to be sent */

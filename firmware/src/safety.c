@@ -61,18 +61,18 @@ safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8
   if (latch != LATCH_NONE || time_to_live > TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVOS)) {
     return SAFETY_REFUSED;
   }
-  const schedule_instant now = schedule_instant_now();
-  const uint16_t ticks = (uint16_t)((uint16_t)now.tick - answers_tick);
+  const uint16_t ticks = (uint16_t)((uint16_t)schedule_tick() - answers_tick);
   if (ticks > AGE_MAX) { /* a tick to come is one of long ago */
     return SAFETY_LATE;
   }
-  const uint32_t age = now.since + ticks * (uint32_t)SCHEDULE_TICK_US;
+  const uint32_t start = schedule_tick_time() - ticks * (uint32_t)SCHEDULE_TICK_US;
+  const uint32_t age = schedule_time() - start; /* before a tick that has not begun, although its tasks are awaited: vast */
   const uint32_t life = (time_to_live != 0 ? time_to_live : parameters_u16(PARAMETER_TIME_TO_LIVE)) * 1000ul;
   if (age >= life || has_newer(answers_tick, sequence) ||
       (ticks_are_over && (int16_t)(answers_tick - last_over) <= 0)) {
     return SAFETY_LATE;
   }
-  deadline = now.tick * SCHEDULE_TICK_US + now.since + (life - age);
+  deadline = start + life;
   state = STATUS_MOTORS_ENABLED;
   last_tick = answers_tick;
   last_sequence = sequence;
@@ -104,7 +104,7 @@ uint8_t safety_arm(uint8_t known_latches) {
   }
   if (latch != LATCH_NONE) {
     latch = LATCH_NONE;
-    end_ticks((uint16_t)schedule_instant_now().tick);
+    end_ticks(schedule_begun_tick());
     events_raise(EVENT_KIND_LATCH, LATCH_NONE);
   }
   return ANSWER_STATUS_OK;
@@ -113,25 +113,27 @@ uint8_t safety_arm(uint8_t known_latches) {
 uint8_t safety_latched(void) { return latch; }
 
 void safety_task(void) {
-  if (supply_low()) {
-    safety_latch(LATCH_SUPPLY_LOW);
-  }
   if ((uint16_t)((uint16_t)schedule_tick() - last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
     ticks_are_over = false;
+  }
+  if (supply_low()) { /* ends a set-point too: nothing else is to be done then */
+    safety_latch(LATCH_SUPPLY_LOW);
+    return;
   }
   if ((state & STATUS_MOTORS_ENABLED) == 0) {
     return;
   }
   if (!parameters_device_on(DEVICES_SERVOS)) {
     state = 0;
-    end_ticks(last_tick);
     motion_off();
   } else if ((int32_t)(schedule_time() - deadline) >= 0) {
     state = STATUS_DEAD_MAN;
-    end_ticks(last_tick);
     stop_all();
     events_raise(EVENT_KIND_DEAD_MAN, last_tick);
+  } else {
+    return;
   }
+  end_ticks(last_tick);
 }
 
 uint16_t safety_status(void) { return (uint16_t)(state | (latch != LATCH_NONE ? STATUS_LATCHED : 0u)); }

@@ -81,13 +81,13 @@ ROWS = (
     Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
     Row("what finds the queue full is told later", "link/events.c", "counters_count(deferred);", "return;", "events"),
     Row("touches that were merged", "link/events.c", "EVENT_KIND_WHISKERS) {", "UINT8_MAX) {", "events"),
-    Row("cells of the EEPROM are read back", "storage.c", "!= record.bytes[step_first]", "< 0", "storage"),
+    Row("cells of the EEPROM are read back", "storage.c", "!= self->record.bytes[self->step_first]", "< 0", "storage"),
     Row("the mark is void during a write", "storage.c", "= MARK_VOID;", "= MARK_VALID;", "storage"),
     Row("a record's checksum", "storage.c", "&& crc == expected", "", "storage"),
     Row("range of a loaded parameter", "link/parameters.c", "!is_allowed(parameter, kept[", "0 && (kept[", "storage"),
     Row("no save while the supply is low", "storage.c", "supply_low()) {\n    return", "0) {\n    return", "storage"),
     Row("no cell while the supply is low", "storage.c", "supply_low()) {\n    give", "0) {\n    give", "storage"),
-    Row("a start counts after 10 s", "storage.c", "run_ticks == RUN_TICKS && ", "", "storage"),
+    Row("a start counts after 10 s", "storage.c", "self->run_ticks == RUN_TICKS && ", "", "storage"),
 )
 SUITES = tuple(sorted({row.suite for row in ROWS}))
 

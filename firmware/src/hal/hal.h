@@ -83,8 +83,8 @@ void *hal_noinit(void);
 /* A hash of memory that nobody has written since the start: what RAM held when the power came, if it just came. */
 uint32_t hal_memory_noise(void);
 
-/* Line at that rate (9600 ... 1000000 bit/s, as near as the clock allows), 8N1. Call once, before the timers. */
-void hal_start_serial(uint32_t baud);
+/* Line at that rate (96 ... 10000, in 100 bit/s; as near as the clock allows), 8N1. Call once, before the timers. */
+void hal_start_serial(uint16_t baud);
 
 /* Starts the time and the slots. Interrupts are enabled from here on. */
 void hal_start_timers(void);
@@ -138,7 +138,7 @@ enum {
   HAL_TWO_WIRE_LAST_READ = 0x58,
 };
 
-/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 50 ms. */
+/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 0.1 s. */
 uint32_t hal_image_size(void);
 uint32_t hal_image_hash(void);
 
@@ -199,8 +199,10 @@ uint32_t hal_image_hash(void);
  *   void hal_eeprom_write_start(uint16_t address, uint8_t value)   returns at once; not while it is busy
  *   void hal_eeprom_interrupt(bool on)            whether HAL_INTERRUPT_EEPROM runs when it is ready
  *   void hal_eeprom_wait(void)
- *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
+ *   HAL_TABLE, hal_table_byte(p), hal_table_word(p), hal_table_copy   constant tables in flash
  *   HAL_ZERO(variable)                            once, at the start: makes it zero, where the start-up code has not
+ *   HAL_NEAR(pointer)                             the same pointer; what a function reads and writes by it is then reached
+ *                                                 from there, half of the flash of an address for each
  *   HAL_NAMED                                     in front of a variable that the board's assembly names
  */
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 GROUP = "boebot.timing"
-_LOOK_S = 0.05
 _CYCLES_PER_S = 16_000_000
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
@@ -193,8 +192,7 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
 
 
 def _board_maxima(port: str | None, robot: RobotDescription, seconds: float) -> Mapping[str, int]:
-    """What a board measures of its own tasks, in cycles by their names: since it was last asked, and so long from now
-    on. Nothing moves."""
+    """What a board measures of its own tasks in a session of so long, in cycles by their names. Nothing moves."""
     if port is None:
         return {}
     from boebot.boards import BoardRequest, open_board
@@ -204,16 +202,18 @@ def _board_maxima(port: str | None, robot: RobotDescription, seconds: float) -> 
     try:
         link = Link(session.transport, record=False)
         link.open()
-        end = link.transport.now() + seconds
-        while link.transport.now() < end:
-            link.poll(_LOOK_S)
-        found = {name: cycles for name, cycles in link.take_task_times().items() if cycles}
+        for notice in link.notices:
+            output.say(notice)
+        label = f"listening to {port}"
+        with output.share_bars([label]) as watch:
+            found = link.measure_task_times(seconds, lambda share: watch({label: share}))
         link.close()
     finally:
         session.close()
-    if not found:
+    measured = {name: cycles for name, cycles in found.items() if cycles}
+    if not measured:
         output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
-    return found
+    return measured
 
 
 def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
@@ -238,8 +238,8 @@ def _board_times(report: Report) -> Any:
 
     if report.responses is None:
         return BoardTimes.of(report.table)
-    telemetry, gap = report.responses.pieces.get("telemetry", 0), report.gap or 0
-    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, gap / _CYCLES_PER_S)
+    telemetry, taken = report.responses.pieces.get("telemetry", 0), report.taken or 0
+    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, taken / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:

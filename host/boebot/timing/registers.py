@@ -5,6 +5,8 @@ After the AVR instruction set manual, and the register conventions of avr-gcc: h
 
 from __future__ import annotations
 
+from functools import cache
+
 from boebot.timing.program import Block, Function, Instruction
 
 
@@ -26,9 +28,13 @@ KEEPS_FLAGS = _words("movw mov ldi ld ldd lds lpm st std sts in out push pop nop
 
 def written(instruction: Instruction) -> frozenset[int]:
     """Registers that may be different after it; after a call, those that a callee need not keep."""
-    name, operands = instruction.mnemonic, instruction.operands
-    if name in ("call", "rcall", "icall"):
+    if instruction.mnemonic in ("call", "rcall", "icall"):
         return CALL_CLOBBERED if not pushes_only(instruction) else frozenset()
+    return _results(instruction.mnemonic, instruction.operands)
+
+
+@cache
+def _results(name: str, operands: tuple[int, ...]) -> frozenset[int]:
     if name in PRODUCTS:
         return frozenset((0, 1))
     result: set[int] = set()

@@ -197,7 +197,8 @@ class Stack:
 def _registers(instruction: Instruction, state: _State) -> dict[int, _Byte]:
     """Behind an instruction: constants, and bytes of the stack pointer."""
     name, operands, known = instruction.mnemonic, instruction.operands, state.registers
-    result = {r: byte for r, byte in known.items() if r not in written(instruction)}
+    changed = written(instruction)
+    result = {r: byte for r, byte in known.items() if r not in changed}
     if name == "ldi":
         result[operands[0]] = _Byte(operands[1])
     elif name == "eor" and operands[0] == operands[1]:

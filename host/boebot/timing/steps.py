@@ -15,6 +15,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from boebot.timing.blocked import Begin, Blocked, Call, Flow, Node
 from boebot.timing.flag import Flag
 
@@ -37,6 +40,37 @@ class _Known:
     is_regular: bool = True
 
 
+class _Recurrence:
+    """V(n, x) of all places at once, from their ways: cycles, and where each may lead."""
+
+    def __init__(self, ways: list[list[tuple[int, tuple[int, ...]]]], longest: int) -> None:
+        nowhere, anywhere = len(ways), len(ways) + 1  # two more values: 0, and that of a step to anywhere
+        self._longest = longest
+        self._values = np.zeros(len(ways) + 2, dtype=np.int64)
+        leads: dict[tuple[int, ...], int] = {}  # each set of places once
+        flat = [way for some in ways for way in some or [(0, ())]]
+        self._cycles = np.array([cycles for cycles, _ in flat], dtype=np.int64)
+        self._leads = np.array([leads.setdefault(to or (nowhere,), len(leads)) for _, to in flat], dtype=np.intp)
+        self._begins = _begins(len(some) or 1 for some in ways)
+        self._to = np.array([anywhere if at == ANYWHERE else at for to in leads for at in to], dtype=np.intp)
+        self._to_begins = _begins(map(len, leads))
+
+    def one_more(self) -> int:
+        """The greatest V of the next n."""
+        if not len(self._cycles):
+            return 0
+        self._values[-1] = self._longest + self._values[:-1].max()
+        best = np.maximum.reduceat(self._values[self._to], self._to_begins)
+        self._values[:-2] = np.maximum.reduceat(self._cycles + best[self._leads], self._begins)
+        return int(self._values[:-2].max())
+
+
+def _begins(sizes: Iterable[int]) -> NDArray[np.intp]:
+    """Where each of several stretches begins that lie one behind the other."""
+    ends = np.cumsum([0, *sizes])
+    return ends[:-1]
+
+
 class Steps:
     """Of a program with a function `main` and vectors."""
 
@@ -50,7 +84,7 @@ class Steps:
         self._number()
         steps = [cycles for ways in self._ways for cycles, _ in ways]
         self.longest = max([LONGEST_INSTRUCTION, *self._irregular(), *steps])
-        self._values = [0] * len(self._ways)
+        self._recurrence = _Recurrence(self._ways, self.longest)
 
     def most(self, steps: int, jumps: int = 0) -> int:
         """The longest time of so many steps, cycles; `jumps`: how often the way may break off and begin elsewhere."""
@@ -61,22 +95,8 @@ class Steps:
         if jumps:
             return max(self.most(n) + self.most(steps - n, jumps - 1) for n in range(steps + 1))
         while len(self._most) <= steps:
-            self._one_more()
+            self._most.append(max(LONGEST_INSTRUCTION, self._most[-1], self._recurrence.one_more()))
         return self._most[steps]
-
-    def _one_more(self) -> None:
-        before, anywhere = self._values, max(self._values, default=0)
-        self._values = [
-            max(
-                (
-                    cycles + (self.longest + anywhere if to == (ANYWHERE,) else max((before[i] for i in to), default=0))
-                    for cycles, to in ways
-                ),
-                default=0,
-            )
-            for ways in self._ways
-        ]
-        self._most.append(max([LONGEST_INSTRUCTION, self._most[-1], *self._values]))
 
     # ---- all functions that steps can be in ----
 

@@ -12,12 +12,12 @@
 #include <string.h>
 
 #include "avr_board.h"
+#include "avr_core.h"
 #include "avr_parts.h"
 #include "sim_core.h"
 
 #define OPEN_MAXIMUM 64u
 #define NOT_CODE 0xFFu
-#define FLASH_WORDS (AVR_BOARD_FLASH_SIZE / 2u)
 #define OUT_MASK 0xFE0Fu /* OUT A, Rr: 1011 1AAr rrrr AAAA */
 #define OUT_SPH 0xBE0Eu
 #define HALF_WRITTEN_STEPS 3u /* out SPH; out SREG; out SPL */
@@ -29,14 +29,15 @@ typedef struct {
 } open_span;
 
 typedef struct avr_recorder {
-  uint8_t watched[FLASH_WORDS]; /* by address: 1 + index of the function that begins there, or NOT_CODE */
+  avr_core_stops stops; /* marked: 1 + index of the function that begins there, or NOT_CODE */
   avr_watch watch;
   avr_span *spans;
   size_t count, capacity;
   open_span open[OPEN_MAXIMUM];
   unsigned open_count;
   uint64_t request[VECTOR_TWI + 1], next_request[VECTOR_TWI + 1]; /* since when each interrupt is wanted, or NEVER */
-  uint16_t stack, lowest_stack;
+  uint16_t stack;                                                 /* when the core stopped last */
+  uint16_t lowest_stack;
   uint8_t half_written; /* steps for which the stack pointer may be half of an old and half of a new one */
   uint64_t hangs_at;    /* unless it sleeps before */
   bool was_reset;       /* by the watchdog */
@@ -135,7 +136,16 @@ static void crash_by_jump(avr_board *b, uint32_t address) {
   }
 }
 
-/* ---- steps ---- */
+/* ---- where the core stops ---- */
+
+/* Above the highest value of the stack pointer a span has ended; below the lowest one it is lower than ever, or it must
+ * not be there. Between them its moves need not be seen. */
+static void choose_stops(avr_recorder *r) {
+  uint16_t allowed = (uint16_t)(r->watch.lowest_stack - 1u);
+  uint16_t highest = r->open_count ? r->open[r->open_count - 1].stack : BOARD_DATA_SIZE - 1u;
+  r->stops.lowest = r->lowest_stack > allowed ? r->lowest_stack : allowed;
+  r->stops.highest = highest < BOARD_DATA_SIZE ? highest : BOARD_DATA_SIZE - 1u;
+}
 
 static bool stack_is_whole(avr_board *b, uint32_t address) {
   avr_recorder *r = b->recorder;
@@ -158,7 +168,7 @@ static void stack_moved(avr_board *b, uint32_t address) {
 static void reached(avr_board *b, uint32_t address) {
   avr_recorder *r = b->recorder;
   uint32_t pc = (uint32_t)b->avr->pc;
-  uint8_t found = pc < AVR_BOARD_FLASH_SIZE ? r->watched[pc / 2] : NOT_CODE;
+  uint8_t found = pc < AVR_BOARD_FLASH_SIZE ? r->stops.marked[pc / 2] : NOT_CODE;
   if (found == NOT_CODE) {
     crash_by_jump(b, address);
     return;
@@ -172,21 +182,17 @@ static void reached(avr_board *b, uint32_t address) {
 void run_recorded(avr_board *b, uint64_t until) {
   avr_t *avr = b->avr;
   avr_recorder *r = b->recorder;
-  uint64_t counted = avr->cycle;
-  bool goes_on = true;
+  uint64_t start = avr->cycle;
   if (until > r->hangs_at) until = r->hangs_at;
-  do {
-    uint32_t address = (uint32_t)avr->pc;
-    avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
-    avr->pc = avr_run_one(avr);
-    b->counters.executed_cycles += avr->cycle - counted;
-    counted = avr->cycle;
-    if (avr->state != cpu_Running) goes_on = core_stopped(b, (uint32_t)avr->pc) && !b->sleeping;
-    if (b->crashed) return;
-    if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
-    if (avr->pc >= AVR_BOARD_FLASH_SIZE || r->watched[avr->pc / 2]) reached(b, address);
-  } while (goes_on && avr->run_cycle_count && !avr->interrupt_state && avr->cycle < until && avr->cycle < b->next_due &&
-           !b->crashed);
+  choose_stops(r);
+  avr->run_cycle_count = r->half_written || until <= start ? 1 : until - start;
+  uint32_t next = avr_run_stopping(avr, &r->stops), address = (uint32_t)avr->pc;
+  avr->pc = next;
+  b->counters.executed_cycles += avr->cycle - start;
+  if (avr->state != cpu_Running) core_stopped(b, next);
+  if (b->crashed) return;
+  if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
+  if (next >= AVR_BOARD_FLASH_SIZE || r->stops.marked[next / 2]) reached(b, address);
   if (b->sleeping) {
     r->hangs_at = NEVER;
   } else if (avr->cycle >= r->hangs_at && !b->crashed) {
@@ -234,11 +240,11 @@ bool avr_board_record(board *self, const avr_watch *watch) {
       free(r);
       return false;
     }
-    r->watched[watch->entries[i] / 2] = (uint8_t)(i + 1);
+    r->stops.marked[watch->entries[i] / 2] = (uint8_t)(i + 1);
   }
-  r->watched[0] = NOT_CODE; /* nobody jumps to the reset vector */
+  r->stops.marked[0] = NOT_CODE; /* nobody jumps to the reset vector */
   for (uint32_t address = watch->code_end; address < AVR_BOARD_FLASH_SIZE; address += 2) {
-    r->watched[address / 2] = NOT_CODE;
+    r->stops.marked[address / 2] = NOT_CODE;
   }
   r->watch = *watch;
   r->watch.entries = NULL; /* the caller's */

@@ -65,8 +65,8 @@ HAL_ISR(PCINT1_vect) {
 }
 
 /* Masks all lines. */
-HAL_NAMED HAL_NEAR void hal_changes_stop(void);
-HAL_NAMED HAL_NEAR __attribute__((naked)) void hal_changes_stop(void) {
+HAL_NAMED HAL_BY_VECTORS void hal_changes_stop(void);
+HAL_NAMED HAL_BY_VECTORS __attribute__((naked)) void hal_changes_stop(void) {
   __asm__ volatile(
       "clr r2                          \n"
       "sts %[mask], r2                 \n"

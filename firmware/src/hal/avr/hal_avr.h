@@ -26,11 +26,11 @@
 /* Interrupts stand near the vectors, whose jumps then take a cycle less. Those that come most are written out, and need not
  * save what they use: the registers r2 to r7 are theirs alone, for the compiler is told to leave them (platformio.ini).
  *   r2  0      r3  scratch, and UCSR0A for who jumps to hal_receive_rest      r4, r5  Z      r6  SREG      r7  scratch */
-#define HAL_NEAR __attribute__((section(".lowtext")))
-#define HAL_ISR(vector) ISR(vector, ISR_NAKED HAL_NEAR)
-#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect, HAL_NEAR)
-#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect, HAL_NEAR)
-#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect, HAL_NEAR)
+#define HAL_BY_VECTORS __attribute__((section(".lowtext")))
+#define HAL_ISR(vector) ISR(vector, ISR_NAKED HAL_BY_VECTORS)
+#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect, HAL_BY_VECTORS)
 #define HAL_INTERRUPT_WATCHDOG ISR(WDT_vect)
 
 /* Runs with interrupts on; that of the EEPROM itself is off until asked for again (eeprom_avr.c). */
@@ -46,6 +46,13 @@
 /* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
 #define HAL_NAMED __attribute__((used, externally_visible))
 
+/* The compiler shall not see that it is a constant. */
+#define HAL_NEAR(pointer)                  \
+  ({                                       \
+    __typeof__(pointer) near_ = (pointer); \
+    __asm__("" : [near_] "+b"(near_));     \
+    near_;                                 \
+  })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
@@ -82,6 +89,7 @@ _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BU
 
 #define HAL_TABLE static const __attribute__((__progmem__))
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return pgm_read_byte(byte); }
+static inline uint16_t hal_table_word(const uint16_t *word) { return pgm_read_word(word); }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy_P(to, from, size); }
 
 /* Interrupt context or HAL_ATOMIC: the two halves of the count share a latch. */
@@ -197,7 +205,7 @@ static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
   }
 }
 
-static inline void hal_eeprom_interrupt(bool on) {
+static inline __attribute__((always_inline)) void hal_eeprom_interrupt(bool on) {
   if (on) {
     EECR |= _BV(EERIE);
   } else {

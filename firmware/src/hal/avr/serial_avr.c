@@ -35,12 +35,12 @@ HAL_NAMED volatile uint8_t hal_send_head;
       [tail] "I"(_SFR_IO_ADDR(HAL_RECEIVE_TAIL)), [flags] "I"(_SFR_IO_ADDR(GPIOR0)), [overrun] "I"(DOR0),           \
       [lost] "I"(HAL_LOST_BIT), [zero] "I"(HAL_ZERO_BIT)
 
-void hal_start_serial(uint32_t baud) {
+void hal_start_serial(uint16_t baud) {
   __asm__ volatile("clr r2");
   GPIOR0 = 0; /* flags and indices: whoever started us may have used them */
   HAL_RECEIVE_HEAD = HAL_RECEIVE_TAIL = 0;
   HAL_SEND_TAIL = hal_send_head = (uint8_t)(uintptr_t)hal_send_ring;
-  UBRR0 = (uint16_t)((F_CPU / DOUBLE_SPEED + baud / 2u) / baud - 1u);
+  UBRR0 = (uint16_t)((uint16_t)(F_CPU / DOUBLE_SPEED / 100u + baud / 2u) / baud - 1u);
   UCSR0A = _BV(U2X0);
   UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
   UCSR0B = SENDER_IDLE;
@@ -60,7 +60,7 @@ HAL_ISR(USART_RX_vect) {
       : HAL_TAKE_OPERANDS);
 }
 
-HAL_NAMED HAL_NEAR __attribute__((naked)) void hal_serial_take(void) {
+HAL_NAMED HAL_BY_VECTORS __attribute__((naked)) void hal_serial_take(void) {
   __asm__ volatile("movw r4, r30                      \n" HAL_TAKE_BYTE
                    "ret                               \n"
                    "sbi %[flags], %[zero]             \n"

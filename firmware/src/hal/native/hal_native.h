@@ -126,9 +126,11 @@ void hal_eeprom_interrupt(bool on);
 
 #define HAL_TABLE static const
 #define HAL_NAMED
+#define HAL_NEAR(pointer) (pointer)
 #define HAL_ZERO(variable) hal_native_zero((void *)&(variable), sizeof(variable)) /* a process starts more than once */
 static inline void hal_native_zero(void *at, size_t size) { memset(at, 0, size); }
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
+static inline uint16_t hal_table_word(const uint16_t *word) { return *word; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
 
 #ifdef __cplusplus
