@@ -49,6 +49,7 @@ HAL_INTERRUPT_CAPTURE {
     self->state = ENDED;
     hal_capture_stop();
   }
+  hal_serial_look();
 }
 
 void ping_collect(void) {
