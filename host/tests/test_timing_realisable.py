@@ -139,10 +139,10 @@ def test_telemetry_fills_half_of_the_line(baud: int, ticks: int) -> None:
 
 def test_table_of_an_image_gives_the_boards_times() -> None:
     table = Table(
-        (TaskRow("first", 1, 0, 1600), TaskRow("late", 4, 2, 800), TaskRow("telemetry", 4, 0, 3200)), (), (PING,)
+        (TaskRow("first", 1, 0, 1600), TaskRow("late", 4, 2, 4000), TaskRow("telemetry", 4, 0, 3200)), (), (PING,)
     )
     times = BoardTimes.of(table)
-    assert times.telemetry_s == pytest.approx(300e-6) and times.set_point_s == pytest.approx(200e-6)
+    assert times.telemetry_s == pytest.approx(300e-6) and times.set_point_s == pytest.approx(350e-6)
     assert times.sensors == (PING,)
 
 

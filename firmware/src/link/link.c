@@ -14,7 +14,6 @@
 #include "link/telemetry.h"
 
 static frame_decoder decoder;
-static bool holds; /* the decoder holds a message that is not carried out yet */
 uint8_t link_room;
 
 void link_start(uint16_t baud) {
@@ -29,7 +28,6 @@ void link_start(uint16_t baud) {
 void link_use_seed(uint32_t seed) {
   decoder.seed = seed;
   link_room = 0; /* a request of the session before is not carried out any more */
-  holds = false;
 }
 
 /* One piece between delimiters, and an empty one before it. What else waits stays due: so this takes a known time, whatever
@@ -50,34 +48,26 @@ bool link_take_frame(void) {
   return ended && frame_decode_end(&decoder);
 }
 
-static void take(void) {
-  holds = link_take_frame();
-  if (holds) {
-    hal_serial_again();
-    if (!message_is_handshake(frame_id(&decoder))) {
-      session_heard();
-    }
-  }
-}
-
-/* In one call it takes a message, in the next it carries it out: neither takes long, and a slot may begin in between. */
 void link_poll(void) {
   if (hal_serial_due() == 0) {
     return;
   }
-  if (!holds) {
-    take();
-    return;
+  if (link_room == 0) {
+    if (!link_take_frame()) {
+      return;
+    }
+    const uint8_t id = frame_id(&decoder);
+    if (!message_is_handshake(id)) {
+      session_heard();
+    }
+    link_room = dispatch_room(id);
   }
-  const uint8_t id = frame_id(&decoder);
-  link_room = dispatch_room(id);
   if (!hal_serial_room(link_room)) {
     hal_serial_again(); /* waits: it stays due */
     return;
   }
   link_room = 0;
-  holds = false;
-  if (!dispatch(id, frame_sequence(&decoder), frame_payload(&decoder))) {
+  if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), frame_payload(&decoder))) {
     counters_count(refused);
   }
 }

@@ -22,9 +22,9 @@ void link_use_seed(uint32_t seed);
 /* Takes received bytes, up to the end of one frame; false unless it is accepted. A part of link_poll(). */
 bool link_take_frame(void) __attribute__((noinline));
 
-/* Takes received bytes, up to the end of one frame, or does what the one asks that it took before. What is answered, and
- * all that follows it, waits while there is no room for its answer and, after that, for the next telemetry, which is never
- * left out for the sake of answers. A stop and set-points do not wait themselves. */
+/* Takes received bytes, up to the end of one frame, and does what it asks. What is answered, and all that follows it, waits
+ * while there is no room for its answer and, after that, for the next telemetry, which is never left out for the sake of
+ * answers. A stop and set-points do not wait themselves. */
 void link_poll(void) __attribute__((noinline));
 
 extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */

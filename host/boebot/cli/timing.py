@@ -238,8 +238,8 @@ def _board_times(report: Report) -> Any:
 
     if report.responses is None:
         return BoardTimes.of(report.table)
-    telemetry, gap = report.responses.pieces.get("telemetry", 0), report.gap or 0
-    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, gap / _CYCLES_PER_S)
+    telemetry, taken = report.responses.pieces.get("telemetry", 0), report.taken or 0
+    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, taken / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:

@@ -18,7 +18,7 @@ from typing import Any
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import WAKE
-from boebot.timing.costs import Costs, costs
+from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
 from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
@@ -34,6 +34,7 @@ RECEIVE_RING = 256  # bytes, of which one stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
+STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,7 @@ class Report:
     responses: Responses | None
     gap: int | None  # cycles between two polls of the link, while slots wait
     ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
+    taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
     frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
     memory: Memory
@@ -124,6 +126,14 @@ class Report:
     def frames_coming(self) -> float:
         """The host's frames in a tick, in the long run."""
         return float(self.frames.load / self.frames.cycles * self.tick_cycles) if self.frames.cycles else 0.0
+
+    @property
+    def edge_age(self) -> int | None:
+        """Cycles from an edge to the moment at which the time is told of it: each slot begins with that. None: there is
+        overload, or no encoder."""
+        if self.responses is None or not self.costs.change:
+            return None
+        return self.schedule.slot_cycles + self.responses.pieces[SLOT_BEGINS]
 
     @property
     def own(self) -> Measurement | None:
@@ -186,6 +196,8 @@ class Report:
             "receive_ring_needed_bytes": self.ring,
             "receive_ring_bytes": RECEIVE_RING - 1,
             "frame_bound_cycles": self.frames.cycles,
+            "frame_taken_bound_cycles": self.taken,
+            "edge_age_bound_cycles": self.edge_age,
             "frames_coming_per_tick": round(self.frames_coming, 2),
             "frames_proven_per_tick": round(self.frames_proven, 2),
             "losses_in_emulator": None if own is None else own.losses,
@@ -229,7 +241,7 @@ def prove(
     answers = responses(schedule, sources)
     between = (*sources, *found.between(program, asked))
     frames = found.of_frames(asked)
-    gap, ring = _of_link(program, found, schedule, between, asked)
+    gap, ring, taken = _of_link(program, found, schedule, between, asked)
     return Report(
         path=str(path),
         table=program.table,
@@ -241,6 +253,7 @@ def prove(
         responses=answers,
         gap=gap,
         ring=ring,
+        taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
@@ -304,24 +317,28 @@ def _rows(
 
 def _of_link(
     program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load
-) -> tuple[int | None, int | None]:
-    """The longest time between two polls of the link, and the bytes that wait in its ring then; None: overload.
+) -> tuple[int | None, int | None, int | None]:
+    """The longest time between two polls of the link, the bytes that wait in its ring then, and the longest time from a
+    frame's last byte to its end; each None: overload.
 
     A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or
     at the encoders may have left some bytes of a frame that had not ended.
     """
     after = found.loop + found.edges + found.loop  # edges that are due go before
     gap = longest_gap(schedule, sources, found.blocking, after)
+    taken = longest_gap(schedule, sources, found.blocking, after + found.frame)
     idle = longest_gap(schedule, sources, found.idle, after)
     row = next((row for row in program.table.interrupts if row.vector == RECEIVE), None)
-    if gap is None or idle is None or row is None:
-        return gap, None if row is not None else 0
+    if row is None:
+        return gap, 0, taken
+    if gap is None or idle is None:
+        return gap, None, taken
     bytes_ = asked.sources(row, found.interrupts[row.name])
 
     def come(window: int) -> int:
         return sum(source.requests(window + 1) for source in bytes_)
 
-    return gap, max(come(gap), IDLE_LEAVES + come(idle))
+    return gap, max(come(gap), IDLE_LEAVES + come(idle)), taken
 
 
 def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:
@@ -370,6 +387,8 @@ def _tick_broken(report: Report) -> list[str]:
         )
     if report.ring is not None and report.ring > RECEIVE_RING - 1:
         found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {RECEIVE_RING - 1}")
+    if report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
+        found.append(f"the time of an edge may be asked for after {report.edge_age} cycles; its stamp has 16 bits")
     return found
 
 

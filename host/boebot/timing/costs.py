@@ -37,6 +37,7 @@ AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task tha
 ENCODER_POLL, LINK_POLL = "encoder_poll", "link_poll"
 TAKE, DECODE, ROOM = "link_take_frame", "frame_decode_end", "hal_serial_room"  # parts of a poll of the link
 RARE, WHEEL, OTHER = "keep_limit", "see_wheel", "see_other"  # parts of a poll of the encoders
+SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the scheduler does
 PIECES = 2  # passes of loops of TAKE that are not over bytes
 CHANGES_DUE = 8  # so many changes the main loop works off between slots; fewer wait (ENCODER_DUE_BYTES of encoder.h)
 
@@ -111,7 +112,7 @@ class Costs:
         rows = program.table.tasks
         slots = []
         for slot in range(_slots(program)):
-            pieces = [Piece("scheduler", self.round)]
+            pieces = [Piece(SLOT_BEGINS, self.round)]
             pieces += [Piece(row.name, self.tasks[row.name] + self.around) for row in rows if _is_due(row, slot)]
             slots.append(tuple(pieces))
         return Schedule(tuple(slots), SLOT_CYCLES, SLOTS_PER_TICK, self.blocking, DROPS_FROM)
