@@ -38,17 +38,17 @@ void ping_start(void) {
 }
 
 HAL_INTERRUPT_CAPTURE {
-  ping_state *const self = HAL_NEAR(&own);
   const schedule_moment now = schedule_moment_at(hal_capture_time());
-  if (self->state == RISING) {
+  if (own.state == RISING) {
     rise = now;
-    self->state = FALLING;
+    own.state = FALLING;
     hal_capture_falling();
   } else {
     fall = now;
-    self->state = ENDED;
+    own.state = ENDED;
     hal_capture_stop();
   }
+  hal_serial_look();
 }
 
 void ping_collect(void) {
