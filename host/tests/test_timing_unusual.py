@@ -82,6 +82,18 @@ def test_stripped_image_is_refused(tmp_path: Path) -> None:
         budget.prove(image, FIGURES)
 
 
+def test_slots_of_another_length_are_refused(tmp_path: Path) -> None:
+    source = timing_program.text().replace("1000 40000", "1000 20000")
+    with pytest.raises(TimingError, match="a slot has 20000 cycles; expected 40000, 4 of them in a tick of 10 ms"):
+        budget.prove(timing_program.compiled(tmp_path, source), FIGURES)
+
+
+@pytest.mark.parametrize("size", [64, 300])
+def test_receive_ring_is_the_images_own(tmp_path: Path, size: int) -> None:
+    ring = f"unsigned char hal_receive_ring[{size}];"
+    assert budget.prove(program(tmp_path, ring, "hal_receive_ring[0] = PINB;"), FIGURES).ring_holds == size - 1
+
+
 def test_row_of_an_interrupt_that_is_not_used_is_refused(tmp_path: Path) -> None:
     source = timing_program.text().replace("INTERRUPT slot 12", "INTERRUPT slot 13")
     with pytest.raises(

@@ -27,6 +27,7 @@ NAME = "timing"
 _CYCLES_PER_MS = 16_000
 _COLOURS = {"task": "#0072b2", "interrupt": "#d55e00", "line": "#cc79a7", "process": "#009e73", "sense": "#e69f00"}
 _COLOURS["command"] = _COLOURS["task"]
+_ON = dict.fromkeys(_COLOURS, "white") | {"line": style.INK, "sense": style.INK}  # of text on these
 _LEGEND = {
     "task": "task",
     "interrupt": "interrupt",
@@ -148,7 +149,7 @@ def _event(axes: Axes, lane: int, event: Event, longest: float) -> None:
     axes.barh(lane, length, _HEIGHT, left=begin, color=_COLOURS[kind], linewidth=0)
     text = ms(event.seconds) + (f", every {ms(event.every)}" if event.beside else "")
     if length > 0.3 * longest:
-        axes.text(begin + length / 2, lane, text, ha="center", va="center", color="white", fontsize=8)
+        axes.text(begin + length / 2, lane, text, ha="center", va="center", color=_ON[kind], fontsize=8)
     else:
         axes.text(begin + length + 0.007 * longest, lane, text, ha="left", va="center", color=style.INK, fontsize=8)
 
