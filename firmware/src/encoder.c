@@ -62,15 +62,15 @@ static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint
 
 /* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
-  uint16_t stamp, stamp_before;  /* of the last two edges */
-  uint8_t stamped;               /* edges since encoder_update() */
+  uint16_t stamp, stamp_before; /* of the last two edges */
+  uint8_t stamped;              /* edges since encoder_update() */
 #if ENCODER_LINES == 2
   int8_t steps; /* and by how much they change the count */
 #endif
-  uint8_t edges;                 /* in this tick, at most 2 */
-  uint8_t silence;               /* ticks since the last edge, at most SILENT_TICKS */
-  uint8_t left[LINES_PER_SIDE];  /* edges of the line in this tick after which it is masked; 0: it is */
-  uint32_t last, gap;            /* time of the last edge, and since the edge before */
+  uint8_t edges;                /* in this tick, at most 2 */
+  uint8_t silence;              /* ticks since the last edge, at most SILENT_TICKS */
+  uint8_t left[LINES_PER_SIDE]; /* edges of the line in this tick after which it is masked; 0: it is */
+  uint32_t last, gap;           /* time of the last edge, and since the edge before */
   int32_t count;
   encoder_reading reading;
 } wheel;
@@ -217,16 +217,20 @@ static uint8_t noisy_lines(uint8_t head) {
 }
 
 /* After a stop: masks the noise and listens to the rest. What the others did meanwhile is a change like any other, with
- * room in the ring, which is empty. */
+ * room in the ring, which is empty. It is looked at when the interrupt already listens: an edge in between would be seen
+ * by neither, and the next one, back to the level before, would not be one. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
   volatile hal_change *const missed = hal_change_after(head);
   missed->time = (uint16_t)schedule_now();
-  missed->bits = PORT_BITS();
   missed->close = 0;
-  hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
   other = NOT_AWAITED;
   hal_changes_resume();
+  HAL_ATOMIC {
+    hal_pin_change_mask((uint8_t)(watched & (uint8_t)~lines));
+    missed->bits = PORT_BITS();
+    hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
+  }
   convict(lines);
 }
 
@@ -322,7 +326,9 @@ static uint8_t lines_on(void) {
 /* A wheel's lines may make as many edges again as the parameter allows; one more masks them. */
 static void begin_tick(wheel *w) {
   phantoms = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
-  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) { w->left[i] = phantoms; }
+  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+    w->left[i] = phantoms;
+  }
 }
 
 void encoder_start(void) {
@@ -361,7 +367,7 @@ static uint16_t period_of(uint32_t gap) {
 static void close_wheel(uint8_t side) {
   wheel *w = &wheels[side];
   w->reading.count = w->count;
-  if (w->edges != 0) {
+  if (ENCODER_LINES != 0 && w->edges != 0) {
     /* After a long silence the edge before the first is too old for its stamp to tell. */
     w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->gap) : 0u;
     w->silence = 0;
@@ -373,7 +379,7 @@ static void close_wheel(uint8_t side) {
   w->edges = 0;
   w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    if (w->left[i] == 0) {
+    if (ENCODER_LINES != 0 && w->left[i] == 0) {
       w->reading.masked = true;
       w->reading.period = 0;
     }
