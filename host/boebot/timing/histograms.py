@@ -29,6 +29,7 @@ COLUMNS = 3
 WIDTH_IN, HEIGHT_IN = 3.9, 2.4  # of one histogram
 FRAME_IN = 0.9  # for title and legend
 BINS = 60
+MARGIN = 3.0  # cycles, beside a single value
 TITLE = "Jitter and latency: in brackets, how many values"
 LIMIT: dict[str, Any] = {"color": style.INK, "ls": (0, (1, 1.5)), "lw": 1.4}
 FORMATS = (".svg", ".png", ".pdf")
@@ -97,7 +98,7 @@ def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None
         label = one.load if one.subject == "boebot" else f"{one.subject}, {one.load}"
         shares = np.histogram(one.values, bins=edges)[0] / one.count
         axes.stairs(shares, edges / scale, label=f"{label} ({one.count})", color=colour, ls=dashes, lw=1.4)
-    span = max(high - low, 1.0)
+    span = max(high - low, MARGIN)
     for limit in limits:
         if low - span <= limit <= high + span:  # else it would squeeze the values
             axes.axvline(limit / scale, **LIMIT)
@@ -105,7 +106,7 @@ def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None
     axes.set_ylim(2e-4, 4.0)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g} %"))
     if high == low:
-        axes.set_xlim(low - 3.0, high + 3.0)
+        axes.set_xlim(low - MARGIN, high + MARGIN)
     axes.set_title(quantity)
     axes.set_xlabel("ms" if scale != 1.0 else "cycles")
     axes.legend(fontsize=6.5, loc="upper right")
