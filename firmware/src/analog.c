@@ -54,15 +54,12 @@ static bool is_on(uint8_t device) {
 
 /* The bandgap every other time, between them the devices in turn. */
 static uint8_t next_input(void) {
-  if (input != ANALOG_BANDGAP) {
+  const bool battery = is_on(ANALOG_BATTERY);
+  const bool infrared = is_on(ANALOG_INFRARED);
+  if (input != ANALOG_BANDGAP || (!battery && !infrared)) {
     return ANALOG_BANDGAP;
   }
-  const uint8_t other = last_device == ANALOG_BATTERY ? ANALOG_INFRARED : ANALOG_BATTERY;
-  if (is_on(other)) {
-    last_device = other;
-  } else if (!is_on(last_device)) {
-    return ANALOG_BANDGAP;
-  }
+  last_device = battery && (last_device != ANALOG_BATTERY || !infrared) ? ANALOG_BATTERY : ANALOG_INFRARED;
   return last_device;
 }
 
@@ -76,7 +73,7 @@ void analog_start(void) {
   join(ANALOG_BANDGAP);
 }
 
-static void grow_older(uint8_t device) {
+static inline __attribute__((always_inline)) void grow_older(uint8_t device) {
   if (!is_on(device)) {
     ages[device] = AGE_NEVER;
     results[device] = 0;

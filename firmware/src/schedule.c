@@ -76,6 +76,7 @@ void schedule_start(uint32_t first_tick) {
 }
 
 HAL_INTERRUPT_SLOT {
+  hal_serial_look();
   schedule_slot++;
   schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
   slot_cycles += HAL_SLOT_CYCLES;
@@ -106,6 +107,7 @@ HAL_INTERRUPT_SLOT {
     default:
       break;
   }
+  hal_serial_look();
 }
 
 HAL_INTERRUPT_EDGE {
@@ -114,6 +116,7 @@ HAL_INTERRUPT_EDGE {
   } else {
     infrared_end();
   }
+  hal_serial_look();
 }
 
 int32_t schedule_between(schedule_moment from, schedule_moment to) {

@@ -49,10 +49,15 @@ HAL_ISR(PCINT1_vect) {
       "inc r2                          \n"
       "std Z+3, r2                     \n"
       "sbrc r2, 2                      \n"
-      "rcall hal_changes_stop          \n" /* a storm */
+      "rjmp 6f                         \n"
       "clr r2                          \n"
       "rjmp 1b                         \n"
       "5: rcall hal_changes_stop       \n"
+      "rjmp 2b                         \n"
+      "6: rcall hal_changes_stop       \n" /* a storm */
+      "lds r7, hal_changes_tail        \n"
+      "cpse r30, r7                    \n"
+      "sts hal_changes_head, r30       \n"
       "rjmp 2b                         \n"
       :
       : [sreg] "I"(_SFR_IO_ADDR(SREG)), [low] "n"(_SFR_MEM_ADDR(TCNT1L)), [high] "n"(_SFR_MEM_ADDR(TCNT1H)),

@@ -65,15 +65,15 @@ enum {
 };
 
 /* Covers what can stand before the edge's interrupt, its latency in the table, which the analysis of the image shows for
- * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 60 and 14 to stop it), a stamped
- * change and a capture; and its own prologue. */
-#define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 60u + 14u)
+ * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 81 and 12 to stop it), a stamped
+ * change and a capture; and its own prologue up to the reading of the time. */
+#define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 81u + 12u)
 _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BUDGET_capture <= HAL_LATENCY_edge,
                "lead");
-#define HAL_EDGE_PROLOGUE 50u
+#define HAL_EDGE_PROLOGUE 65u
 #define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
-#define HAL_EDGE_CLOSE 150u /* cycles before it from which nothing else is done */
-#define HAL_EDGE_TAKES 35u  /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
+#define HAL_EDGE_CLOSE 70u /* cycles before it from which nothing else is done */
+#define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
@@ -114,7 +114,9 @@ static inline void hal_capture_falling(void) {
   TIFR1 = _BV(ICF1);
 }
 
-static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
+static inline __attribute__((always_inline)) void hal_capture_stop(void) {
+  TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1));
+}
 
 /* The place at that low byte in a ring that begins at a multiple of 256. */
 #define HAL_RING_PLACE(place, ring, low) __asm__("mov %A0, %1 \n ldi %B0, hi8(" #ring ")" : "=&d"(place) : "r"(low))

@@ -94,6 +94,7 @@ bool hal_serial_received(void);
 uint8_t hal_serial_due(void);
 void hal_serial_seen(void);
 void hal_serial_again(void);
+static inline void hal_serial_look(void) {}
 bool hal_serial_receive(uint8_t *byte);
 static inline bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size) {
   uint8_t byte = 0;
