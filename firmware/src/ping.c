@@ -38,15 +38,14 @@ void ping_start(void) {
 }
 
 HAL_INTERRUPT_CAPTURE {
-  ping_state *const self = HAL_NEAR(&own);
   const schedule_moment now = schedule_moment_at(hal_capture_time());
-  if (self->state == RISING) {
-    rise = now;
-    self->state = FALLING;
+  if (own.state == RISING) {
+    *HAL_NEAR(&rise) = now;
+    own.state = FALLING;
     hal_capture_falling();
   } else {
-    fall = now;
-    self->state = ENDED;
+    *HAL_NEAR(&fall) = now;
+    own.state = ENDED;
     hal_capture_stop();
   }
   hal_serial_look();

@@ -133,7 +133,9 @@ def write_core(simavr: Path) -> Path:
     text = (ROOT / simavr / "sim" / CORE).read_text(encoding="utf-8")
     for there, instead in CORE_CHANGES:
         if text.count(there) != 1:
-            raise SystemExit(f"simavr's {CORE} is not the one that was expected: {there.splitlines()[0]!r} is not in it")
+            raise SystemExit(
+                f"simavr's {CORE} is not the one that was expected: {there.splitlines()[0]!r} is not in it"
+            )
         text = text.replace(there, instead)
     file = CONFIGURATION / CORE
     text += CORE_FACES
