@@ -53,7 +53,7 @@ def test_no_interrupt_waits_longer_than_its_bound(bounds: dict[str, int], scenar
 
 
 def cycles_up_to(program: Program, entry: str, mnemonic: str, address: int) -> int:
-    """From the acceptance of an interrupt, its entry and the vector's `rjmp` included, to the end of a load or store that
+    """From an interrupt's acceptance, its entry and the vector's `rjmp` included, to the end of a load or store that
     no branch comes before; a skip takes as long as what it skips."""
     cycles = 4 + 2
     function = program.functions[program.by_name[entry]]
