@@ -36,6 +36,7 @@ WORK_MOST = 25 * TICK // 100  # of the fullest tick, by static bound
 MEMORY_MOST = 1_600  # static RAM and the deepest stack
 FLASH_MOST = 16 * 1024
 PLANTED = 200  # cycles
+FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +177,7 @@ def test_planted_slow_task_breaks_the_gate(
         return next(row for row in report.rows if row.name == "turret")
 
     sound, slowed = task(resources.folder("images") / "shieldbot.elf"), task(image)
-    assert sound.slack >= 0 and slowed.bound == sound.bound + PLANTED
+    assert sound.slack >= 0 and 0 <= slowed.bound - sound.bound - PLANTED <= FARTHER
     (check,) = [check for check in _row_checks(slowed) if check.what == "task turret: bound <= budget"]
     assert not check.holds and check.what not in {entry.what for entry in KNOWN}
     code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure")

@@ -21,7 +21,7 @@ from tools.timing_page import Reports
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "timing.md"
 PICTURE = Path("..") / "images" / timing_page.PICTURE
-RENEW = "print it anew: build/venv/bin/python -m tools.timing_page --page docs/reference/timing.md"
+RENEW = "print it anew: make timing"
 NUMBER = re.compile(r"(?:–|\d{1,3}(?:,\d{3})*(?:\.\d+)?(?: %)?(?: / \d+\.\d+)*)")
 LOAD = "figures"
 COLOURS = {to_rgb(colour) for colour in ("#d55e00", "#0072b2")}  # interrupts and tasks (diagram.py)

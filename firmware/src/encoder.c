@@ -34,6 +34,7 @@ static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {0, 0};
 #define PORT_BITS() HAL_PORT_C()
 
 #define LINES (LINES_PER_SIDE * SIDES)
+#define ANY_LINES (ENCODER_LINES != 0)
 
 /* The lines of one wheel among bits of the port. `side` is a constant; neighbours are but shifted. */
 enum { A = 1, B = 2 };
@@ -62,15 +63,15 @@ static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint
 
 /* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
-  uint16_t stamp, stamp_before;  /* of the last two edges */
-  uint8_t stamped;               /* edges since encoder_update() */
+  uint16_t stamp, stamp_before; /* of the last two edges */
+  uint8_t stamped;              /* edges since encoder_update() */
 #if ENCODER_LINES == 2
   int8_t steps; /* and by how much they change the count */
 #endif
-  uint8_t edges;                 /* in this tick, at most 2 */
-  uint8_t silence;               /* ticks since the last edge, at most SILENT_TICKS */
-  uint8_t left[LINES_PER_SIDE];  /* edges of the line in this tick after which it is masked; 0: it is */
-  uint32_t last, gap;            /* time of the last edge, and since the edge before */
+  uint8_t edges;                /* in this tick, at most 2 */
+  uint8_t silence;              /* ticks since the last edge, at most SILENT_TICKS */
+  uint8_t left[LINES_PER_SIDE]; /* edges of the line in this tick after which it is masked; 0: it is */
+  uint32_t last, gap;           /* time of the last edge, and since the edge before */
   int32_t count;
   encoder_reading reading;
 } wheel;
@@ -217,16 +218,20 @@ static uint8_t noisy_lines(uint8_t head) {
 }
 
 /* After a stop: masks the noise and listens to the rest. What the others did meanwhile is a change like any other, with
- * room in the ring, which is empty. */
+ * room in the ring, which is empty. It is looked at when the interrupt already listens: an edge in between would be seen
+ * by neither, and the next one, back to the level before, would not be one. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
   volatile hal_change *const missed = hal_change_after(head);
   missed->time = (uint16_t)schedule_now();
-  missed->bits = PORT_BITS();
   missed->close = 0;
-  hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
   other = NOT_AWAITED;
   hal_changes_resume();
+  HAL_ATOMIC {
+    hal_pin_change_mask((uint8_t)(watched & (uint8_t)~lines));
+    missed->bits = PORT_BITS();
+    hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
+  }
   convict(lines);
 }
 
@@ -302,8 +307,10 @@ static __attribute__((noinline)) void update_wheel(wheel *w, uint32_t now) {
 void encoder_update(void) {
   encoder_poll();
   const uint32_t now = schedule_now();
-  update_wheel(&wheels[LEFT], now);
-  update_wheel(&wheels[RIGHT], now);
+  if (ANY_LINES) {
+    update_wheel(&wheels[LEFT], now);
+    update_wheel(&wheels[RIGHT], now);
+  }
   if (OTHER_BIT != 0 && other == STAMPED) {
     other_edge = time_of(other_stamp, now);
     other = (int32_t)(other_edge - other_from) >= 0 ? SEEN : AWAITED;
@@ -319,10 +326,15 @@ static uint8_t lines_on(void) {
   return parameters_device_on(DEVICES_ENCODERS) ? (uint8_t)(SIDE_BITS(LEFT) | SIDE_BITS(RIGHT)) : 0u;
 }
 
-/* A wheel's lines may make as many edges again as the parameter allows; one more masks them. */
-static void begin_tick(wheel *w) {
-  phantoms = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
-  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) { w->left[i] = phantoms; }
+/* Each line may make as many edges again as the parameter allows; one more masks it. */
+static void begin_tick(void) {
+  const uint8_t edges = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
+  phantoms = edges;
+  BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
+    BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+      wheels[side].left[i] = edges;
+    }
+  }
 }
 
 void encoder_start(void) {
@@ -342,8 +354,8 @@ void encoder_start(void) {
   HAL_ZERO(other);
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
-    begin_tick(&wheels[side]);
   }
+  begin_tick();
   before = PORT_BITS();
   hal_change_at(0)->bits = before; /* the change before the first one; the start-up code has not made the ring zero */
   hal_change_at(0)->close = 0;
@@ -378,7 +390,6 @@ static void close_wheel(uint8_t side) {
       w->reading.period = 0;
     }
   }
-  begin_tick(w);
 }
 
 /* What a line does that did not count says nothing about the time to its next edge. */
@@ -389,8 +400,14 @@ static void forget_gap(uint8_t side, uint8_t back, uint8_t lines) {
 }
 
 void encoder_task(void) {
-  close_wheel(LEFT);
-  close_wheel(RIGHT);
+  if (ANY_LINES) {
+    close_wheel(LEFT);
+    close_wheel(RIGHT);
+  }
+  begin_tick();
+  if (!ANY_LINES) {
+    return;
+  }
   const uint8_t lines = lines_on();
   returning = (uint8_t)(lines & (uint8_t)~watched);
   forget_gap(LEFT, returning, lines);

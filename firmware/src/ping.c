@@ -18,20 +18,20 @@ _Static_assert(PIN_PING == 8, "the timer captures on pin 8");
 enum { IDLE, RISING, FALLING, ENDED }; /* what is awaited */
 
 typedef struct {
-  volatile uint8_t state; /* shared with the capture interrupt; the others are the main loop's only */
   uint16_t echo;
   uint8_t age;
   uint8_t since_trigger; /* ticks, saturating */
 } ping_state;
 
-static ping_state own;
-static schedule_moment rise, fall; /* the interrupt's stamps, settled when the state is ENDED */
+static ping_state own;             /* the main loop's only */
+static volatile uint8_t state;     /* shared with the capture interrupt */
+static schedule_moment rise, fall; /* its stamps, settled when the state is ENDED */
 
 void ping_start(void) {
   ping_state *const self = HAL_NEAR(&own);
   HAL_PIN_INPUT(PING);
   hal_capture_stop();
-  HAL_ZERO(self->state);
+  HAL_ZERO(state);
   HAL_ZERO(self->echo);
   self->age = AGE_NEVER;
   self->since_trigger = 255;
@@ -39,13 +39,13 @@ void ping_start(void) {
 
 HAL_INTERRUPT_CAPTURE {
   const schedule_moment now = schedule_moment_at(hal_capture_time());
-  if (own.state == RISING) {
-    *HAL_NEAR(&rise) = now;
-    own.state = FALLING;
+  if (state == RISING) {
+    rise = now;
+    state = FALLING;
     hal_capture_falling();
   } else {
-    *HAL_NEAR(&fall) = now;
-    own.state = ENDED;
+    fall = now;
+    state = ENDED;
     hal_capture_stop();
   }
   hal_serial_look();
@@ -56,8 +56,8 @@ void ping_collect(void) {
   if (self->age < AGE_NEVER) {
     self->age++;
   }
-  if (self->state == ENDED) {
-    self->state = IDLE;
+  if (state == ENDED) {
+    state = IDLE;
     self->echo =
         (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
     if (self->echo < ECHO_MIN) {
@@ -77,20 +77,20 @@ void ping_task(void) {
   if (self->since_trigger < 255u) {
     self->since_trigger++;
   }
-  if ((self->state == RISING || self->state == FALLING) && self->since_trigger >= GIVE_UP_TICKS) {
+  if ((state == RISING || state == FALLING) && self->since_trigger >= GIVE_UP_TICKS) {
     HAL_ATOMIC {
-      if (self->state != ENDED) {
+      if (state != ENDED) {
         hal_capture_stop();
-        self->state = IDLE;
+        state = IDLE;
         self->echo = 0;
         self->age = 0;
       }
     }
   }
-  if (self->state == IDLE && parameters_device_on(DEVICES_PING) &&
+  if (state == IDLE && parameters_device_on(DEVICES_PING) &&
       self->since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
     self->since_trigger = 0;
-    self->state = RISING;
+    state = RISING;
     hal_ping_trigger();
   }
 }

@@ -75,7 +75,8 @@ class Peer:
         carried_out: requests carried out, in order, as (session, message).
         setpoints: those that arrived, and `setpoint_ticks`, when; `accepted`, those that count.
         tones: (frequency in Hz, length in s) of those that were begun, in order.
-        task_times: the longest of each task in this session, in cycles; those of `untold` it does not tell.
+        task_times: the longest of each task in this session, in cycles, at its opening `usual_task_times`; those of
+            `untold` it does not tell.
         starts: how often it was started. openings: sessions that were opened.
     """
 
@@ -101,6 +102,7 @@ class Peer:
         self.battery_mv = 3600  # at the pin, behind the divider
         self.light_us = (800, 1600)
         self.telemetry_period = 1
+        self.usual_task_times = [0] * len(messages.Task)
         self.untold: set[int] = set()
         self.saved: dict[int, int] | None = None
         self.carried_out: list[tuple[int, messages.Message]] = []
@@ -201,7 +203,7 @@ class Peer:
         self.openings.append(seed)
         self.decoder.seed = seed if self.protections.seed else SEED
         self._begin_numbers()
-        self.task_times = [0] * len(messages.Task)
+        self.task_times = list(self.usual_task_times)
         self._tone_token = 0
         if self._save_answer is not None:
             self._save_answer = None

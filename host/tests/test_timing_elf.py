@@ -72,6 +72,13 @@ def test_symbols_are_those_of_avr_nm() -> None:
     }
 
 
+def test_variables_are_those_of_avr_nm(tmp_path: Path) -> None:
+    path = build(tmp_path, PROGRAM)
+    lines = [line.split() for line in output("avr-nm", "-S", path).splitlines()]
+    sizes = {words[3]: int(words[1], 16) for words in lines if len(words) == 4 and words[2] in "bBdD"}
+    assert sizes and read_image(path).variables == sizes
+
+
 def test_the_code_is_that_of_avr_objcopy(tmp_path: Path) -> None:
     binary = tmp_path / "flash.bin"
     output("avr-objcopy", "-O", "binary", "-R", ".eeprom", IMAGE, binary)

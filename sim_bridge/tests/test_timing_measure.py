@@ -18,7 +18,7 @@ from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import TICK_CYCLES, Bench
 from sim_bridge.timing.losses import MASKED
 from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
-from sim_bridge.timing.scenarios import EDGES_PER_S, RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
+from sim_bridge.timing.scenarios import RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
 
 IMAGE = avr_image("shieldbot")
 SECONDS = 0.4
@@ -95,13 +95,14 @@ def test_a_saturated_line_is_full_both_ways_and_nothing_is_lost() -> None:
     assert {name: saturated.lost[name] for name in names} == dict.fromkeys(names, 0)
 
 
-def test_a_noisy_line_is_masked_and_told_without_a_missed_tick() -> None:
+@pytest.mark.parametrize("seed", [1, 6])
+def test_a_noisy_line_is_masked_and_told_and_the_other_wheel_loses_nothing(seed: int) -> None:
+    """Neither a tick nor, where the other wheel's line changes less than once while noise has stopped the interrupt, an
+    edge: at these phases one comes between the look at the port and the end of the stop."""
     ticks = 50
-    noise = run(IMAGE, robot_of(IMAGE), "noise", ticks / 100, 1)
+    noise = run(IMAGE, robot_of(IMAGE), "noise", ticks / 100, seed)
     assert ticks - 3 <= noise.lost["masked"] <= ticks + 4, "told from the tick on in which it began"
-    assert {name for name, count in noise.lost.items() if count} <= {"masked", "edges"}
-    # While noise has stopped the interrupt, edges of the other wheel go unseen: at some phases a few.
-    assert noise.lost["edges"] < 0.01 * EDGES_PER_S["noise"] * ticks / 100
+    assert {name for name, count in noise.lost.items() if count} == {"masked"}
     counted = noise.spans[noise.spans["id"] == 4]  # pin changes of the encoders' port
     assert len(counted) < ticks / 100 * 200_000 / 20, "the line still interrupts"
 

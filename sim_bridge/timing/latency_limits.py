@@ -26,8 +26,8 @@ EXACT = Limits(-2, 2)  # servo width and period: the figure to reach
 ECHO_STAMP = Limits(-8, 8)  # the same
 
 # A tick begins with slot 0 or 4, where no exact edge and no burst is near, so that the slot's interrupt waits for what
-# that of an exact edge does: 610 (tasks.def, the latency of `edge`). It counts the slot within 50 cycles more.
-TICK_START = Limits(0, 610 + 50)
+# that of an exact edge does: 600 (tasks.def, the latency of `edge`). It counts the slot within 50 cycles more.
+TICK_START = Limits(0, 600 + 50)
 
 RISE = 8_000  # from the slot's start to the rising edge (servo.c)
 TELEMETRY_BYTES = 46

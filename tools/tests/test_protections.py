@@ -45,21 +45,19 @@ class Row(NamedTuple):
 
 ROWS = (
     Row("a set-point's age by its tick", "safety.c", "age >= life || ", "", "safety"),
-    Row("order of set-points", "safety.c", "|| has_newer(answers_tick, sequence) ", "", "safety"),
+    Row("order of set-points", "safety.c", "|| has_newer(self, answers_tick, sequence) ", "", "safety"),
     Row(
-        "set-points from before arming", "safety.c", "ticks_are_over && (int16_t)(answers_tick", "false && (0", "safety"
-    ),
-    Row(
-        "copies from before a dead-man stop",
+        "set-points from before arming",
         "safety.c",
-        "STATUS_DEAD_MAN;\n    end_ticks(last_tick);",
-        "STATUS_DEAD_MAN;",
+        "self->ticks_are_over && (int16_t)(answers_tick",
+        "false && (0",
         "safety",
     ),
-    Row("latch", "safety.c", "latch != LATCH_NONE || ", "", "safety"),
+    Row("copies from before a dead-man stop", "safety.c", "  end_ticks(self, self->last_tick);\n", "", "safety"),
+    Row("latch", "safety.c", "self->latch != LATCH_NONE || ", "", "safety"),
     Row("longest time to live", "safety.c", "time_to_live > TIME_TO_LIVE_MAX", "false", "safety"),
-    Row("arm names the latch that it ends", "safety.c", "known_latches != latches", "false", "safety"),
-    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - deadline) >= 0", "false", "safety"),
+    Row("arm names the latch that it ends", "safety.c", "known_latches != self->latches", "false", "safety"),
+    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - self->deadline) >= 0", "false", "safety"),
     Row("no arming below the supply's minimum", "safety.c", "supply_low() || ", "", "safety"),
     Row("no arming before the supply is measured", "safety.c", "|| supply_voltage() == 0", "", "safety"),
     Row("a low supply latches", "safety.c", "if (supply_low()) {", "if (false) {", "safety"),
