@@ -5,9 +5,11 @@ from __future__ import annotations
 import random
 import struct
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from elftools.elf.elffile import ELFFile
 
 from avr_image import build, disassembly
 from boebot.errors import TimingError
@@ -100,6 +102,21 @@ def test_an_image_without_lines_has_none(tmp_path: Path) -> None:
     path = build(tmp_path, PROGRAM)
     assert read_image(path).lines == {}
     assert load_program(path).where(0x1A2).startswith("0x01A2 (in ")
+
+
+def test_debugging_information_with_addresses_of_two_bytes_gives_no_lines(tmp_path: Path) -> None:
+    """As clang writes it: the address size is byte 10 of a unit's header (DWARF 4, section 7.5.1.1)."""
+    path = build(tmp_path, PROGRAM, "-gdwarf-4")
+    plain = read_image(path)
+    with path.open("rb") as stream:
+        section = ELFFile(stream).get_section_by_name(".debug_info")
+        assert section is not None
+        start = section["sh_offset"]
+    data = bytearray(path.read_bytes())
+    assert data[start + 10] == 4 and plain.lines
+    data[start + 10] = 2
+    path.write_bytes(data)
+    assert read_image(path) == replace(plain, lines={})
 
 
 def test_an_image_without_symbols_is_followed_the_same(tmp_path: Path) -> None:

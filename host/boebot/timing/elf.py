@@ -98,10 +98,19 @@ def _image(path: Path, elf: ELFFile) -> Image:
         variables=_variables(elf),
         ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
         stack_start=stack_start,
-        lines=source_lines(elf, len(code)),
+        lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
         bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
     )
+
+
+def _lines(elf: ELFFile, end: int) -> dict[int, str]:
+    """The source lines; none where the debugging information is not one that pyelftools reads, as clang's for the AVR
+    with its addresses of two bytes. The program is all the same what it is."""
+    try:
+        return source_lines(elf, end)
+    except DAMAGE:
+        return {}
 
 
 def _flash(path: Path, elf: ELFFile) -> tuple[bytes, int]:
