@@ -282,6 +282,9 @@ void encoder_poll(void) {
   if (stopped) {
     go_on(head);
   }
+  if (returning != 0) {
+    take_back();
+  }
 }
 
 /* The schedule_now() of a stamp: not later than `now`, and less than 2^16 cycles before it. */
@@ -315,9 +318,6 @@ void encoder_update(void) {
     other_edge = time_of(other_stamp, now);
     other = (int32_t)(other_edge - other_from) >= 0 ? SEEN : AWAITED;
     listen();
-  }
-  if (returning != 0) {
-    take_back();
   }
 }
 

@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import ENTRY, Blocked
-from boebot.timing.constants import Context
+from boebot.timing.constants import Context, Known
 from boebot.timing.latency import Latencies
 from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
 from boebot.timing.loops import Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
-from boebot.timing.program import Function, Program, TaskRow
+from boebot.timing.program import Block, Function, Program, TaskRow
 from boebot.timing.response import Piece, Schedule, Source
 from boebot.timing.taken import Taken
 from boebot.timing.wcet import Bound, WorstCase
@@ -261,10 +261,38 @@ def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> i
     known = given.inside(main)
     function = known.function
     loops = [loop for loop in _loops(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
+    return sum(_once(loop, given, known) for loop in loops)
+
+
+def _once(loop: Loop[int], given: Given, known: Known) -> int:
+    """Every block of a loop once. A loop within it that sleeps waits for work, and so counts once too; others with all
+    their passes.
+
+    Raises:
+        TimingError: one of these has no bound.
+    """
+    ways = {node: given.ways(known.function.blocks[node], known) for node in loop.nodes}
     cycles = 0
-    for start in frozenset[int]().union(*(loop.nodes for loop in loops)):
-        cycles += max(way.cycles for way in given.ways(function.blocks[start], known))
-    return cycles
+    for inner in loop.inner:
+        if any(_sleeps(known.function.blocks[node]) for node in inner.nodes):
+            cycles += _once(inner, given, known)
+        else:
+            inside = {node: [_within(way, inner.nodes) for way in ways[node]] for node in inner.nodes}
+            walk = longest(Graph(inner.header, inside, given.program.where, given.marks(known.function.entry)))
+            if walk is None:
+                raise TimingError(f"the loop at {given.program.where(inner.header)} in the main loop never ends")
+            cycles += walk.cycles
+    own = loop.nodes.difference(*(inner.nodes for inner in loop.inner))
+    return cycles + sum(max(way.cycles for way in ways[node]) for node in own)
+
+
+def _within(way: Way[int], nodes: Collection[int]) -> Way[int]:
+    """A way that leaves the graph where it leaves these nodes."""
+    return way if way.to in nodes else replace(way, to=None)
+
+
+def _sleeps(block: Block) -> bool:
+    return any(instruction.mnemonic == "sleep" for instruction in block.instructions)
 
 
 def _loops(function: Function) -> list[Loop[int]]:
