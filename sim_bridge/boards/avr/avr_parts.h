@@ -364,10 +364,10 @@ typedef struct avr_board {
 
 /* avr_run.c */
 board_state run_until(avr_board *b, uint64_t until);
-/* The core has stopped, or sleeps, before the instruction at `pc`; false: it cannot go on. */
-bool core_stopped(avr_board *b, uint32_t pc);
-void restart(avr_board *b);   /* for the causes in `reset_wanted` */
-void hear_core(avr_board *b); /* what simavr's core tells, from each of its resets on */
+bool core_stopped(avr_board *b);           /* because it sleeps, or not; false: it cannot go on */
+uint64_t next_of_simavr(const avr_t *avr); /* when the next of simavr's own timers is due, or NEVER */
+void restart(avr_board *b);                /* for the causes in `reset_wanted` */
+void hear_core(avr_board *b);              /* what simavr's core tells, from each of its resets on */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
 void raise_flag(avr_board *b, uint8_t vector);
 void clear_flag(avr_board *b, uint8_t vector);
