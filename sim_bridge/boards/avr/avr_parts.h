@@ -345,6 +345,7 @@ typedef struct avr_board {
   char fault[160];
   uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
   uint32_t image_end;            /* behind the last byte of flash that the image fills */
+  bool one_by_one;               /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
   flag_register flag_registers[FLAG_REGISTERS];

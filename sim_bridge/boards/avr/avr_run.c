@@ -263,9 +263,7 @@ void restart(avr_board *b) {
 
 static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-uint64_t next_of_simavr(const avr_t *avr) {
-  return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER;
-}
+uint64_t next_of_simavr(const avr_t *avr) { return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER; }
 
 bool core_stopped(avr_board *b) {
   avr_t *avr = b->avr;
