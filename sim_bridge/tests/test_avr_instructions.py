@@ -1,5 +1,5 @@
-"""The instructions that the emulated ATmega328P executes without simavr's core: each does the same as there, in the same
-time, whatever the registers hold; and a whole firmware does, recorded or not."""
+"""The instructions that the emulated ATmega328P executes without simavr's core: each does the same as there, in the
+same time, whatever the registers hold; and a whole firmware does, and what is recorded of it."""
 
 from __future__ import annotations
 
@@ -20,10 +20,16 @@ WORDS = 12_000
 RAM = range(0x100, 0x900)
 # What would lead elsewhere, sleep, write program memory or let the outside in: jumps back and returns have tests of
 # their own; interrupts are in the firmware's.
-ELSEWHERE = frozenset(
-    "rjmp rcall jmp call ijmp eijmp icall eicall ret reti sleep break spm elpm out sbi cbi sei wdr".split()
-)
+ELSEWHERE = frozenset(("rjmp", "rcall", "jmp", "call", "ijmp", "eijmp", "icall", "eicall", "ret", "reti"))
+ELSEWHERE |= frozenset(("sleep", "break", "spm", "elpm", "out", "sbi", "cbi", "sei", "wdr"))
 IN_SREG = 0xB60F
+END = """
+  .rept 16
+  nop
+  .endr
+  ldi r16, 0xA5
+1: rjmp 1b
+"""
 
 
 def opcodes() -> list[int]:
@@ -39,7 +45,7 @@ def opcodes() -> list[int]:
 
 
 def words(draw: random.Random, plain: list[int]) -> Iterator[int]:
-    """A program that goes forward: any instruction, with pointers that are mostly in RAM, and flags that are looked at."""
+    """A program that goes forward: any instruction, pointers mostly in RAM, flags that are looked at."""
     while True:
         kind = draw.random()
         register = draw.randrange(32)

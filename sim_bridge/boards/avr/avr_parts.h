@@ -1,10 +1,10 @@
 /* avr_parts.h: what the files of the emulated ATmega328P know of each other.
  *
- * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
- * here: run loop and interrupts (avr_run.c), registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
- * avr_timer_count.c), USART
- * (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c),
- * program image (avr_image.c), recorder (avr_spans.c).
+ * simavr (sim_core.c) executes the less common instructions and keeps the data space. Everything that has to do with
+ * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
+ * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
+ * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c),
+ * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
