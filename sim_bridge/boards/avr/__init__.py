@@ -103,7 +103,7 @@ class AvrBoard:
         return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
 
     def one_by_one(self) -> None:
-        """From now on each instruction is executed by itself, and by simavr's core: for tests of what else is faster."""
+        """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
         self._lib.avr_board_one_by_one(self._running)
 
     # ---- recorder ----------------------------------------------------------------------------------------------------

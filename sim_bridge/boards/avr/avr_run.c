@@ -1,9 +1,9 @@
 /* avr_run.c: run loop, interrupts and resets of the emulated ATmega328P.
  *
- * The loop keeps lockstep with the outside: it never waits for the host's clock, counts every cycle, and lets the
- * instructions run exactly to the next event or to the end of the call. An instruction is never split: what is due while it
- * runs happens, at its own cycle, before the next one. Interrupts are taken between instructions: 4 cycles, 4 more from
- * sleep (12.7), and one instruction always runs after SEI, RETI and a write that sets I.
+ * The loop keeps lockstep with the outside: it never waits for the host's clock, counts every cycle, and lets
+ * instructions run exactly to the next event or to the end of the call. An instruction is never split: what is due
+ * while it runs happens, at its own cycle, before the next one. Interrupts are taken between instructions: 4 cycles, 4
+ * more from sleep (12.7), and one instruction always runs after SEI, RETI and a write that sets I.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
