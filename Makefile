@@ -23,7 +23,7 @@ export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures format setup clean lock compile_commands.json
+.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures timing format setup clean lock compile_commands.json
 
 help:
 	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
@@ -35,7 +35,8 @@ help:
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
 	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.html"
-	@echo "make pictures  the pictures of the documentation, and the pages of experiments"
+	@echo "make pictures  the pictures of the documentation, and the pages of experiments and of the timing"
+	@echo "make timing    the pages of the timing: table, bounds and measurements, a tick drawn to scale"
 	@echo "make format    format all sources"
 	@echo "make setup     only what run, test and check need; do no more"
 	@echo "make clean     remove everything that was built"
@@ -91,6 +92,13 @@ pictures:
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(PYTHON_VENV) -m tools.experiment_pages
+	@$(MAKE) --no-print-directory timing
+
+timing:
+	@$(SIDE_BY_SIDE) ready-run
+	@$(PYTHON_VENV) -m tools.timing_table --page docs/reference/timing-table.md
+	@$(PYTHON_VENV) -m tools.timing_page --page docs/reference/timing.md
+	@$(PYTHON_VENV) -m tools.shown_output docs/how-to/timing.md
 
 firmware: ready-firmware
 

@@ -18,10 +18,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--on", action="append", help="board under test: native, avr, or a port; may be given again")
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "emulated: needs the pins or the true path that only an emulated board gives")
-
-
 def boards(config: pytest.Config) -> list[str]:
     return config.getoption("--on") or ["native", "avr"]
 

@@ -107,6 +107,13 @@ class MinimalHost:
         self.send(messages.Open(messages.PROTOCOL_VERSION, heard.board_nonce, HOST_NONCE))
         return self.wait_for(messages.Hello, lambda hello: hello.session == self.seed, 0.3, "the session")
 
+    def take_over(self) -> messages.Hello:
+        """Opens another session in place of the one that is open; returns the board's hello in it."""
+        heard = self.hello()
+        self.send(messages.Open(messages.PROTOCOL_VERSION, heard.board_nonce, HOST_NONCE))
+        self.seed, self.number = heard.board_nonce ^ HOST_NONCE, 0
+        return self.wait_for(messages.Hello, lambda hello: hello.session == self.seed, 0.3, "the session")
+
     def ask(self, kind: type[Any], *fields: int, within_s: float = 1.0) -> messages.Answer:
         """Sends a numbered request, keeps the session open, returns the answer."""
         number = self.begin(kind, *fields)

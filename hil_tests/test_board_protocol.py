@@ -59,6 +59,7 @@ FROM_BOARD: dict[int, tuple[str, str, str]] = {
         "<10H",
         "good bad resynchronised retransmitted duplicate overrun dropped late refused deferred",
     ),
+    0x93: ("task_time", "<BH", "task longest"),
     0xA0: ("answer", "<HBi", "number status value"),
     0xA1: ("event", "<HBHI", "number kind value time"),
     0xB0: ("clock_answer", "<HI", "token time"),
@@ -66,6 +67,7 @@ FROM_BOARD: dict[int, tuple[str, str, str]] = {
 MOTORS_ENABLED, DEAD_MAN, LATCHED = 1, 2, 4  # status bits
 START, STOP_COMMAND, SESSION_ENDED = 1, 2, 3  # latch
 OK, UNKNOWN_PARAMETER, OUT_OF_RANGE, LATCHED_AGAIN = 0, 1, 2, 5  # answer_status
+TASKS = 18
 WHISKERS, LATCH, DEAD_MAN_EVENT = 0, 1, 2  # event_kind
 TIME_TO_LIVE, TRACK_WIDTH = 1, 12  # parameters
 
@@ -311,6 +313,23 @@ def test_session_opens_and_telemetry_comes_every_tick_in_it(host: Host) -> None:
     sequence = [message.sequence for message in host.messages]
     assert all((later - earlier) & 0xFF == 1 for earlier, later in itertools.pairwise(sequence))
     assert host.refused == 0
+
+
+def test_times_of_tasks_and_counters_take_turns_of_four_ticks(host: Host) -> None:
+    host.hello()
+    host.open()
+    host.live(200 * TICK)
+    own = [message for message in host.messages if message.name in ("task_time", "counters")]
+    assert len(own) >= 49
+    turns = [message.task if message.name == "task_time" else TASKS for message in own]
+    assert turns == [(turns[0] + n) % (TASKS + 1) for n in range(len(turns))]
+    for earlier, later in itertools.pairwise(own):
+        assert later.cycle - earlier.cycle == pytest.approx(4 * TICK, abs=TICK / 2)
+    longest = dict.fromkeys(range(TASKS), 0)
+    for message in own:
+        if message.name == "task_time":
+            assert message.longest >= longest[message.task]
+            longest[message.task] = message.longest
 
 
 def test_frames_of_no_session_and_of_another_one_do_nothing(host: Host) -> None:
@@ -575,7 +594,7 @@ def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host, setpoint
         host.run(len(wire) * 320)
     after = host.board.counters()
     assert after["overruns"] == before["overruns"]
-    host.live(70 * TICK)
+    host.live(80 * TICK)
     telemetry = [message for message in host.all("telemetry") if message.tick >= first.tick]
     assert [message.tick for message in telemetry] == list(range(first.tick, first.tick + len(telemetry)))
     assert telemetry[-1].overruns == 0

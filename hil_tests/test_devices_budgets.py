@@ -27,5 +27,5 @@ def test_each_task_keeps_its_budget(pin_map: str) -> None:
 
 
 def test_budgets_of_the_fullest_slot_leave_half_of_it() -> None:
-    """Interrupts of a saturated line take the other half at most (ANCHORS, section 5)."""
+    """Interrupts of a saturated line and four encoders take the other half at most, by their shares in tasks.def."""
     assert fullest_slot(TABLE) <= 20_000

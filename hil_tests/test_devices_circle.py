@@ -1,6 +1,6 @@
 """The slow devices around the whole circle: arena, model, part, pin, firmware, telemetry, host.
 
-Expected values come from the arena's geometry and the data sheets' curves (HARDWARE sections 4 to 6), without noise
+Expected values come from the arena's geometry and the data sheets' curves (Parallax, Sharp), without noise
 unless a test is about it.
 """
 
@@ -90,7 +90,7 @@ def test_analog_infrared_holds_its_value_until_the_next_measurement(board_url: s
 
 
 def decay_us(x: float, y: float, heading: float, lamps: list[Light]) -> float:
-    """1.5 ms at L = 1; L = ambient + sum P max(0, cos theta) / (d0^2 + d^2) (THEORY section 1.9)."""
+    """1.5 ms at L = 1; L = ambient + sum P max(0, cos theta) / (d0^2 + d^2) (world/sensors/light.h)."""
     light = imperfections.LIGHT_AMBIENT
     for lamp in lamps:
         dx, dy = lamp.x_m - x, lamp.y_m - y

@@ -1,6 +1,7 @@
 """Wheels, battery and supply around the whole circle: pulses, servos, body, floor, encoders, pack, telemetry, host.
 
-Expected values are closed forms of the servo's curve (HARDWARE section 3), of Coulomb friction and of the pack.
+Expected values are closed forms of the servo's measured curve (docs/reference/imperfections.md), of Coulomb friction
+and of the pack.
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ def test_nobody_waits_for_ever(bounds: dict[str, int]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "seconds"), [("figures", 0.2), ("saturated", 0.2), ("noise", 0.2), ("everything", 0.5)]
+    ("scenario", "seconds"),
+    [("figures", 0.2), ("saturated", 0.2), ("noise", 0.2), ("faults", 0.2), ("everything", 0.5)],
 )
 def test_no_interrupt_waits_longer_than_its_bound(bounds: dict[str, int], scenario: str, seconds: float) -> None:
     found = run(IMAGE, robots.load_robot("shieldbot"), scenario, seconds, seed=7)

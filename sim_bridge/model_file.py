@@ -21,7 +21,7 @@ from sim_bridge.model import SIDES, VehicleModel, beam
 from sim_bridge.parameters import FINITE, number
 from sim_bridge.switches import idealised
 
-STEP_S: Final = 0.01  # THEORY section 2.4
+STEP_S: Final = 0.01  # notes, section 3.2.6
 
 
 def vehicle_model(
@@ -223,7 +223,7 @@ def arsim(
     odometer_sigma: float | None = None,
     compass_sigma: float | None = None,
 ) -> VehicleModel:
-    """The notes' default robot, by protocol/robots/arsim.toml (THEORY 1.2, 1.5, 1.10, 3.6).
+    """The notes' default robot, by protocol/robots/arsim.toml (notes, sections 3.2.3, 3.2.4, Fig. 3.6, appendix A).
 
     3 kg, two 12 V DC motors, IR sensors of three rays on the body's circle at +-0.7854 rad, odometer, compass.
     Readings: infrared_left, infrared_right (infrared_0 ... where there are not two), odometer (x, y, heading), compass.

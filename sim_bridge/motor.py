@@ -1,4 +1,4 @@
-"""Motors of the notes by themselves, sections 1.2 and 1.10 to 1.12 of THEORY: for plots, exercises and vehicles.
+"""Motors of the notes by themselves, sections 1.2.3 and 3.2.4: for plots, exercises and vehicles.
 
 `DCMotor` (1.1)-(1.10), `RegulatedMotor` (3.15) and `ServoMotor`, a servo modified for continuous rotation, drive a
 `VehicleModel`; a `PositionServo` turns to an angle. Each has its parameters as a C struct of sim_bridge/world, SI units

@@ -1,4 +1,4 @@
-"""Tables of readings: noise as the real sensor has it, rule S3 of THEORY section 1.3 (world/sensors/table_noise.h).
+"""Tables of readings: noise as the real sensor has it, section 3.2.2 of the notes (world/sensors/table_noise.h).
 
 Readings of one real sensor are recorded at some distances and angles of incidence. A simulated reading draws one of
 them from each of the four bins around the question and interpolates. One table per sensor keeps what makes equal

@@ -1,8 +1,8 @@
 """A simulation as bytes: what it was built of, all that came from outside up to a cycle, and a hash of its state.
 
-A run is a function of these (ARCHITECTURE: "a function of brain, robot, arena and seed"), so that the state is not
-written down but gone to again: the inputs are played to a simulation that was built alike, and the hash tells that it
-came to the same state. The layout is
+A run is a function of these, bit for bit (docs/explanation/world.md), so that the state is not written down but gone to
+again: the inputs are played to a simulation that was built alike, and the hash tells that it came to the same state.
+The layout is
 
     MAGIC, length of the heading (4 bytes, little-endian), heading (JSON), inputs (loop_inputs.c), SHA-256 of all that
 """

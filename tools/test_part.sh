@@ -1,7 +1,7 @@
 #!/bin/sh
 # One part of all tests: tools/test_part.sh PART [ARGUMENT OF PYTEST...]. PART is a folder or `sanitized`
-# (tools/test_sanitized.sh). Before those of `tools` run the firmware's units on this computer, plain and with sanitizers:
-# both use PlatformIO, which has one folder. Says how the part ended; more only if it failed.
+# (tools/test_sanitized.sh). Before those of `tools` run the firmware's units on this computer, those of the usual pin map
+# with sanitizers: both use PlatformIO, which has one folder. Says how the part ended; more only if it failed.
 set -eu
 cd "$(dirname "$0")/.."
 part=$1
@@ -14,7 +14,7 @@ run() {
   case $part in
     sanitized) tools/test_sanitized.sh ;;
     tools)
-      tools/pio test -e native -e native_quad -e native_sanitized >"$units" 2>&1 || { cat "$units" && return 1; }
+      tools/pio test -e native_sanitized -e native_quad -e native_boebot >"$units" 2>&1 || { cat "$units" && return 1; }
       grep ' test cases: ' "$units" && of_folder "$@"
       ;;
     *) of_folder "$@" ;;

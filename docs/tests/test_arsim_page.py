@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 PAGE = (Path(__file__).resolve().parents[1] / "reference" / "arsim.md").read_text()
-# THEORY section 3.6: 29 functions, the other name of one of them, and the script of the test run.
+# Appendix A of the notes: 29 functions, the other name of one of them, and the script of the test run.
 LISTED = """
 AddMotionResults BrainStep CalibrateOdometer CheckForCollisions CreateArena CreateArenaObject CreateBrain CreateCompass
 CreateIRSensor CreateMotor CreateOdometer CreateRobot GetCompassReading GetDistanceToLineAlongRay

@@ -30,6 +30,7 @@ static uint8_t ages[ANALOG_INPUTS]; /* ticks */
 static uint8_t input;               /* to which the converter is joined */
 static uint8_t last_device;         /* the input before the bandgap */
 static bool converting;
+static bool tick_begins;   /* and the ages are still to grow by it */
 static uint16_t joined_at; /* hal_time() */
 
 static uint16_t now(void) {
@@ -53,15 +54,12 @@ static bool is_on(uint8_t device) {
 
 /* The bandgap every other time, between them the devices in turn. */
 static uint8_t next_input(void) {
-  if (input != ANALOG_BANDGAP) {
+  const bool battery = is_on(ANALOG_BATTERY);
+  const bool infrared = is_on(ANALOG_INFRARED);
+  if (input != ANALOG_BANDGAP || (!battery && !infrared)) {
     return ANALOG_BANDGAP;
   }
-  const uint8_t other = last_device == ANALOG_BATTERY ? ANALOG_INFRARED : ANALOG_BATTERY;
-  if (is_on(other)) {
-    last_device = other;
-  } else if (!is_on(last_device)) {
-    return ANALOG_BANDGAP;
-  }
+  last_device = battery && (last_device != ANALOG_BATTERY || !infrared) ? ANALOG_BATTERY : ANALOG_INFRARED;
   return last_device;
 }
 
@@ -71,10 +69,11 @@ void analog_start(void) {
     ages[i] = AGE_NEVER;
   }
   last_device = ANALOG_INFRARED;
+  HAL_ZERO(tick_begins);
   join(ANALOG_BANDGAP);
 }
 
-static void grow_older(uint8_t device) {
+static inline __attribute__((always_inline)) void grow_older(uint8_t device) {
   if (!is_on(device)) {
     ages[device] = AGE_NEVER;
     results[device] = 0;
@@ -83,20 +82,25 @@ static void grow_older(uint8_t device) {
   }
 }
 
+/* Takes what the converter has, or does all else: so no slot has both, however long the converter has been kept waiting. */
 void analog_task(void) {
   if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
-    grow_older(ANALOG_BATTERY);
-    grow_older(ANALOG_INFRARED);
+    tick_begins = true;
   }
-  if (!converting) {
-    if ((uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
-      converting = true;
-      hal_analog_convert();
-    }
-  } else if (!hal_analog_busy()) {
+  if (converting && !hal_analog_busy()) {
     results[input] = hal_analog_result();
     ages[input] = 0;
     join(next_input());
+    return;
+  }
+  if (tick_begins) {
+    tick_begins = false;
+    grow_older(ANALOG_BATTERY);
+    grow_older(ANALOG_INFRARED);
+  }
+  if (!converting && (uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
+    converting = true;
+    hal_analog_convert();
   }
 }
 

@@ -1,14 +1,13 @@
 /* buzzer.c: see buzzer.h. */
 #include "buzzer.h"
 
-#include "bounds.h"
+#include "division.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/parameters.h"
 #include "pins.h"
 
 #define START_FREQUENCY 2000u /* Hz */
-#define STEPS_MAX 4u          /* of a division; the finest clock's */
 
 static uint8_t left;  /* ticks of the tone still to come */
 static uint8_t token; /* of the last tone */
@@ -23,32 +22,22 @@ void buzzer_start(void) {
   HAL_ZERO(is_start);
 }
 
-/* Half a period in counts of a clock, clock / (2 * frequency), rounded down: a division of 16 bits and `steps` of a longer
- * one by hand, as in supply.c. clock / 2 = half_rate * 2^steps. */
-static uint8_t half_period(uint16_t half_rate, uint8_t steps, uint16_t frequency) {
-  uint16_t quotient = half_rate / frequency;
-  uint16_t rest = half_rate % frequency;
-  BOUNDED(STEPS_MAX, for (; steps > 0; steps--)) {
-    quotient = (uint16_t)(quotient << 1);
-    rest = (uint16_t)(rest << 1);
-    if (rest >= frequency) {
-      rest = (uint16_t)(rest - frequency);
-      quotient++;
-    }
-  }
-  return (uint8_t)quotient;
+/* Sounds the tone in a clock of half_rate * 2^(places + 1) Hz: half a period is clock / (2 * frequency) of its counts, rounded
+ * down. */
+static void sound_by(uint8_t clock, uint16_t half_rate, uint8_t places, uint16_t frequency) {
+  hal_tone_start(clock, (uint8_t)divide(half_rate, frequency, places));
 }
 
 /* The fastest clock in which half a period is 255 counts at most. */
 static void sound(uint16_t frequency) {
   if (frequency > 3906u) {
-    hal_tone_start(HAL_TONE_BY_8, half_period(62500u, STEPS_MAX, frequency)); /* 1 MHz */
+    sound_by(HAL_TONE_BY_8, 62500u, 4, frequency); /* 2 MHz */
   } else if (frequency > 488u) {
-    hal_tone_start(HAL_TONE_BY_64, half_period(62500u, 1, frequency)); /* 125 kHz */
+    sound_by(HAL_TONE_BY_64, 62500u, 1, frequency); /* 250 kHz */
   } else if (frequency > 122u) {
-    hal_tone_start(HAL_TONE_BY_256, half_period(31250u, 0, frequency));
+    sound_by(HAL_TONE_BY_256, 31250u, 0, frequency);
   } else {
-    hal_tone_start(HAL_TONE_BY_1024, half_period(7812u, 0, frequency));
+    sound_by(HAL_TONE_BY_1024, 7812u, 0, frequency);
   }
 }
 

@@ -22,80 +22,86 @@ static const uint8_t data_register[] = {3}; /* x, z, y, the high byte first */
 _Static_assert(sizeof settings <= TWO_WIRE_WRITE_MAX && DATA_BYTES <= TWO_WIRE_READ_MAX, "a transfer has room");
 
 enum { OFF, WAITING, SETTING, READING, FREEING };
-static uint8_t state;
-static bool is_set;    /* the device has its settings */
-static uint8_t wait;   /* ticks until the next transfer */
-static uint8_t pulses; /* of the clock, twice: low and high again */
-static compass_reading reading;
 
-static void forget(uint8_t status) {
-  reading = (compass_reading){.age = AGE_NEVER, .status = status};
-  is_set = false;
+typedef struct {
+  uint8_t state;
+  bool is_set;    /* the device has its settings */
+  uint8_t wait;   /* ticks until the next transfer */
+  uint8_t pulses; /* of the clock, twice: low and high again */
+  compass_reading reading;
+} compass_state;
+
+static compass_state own;
+
+static void forget(compass_state *self, uint8_t status) {
+  self->reading = (compass_reading){.age = AGE_NEVER, .status = status};
+  self->is_set = false;
 }
 
 void compass_start(void) {
+  compass_state *const self = HAL_NEAR(&own);
   HAL_PIN_PULL_UP(COMPASS_SDA);
   HAL_PIN_PULL_UP(COMPASS_SCL);
-  state = OFF;
-  wait = 0;
-  forget(COMPASS_STATUS_OFF);
+  self->state = OFF;
+  self->wait = 0;
+  forget(self, COMPASS_STATUS_OFF);
 }
 
 static int16_t word(const uint8_t *bytes) { return (int16_t)(uint16_t)((uint16_t)bytes[0] << 8 | bytes[1]); }
 
-static void take(void) {
+static void take(compass_state *self) {
   const uint8_t *bytes = two_wire_bytes();
-  reading.x = word(bytes);
-  reading.z = word(bytes + 2);
-  reading.y = word(bytes + 4);
-  reading.age = 0;
-  reading.status = COMPASS_STATUS_OK;
+  self->reading.x = word(bytes);
+  self->reading.z = word(bytes + 2);
+  self->reading.y = word(bytes + 4);
+  self->reading.age = 0;
+  self->reading.status = COMPASS_STATUS_OK;
 }
 
-static void begin(void) {
-  if (is_set) {
-    state = READING;
+static void begin(compass_state *self) {
+  if (self->is_set) {
+    self->state = READING;
     two_wire_begin(ADDRESS, data_register, sizeof data_register, DATA_BYTES);
   } else {
-    state = SETTING;
+    self->state = SETTING;
     two_wire_begin(ADDRESS, settings, sizeof settings, 0);
   }
 }
 
 /* A transfer was begun in the tick before: it takes 1 ms. */
-static void finish(void) {
+static void finish(compass_state *self) {
   switch (two_wire_ended()) {
     case TWO_WIRE_OK:
-      if (state == READING) {
-        take();
+      if (self->state == READING) {
+        take(self);
       }
-      is_set = true;
+      self->is_set = true;
       break;
     case TWO_WIRE_NO_ANSWER:
-      reading.status = COMPASS_STATUS_NO_ANSWER;
-      is_set = false;
+      self->reading.status = COMPASS_STATUS_NO_ANSWER;
+      self->is_set = false;
       break;
     case TWO_WIRE_FAILED:
-      reading.status = COMPASS_STATUS_FAILED;
-      is_set = false;
+      self->reading.status = COMPASS_STATUS_FAILED;
+      self->is_set = false;
       break;
     default:
       two_wire_stop();
-      reading.status = COMPASS_STATUS_BUS_STUCK;
-      is_set = false;
-      pulses = 0;
-      state = FREEING;
+      self->reading.status = COMPASS_STATUS_BUS_STUCK;
+      self->is_set = false;
+      self->pulses = 0;
+      self->state = FREEING;
       return;
   }
-  state = WAITING;
+  self->state = WAITING;
 }
 
 /* One edge of the clock a tick, low or let go, until the data line is free after a pulse, or after all of them. */
-static void free_bus(void) {
-  if (pulses % 2u == 0) {
-    if (pulses == 2u * CLOCK_PULSES || (pulses != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
+static void free_bus(compass_state *self) {
+  if (self->pulses % 2u == 0) {
+    if (self->pulses == 2u * CLOCK_PULSES || (self->pulses != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
       two_wire_start();
-      state = WAITING;
+      self->state = WAITING;
       return;
     }
     HAL_PIN_LOW(COMPASS_SCL);
@@ -103,46 +109,47 @@ static void free_bus(void) {
   } else {
     HAL_PIN_PULL_UP(COMPASS_SCL);
   }
-  pulses++;
+  self->pulses++;
 }
 
-static void switch_off(void) {
-  if (state != OFF) {
+static void switch_off(compass_state *self) {
+  if (self->state != OFF) {
     two_wire_stop();
     compass_start();
   }
 }
 
 void compass_task(void) {
-  if (reading.age < AGE_NEVER) {
-    reading.age++;
+  compass_state *const self = HAL_NEAR(&own);
+  if (self->reading.age < AGE_NEVER) {
+    self->reading.age++;
   }
-  if (wait > 0) {
-    wait--;
+  if (self->wait > 0) {
+    self->wait--;
   }
   if (!parameters_device_on(DEVICES_COMPASS)) {
-    switch_off();
+    switch_off(self);
     return;
   }
-  switch (state) {
+  switch (self->state) {
     case OFF:
       two_wire_start();
-      state = WAITING;
+      self->state = WAITING;
       break;
     case SETTING:
     case READING:
-      finish();
+      finish(self);
       break;
     case FREEING:
-      free_bus();
+      free_bus(self);
       break;
     default:
       break;
   }
-  if (state == WAITING && wait == 0) {
-    wait = PERIOD;
-    begin();
+  if (self->state == WAITING && self->wait == 0) {
+    self->wait = PERIOD;
+    begin(self);
   }
 }
 
-const compass_reading *compass_read(void) { return &reading; }
+const compass_reading *compass_read(void) { return &own.reading; }

@@ -55,9 +55,6 @@ static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint
 #define OTHER_BIT 0u
 #endif
 
-#define POLL_MOST 8u /* changes that one call works off: as many as make it due */
-_Static_assert(POLL_MOST *HAL_CHANGE_BYTES <= ENCODER_DUE_BYTES, "what is not due leaves nothing behind");
-
 /* Noise is blamed on the lines that did this much of the last changes. */
 #define LOOKED_AT 16u
 #define SHARE_OF_STORM 2u /* of at least HAL_CHANGES_STORM changes in 0.05 ms */
@@ -65,13 +62,15 @@ _Static_assert(POLL_MOST *HAL_CHANGE_BYTES <= ENCODER_DUE_BYTES, "what is not du
 
 /* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
-  uint16_t stamp, stamp_before;  /* of the last two edges */
-  uint8_t stamped;               /* edges since encoder_update() */
-  int8_t steps;                  /* and by how much they change the count */
-  uint8_t edges;                 /* in this tick, at most 2 */
-  uint8_t silence;               /* ticks since the last edge, at most SILENT_TICKS */
-  uint8_t fired[LINES_PER_SIDE]; /* edges of the line in this tick */
-  uint32_t last, gap;            /* time of the last edge, and since the edge before */
+  uint16_t stamp, stamp_before; /* of the last two edges */
+  uint8_t stamped;              /* edges since encoder_update() */
+#if ENCODER_LINES == 2
+  int8_t steps; /* and by how much they change the count */
+#endif
+  uint8_t edges;                /* in this tick, at most 2 */
+  uint8_t silence;              /* ticks since the last edge, at most SILENT_TICKS */
+  uint8_t left[LINES_PER_SIDE]; /* edges of the line in this tick after which it is masked; 0: it is */
+  uint32_t last, gap;           /* time of the last edge, and since the edge before */
   int32_t count;
   encoder_reading reading;
 } wheel;
@@ -80,8 +79,7 @@ static wheel wheels[SIDES];
 static uint8_t before;    /* port bits of the last change worked off */
 static uint8_t watched;   /* port bits of the lines that count */
 static uint8_t returning; /* port bits of those that do again as soon as take_back() can */
-static uint8_t limit;     /* edges of a line in a tick above which it is masked */
-static uint8_t phantoms;  /* interrupts of this tick without a change to be seen: pulses too short */
+static uint8_t phantoms;  /* the same as a line's `left`, of interrupts without a change to be seen: pulses too short */
 
 /* The fall of the other line: */
 static enum { NOT_AWAITED, AWAITED, STAMPED, SEEN } other;
@@ -124,43 +122,12 @@ static __attribute__((noinline)) void see_other(uint16_t time) {
   listen();
 }
 
-/* What a change of the port means to one wheel, of whose lines `changed` have changed and `bits` are high. Forward are the
- * edges of A after which the lines differ and those of B after which they do not; an edge of both is a step of 0. Returns
- * whether a line has fired too often. */
-static __attribute__((noinline)) bool see_wheel(wheel *w, uint8_t changed, uint8_t bits, uint16_t time) {
-  const uint8_t most = limit;
-  bool over = false;
-  w->stamp_before = w->stamp;
-  w->stamp = time;
-  w->stamped++;
-#if ENCODER_LINES == 2
-  if (changed != (A | B)) {
-    if (((bits ^ bits >> 1 ^ changed) & A) == 0) {
-      w->steps++;
-    } else {
-      w->steps--;
-    }
-  }
-  if ((changed & A) != 0) {
-    over = ++w->fired[0] > most;
-  }
-  if ((changed & B) != 0 && ++w->fired[1] > most) {
-    over = true;
-  }
-#else
-  (void)changed, (void)bits;
-  w->steps++;
-  over = ++w->fired[0] > most;
-#endif
-  return over;
-}
-
 /* Masks lines until the next tick and has them reported. */
 static __attribute__((noinline)) void convict(uint8_t lines) {
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
       if ((lines & line_bit[side * LINES_PER_SIDE + i]) != 0) {
-        wheels[side].fired[i] = (uint8_t)(limit + 1u);
+        wheels[side].left[i] = 0;
       }
     }
   }
@@ -173,16 +140,44 @@ static __attribute__((noinline)) void keep_limit(void) {
   uint8_t lines = 0;
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-      if (wheels[side].fired[i] > limit) {
+      if (wheels[side].left[i] == 0) {
         lines |= line_bit[side * LINES_PER_SIDE + i];
       }
     }
   }
-  if (phantoms > limit) { /* nobody knows whose */
+  if (phantoms == 0) { /* nobody knows whose */
     lines = watched;
-    phantoms = 0;
   }
   convict(lines);
+}
+
+/* What a change of the port means to one wheel, of whose lines `changed` have changed and `bits` are high. Forward are the
+ * edges of A after which the lines differ and those of B after which they do not; an edge of both is a step of 0, and the
+ * limit of A leaves its last edge to one of A alone. */
+static __attribute__((noinline)) void see_wheel(wheel *w, uint8_t changed, uint8_t bits, uint16_t time) {
+  w->stamp_before = w->stamp;
+  w->stamp = time;
+  w->stamped++;
+  uint8_t *left = &w->left[0];
+#if ENCODER_LINES == 2
+  if (changed == (A | B)) {
+    if (*left > 1u) {
+      --*left;
+    }
+  } else if (((bits ^ bits >> 1 ^ changed) & A) == 0) {
+    w->steps++;
+  } else {
+    w->steps--;
+  }
+  if ((changed & B) != 0) {
+    left++;
+  }
+#else
+  (void)changed, (void)bits;
+#endif
+  if (--*left == 0) {
+    keep_limit();
+  }
 }
 
 /* Adds the edges of each line between two changes. The other line is told from them like one of theirs. */
@@ -222,64 +217,60 @@ static uint8_t noisy_lines(uint8_t head) {
 }
 
 /* After a stop: masks the noise and listens to the rest. What the others did meanwhile is a change like any other, with
- * room in the ring, which is empty. */
+ * room in the ring, which is empty. It is looked at when the interrupt already listens: an edge in between would be seen
+ * by neither, and the next one, back to the level before, would not be one. */
 static __attribute__((noinline)) void go_on(uint8_t head) {
   const uint8_t lines = noisy_lines(head);
   volatile hal_change *const missed = hal_change_after(head);
   missed->time = (uint16_t)schedule_now();
-  missed->bits = PORT_BITS();
   missed->close = 0;
-  head = (uint8_t)(head + HAL_CHANGE_BYTES);
-  if (head == 0) { /* the last place is also the first */
-    hal_changes[0] = hal_changes[HAL_CHANGES];
-  }
-  hal_changes_head = head;
   other = NOT_AWAITED;
   hal_changes_resume();
+  HAL_ATOMIC {
+    hal_pin_change_mask((uint8_t)(watched & (uint8_t)~lines));
+    missed->bits = PORT_BITS();
+    hal_changes_head = (uint8_t)(head + HAL_CHANGE_BYTES);
+  }
   convict(lines);
 }
 
-/* Lines that were masked count again, from their present level on: changes that wait for it show their noise, and have it
- * taken out; if too many wait, later. */
+/* Lines that were masked count again, from their present level on; as long as changes wait, which show their noise, later. */
 static __attribute__((noinline)) void take_back(void) {
-  uint8_t tail = hal_changes_tail;
-  const uint8_t head = hal_changes_head;
-  if ((uint8_t)(head - tail) > POLL_MOST * HAL_CHANGE_BYTES) {
-    return;
+  const uint8_t tail = hal_changes_tail;
+  HAL_ATOMIC {
+    if (hal_changes_head == tail) {
+      before = (uint8_t)((before & (uint8_t)~returning) | (PORT_BITS() & returning));
+      watched |= returning;
+      returning = 0;
+    }
   }
-  const uint8_t others = (uint8_t)~returning;
-  const uint8_t level = PORT_BITS() & returning;
-  BOUNDED(POLL_MOST, for (; tail != head; tail = (uint8_t)(tail + HAL_CHANGE_BYTES))) {
-    volatile hal_change *const change = hal_change_after(tail);
-    change->bits = (change->bits & others) | level;
-  }
-  before = (before & others) | level;
-  watched |= returning;
-  returning = 0;
+  listen();
 }
 
-/* Works off up to POLL_MOST of the changes from `tail` to `head`, and returns the new tail. */
-static inline __attribute__((always_inline)) uint8_t work_off(uint8_t tail, uint8_t head) {
-  const uint8_t counts = watched;
-  const uint8_t end =
-      (uint8_t)(head - tail) < POLL_MOST * HAL_CHANGE_BYTES ? head : (uint8_t)(tail + POLL_MOST * HAL_CHANGE_BYTES);
+void encoder_poll(void) {
+  const uint8_t stopped = hal_changes_stopped(); /* before the head is read: no change comes after it */
+  const uint8_t head = hal_changes_head;
+  uint8_t tail = hal_changes_tail;
   uint8_t was = before;
-  bool over = false;
-  BOUNDED(POLL_MOST, while (tail != end)) {
+  BOUNDED(HAL_CHANGES - 1u, while (tail != head)) {
     const volatile hal_change *const change = hal_change_after(tail);
     const uint16_t time = change->time;
     const uint8_t bits = change->bits;
     tail = (uint8_t)(tail + HAL_CHANGE_BYTES);
+    hal_changes_tail = tail;
     const uint8_t changed = bits ^ was;
-    if (changed == 0 && ++phantoms > limit) {
-      over = true;
+    if (changed == 0) {
+      if (--phantoms == 0) {
+        keep_limit();
+      }
+      continue;
     }
-    const uint8_t edges = changed & counts;
+    const uint8_t edges = changed & watched;
     if ((edges & SIDE_BITS(LEFT)) != 0) {
-      over |= see_wheel(&wheels[LEFT], lines_of(LEFT, edges), lines_of(LEFT, bits), time);
+      see_wheel(&wheels[LEFT], lines_of(LEFT, edges), lines_of(LEFT, bits), time);
     }
     if ((edges & SIDE_BITS(RIGHT)) != 0) {
-      over |= see_wheel(&wheels[RIGHT], lines_of(RIGHT, edges), lines_of(RIGHT, bits), time);
+      see_wheel(&wheels[RIGHT], lines_of(RIGHT, edges), lines_of(RIGHT, bits), time);
     }
     if ((changed & was & OTHER_BIT) != 0 && other == AWAITED) {
       see_other(time);
@@ -287,19 +278,7 @@ static inline __attribute__((always_inline)) uint8_t work_off(uint8_t tail, uint
     was = bits;
   }
   before = was;
-  if (over) {
-    keep_limit();
-  }
-  return tail;
-}
-
-void encoder_poll(void) {
-  const uint8_t stopped = hal_changes_stopped(); /* before the head is read: no change comes after it */
-  const uint8_t tail = hal_changes_tail;
-  const uint8_t head = hal_changes_head;
-  if (tail != head) {
-    hal_changes_tail = work_off(tail, head);
-  } else if (stopped) {
+  if (stopped) {
     go_on(head);
   }
 }
@@ -314,10 +293,14 @@ static __attribute__((noinline)) void update_wheel(wheel *w, uint32_t now) {
   const uint32_t last = time_of(w->stamp, now);
   w->gap = w->stamped >= 2 ? (uint16_t)(w->stamp - w->stamp_before) : last - w->last;
   w->last = last;
+#if ENCODER_LINES == 2
   w->count += w->steps;
+  w->steps = 0;
+#else
+  w->count += w->stamped;
+#endif
   w->edges = w->edges == 0 && w->stamped == 1 ? 1u : 2u;
   w->stamped = 0;
-  w->steps = 0;
 }
 
 void encoder_update(void) {
@@ -332,13 +315,20 @@ void encoder_update(void) {
   }
   if (returning != 0) {
     take_back();
-    listen();
   }
 }
 
 /* Port bits of the lines that count, none if encoders are switched off. */
 static uint8_t lines_on(void) {
   return parameters_device_on(DEVICES_ENCODERS) ? (uint8_t)(SIDE_BITS(LEFT) | SIDE_BITS(RIGHT)) : 0u;
+}
+
+/* A wheel's lines may make as many edges again as the parameter allows; one more masks them. */
+static void begin_tick(wheel *w) {
+  phantoms = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
+  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+    w->left[i] = phantoms;
+  }
 }
 
 void encoder_start(void) {
@@ -354,14 +344,15 @@ void encoder_start(void) {
   HAL_ZERO(hal_changes_head);
   HAL_ZERO(hal_changes_tail);
   hal_changes_resume();
-  HAL_ZERO(phantoms);
   HAL_ZERO(returning);
   HAL_ZERO(other);
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
+    begin_tick(&wheels[side]);
   }
-  limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   before = PORT_BITS();
+  hal_change_at(0)->bits = before; /* the change before the first one; the start-up code has not made the ring zero */
+  hal_change_at(0)->close = 0;
   watched = lines_on();
   listen();
 }
@@ -376,7 +367,7 @@ static uint16_t period_of(uint32_t gap) {
 static void close_wheel(uint8_t side) {
   wheel *w = &wheels[side];
   w->reading.count = w->count;
-  if (w->edges != 0) {
+  if (ENCODER_LINES != 0 && w->edges != 0) {
     /* After a long silence the edge before the first is too old for its stamp to tell. */
     w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->gap) : 0u;
     w->silence = 0;
@@ -388,12 +379,12 @@ static void close_wheel(uint8_t side) {
   w->edges = 0;
   w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    w->reading.masked = w->reading.masked || w->fired[i] > limit;
-    w->fired[i] = 0;
+    if (ENCODER_LINES != 0 && w->left[i] == 0) {
+      w->reading.masked = true;
+      w->reading.period = 0;
+    }
   }
-  if (w->reading.masked) {
-    w->reading.period = 0;
-  }
+  begin_tick(w);
 }
 
 /* What a line does that did not count says nothing about the time to its next edge. */
@@ -404,18 +395,14 @@ static void forget_gap(uint8_t side, uint8_t back, uint8_t lines) {
 }
 
 void encoder_task(void) {
-  encoder_update();
   close_wheel(LEFT);
   close_wheel(RIGHT);
-  limit = (uint8_t)parameters_u16(PARAMETER_ENCODER_LIMIT);
   const uint8_t lines = lines_on();
   returning = (uint8_t)(lines & (uint8_t)~watched);
   forget_gap(LEFT, returning, lines);
   forget_gap(RIGHT, returning, lines);
   watched &= lines;
-  phantoms = 0;
   take_back();
-  listen();
 }
 
 const encoder_reading *encoder_read(uint8_t side) { return &wheels[side].reading; }

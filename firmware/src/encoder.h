@@ -25,11 +25,11 @@ typedef struct {
 
 void encoder_start(void);
 
-/* Works off some of the changes that the interrupt has stamped, the oldest ones, as many as make it due. Whenever it is
- * due. */
+/* Works off the changes that the interrupt has stamped. Whenever it is due. */
 void encoder_poll(void) __attribute__((noinline));
 
-/* The same, and tells from the clock when the edges were: before its 16 bits roll over (4 ms), that is in every slot. */
+/* The same, and tells from the clock when the edges were: before its 16 bits roll over (4 ms), that is before the tasks of
+ * each slot. */
 void encoder_update(void) __attribute__((noinline));
 
 /* Not 0 if changes have piled up to an eighth of the ring, or were stopped. */
@@ -39,7 +39,7 @@ static inline __attribute__((always_inline)) uint8_t encoder_due(void) {
                    ((uint8_t)(hal_changes_head - hal_changes_tail) & (uint8_t) ~(ENCODER_DUE_BYTES - 1u)));
 }
 
-/* Once per tick: closes the tick's readings and lifts masks. */
+/* Once per tick, after encoder_update(): closes the tick's readings of what that has worked off, and lifts masks. */
 void encoder_task(void) __attribute__((noinline));
 
 /* The reading at the start of this tick. */

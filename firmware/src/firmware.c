@@ -18,7 +18,6 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
-#include "task_times.h"
 #include "whisker.h"
 
 void firmware_start(void) {
@@ -37,10 +36,9 @@ void firmware_start(void) {
   compass_start();
   buzzer_start();
   schedule_start(0);
-  task_times_start();
   safety_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
-  hal_start_serial(100ul * baud);
+  hal_start_serial(baud);
   link_start(baud);
   hal_start_timers();
   buzzer_start_beep();
@@ -48,11 +46,13 @@ void firmware_start(void) {
 }
 
 void firmware_poll(void) {
-  if (encoder_due() != 0) {
+  if (schedule_waiting() != 0) {
+    schedule_poll();
+  } else if (encoder_due() != 0) {
     encoder_poll();
+  } else {
+    link_poll();
   }
-  link_poll();
-  schedule_poll();
 }
 
 bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() != 0 || link_due(); }

@@ -13,7 +13,8 @@ extern "C" {
 /* Brings up board, devices and link, says hello, and starts the slots. */
 void firmware_start(void);
 
-/* Does what is due, at most one received frame and one slot's tasks, and returns. */
+/* Does one thing that is due, and returns: a slot's tasks; if no slot waits, the encoders' changes; if none of these do, one
+ * received frame. So a frame delays a slot once at most, and waits while slots do. */
 void firmware_poll(void);
 
 /* Whether there is something for firmware_poll() to do. */

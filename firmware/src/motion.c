@@ -1,19 +1,14 @@
 /* motion.c: see motion.h. */
 #include "motion.h"
 
+#include "division.h"
 #include "generated/parameters.h"
 #include "link/parameters.h"
 #include "servo.h"
 
-#define FULL 10000 /* a signal of 1 */
+#define FULL 10000u /* a signal of 1 */
 
-/* numerator / denominator, rounded to nearest, halves away from zero. denominator > 0 */
-static int32_t divide(int32_t numerator, int32_t denominator) {
-  const int32_t half = denominator / 2;
-  return (numerator < 0 ? numerator - half : numerator + half) / denominator;
-}
-
-/* The same for a denominator of 2^bits, without a division. */
+/* numerator / 2^bits, rounded to nearest, halves away from zero. */
 static inline __attribute__((always_inline)) int32_t shift(int32_t numerator, uint8_t bits) {
   const int32_t half = (int32_t)1 << (bits - 1u);
   return numerator < 0 ? -((half - numerator) >> bits) : (numerator + half) >> bits;
@@ -41,7 +36,7 @@ static int32_t signal_per_speed(int16_t maximum) {
   static int32_t quotient;
   if (maximum != divisor) {
     divisor = maximum;
-    quotient = divide((int32_t)FULL << 17, maximum);
+    quotient = (int32_t)(divide(FULL, (uint16_t)maximum, 18) + 1u) >> 1; /* rounded to nearest */
   }
   return quotient;
 }

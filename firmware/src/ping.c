@@ -17,22 +17,24 @@ _Static_assert(PIN_PING == 8, "the timer captures on pin 8");
 
 enum { IDLE, RISING, FALLING, ENDED }; /* what is awaited */
 
-/* Shared with the capture interrupt. `rise` and `fall` are settled when `state` is ENDED. */
-static volatile uint8_t state;
-static schedule_moment rise, fall;
+typedef struct {
+  uint16_t echo;
+  uint8_t age;
+  uint8_t since_trigger; /* ticks, saturating */
+} ping_state;
 
-/* Main loop only. */
-static uint16_t echo;
-static uint8_t age;
-static uint8_t since_trigger; /* ticks, saturating */
+static ping_state own;             /* the main loop's only */
+static volatile uint8_t state;     /* shared with the capture interrupt */
+static schedule_moment rise, fall; /* its stamps, settled when the state is ENDED */
 
 void ping_start(void) {
+  ping_state *const self = HAL_NEAR(&own);
   HAL_PIN_INPUT(PING);
   hal_capture_stop();
   HAL_ZERO(state);
-  HAL_ZERO(echo);
-  age = AGE_NEVER;
-  since_trigger = 255;
+  HAL_ZERO(self->echo);
+  self->age = AGE_NEVER;
+  self->since_trigger = 255;
 }
 
 HAL_INTERRUPT_CAPTURE {
@@ -46,49 +48,53 @@ HAL_INTERRUPT_CAPTURE {
     state = ENDED;
     hal_capture_stop();
   }
+  hal_serial_look();
 }
 
 void ping_collect(void) {
-  if (age < AGE_NEVER) {
-    age++;
+  ping_state *const self = HAL_NEAR(&own);
+  if (self->age < AGE_NEVER) {
+    self->age++;
   }
   if (state == ENDED) {
     state = IDLE;
-    echo = (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
-    if (echo < ECHO_MIN) {
-      echo = 0;
+    self->echo =
+        (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
+    if (self->echo < ECHO_MIN) {
+      self->echo = 0;
     }
     /* Whole ticks between the tick in which it ended and this one. */
-    age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
+    self->age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
   }
   if (!parameters_device_on(DEVICES_PING)) {
-    echo = 0;
-    age = AGE_NEVER;
+    self->echo = 0;
+    self->age = AGE_NEVER;
   }
 }
 
 void ping_task(void) {
-  if (since_trigger < 255u) {
-    since_trigger++;
+  ping_state *const self = HAL_NEAR(&own);
+  if (self->since_trigger < 255u) {
+    self->since_trigger++;
   }
-  if ((state == RISING || state == FALLING) && since_trigger >= GIVE_UP_TICKS) {
+  if ((state == RISING || state == FALLING) && self->since_trigger >= GIVE_UP_TICKS) {
     HAL_ATOMIC {
       if (state != ENDED) {
         hal_capture_stop();
         state = IDLE;
-        echo = 0;
-        age = 0;
+        self->echo = 0;
+        self->age = 0;
       }
     }
   }
   if (state == IDLE && parameters_device_on(DEVICES_PING) &&
-      since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
-    since_trigger = 0;
+      self->since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
+    self->since_trigger = 0;
     state = RISING;
     hal_ping_trigger();
   }
 }
 
-uint16_t ping_echo(void) { return echo; }
+uint16_t ping_echo(void) { return own.echo; }
 
-uint8_t ping_age(void) { return age; }
+uint8_t ping_age(void) { return own.age; }

@@ -26,8 +26,7 @@ typedef struct {
 
 _Static_assert(sizeof(reset_record) <= HAL_NOINIT_SIZE, "the record fits");
 
-static uint8_t cause;
-static uint8_t hung; /* 1 + number of the task that ran at a watchdog reset; 0: none */
+static uint8_t cause; /* of a watchdog reset with the task */
 
 static reset_record *record(void) { return (reset_record *)hal_noinit(); }
 
@@ -47,7 +46,9 @@ void reset_start(void) {
   if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
     cause = RESET_CAUSE_WATCHDOG;
   }
-  hung = whole && cause == RESET_CAUSE_WATCHDOG && own->running <= TASKS ? own->running : 0u;
+  if (cause == RESET_CAUSE_WATCHDOG && whole && own->running <= TASKS) {
+    cause = (uint8_t)(RESET_CAUSE_WATCHDOG + own->running);
+  }
   own->running = 0;
   own->magic = MAGIC;
   own->mark = 0;
@@ -61,10 +62,11 @@ HAL_INTERRUPT_WATCHDOG {
 
 uint8_t reset_cause(void) { return cause; }
 
-uint8_t reset_cause_and_task(void) { return (uint8_t)(cause + hung); }
 _Static_assert(RESET_CAUSE_WATCHDOG_IN_WHISKER == RESET_CAUSE_WATCHDOG + 1u + TASK_whisker, "as in tasks.def");
 
 void reset_note_running(uint8_t task) { record()->running = task; }
+
+uint8_t reset_running(void) { return record()->running; }
 
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
  * undone. Close numbers come out far apart. */

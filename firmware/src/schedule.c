@@ -76,6 +76,7 @@ void schedule_start(uint32_t first_tick) {
 }
 
 HAL_INTERRUPT_SLOT {
+  hal_serial_look();
   schedule_slot++;
   schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
   slot_cycles += HAL_SLOT_CYCLES;
@@ -106,6 +107,7 @@ HAL_INTERRUPT_SLOT {
     default:
       break;
   }
+  hal_serial_look();
 }
 
 HAL_INTERRUPT_EDGE {
@@ -114,6 +116,7 @@ HAL_INTERRUPT_EDGE {
   } else {
     infrared_end();
   }
+  hal_serial_look();
 }
 
 int32_t schedule_between(schedule_moment from, schedule_moment to) {
@@ -145,12 +148,9 @@ uint32_t schedule_tick(void) { return tick; }
 
 uint32_t schedule_tick_time(void) { return tick_us; }
 
-schedule_instant schedule_instant_now(void) {
-  const uint32_t since = schedule_time() - tick_us;
-  if ((int32_t)since < 0) { /* the next tick's tasks are awaited, but it has not begun */
-    return (schedule_instant){tick - 1u, since + SCHEDULE_TICK_US};
-  }
-  return (schedule_instant){tick, since};
+uint16_t schedule_begun_tick(void) {
+  const bool is_awaited = (int32_t)(schedule_time() - tick_us) < 0; /* its tasks are, but it has not begun */
+  return (uint16_t)((uint16_t)tick - is_awaited);
 }
 
 static void next_tick(void) {
@@ -178,15 +178,6 @@ static void begin_tick(void) {
   overrun_row = !overran ? 0u : overrun_row < OVERLOAD_TICKS ? (uint8_t)(overrun_row + 1u) : OVERLOAD_TICKS;
 }
 
-/* A task has ended; and what cannot wait for the end of all tasks. */
-static __attribute__((noinline)) void between_tasks(void) {
-  task_has_ended();
-  if (encoder_due() != 0) {
-    encoder_poll();
-  }
-  link_poll();
-}
-
 /* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has returned, and not
  * in a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
@@ -195,19 +186,15 @@ static void run_tasks(uint8_t slot) {
   if (slot % (uint8_t)(period) == (phase)) { \
     task_begins(TASK_##name);                \
     name##_task();                           \
-    between_tasks();                         \
+    task_has_ended();                        \
   }
 #include "tasks.def"
-  encoder_update();
   if (overrun_row < OVERLOAD_TICKS) {
     hal_kick_watchdog();
   }
 }
 
 void schedule_poll(void) {
-  if (schedule_waiting() == 0) {
-    return;
-  }
   if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
     begin_tick();
   }

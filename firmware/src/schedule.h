@@ -28,7 +28,7 @@ static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
   return (uint8_t)(schedule_slot + 1u - schedule_next_slot);
 }
 
-/* Runs the tasks of the next slot that has begun, if any. */
+/* Runs the tasks of the next slot that has begun; one is waiting. */
 void schedule_poll(void) __attribute__((noinline));
 
 /* The control tick whose tasks run now; when they all have run, the next one, which may not have begun yet. */
@@ -39,11 +39,8 @@ uint32_t schedule_tick(void);
 uint32_t schedule_time(void);
 uint32_t schedule_tick_time(void);
 
-/* The tick that has begun, and how long ago in us. Main loop only. */
-typedef struct {
-  uint32_t tick, since;
-} schedule_instant;
-schedule_instant schedule_instant_now(void);
+/* The low half of the number of the tick that has begun. Main loop only. */
+uint16_t schedule_begun_tick(void);
 
 /* Cycles since the timers started, modulo 2^32 (268 s); the low half is hal_time(). Main loop only. */
 uint32_t schedule_now(void);

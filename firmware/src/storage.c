@@ -46,34 +46,40 @@ _Static_assert(sizeof(copy_record) <= COPY_ROOM && sizeof(copy_record) == 6u + 2
 _Static_assert(sizeof(boot_record) == 8u, "no gaps");
 _Static_assert(BOOT_ADDRESS + BOOT_RECORDS * sizeof(boot_record) <= HAL_EEPROM_SIZE, "the EEPROM has room");
 
-/* The record at hand, and what is done with it. */
-static union {
-  copy_record copy;
-  boot_record boot;
-  uint8_t bytes[sizeof(copy_record)];
-} record;
-static uint16_t record_address;
-static uint8_t record_size;
 enum { IDLE, TO_VOID, REST, TO_VALID };
-static uint8_t step;
-static bool is_save;                   /* or a boot counter's */
-static uint8_t step_first, step_count; /* bytes of the record that the step has written or not read back */
 
-/* Of the interrupt: the next byte, how many are left, CRC of those written. */
-static volatile uint8_t write_next, write_left;
-static uint16_t write_crc;
+typedef struct {
+  uint16_t record_address;
+  uint8_t record_size;
+  uint8_t step;
+  bool is_save;                   /* or a boot counter's */
+  uint8_t step_first, step_count; /* bytes of the record that the step has written or not read back */
 
-static bool save_wanted;
-static uint8_t save_result;
-static bool loaded;
-static uint8_t copy_in_force; /* COPIES: none */
-static uint8_t generation;    /* of the newest copy */
+  /* Of the interrupt: the next byte, how many are left, CRC of those written. */
+  volatile uint8_t write_next, write_left;
+  uint16_t write_crc;
 
-static uint32_t boots;      /* before this start */
-static uint8_t boot_newest; /* entry of the ring that says so */
-static uint8_t boot_next;   /* entry to write */
-static uint16_t run_ticks;  /* of this start, at most RUN_TICKS */
-static bool counted;        /* this start is in the ring, or no entry takes it */
+  bool save_wanted;
+  uint8_t save_result;
+  bool loaded;
+  uint8_t copy_in_force; /* COPIES: none */
+  uint8_t generation;    /* of the newest copy */
+
+  uint32_t boots;      /* before this start */
+  uint8_t boot_newest; /* entry of the ring that says so */
+  uint8_t boot_next;   /* entry to write */
+  uint16_t run_ticks;  /* of this start, at most RUN_TICKS */
+  bool counted;        /* this start is in the ring, or no entry takes it */
+
+  /* The record at hand, with which that is done. */
+  union {
+    copy_record copy;
+    boot_record boot;
+    uint8_t bytes[sizeof(copy_record)];
+  } record;
+} storage_state;
+
+static storage_state own;
 
 /* ---- records ---- */
 
@@ -86,64 +92,65 @@ static uint16_t crc16(uint16_t crc, uint8_t byte) {
 }
 
 /* Reads a record; whether it is whole. */
-static bool read_record(uint16_t address, uint8_t size) {
+static bool read_record(storage_state *self, uint16_t address, uint8_t size) {
   hal_eeprom_wait(); /* for a write from before the reset */
   uint16_t expected = CRC_START;
-  BOUNDED(sizeof record.bytes, for (uint8_t i = 0; i < size; i++)) {
-    record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
+  BOUNDED(sizeof self->record.bytes, for (uint8_t i = 0; i < size; i++)) {
+    self->record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
     if (i > 0 && i < size - 2u) {
-      expected = crc16(expected, record.bytes[i]);
+      expected = crc16(expected, self->record.bytes[i]);
     }
   }
   uint16_t crc = 0;
-  memcpy(&crc, &record.bytes[size - 2u], sizeof crc);
-  return record.bytes[0] == MARK_VALID && crc == expected;
+  memcpy(&crc, &self->record.bytes[size - 2u], sizeof crc);
+  return self->record.bytes[0] == MARK_VALID && crc == expected;
 }
 
 /* Writes `count` bytes of the record from `first` on. */
-OUTLINE void begin_step(uint8_t next_step, uint8_t first, uint8_t count) {
-  step = next_step;
-  step_first = first;
-  step_count = count;
-  write_next = first;
-  write_left = count;
-  write_crc = CRC_START;
+OUTLINE void begin_step(storage_state *self, uint8_t next_step, uint8_t first, uint8_t count) {
+  self->step = next_step;
+  self->step_first = first;
+  self->step_count = count;
+  self->write_next = first;
+  self->write_left = count;
+  self->write_crc = CRC_START;
   hal_eeprom_interrupt(true);
 }
 
 /* With the EEPROM ready: the next byte. At the end of the rest comes its CRC, which is known by then. */
 HAL_INTERRUPT_EEPROM {
-  const uint8_t i = write_next;
-  if (i == record_size - 2u) {
-    memcpy(&record.bytes[i], &write_crc, sizeof write_crc);
+  storage_state *const self = HAL_NEAR(&own);
+  const uint8_t i = self->write_next;
+  if (i == (uint8_t)(self->record_size - 2u)) {
+    memcpy(&self->record.bytes[i], &self->write_crc, sizeof self->write_crc);
   }
-  write_crc = crc16(write_crc, record.bytes[i]);
-  hal_eeprom_write_start((uint16_t)(record_address + i), record.bytes[i]);
-  write_next = (uint8_t)(i + 1u);
-  write_left--;
-  hal_eeprom_interrupt(write_left != 0);
+  self->write_crc = crc16(self->write_crc, self->record.bytes[i]);
+  hal_eeprom_write_start((uint16_t)(self->record_address + i), self->record.bytes[i]);
+  self->write_next = (uint8_t)(i + 1u);
+  self->write_left--;
+  hal_eeprom_interrupt(self->write_left != 0);
 }
 
-static bool is_written(void) { return write_left == 0 && !hal_eeprom_busy(); }
+static bool is_written(storage_state *self) { return self->write_left == 0 && !hal_eeprom_busy(); }
 
 /* Reads a few of the step's bytes back and takes them off `step_count`; false if one is not as it should be. */
-static bool reads_back(void) {
-  BOUNDED(READ_BACK, for (uint8_t n = 0; n < READ_BACK && step_count > 0; n++)) {
-    if (hal_eeprom_read((uint16_t)(record_address + step_first)) != record.bytes[step_first]) {
+static bool reads_back(storage_state *self) {
+  BOUNDED(READ_BACK, for (uint8_t n = 0; n < READ_BACK && self->step_count > 0; n++)) {
+    if (hal_eeprom_read((uint16_t)(self->record_address + self->step_first)) != self->record.bytes[self->step_first]) {
       return false;
     }
-    step_first++;
-    step_count--;
+    self->step_first++;
+    self->step_count--;
   }
   return true;
 }
 
 /* Begins to write the record at hand. */
-OUTLINE void begin_record(uint16_t address, uint8_t size) {
-  record_address = address;
-  record_size = size;
-  record.bytes[0] = MARK_VOID;
-  begin_step(TO_VOID, 0, 1);
+OUTLINE void begin_record(storage_state *self, uint16_t address, uint8_t size) {
+  self->record_address = address;
+  self->record_size = size;
+  self->record.bytes[0] = MARK_VOID;
+  begin_step(self, TO_VOID, 0, 1);
 }
 
 /* ---- parameters ---- */
@@ -166,60 +173,62 @@ INLINE uint16_t table_hash(void) {
   return (uint16_t)(hash >> 16 ^ hash);
 }
 
-OUTLINE bool read_copy(uint8_t copy) {
-  return read_record(copy_address(copy), sizeof(copy_record)) && record.copy.table == table_hash();
+OUTLINE bool read_copy(storage_state *self, uint8_t copy) {
+  return read_record(self, copy_address(copy), sizeof(copy_record)) && self->record.copy.table == table_hash();
 }
 
 void storage_load_parameters(void) {
+  storage_state *const self = HAL_NEAR(&own);
   bool whole[COPIES];
   uint8_t generations[COPIES];
   BOUNDED(COPIES, for (uint8_t copy = 0; copy < COPIES; copy++)) {
-    whole[copy] = read_copy(copy);
-    generations[copy] = record.copy.generation;
+    whole[copy] = read_copy(self, copy);
+    generations[copy] = self->record.copy.generation;
   }
   const uint8_t newer = whole[1] && (!whole[0] || (int8_t)(uint8_t)(generations[1] - generations[0]) > 0);
-  generation = whole[newer] ? generations[newer] : 0u;
-  loaded = true;
+  self->generation = whole[newer] ? generations[newer] : 0u;
+  self->loaded = true;
   BOUNDED(COPIES, for (uint8_t i = 0; i < COPIES; i++)) {
-    copy_in_force = newer ^ i;
-    if (whole[copy_in_force] && read_copy(copy_in_force) && parameters_restore(record.copy.values)) {
+    self->copy_in_force = newer ^ i;
+    if (whole[self->copy_in_force] && read_copy(self, self->copy_in_force) &&
+        parameters_restore(self->record.copy.values)) {
       return;
     }
   }
-  copy_in_force = COPIES;
-  loaded = false;
+  self->copy_in_force = COPIES;
+  self->loaded = false;
 }
 
-bool storage_parameters_loaded(void) { return loaded; }
+bool storage_parameters_loaded(void) { return own.loaded; }
 
 uint8_t storage_save(void) {
   if (supply_low()) {
     return ANSWER_STATUS_SUPPLY_LOW;
   }
-  save_wanted = true;
+  own.save_wanted = true;
   return ANSWER_STATUS_OK;
 }
 
-bool storage_busy(void) { return save_wanted || (step != IDLE && is_save); }
+bool storage_busy(void) { return own.save_wanted || (own.step != IDLE && own.is_save); }
 
-uint8_t storage_result(void) { return save_result; }
+uint8_t storage_result(void) { return own.save_result; }
 
-static uint8_t other_copy(void) { return copy_in_force == 0 ? 1u : 0u; }
+static uint8_t other_copy(storage_state *self) { return self->copy_in_force == 0 ? 1u : 0u; }
 
-static void begin_save(void) {
-  save_wanted = false;
-  is_save = true;
-  record.copy.generation = (uint8_t)(generation + 1u);
-  record.copy.table = table_hash();
-  memcpy(record.copy.values, parameters_values(), sizeof record.copy.values);
-  begin_record(copy_address(other_copy()), sizeof(copy_record));
+static void begin_save(storage_state *self) {
+  self->save_wanted = false;
+  self->is_save = true;
+  self->record.copy.generation = (uint8_t)(self->generation + 1u);
+  self->record.copy.table = table_hash();
+  memcpy(self->record.copy.values, parameters_values(), sizeof self->record.copy.values);
+  begin_record(self, copy_address(other_copy(self)), sizeof(copy_record));
 }
 
-static void end_save(uint8_t result) {
-  save_result = result;
+static void end_save(storage_state *self, uint8_t result) {
+  self->save_result = result;
   if (result == ANSWER_STATUS_OK) {
-    copy_in_force = other_copy();
-    generation++;
+    self->copy_in_force = other_copy(self);
+    self->generation++;
   }
 }
 
@@ -227,106 +236,108 @@ static void end_save(uint8_t result) {
 
 static uint16_t boot_address(uint8_t entry) { return (uint16_t)(BOOT_ADDRESS + entry * sizeof(boot_record)); }
 
-static void find_boots(void) {
-  boots = 0;
-  boot_newest = BOOT_RECORDS - 1u;
+static void find_boots(storage_state *self) {
+  self->boots = 0;
+  self->boot_newest = BOOT_RECORDS - 1u;
   BOUNDED(BOOT_RECORDS, for (uint8_t entry = 0; entry < BOOT_RECORDS; entry++)) {
-    if (read_record(boot_address(entry), sizeof(boot_record))) {
-      const uint32_t count = (uint32_t)record.boot.count[1] << 16 | record.boot.count[0];
-      if (count > boots) {
-        boots = count;
-        boot_newest = entry;
+    if (read_record(self, boot_address(entry), sizeof(boot_record))) {
+      const uint32_t count = (uint32_t)self->record.boot.count[1] << 16 | self->record.boot.count[0];
+      if (count > self->boots) {
+        self->boots = count;
+        self->boot_newest = entry;
       }
     }
   }
-  boot_next = (boot_newest + 1u) % BOOT_RECORDS;
+  self->boot_next = (self->boot_newest + 1u) % BOOT_RECORDS;
 }
 
-uint32_t storage_boot_counter(void) { return boots + 1u; }
+uint32_t storage_boot_counter(void) { return own.boots + 1u; }
 
-static void begin_count(void) {
-  is_save = false;
-  record.boot.spare = 0;
-  record.boot.count[0] = (uint16_t)storage_boot_counter();
-  record.boot.count[1] = (uint16_t)(storage_boot_counter() >> 16);
-  begin_record(boot_address(boot_next), sizeof(boot_record));
+static void begin_count(storage_state *self) {
+  self->is_save = false;
+  self->record.boot.spare = 0;
+  self->record.boot.count[0] = (uint16_t)storage_boot_counter();
+  self->record.boot.count[1] = (uint16_t)(storage_boot_counter() >> 16);
+  begin_record(self, boot_address(self->boot_next), sizeof(boot_record));
 }
 
 /* A cell that does not take it is passed over; the newest entry is never touched. */
-static void end_count(uint8_t result) {
+static void end_count(storage_state *self, uint8_t result) {
   if (result == ANSWER_STATUS_OK) {
-    counted = true;
+    self->counted = true;
   } else if (result == ANSWER_STATUS_STORAGE_FAILED) {
-    boot_next = (boot_next + 1u) % BOOT_RECORDS;
-    counted = boot_next == boot_newest;
+    self->boot_next = (self->boot_next + 1u) % BOOT_RECORDS;
+    self->counted = self->boot_next == self->boot_newest;
   }
 }
 
 /* ---- the task ---- */
 
 void storage_start(void) {
+  storage_state *const self = HAL_NEAR(&own);
   hal_eeprom_interrupt(false);
-  HAL_ZERO(step);
-  HAL_ZERO(write_left);
-  HAL_ZERO(save_wanted);
-  save_result = ANSWER_STATUS_OK;
-  HAL_ZERO(run_ticks);
-  HAL_ZERO(counted);
-  find_boots();
+  HAL_ZERO(self->step);
+  HAL_ZERO(self->write_left);
+  HAL_ZERO(self->save_wanted);
+  self->save_result = ANSWER_STATUS_OK;
+  HAL_ZERO(self->run_ticks);
+  HAL_ZERO(self->counted);
+  find_boots(self);
 }
 
-OUTLINE void end_record(uint8_t result) {
-  step = IDLE;
-  if (is_save) {
-    end_save(result);
+OUTLINE void end_record(storage_state *self, uint8_t result) {
+  self->step = IDLE;
+  if (self->is_save) {
+    end_save(self, result);
   } else {
-    end_count(result);
+    end_count(self, result);
   }
 }
 
-static void go_on(void) {
-  if (!reads_back()) {
-    end_record(ANSWER_STATUS_STORAGE_FAILED);
-  } else if (step_count > 0) {
+static void go_on(storage_state *self) {
+  if (!reads_back(self)) {
+    end_record(self, ANSWER_STATUS_STORAGE_FAILED);
+  } else if (self->step_count > 0) {
     return; /* the others in the next tick */
-  } else if (step == TO_VOID) {
-    begin_step(REST, 1, (uint8_t)(record_size - 1u));
-  } else if (step == REST) {
-    record.bytes[0] = MARK_VALID;
-    begin_step(TO_VALID, 0, 1);
+  } else if (self->step == TO_VOID) {
+    begin_step(self, REST, 1, (uint8_t)(self->record_size - 1u));
+  } else if (self->step == REST) {
+    self->record.bytes[0] = MARK_VALID;
+    begin_step(self, TO_VALID, 0, 1);
   } else {
-    end_record(ANSWER_STATUS_OK);
+    end_record(self, ANSWER_STATUS_OK);
   }
 }
 
 /* The supply fails: the cell under way ends by itself, no other begins. */
-static void give_up(void) {
+static void give_up(storage_state *self) {
   hal_eeprom_interrupt(false);
-  write_left = 0;
-  if (save_wanted) {
-    save_wanted = false;
-    save_result = ANSWER_STATUS_SUPPLY_LOW;
+  self->write_left = 0;
+  if (self->save_wanted) {
+    self->save_wanted = false;
+    self->save_result = ANSWER_STATUS_SUPPLY_LOW;
   }
-  if (step != IDLE) {
-    end_record(ANSWER_STATUS_SUPPLY_LOW);
+  if (self->step != IDLE) {
+    end_record(self, ANSWER_STATUS_SUPPLY_LOW);
   }
 }
 
 void storage_task(void) {
-  if (run_ticks < RUN_TICKS) {
-    run_ticks++;
+  storage_state *const self = HAL_NEAR(&own);
+  if (self->run_ticks < RUN_TICKS) {
+    self->run_ticks++;
   }
   if (supply_low()) {
-    give_up();
-  } else if (step != IDLE) {
-    if (is_written()) {
-      go_on();
+    give_up(self);
+  } else if (self->step != IDLE) {
+    if (is_written(self)) {
+      go_on(self);
     }
   } else if (hal_eeprom_busy()) {
     return; /* a write from before the reset, or one that was given up */
-  } else if (save_wanted) {
-    begin_save();
-  } else if (run_ticks == RUN_TICKS && !counted) {
-    begin_count();
+  } else if (self->save_wanted) {
+    begin_save(self);
+  } else if (self->run_ticks == RUN_TICKS && !self->counted) {
+    begin_count(self);
   }
 }

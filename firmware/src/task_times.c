@@ -1,19 +1,22 @@
 /* task_times.c: see task_times.h. */
 #include "task_times.h"
 
+#include "bounds.h"
 #include "hal/hal.h"
 #include "reset.h"
 #include "schedule.h"
 
 static uint16_t longest[TASKS];
-static uint8_t running;
 static uint16_t began;     /* hal_time() */
 static uint8_t began_slot; /* schedule_slot then */
 
-void task_times_start(void) { HAL_ZERO(longest); }
+void task_times_start(void) {
+  BOUNDED(TASKS, for (uint8_t task = 0; task < TASKS; task++)) {
+    longest[task] = 0;
+  }
+}
 
 void task_begins(uint8_t task) {
-  running = task;
   reset_note_running((uint8_t)(task + 1u));
   HAL_ATOMIC {
     began = hal_time();
@@ -37,14 +40,11 @@ void task_has_ended(void) {
   if (slots > 1u || (slots == 1u && took < in_slot)) {
     took = TASK_TIME_LONGEST;
   }
-  if (took > longest[running]) {
-    longest[running] = took;
+  uint16_t *const most = &longest[reset_running() - 1u];
+  if (took > *most) {
+    *most = took;
   }
   reset_note_running(0);
 }
 
-uint16_t task_times_take(uint8_t task) {
-  const uint16_t most = longest[task];
-  longest[task] = 0;
-  return most;
-}
+uint16_t task_times_longest(uint8_t task) { return longest[task]; }

@@ -16,6 +16,7 @@ enum {
   TASKS
 };
 
+/* The longest times start anew. */
 void task_times_start(void);
 
 /* Around each task. The number of the task that runs outlives a reset (reset.h). Main loop only. */
@@ -24,8 +25,8 @@ void task_has_ended(void);
 
 #define TASK_TIME_LONGEST 0xFFFFu /* so long or longer; no run is so long on purpose */
 
-/* The longest that a task took since this was last asked of it, or since the start; 0: it has not run. */
-uint16_t task_times_take(uint8_t task);
+/* The longest that a task took since task_times_start(); 0: it has not run. Main loop only. */
+uint16_t task_times_longest(uint8_t task);
 
 #ifdef __cplusplus
 }

@@ -237,7 +237,7 @@ class native_bench {
   msg_devices_telemetry devices() const { return last(MSG_DEVICES_TELEMETRY_ID).as<msg_devices_telemetry>(); }
   msg_answer answer() const { return last(MSG_ANSWER_ID).as<msg_answer>(); }
 
-  /* The board's counters, sent every 64 ticks: waits for the next ones. */
+  /* The board's counters, sent every 76 ticks: waits for the next ones. */
   msg_counters counters() {
     const size_t before = count(MSG_COUNTERS_ID);
     for (int i = 0; i < 20 && count(MSG_COUNTERS_ID) == before; i++) {

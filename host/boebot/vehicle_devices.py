@@ -1,7 +1,7 @@
 """Devices of robots without a board: what a simulated vehicle is driven by and senses with, in the notes' terms.
 
 They have no pins; brains meet their readings by the same names as those of a robot with a board. Models and symbols are
-those of the lecture notes (THEORY sections 1.2 to 1.10); every key carries its unit in its name.
+those of the lecture notes (sections 1.2.2, 1.2.3, 3.2.3 and 3.2.4); every key carries its unit in its name.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ SLOW_DEVICES = (
 )
 FIELD_COUNTS = 200  # of the earth's field along the floor
 HELLO_TICKS, HELLO_SESSION_TICKS = 10, 20
-COUNTERS_TICKS = 64
+OWN_TICKS = 4  # from one task's time to the next, or to the counters
 QUEUE = 4
 EEPROM_S = 0.2  # for all parameters
 Setpoint = messages.SetpointSignal | messages.SetpointSpeed | messages.SetpointCoast
@@ -75,6 +75,8 @@ class Peer:
         carried_out: requests carried out, in order, as (session, message).
         setpoints: those that arrived, and `setpoint_ticks`, when; `accepted`, those that count.
         tones: (frequency in Hz, length in s) of those that were begun, in order.
+        task_times: the longest of each task in this session, in cycles, at its opening `usual_task_times`; those of
+            `untold` it does not tell.
         starts: how often it was started. openings: sessions that were opened.
     """
 
@@ -100,6 +102,8 @@ class Peer:
         self.battery_mv = 3600  # at the pin, behind the divider
         self.light_us = (800, 1600)
         self.telemetry_period = 1
+        self.usual_task_times = [0] * len(messages.Task)
+        self.untold: set[int] = set()
         self.saved: dict[int, int] | None = None
         self.carried_out: list[tuple[int, messages.Message]] = []
         self.setpoints: list[Setpoint] = []
@@ -145,6 +149,7 @@ class Peer:
         self._saving_until: float | None = None
         self._save_answer: int | None = None
         self.counts = dict.fromkeys(messages.Counters._fields, 0)
+        self._own = 0
         self._new_nonce()
         self._begin_numbers()
         if self.answers:
@@ -198,6 +203,7 @@ class Peer:
         self.openings.append(seed)
         self.decoder.seed = seed if self.protections.seed else SEED
         self._begin_numbers()
+        self.task_times = list(self.usual_task_times)
         self._tone_token = 0
         if self._save_answer is not None:
             self._save_answer = None
@@ -453,9 +459,17 @@ class Peer:
             self._send(self._telemetry())
         if self._is_on(SLOW_DEVICES) and self.ticks % self.parameter("devices_period") == 0:
             self._send(self._devices_telemetry())
-        if self.ticks % COUNTERS_TICKS == 0:
+        if self.ticks % (OWN_TICKS * self.telemetry_period) == 0:
+            self._send_of_itself()
+
+    def _send_of_itself(self) -> None:
+        if self._own < len(messages.Task):
+            if self._own not in self.untold:
+                self._send(messages.TaskTime(self._own, self.task_times[self._own]))
+        else:
             self.counts["good"], self.counts["bad"] = self.decoder.good, self.decoder.bad
             self._send(messages.Counters(*(value & 0xFFFF for value in self.counts.values())))
+        self._own = (self._own + 1) % (len(messages.Task) + 1)
 
     def _telemetry(self) -> messages.Telemetry:
         ahead = self._ahead()

@@ -1,4 +1,4 @@
-"""Avoid: away from what infra-red sensors see, and out of nooks (section 4.9 of the specification)."""
+"""Avoid: away from what infra-red sensors see, and out of nooks (docs/reference/notes.md)."""
 
 from __future__ import annotations
 

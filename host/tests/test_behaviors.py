@@ -1,4 +1,4 @@
-"""Motor behaviors, each alone: observations in, commands out, against the laws of THEORY section 4."""
+"""Motor behaviors, each alone: observations in, commands out, against laws that docs/reference/notes.md lists."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The general-purpose brain structure against closed forms: utilities, gamma parameters, activation, random streams.
 
-E61 to E64 and E34 are experiments of the specification, THEORY section 8.
+E61 to E64 and E34 are experiments that docs/experiments shows: notes, sections 8.2.2, 8.2.3 and 4.4.3.
 """
 
 from __future__ import annotations

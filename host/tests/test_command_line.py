@@ -471,17 +471,30 @@ def board(monkeypatch: pytest.MonkeyPatch) -> InProcess:
 
 
 def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
+    board.peer.usual_task_times = [8 * number for number in range(len(messages.Task))]
     code, out, err = boebot(capsys, "link", "--once", "--json")
     seen = json.loads(out)
     assert (code, err) == (0, "")
+    assert seen["task_longest_us"] == {task.name.lower(): task / 2 for task in messages.Task}
+    assert seen["last_reset"] == "power"
     assert seen["host"]["good"] > 90 and seen["board_end"]["good"] > 1 and seen["host"]["bad"] == 0
-    assert 100 <= seen["frame_rate_hz"] <= 150
+    assert 120 <= seen["frame_rate_hz"] <= 175, "telemetry, a quarter of that about the board itself, hello, probes"
     assert seen["round_trip_p50_ms"] == pytest.approx(0.52, abs=0.3), "10 bytes there and 14 back"
     assert abs(seen["clock_drift_ppm"]) < 200 and seen["clock_bound_us"] < 500
     board.read(0.01)
     assert board.peer.session == 0 and board.peer.accepted == [], "closed, and nothing has moved"
     code, out, _ = boebot(capsys, "link", "--once")
-    for name in ("round trip p99", "clock drift", "counted", "resynchronised", "deferred", "late"):
+    for name in (
+        "round trip p99",
+        "clock drift",
+        "counted",
+        "resynchronised",
+        "deferred",
+        "late",
+        "last reset",
+        "longest, us",
+        "storage",
+    ):
         assert name in out
 
 

@@ -30,8 +30,8 @@ def variable(record: BrainRecord, name: str) -> np.ndarray:
 @pytest.mark.parametrize(
     ("near", "contact", "energy", "charging"), [(0, 0, 1.0, 0), (1, 0, 0.5, 0), (0.4, 1, 0.2, 0), (0, 0, 0.7, 1)]
 )
-def test_weights_are_those_of_the_specification(near: float, contact: float, energy: float, charging: float) -> None:
-    """Section 7.5: tanh 0.5; b -1, 3 near, 4 contact; 1.5 - 3.2 E + 1.9 on_charger."""
+def test_weights_are_those_that_were_chosen(near: float, contact: float, energy: float, charging: float) -> None:
+    """tanh 0.5; b -1, 3 near, 4 contact; 1.5 - 3.2 E + 1.9 on_charger."""
     brain = load_brain("demo").brain
     assert isinstance(brain, Brain)
     z = {"near": near, "contact": contact, "low": 1 - energy, "charging": charging}

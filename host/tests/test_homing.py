@@ -1,6 +1,6 @@
 """Path integration and homing against closed forms: home vectors, the spiral, what is missing or stale, wrap-around.
 
-The robot is arsim without its motors: tests say what its odometer and its compass read (THEORY section 4.8).
+The robot is arsim without its motors: tests say what its odometer and its compass read (notes, section 4.4.4).
 """
 
 from __future__ import annotations

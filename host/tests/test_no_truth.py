@@ -1,4 +1,4 @@
-"""E66: no brain reaches the world's truth (THEORY section 7.3).
+"""E66: no brain reaches the world's truth (notes, section 3.2.3).
 
 What these tests guarantee:
 

@@ -691,7 +691,7 @@ def test_telemetry_that_comes_during_a_request_is_kept() -> None:
 
 def test_telemetry_that_nobody_fetches_does_not_fill_the_memory() -> None:
     link, _, _ = joined()
-    for _ in range(6000):
+    while link.transport.now() < 50.0:  # 5,000 of them
         link._turn(link.transport.now() + 0.01)
     assert len(link._telemetry) <= 4096 and link.counters().dropped > 500
 
@@ -755,16 +755,62 @@ def test_ticks_roll_over(first_tick: int) -> None:
 def test_board_counters_are_unwrapped() -> None:
     link, peer, _ = joined()
     peer.counts["late"] = 65500
-    listen(link, 0.7)
+    listen(link, 0.8)
     peer.counts["late"] = 65536 + 20
-    listen(link, 0.7)
+    listen(link, 0.8)
     assert link.board_counters.values["late"] == 65556
     before = link.board_counters.values["late"]
     peer.reset()
     listen(link, 0.1)
     peer.counts["late"] = 3
-    listen(link, 0.7)
+    listen(link, 0.8)
     assert link.board_counters.values["late"] == before + 3
+
+
+def test_longest_times_of_tasks_are_those_of_this_session() -> None:
+    link, peer, _ = joined()
+    assert set(link.task_times.values()) == {None}
+    names = [task.name.lower() for task in messages.Task]
+    peer.task_times = [100 + number for number in range(len(names))]
+    assert link.measure_task_times(0.0) == dict(zip(names, peer.task_times, strict=True))
+    peer.task_times[3] = 65535
+    assert link.measure_task_times(0.0)[names[3]] == link.task_times[names[3]] == 65535
+    peer.reset()
+    listen(link, 0.1)
+    assert link.is_open and link.task_times[names[3]] is None
+    assert set(link.measure_task_times(0.0).values()) == {0}
+
+
+def test_longest_times_lost_on_the_line_come_again() -> None:
+    link, peer, _ = joined(channel=Channel(loss=0.2))
+    peer.task_times = [7] * len(messages.Task)
+    assert set(link.measure_task_times(0.0).values()) == {7}
+    assert link.counters().lost > 10
+
+
+@pytest.mark.parametrize("period", [1, 10])
+def test_measuring_the_tasks_lasts_as_long_as_asked_and_a_round(period: int) -> None:
+    peer = Peer()
+    peer.telemetry_period = period
+    link, peer, _ = joined(peer)
+    begun, round_s = link.transport.now(), 4 * 0.01 * period * (len(messages.Task) + 1)
+    link.measure_task_times(1.0)
+    assert 1.0 + round_s <= link.transport.now() - begun < 1.0 + round_s + 0.1
+
+
+def test_a_board_that_does_not_tell_of_a_task_is_named_with_it() -> None:
+    link, peer, _ = joined()
+    peer.untold = {messages.Task.TURRET, messages.Task.DEVICES}
+    begun = link.transport.now()
+    with pytest.raises(BoardError, match=r"did not tell the times of its tasks turret, devices within 3\.5 s"):
+        link.measure_task_times(0.5)
+    assert link.transport.now() - begun < 3.7
+
+
+def test_a_task_that_this_kit_does_not_know_is_left_out() -> None:
+    link, _, _ = joined()
+    link._hear_task_time(messages.TaskTime(len(messages.Task), 9).pack(), 0.0)
+    assert set(link.task_times.values()) == {None}
 
 
 def test_same_run_twice_is_the_same_to_the_last_byte() -> None:

@@ -59,7 +59,7 @@ def stay(robot: Robot) -> None:
 
 
 def decay_time(pose: Pose, side: str) -> float:
-    """L = ambient + P cos(theta) / (d0^2 + d^2) (THEORY, section 1.9); the capacitor needs SCALE_S / L."""
+    """L = ambient + P cos(theta) / (d0^2 + d^2) (sim_bridge/world/sensors/light.h); the capacitor needs SCALE_S / L."""
     x0, y0, heading = pose
     forward, aside, turn = SENSORS[side]
     x = x0 + forward * math.cos(heading) - aside * math.sin(heading)

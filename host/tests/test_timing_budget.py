@@ -88,7 +88,7 @@ def test_planted_faults_are_found(tmp_path: Path, options: dict[str, int], sente
 
 def judged(report: budget.Report, **cycles: int) -> budget.Report:
     """The same with other tasks."""
-    costs = replace(report.costs, alone=report.costs.alone | cycles)
+    costs = replace(report.costs, tasks=report.costs.tasks | cycles)
     schedule = costs.schedule(load_program(Path(report.path)))
     answers = responses(schedule, report.sources)
     return replace(report, costs=costs, schedule=schedule, responses=answers)
@@ -97,7 +97,7 @@ def judged(report: budget.Report, **cycles: int) -> budget.Report:
 def test_tick_that_is_too_full_is_found(report: budget.Report) -> None:
     """Four slots of 45,000 are more than the tick has; of 90,000 in slot 1 it has time, of 125,000 not."""
     (fault,) = judged(report, first=45_000).faults
-    assert fault.startswith("overload: under the load 'figures' tasks and interrupts may take 112.")
+    assert fault.startswith("overload: under the load 'figures' the tick and interrupts may take 112.")
     assert judged(report, second=90_000).faults == []
     assert any("slot 1 may end 12" in fault for fault in judged(report, second=125_000).faults)
 
@@ -141,10 +141,11 @@ def test_scenario_is_compared_with_its_own_load(image: Path, report: budget.Repo
 
 
 def test_sums_of_a_tick_are_those_counted_by_hand(report: budget.Report) -> None:
-    """A slot interrupt of 31 in each slot, which wakes the main loop: 4 cycles and a round of it."""
-    around = report.costs.round
+    """A slot interrupt of 31 in each slot, which wakes the main loop: 4 cycles and a pass. No link, no encoder."""
     assert report.demand == report.schedule.blocking + report.tick_work + 4 * 31
-    assert report.executed == report.demand + 4 * (4 + around)
+    passes = 4 * (4 + report.costs.loop)
+    assert report.executed == report.demand + passes + 2 * report.frames.cycles
+    assert report.costs.frame == report.costs.edges == 0 and report.frames.cycles == 2 * report.costs.loop
 
 
 def test_bound_far_above_what_was_measured_is_noted(image: Path) -> None:

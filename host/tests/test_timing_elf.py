@@ -72,6 +72,13 @@ def test_symbols_are_those_of_avr_nm() -> None:
     }
 
 
+def test_variables_are_those_of_avr_nm(tmp_path: Path) -> None:
+    path = build(tmp_path, PROGRAM)
+    lines = [line.split() for line in output("avr-nm", "-S", path).splitlines()]
+    sizes = {words[3]: int(words[1], 16) for words in lines if len(words) == 4 and words[2] in "bBdD"}
+    assert sizes and read_image(path).variables == sizes
+
+
 def test_the_code_is_that_of_avr_objcopy(tmp_path: Path) -> None:
     binary = tmp_path / "flash.bin"
     output("avr-objcopy", "-O", "binary", "-R", ".eeprom", IMAGE, binary)
@@ -92,7 +99,7 @@ def test_source_lines_are_those_of_addr2line(tmp_path: Path, flags: tuple[str, .
 def test_an_image_without_lines_has_none(tmp_path: Path) -> None:
     path = build(tmp_path, PROGRAM)
     assert read_image(path).lines == {}
-    assert load_program(path).where(0x1A2) == "0x01A2"
+    assert load_program(path).where(0x1A2).startswith("0x01A2 (in ")
 
 
 def test_an_image_without_symbols_is_followed_the_same(tmp_path: Path) -> None:
@@ -129,12 +136,24 @@ def test_the_rows_of_the_timing_table_are_read_in_their_order(tmp_path: Path) ->
         ("SENSOR", "a name and 3 whole numbers are expected"),
         ("JOB whisker 1 0 200", "is of no known kind: TASK, INTERRUPT, SENSOR are expected"),
         ("   ", "is of no known kind"),
+        ("TASK first 2 0 10", "two rows of the name 'first'"),
+        ("TASK whisker 0 0 200", "phase 0 of period 0; expected a phase below its period"),
+        ("TASK whisker 4 4 200", "phase 4 of period 4"),
+        ("TASK whisker 4 0 0", "a budget of 0 cycles"),
+        ("TASK whisker 4 0 4294967296", "4294967296 is too large; expected at most 4294967295"),
+        ("TASK whisker 4 0 " + "9" * 5000, "999999999999 is too large"),
+        ("TASK whisker 4099 0 200", "repeat after 4099 slots only; expected at most 4096"),
+        ("INTERRUPT receive 0 48 600 320", "vector 0; expected 1 to 25"),
+        ("INTERRUPT receive 26 48 600 320", "vector 26; expected 1 to 25"),
+        ("INTERRUPT receive 18 48 600 0", "a budget or an interval of 0 cycles"),
+        ("SENSOR ping 18500 0 20000", "a period of 0 ticks"),
     ],
 )
 def test_a_broken_row_is_refused(tmp_path: Path, line: str, expected: str) -> None:
     with pytest.raises(TimingError) as caught:
         rows(tmp_path, "TASK first 1 0 10", line)
-    assert repr(line) in str(caught.value) and expected in str(caught.value)
+    assert expected in str(caught.value) and str(tmp_path) in str(caught.value)
+    assert repr(line) in str(caught.value) or "two rows" in expected or "slots" in expected
 
 
 def loops(folder: Path, records: bytes) -> Image:

@@ -144,7 +144,7 @@ def test_what_cannot_be_followed_is_refused_with_address_and_source_line(tmp_pat
 
 def test_code_without_an_end_is_refused(tmp_path: Path) -> None:
     message = refusal(tmp_path, "main: nop\n inc r24", "-nostartfiles")
-    assert "0x0004: there is no code, but __ctors_end leads there" in message
+    assert "0x0004 (in __ctors_end+0x4): there is no code, but __ctors_end leads there" in message
 
 
 @pytest.mark.parametrize("name", ["boebot", "shieldbot", "shieldbot-quad"])

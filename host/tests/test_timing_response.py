@@ -12,9 +12,9 @@ from boebot.timing.response import (
     Piece,
     Schedule,
     Source,
+    background,
+    longest_gap,
     misses,
-    poll_gap,
-    receive_backlog,
     response,
     responses,
 )
@@ -39,7 +39,7 @@ def test_overload_is_said() -> None:
     assert response(1, [Source("a", 5, 10), Source("b", 5, 10)]) is None, "interrupts alone take all"
     full = Schedule(((Piece("task", 60),),), slot_cycles=100, slots_per_tick=1)
     assert responses(full, [Source("a", 4, 10)]) is None
-    assert receive_backlog(full, [Source("a", 4, 10)], Source("a", 4, 10), 20, 0) is None
+    assert longest_gap(full, [Source("a", 4, 10)], 0, 0) is None and background(full, [Source("a", 5, 10)]) == 0
     assert responses(full, [Source("a", 3, 10)]) is not None
 
 
@@ -47,14 +47,17 @@ def test_no_source_without_an_interval() -> None:
     with pytest.raises(ValueError, match="no source"):
         Source("a", 1, 0)
     with pytest.raises(ValueError, match="no source"):
-        Source("a", 1, 10, burst=3)
+        Source("a", 1, 10, bursts=((3, 0),))
 
 
 def test_bursts_have_both_bounds() -> None:
     """Frames of 3 bytes every 100 cycles, a byte every 10: 3 in each window up to 100, 6 up to 200."""
-    frames = Source("bytes", 1, 10, burst=3, period=100)
+    frames = Source("bytes", 1, 10, bursts=((3, 100),))
     assert [frames.requests(w) for w in (0, 1, 10, 11, 30, 100, 101, 1000)] == [0, 1, 1, 2, 3, 3, 6, 30]
     assert frames.load == Fraction(3, 100)
+    pairs = Source("bytes", 1, 10, bursts=((3, 100), (4, 1000)))
+    assert [pairs.requests(w) for w in (30, 100, 101, 1000, 1001)] == [3, 3, 4, 4, 8]
+    assert pairs.load == Fraction(4, 1000)
 
 
 # ---- simulation: one cycle after another ---------------------------------------------------------------------------
@@ -134,37 +137,55 @@ def test_a_late_slot_delays_the_next() -> None:
     assert misses(schedule, (21, 8)) == [0]
 
 
+LONG = 500
+
+
+def until_poll(schedule: Schedule, first: int, found: list[Source], before: int, after: int) -> int:
+    """A main loop cycle by cycle, interrupts first: other work during which a slot begins, all slots that wait, and
+    some more work, which is done before it polls; a slot that begins meanwhile goes before it."""
+    requested = [(source, times(source, LONG, [0])) for source in found]
+    slot, waiting, queue, left, rest = first, 0, list[int](), before, after
+    for now in range(LONG + 1):
+        if now and not (waiting or left or sum(queue) or rest):
+            return now
+        waiting += sum(source.cycles * moments.count(now) for source, moments in requested)
+        if now % schedule.slot_cycles == 0:
+            queue.append(schedule.work(slot))
+            slot += 1
+        while left == 0 and queue and queue[0] == 0:
+            queue.pop(0)
+        if waiting:
+            waiting -= 1
+        elif left:
+            left -= 1
+        elif queue:
+            queue[0] -= 1
+        elif rest:
+            rest -= 1
+    raise AssertionError("never polled")
+
+
 @QUICK
-@given(st.lists(st.integers(1, 60), min_size=1, max_size=6), st.integers(1, 3), st.integers(3, 6), st.integers(2, 9))
-def test_ring_holds_what_comes_between_polls(cycles: list[int], each: int, every: int, frame: int) -> None:
-    """Pieces back to back for one cycle, a poll after each that takes one frame: what waits never exceeds the bound."""
-    bytes_ = Source("receive", each, every + each)
-    pieces = tuple(Piece(f"t{n}", some, polls=1) for n, some in enumerate(cycles))
-    schedule = Schedule((pieces,), 4000, 1)
-    bound = receive_backlog(schedule, [bytes_], bytes_, frame, frame - 1)
-    assert bound is not None
-    held, interrupt, now = frame - 1, 0, 0
-    most = held
-    for piece in pieces:
-        left = piece.cycles
-        while left:
-            if now % bytes_.interval == 0:
-                held, interrupt = held + 1, interrupt + bytes_.cycles
-            most = max(most, held)
-            if interrupt:
-                interrupt -= 1
-            else:
-                left -= 1
-            now += 1
-        if held >= frame:
-            held -= frame
-    assert most <= bound
+@given(sources, st.lists(work, min_size=1, max_size=4), st.integers(1, 9), st.integers(0, 4))
+def test_no_poll_comes_later_than_the_gap(found: list[Source], works: list[int], before: int, after: int) -> None:
+    schedule = Schedule(tuple((Piece(f"t{n}", cycles),) for n, cycles in enumerate(works)), 20, 1)
+    bound = longest_gap(schedule, found, before, after)
+    if bound is None or bound > LONG:
+        return
+    assert max(until_poll(schedule, first, found, before, after) for first in range(len(works))) <= bound
 
 
-def test_ring_and_gap_by_hand() -> None:
-    """Tasks of 100 and 40 cycles, a poll after each, a byte of 2 cycles every 10: 100 and 13 bytes take 126, the
-    fourteenth comes at 130."""
-    schedule = Schedule(((Piece("a", 100, polls=1), Piece("b", 40, polls=1)),), 1000, 1)
+def test_gap_by_hand() -> None:
+    """Work of 60, 140 and 20 under a byte of 2 cycles every 10: 220 and 28 bytes take 276. Slots of 10 with work 14 and
+    4 after 3: 18 and 22 and 36 cycles end when the next slot has begun, 40 just as it does."""
+    slot = Schedule(((Piece("a", 100), Piece("b", 40)),), 1000, 1)
     receive = Source("receive", 2, 10)
-    assert poll_gap(schedule, [receive]) == response(100, [receive]) == 126
-    assert receive_backlog(schedule, [receive], receive, frame_least=20, idle_most=0) == 13
+    assert longest_gap(slot, [receive], 60, 20) == response(220, [receive]) == 276
+    late = Schedule(((Piece("long", 14),), (Piece("short", 4),)), slot_cycles=10, slots_per_tick=2)
+    assert longest_gap(late, [], 3, 1) == 40
+
+
+def test_background_is_what_is_left() -> None:
+    """Of 1000 cycles a slot takes 140, bytes 200."""
+    slot = Schedule(((Piece("a", 100), Piece("b", 40)),), 1000, 1)
+    assert background(slot, [Source("receive", 2, 10)]) == Fraction(660, 1000)

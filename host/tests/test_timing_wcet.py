@@ -39,6 +39,7 @@ NESTED = """main: nop
  rjmp 1b
 9: ret
 """
+TWO_ENTRIES = "main: ldi r25, 3\n sbrc r24, 0\n rjmp 2f\n 1: nop\n nop\n nop\n 2: nop\n dec r25\n brne 1b\n ret"
 
 
 def cycles_of(folder: Path, source: str, name: str = "main") -> int:
@@ -62,10 +63,16 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: ldi r24, 7\n 1: dec r24\n brpl 1b\n ret", 1 + 7 * 3 + 2 + 4),  # 6 to 0, then 255
         ("main: ldi r24, 1\n ldi r25, 1\n 1: sbiw r24, 1\n brne 1b\n ret", 2 + 256 * 4 + 3 + 4),
         ("main: ldi r24, 0\n 1: dec r24\n brne 1b\n ret", 1 + 255 * 3 + 2 + 4),
+        ("main: set\n bld r1, 3\n 1: lsr r24\n lsr r1\n brne 1b\n ret", 2 + 3 * (2 + 2) + (2 + 1) + 4),  # 8, 4, 2, 1
+        ("main: ldi r24, 1\n rjmp 2f\n 1: ldi r24, 0\n 2: cpse r24, r1\n rjmp 1b\n ret", 3 + (1 + 2 + 1) + 2 + 4),
+        ("main: ldi r24, 96\n ldi r25, 0\n bst r24, 5\n 1: bld r25, 7\n inc r25\n brmi 1b\n ret", 3 + 127 * 4 + 3 + 4),
+        (TWO_ENTRIES, 1 + 2 + 3 * (3 + 2) + 2 * 2 + 1 + 4),  # skips the jump, then three passes
+        (TWO_ENTRIES.replace("rjmp", "jmp"), 1 + 3 + 3 * (3 + 2) + 2 * 2 + 1 + 4),  # skips two words
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
-         "nested", "counted", "counted below zero", "two bytes", "256 times", "waits"],
+         "nested", "counted", "counted below zero", "two bytes", "256 times", "shifted out", "flag", "bit of another",
+         "two entries", "two entries, farther", "waits"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles
@@ -92,10 +99,13 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
     ("source", "words"),
     [
         (WHILE.replace("bounded 5", "nop"), "has no bound"),
+        ("main: set\n bld r1, 3\n 1: lsr r24\n asr r1\n sec\n brcs 1b\n ret", "has no bound"),
+        ("main: ldi r24, 1\n rjmp 2f\n 1: ldi r24, 2\n 2: cpse r24, r1\n rjmp 1b\n ret", "has no bound"),
+        ("main: bst r25, 5\n bld r1, 3\n 1: nop\n dec r1\n brne 1b\n ret", "has no bound"),
         ("main: rcall f\n ret\n f: rcall main\n ret", "recursion at .*: main calls f calls main"),
         ("main: rjmp main", "has no bound"),
         ("main: sbrc r24, 0\n rjmp 2f\n 1: bounded 3\n dec r24\n 2: tst r25\n brne 3f\n dec r25\n rjmp 1b\n"
-         " 3: brcs 1b\n tst r24\n brcs 2b\n ret", "entered at two places|passed without"),
+         " 3: brcs 1b\n tst r24\n brcs 2b\n ret", "passed without"),  # two loops, one row
     ],
 )  # fmt: skip
 def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None:

@@ -41,14 +41,24 @@ int main(void) {
 """
 
 
-def build(
-    folder: Path, first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10
-) -> Path:
-    """Compiles it; returns its ELF file."""
-    text = SOURCE.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
-    text = text.replace("INTERRUPT_BUDGET", str(interrupt_budget)).replace("RESERVE", str(reserve))
-    source, image = folder / "program.c", folder / "program.elf"
-    source.write_text(text)
-    command = ["avr-gcc", "-Os", "-g", "-mmcu=atmega328p", "-fno-optimize-sibling-calls", "-o", str(image), str(source)]
-    subprocess.run(command, check=True)
+FIRMWARE = Path(__file__).resolve().parents[2] / "firmware" / "src"
+
+
+def text(first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10) -> str:
+    """Its source."""
+    source = SOURCE.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
+    return source.replace("INTERRUPT_BUDGET", str(interrupt_budget)).replace("RESERVE", str(reserve))
+
+
+def compiled(folder: Path, source: str, *flags: str) -> Path:
+    """The ELF file of a source."""
+    program, image = folder / "program.c", folder / "program.elf"
+    program.write_text(source)
+    command = ["avr-gcc", "-Os", "-g", "-mmcu=atmega328p", "-fno-optimize-sibling-calls", *flags]
+    subprocess.run([*command, "-o", str(image), str(program)], check=True)
     return image
+
+
+def build(folder: Path, **changes: int) -> Path:
+    """Compiles it, with other numbers than those of `text`; returns its ELF file."""
+    return compiled(folder, text(**changes))

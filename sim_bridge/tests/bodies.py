@@ -16,7 +16,7 @@ from sim_bridge.tests.simulated import arena_of
 Points = Sequence[tuple[float, float]]
 
 RADIUS = 0.07
-# A Boe-Bot of 0.6 kg, section 1.2 of the specification.
+# A Boe-Bot of 0.6 kg (docs/reference/notes.md).
 BOE_BOT: dict[str, Any] = {
     "mass": 0.60,
     "inertia": 1.2e-3,

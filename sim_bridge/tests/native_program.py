@@ -23,7 +23,7 @@ PREAMBLE = """
 static void start(void);
 static void slot(void);
 static inline void say(const void *bytes, uint8_t count) { hal_serial_send(bytes, count); }
-void firmware_start(void) { hal_start_serial(500000u); start(); hal_start_timers(); }
+void firmware_start(void) { hal_start_serial(5000u); start(); hal_start_timers(); }
 void firmware_poll(void) {}
 bool firmware_due(void) { return false; }
 HAL_INTERRUPT_SLOT { hal_slot_arm((uint16_t)(hal_time() + HAL_SLOT_CYCLES)); slot(); }

@@ -1,4 +1,4 @@
-"""The rolling body: closed forms and a high-accuracy integrator; experiments E03 to E07 of the specification."""
+"""The rolling body: closed forms and a high-accuracy integrator; experiments E03 to E07."""
 
 from __future__ import annotations
 

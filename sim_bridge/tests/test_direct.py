@@ -1,6 +1,6 @@
 """Runs without a board: the same brains, the same results, as far as the robot has what they need.
 
-Truth: figures of the notes' default robot (THEORY sections 1.5 and 2.4) and closed forms.
+Truth: the notes' (2.31), (2.32) and (3.13) worked out by hand for their default robot, and closed forms.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Experiments of the notes on the world without boards: rows E04, E05, E08-E13, E16, E18 and E69 of THEORY's table.
+"""Experiments of the notes on the world without boards: E04, E05, E08-E13, E16, E18 and E69.
 
 E01 to E07 stand with motors and body in test_motors.py, test_vehicle_motors.py and test_body.py, E12 to E15 and E70
 with rays and sensors in test_rays.py, test_sensors*.py and test_reading_table.py, E11's other half in
@@ -370,7 +370,7 @@ def test_e18_testrun(heading: float, ends: bool) -> None:
 
 def test_e18_with_the_wander_brain_many_seeds() -> None:
     """The notes' pose of the IR sensors leaves a frontal blind cone, so that 5 to 6 of 12 runs of 30 s collide; at
-    +-0.3324 rad fewer do (THEORY section 1.5). Bounds are three standard deviations of 64 runs."""
+    +-0.3324 rad fewer do (docs/reference/notes.md). Bounds are three standard deviations of 64 runs."""
 
     def collided(angle: float) -> int:
         batch = Batch(arsim(infrared_rad=(angle, -angle)), load_arena("arsim"), np.zeros((64, 3)), np.arange(64))

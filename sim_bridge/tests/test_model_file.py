@@ -51,7 +51,7 @@ def test_vehicle_is_the_run_of_boebot_run(source: str, seed: int) -> None:
 
 
 def test_default_robot_is_that_of_the_notes() -> None:
-    """THEORY 1.2, 1.5, 1.10 against the file that everybody reads."""
+    """The values of ARSim 1.1.9 (docs/reference/notes.md) against the file that everybody reads."""
     assert ARSIM_BODY == {
         "mass": 3.0, "inertia": 0.2, "radius": 0.2, "half_track": 0.2, "wheel_radius": 0.1, "wheel_mass": 0.0,
         "wheel_inertia": 0.0, "linear_damping": 1.0, "angular_damping": 0.1, "grip": 0.7,

@@ -1,4 +1,4 @@
-"""Motors: (1.1)-(1.10), (3.15), servos; experiments E01 and E02 of the specification."""
+"""Motors: (1.1)-(1.10), (3.15), servos; experiments E01 and E02."""
 
 from __future__ import annotations
 

@@ -190,8 +190,8 @@ def test_a_measurement_takes_104_us() -> None:
 TALKER = """
 static uint16_t count;
 static void start(void) {
-  const uint32_t rate = hal_eeprom_read(0) | (uint32_t)hal_eeprom_read(1) << 8;
-  if (rate != 0xFFFF) hal_start_serial(rate * 100u);
+  const uint16_t rate = (uint16_t)(hal_eeprom_read(0) | hal_eeprom_read(1) << 8);
+  if (rate != 0xFFFF) hal_start_serial(rate);
 }
 static void slot(void) {
   uint8_t byte;

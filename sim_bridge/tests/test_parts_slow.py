@@ -55,12 +55,13 @@ def decay(robot: Scripted, charge_us: float = 100.0) -> float:
 
 @pytest.mark.parametrize("ambient", [0.5, 1.0, 2.0, 4.0])
 def test_decay_time_is_inverse_to_the_light(ambient: float) -> None:
-    """A constant current from a full charge: t = decay_s / L; 1.5 ms in a room (HARDWARE: 1 to 2 ms)."""
+    """A constant current from a full charge: t = decay_s / L; 1.5 ms in a room (Parallax's book
+    on the robot, chapter 6: 1 to 2 ms)."""
     assert decay(lit(arena_of(), ambient=ambient)) == pytest.approx(0.0015 / ambient, abs=1e-6)
 
 
 def test_a_lamp_counts_by_its_distance_and_direction() -> None:
-    """L = ambient + P cos(theta) / (d0^2 + d^2), (section 1.9)."""
+    """L = ambient + P cos(theta) / (d0^2 + d^2), world/sensors/light.h."""
     for heading, facing in ((0.0, 1.0), (1.0, math.cos(1.0)), (math.pi, 0.0)):
         robot = lit(lamp_at(2.0, 0.0, 8.0), heading)
         expected = 0.0015 / (1.0 + 8.0 * facing / (0.05**2 + 4.0))
@@ -117,7 +118,7 @@ def sharp_before(distance: float, draw: imperfections.Draw = OFF) -> Scripted:
 
 @pytest.mark.parametrize("distance", [0.1, 0.15, 0.3, 0.5, 0.8])
 def test_voltage_falls_with_the_distance(distance: float) -> None:
-    """V = 33.9 / (d + 4.74), d in cm (HARDWARE section 5)."""
+    """V = 33.9 / (d + 4.74), d in cm, fitted to the curve of the data sheet (Sharp GP2D12)."""
     robot = sharp_before(distance)
     robot.run(0.1)
     assert lib.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (100 * distance + 4.74), rel=1e-9)

@@ -1,4 +1,4 @@
-"""Sensor models of the world, each against a closed form or its specification (E13, E14, E15, E70 of THEORY)."""
+"""Sensor models of the world, each against a closed form or the notes' section 3.2 (experiments E13, E14, E15, E70)."""
 
 from __future__ import annotations
 

@@ -343,7 +343,7 @@ def test_e01_by_the_python_face(volts: float, load: float, expected: float) -> N
 
 
 def test_position_servo_turns_as_an_integrator_says() -> None:
-    """d(alpha)/dt = clamp(K_s (alpha_ref - alpha), +-omega_s), K_s 20 1/s, 5 rad/s (THEORY 1.11)."""
+    """d(alpha)/dt = clamp(K_s (alpha_ref - alpha), +-omega_s), K_s 20 1/s, 5 rad/s (the kit's own)."""
     servo = PositionServo(dead_band_us=0.0)
     assert servo.pulse_of(math.pi / 4) == pytest.approx(2000.0)
     target, truth = -0.9, 0.0

@@ -36,6 +36,8 @@ class Line:
         self.seed = 0
         self.free = 0
         """the cycle at which the last byte sent so far has arrived"""
+        self.acknowledges = True
+        """events are acknowledged when they come"""
         self._sequence = self._number = 0
         self._bytes = b""  # of a frame that has not ended
         self._cycles = [bench.now]  # of the same, and of the byte before
@@ -75,7 +77,7 @@ class Line:
 
     def _hear(self, message: Any, first: int, last: int) -> None:
         self.heard.append(Heard(first, last, message))
-        if isinstance(message, messages.Event):
+        if self.acknowledges and isinstance(message, messages.Event):
             self.send(messages.Acknowledge(message.number))
 
     def wait(self, kind: type[_M], since: int) -> _M:
@@ -134,7 +136,13 @@ class Line:
     @property
     def tick(self) -> int:
         """Of the newest telemetry, as a set-point names it."""
+        newest = self.newest
+        return newest.tick & 0xFFFF if newest is not None else 0
+
+    @property
+    def newest(self) -> messages.Telemetry | None:
+        """Telemetry, None before the first."""
         for heard in reversed(self.heard):
             if isinstance(heard.message, messages.Telemetry):
-                return heard.message.tick & 0xFFFF
-        return 0
+                return heard.message
+        return None

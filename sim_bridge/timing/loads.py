@@ -206,6 +206,22 @@ class Contact:
             self._next += self.period
 
 
+class Bursts:
+    """Noise: a pin that every `period` cycles changes its level `count` times, `half` cycles apart."""
+
+    def __init__(self, pin: int, count: int, half: int, period: int, first: int) -> None:
+        self.pin, self.count, self.half, self.period = pin, count, half, period
+        self._next, self._begun = first, 0
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source. A burst is queued at once."""
+        while self._next < until:
+            level = Level.LOW if self._begun * self.count % 2 else Level.HIGH
+            bench.access.wave(self.pin, self.half, self._next, self.count, level)
+            self._begun += 1
+            self._next += self.period
+
+
 class Ping:
     """A range finder that answers each trigger with an echo; their lengths sweep the sensor's range."""
 

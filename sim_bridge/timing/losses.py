@@ -11,7 +11,7 @@ from boebot.timing.distributions import Losses
 from sim_bridge.timing.line import Line
 from sim_bridge.timing.loads import TICK_CYCLES, PulseTrain
 
-COUNTERS_TICKS = 70  # from one message with the board's counters to the next one at most
+COUNTERS_TICKS = 80  # from one message with the board's counters to the next one at most
 SIDES = ("left", "right")
 MASKED = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MASKED
 

@@ -31,7 +31,7 @@ from sim_bridge.timing.scenarios import RANGES, SILENCE, STATES, load, numbers_o
 from sim_bridge.timing.watched import Circumstances, Watched, measurement, watched
 from sim_bridge.timing.world_access import WorldAccess
 
-SCENARIOS = ("figures", "saturated", "noise", "everything")
+SCENARIOS = ("figures", "saturated", "noise", "faults", "everything")
 CLOCK_HZ = 16_000_000
 DRAIN_TICKS = 3  # after a run, for what is under way
 RESTART = 0.3  # share of the search's runs that begin anew

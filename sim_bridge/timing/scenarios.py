@@ -10,7 +10,7 @@ Periods share no factor with the control tick, so that a longer run sweeps the p
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import count
 from math import gcd, prod
@@ -19,17 +19,21 @@ from boebot import robots
 from boebot.link import frame, messages
 from boebot.robots import RobotDescription
 from sim_bridge.timing.line import BYTE_CYCLES, Line
-from sim_bridge.timing.loads import Bench, Contact, Ping, PulseTrain, wheels
+from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels
 from sim_bridge.timing.traffic import EachTick, FullLine
 
-EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "everything": 1500}
+EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "faults": 1500, "everything": 1500}
 NOISE_PERIOD = 80  # cycles from edge to edge of a 100 kHz square wave
+BURSTS = ((10, 120, 101_009), (110, 300, 397_001))  # edges, cycles apart and to the next burst: too close; too many
+BOUNCE_PERIOD, BOUNCE_CLOSED = 283_007, 90_001  # "faults": two slots are a touch, four without one its end
 CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how long one lasts
+SHORT_LIFE_MS = 18  # of a set-point in "faults": telemetry is a tick old at most when it is answered
 DEVICES = messages.Devices
 STUCK, NEVER_AGAIN = 1_600_000, 1 << 60  # cycles for which the two-wire bus is held, once
 SILENCE = 5_600_000  # cycles at the end of "everything": the dead man's 250 ms and the tasks that follow
 CHANGED = ("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain")
 FIGURE_DEVICES = DEVICES.SERVOS | DEVICES.ENCODERS | DEVICES.WHISKERS | DEVICES.INFRARED | DEVICES.PING
+FAULT_DEVICES = FIGURE_DEVICES | DEVICES.TURRET | DEVICES.BUZZER
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +157,43 @@ class AllSorts:
         return messages.Arm(1, 0)
 
 
+class Deaf:
+    """A host that acknowledges no event, stops and arms the motors again and again, and lets each set-point run out.
+
+    So events of all kinds come while the board's queue of them is full. See Source.
+    """
+
+    STEP = 99_991  # cycles, a prime: set-points come every fourth, and a stop every 24th
+
+    def __init__(self, line: Line, first: int) -> None:
+        line.acknowledges = False
+        self._line, self._next, self._count = line, first, 0
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source."""
+        del bench
+        while self._next < until:
+            for message in self._messages():
+                self._line.send(message, self._next)
+            self._count += 1
+            self._next += self.STEP
+
+    def _messages(self) -> Sequence[object]:
+        step, newest = self._count % 24, self._line.newest
+        if step == 0:
+            return [messages.Stop(0)]
+        if step == 4 and newest is not None:
+            return [self._line.numbered(messages.Arm, newest.latches)]
+        if step % 4 or step < 8:
+            return []
+        token = self._count % 255 + 1
+        return [
+            messages.Turret(-9_000, 1),
+            messages.Buzzer(1_000, 100, token),
+            messages.SetpointSignal(2_000, -2_000, SHORT_LIFE_MS, self._line.tick),
+        ]
+
+
 # ---- preparation -----------------------------------------------------------------------------------------------------
 
 
@@ -170,8 +211,8 @@ def encoder_pins(robot: RobotDescription) -> list[tuple[int, ...]]:
 def built(robot: RobotDescription) -> DEVICES:
     """All devices that the robot's pin map has."""
     found = DEVICES(0)
-    for bit, name in messages.DEVICE_OF_BIT.items():
-        if name in robot.device:
+    for bit, left in messages.DEVICE_OF_BIT.items():
+        if {left, left.replace("_left", "_right")} & set(robot.device):
             found |= bit
     return found
 
@@ -180,7 +221,7 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     """Opens a session with the board, switches on what the scenario needs, and arms the motors."""
     line = Line(bench)
     line.open()
-    devices = built(robot) if scenario == "everything" else built(robot) & FIGURE_DEVICES
+    devices = built(robot) & {"everything": ~DEVICES(0), "faults": FAULT_DEVICES}.get(scenario, FIGURE_DEVICES)
     line.set("devices", int(devices))
     line.set("infrared_period", 2)
     line.set("infrared_sweep", 1)
@@ -191,6 +232,20 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     return line
 
 
+def turn(bench: Bench, robot: RobotDescription, scenario: str, numbers: Numbers, start: int) -> list[list[PulseTrain]]:
+    """Turns the wheels. Returns the encoder lines of each; a noisy wheel has none."""
+    first = start + numbers.wheels
+    turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], first)
+    noise: list[Source] = []
+    if scenario == "noise":
+        noise = [PulseTrain(wheel[0].pin, NOISE_PERIOD, first) for wheel in turning[:1]]
+    elif scenario == "faults":
+        noise = [Bursts(wheel[0].pin, *burst, first) for wheel, burst in zip(turning, BURSTS, strict=False)]
+    lines = [train for number, wheel in enumerate(turning) for train in wheel[number < len(noise) :]]
+    bench.sources += [*noise, *lines]
+    return [[] if number < len(noise) else wheel for number, wheel in enumerate(turning)]
+
+
 def load(
     bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbers: Numbers, cycles: int
 ) -> list[list[PulseTrain]]:
@@ -199,15 +254,10 @@ def load(
     Returns the encoder lines of each wheel; a noisy wheel has none.
     """
     start = bench.now + 2_000
-    turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], start + numbers.wheels)
-    trains = [train for wheel in turning for train in wheel]
-    if scenario == "noise" and trains:
-        trains[0] = PulseTrain(trains[0].pin, NOISE_PERIOD, start + numbers.wheels)
-        turning[0] = []
-    bench.sources += trains
+    turning = turn(bench, robot, scenario, numbers, start)
     first = start + numbers.line
+    whiskers = [d for d in robot.device.values() if isinstance(d, robots.Whisker)]
     if scenario == "everything":
-        whiskers = [d for d in robot.device.values() if isinstance(d, robots.Whisker)]
         bench.sources += [
             Contact(robots.pin_number(d.pin), CONTACT_PERIOD + 2 * i, BOUNCE, start + numbers.contact // (i + 1))
             for i, d in enumerate(whiskers)
@@ -223,6 +273,12 @@ def load(
     for device in robot.device.values():
         if isinstance(device, robots.Ping):
             bench.sources.append(Ping(robots.pin_number(device.pin), step=23_459 + numbers.echo))
+    if scenario == "faults":
+        bench.sources += [
+            Contact(robots.pin_number(d.pin), BOUNCE_PERIOD, BOUNCE_CLOSED, start + numbers.contact) for d in whiskers
+        ]
+        bench.sources.append(Deaf(line, first))
+        return turning
     signals = [(numbers.signal - 10_000, 10_000 - numbers.signal // 2)]
     bench.sources.append((FullLine if scenario == "saturated" else EachTick)(line, first, signals, probes=False))
     return turning

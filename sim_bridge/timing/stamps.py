@@ -85,8 +85,7 @@ class EncoderStamps:
         return self._bench.access.read_memory(self._head, 1)[0]
 
     def _entry(self, place: int) -> bytes:
-        """The first place is a copy of the one behind the last, which is written before the head says so."""
-        return self._bench.access.read_memory(self._ring + (place or CHANGES_BYTES), CHANGE_BYTES)
+        return self._bench.access.read_memory(self._ring + place, CHANGE_BYTES)
 
     def _look(self) -> None:
         head = self._now()

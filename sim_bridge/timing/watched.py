@@ -162,6 +162,8 @@ def _fullest_tick(what: Watched, spans: NDArray[Any], since: int, work: NDArray[
 
 
 def _between_polls(what: Watched, spans: NDArray[Any]) -> int:
-    """Most cycles from the beginning of one poll of the link to the next, sleep not counted."""
+    """Most cycles from the beginning of one poll of the link to the next without sleep: before it sleeps the main loop
+    has asked whether the link is due."""
     polls = spans[spans["id"] == what.poll_id] if what.poll_id is not None else spans[:0]
-    return int(np.diff(polls["executed"].astype(np.int64)).max(initial=0))
+    time, executed = (np.diff(polls[name].astype(np.int64)) for name in ("begin", "executed"))
+    return int(time[time == executed].max(initial=0))

@@ -1,8 +1,8 @@
 /* model.h: what a vehicle without a board is made of: a body, a drive, sensors and perhaps a battery.
  *
  * A model is built up once and then shared by any number of worlds and threads, which do not change it. Each sensor adds
- * readings, numbers that the brain gets; a sensor with a period holds its readings in between (rule S4 of THEORY section
- * 1.3). A sensor's noise is keyed by its kind and its number among that kind, so that another sensor changes no draw.
+ * readings, numbers that the brain gets; a sensor with a period holds its readings in between (notes, section 3.2.2). A
+ * sensor's noise is keyed by its kind and its number among that kind, so that another sensor changes no draw.
  */
 #ifndef VEHICLES_MODEL_H
 #define VEHICLES_MODEL_H

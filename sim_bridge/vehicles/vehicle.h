@@ -2,9 +2,9 @@
  *
  * `vehicles` holds N worlds of one model, each with one vehicle, its own arena, seed and pose. They know nothing of each
  * other: what one does is the same whatever the others are, in whatever order and by however many threads they are
- * stepped. The order of events within a step is that of Fig. 3.1 of the notes (THEORY section 3.1): sense, process, send
- * motor signals, move, update the arena, check for the end. A world starts with its first sensing done, so that one
- * call, vehicles_step, goes from motor signals to the next readings.
+ * stepped. The order of events within a step is that of Fig. 3.1 of the notes: sense, process, send motor signals, move,
+ * update the arena, check for the end. A world starts with its first sensing done, so that one call, vehicles_step,
+ * goes from motor signals to the next readings.
  */
 #ifndef VEHICLES_VEHICLE_H
 #define VEHICLES_VEHICLE_H

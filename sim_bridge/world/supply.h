@@ -46,8 +46,8 @@ void supply_init(const supply_parameters *p, supply *self, double charge);
 /* `dt` seconds under the load of all servos, A; `at_charger`: the robot stands at a charging station. */
 void supply_step(const supply_parameters *p, supply *self, double servos_a, int at_charger, double dt);
 
-/* The notes' energy E in [0, 1] (section 1.9 of the specification): it falls by p_0 and by p_m per motor signal, and rises
- * by p_c at a charger, all 1/s. Returns E after `dt`. */
+/* An energy E in [0, 1], the kit's own: it falls by p_0 and by p_m per motor signal, and rises by p_c at a charger, all
+ * 1/s. Returns E after `dt`. */
 typedef struct {
   double idle_per_s;    /* p_0 */
   double signal_per_s;  /* p_m */

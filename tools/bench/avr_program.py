@@ -31,10 +31,18 @@ def flags(environment: str = ENVIRONMENT) -> list[str]:
     return [*PLATFORM_FLAGS, *shlex.split(option(environment, "build_flags")), "-std=gnu11"]
 
 
-def build(image: Path, main: Path | None = None, extra: tuple[str, ...] = (), environment: str = ENVIRONMENT) -> Path:
-    """The firmware's ELF file at `image`, with `main` in place of its main.c. Raises CalledProcessError."""
-    own = SOURCES / "main.c"
-    firmware = [path for path in sorted(SOURCES.rglob("*.c")) if "native" not in path.parts]
+def build(
+    image: Path,
+    main: Path | None = None,
+    extra: tuple[str, ...] = (),
+    environment: str = ENVIRONMENT,
+    folder: Path | None = None,
+) -> Path:
+    """The firmware's ELF file at `image`, with `main` in place of its main.c; its sources may be a copy in a `folder`.
+    Raises CalledProcessError."""
+    folder = folder or SOURCES
+    own = folder / "main.c"
+    firmware = [path for path in sorted(folder.rglob("*.c")) if "native" not in path.parts]
     sources = [str(main or path) if path == own else str(path) for path in firmware]
-    subprocess.run(["avr-gcc", *flags(environment), *extra, f"-I{SOURCES}", "-o", str(image), *sources], check=True)
+    subprocess.run(["avr-gcc", *flags(environment), *extra, f"-I{folder}", "-o", str(image), *sources], check=True)
     return image

@@ -89,7 +89,7 @@ int main(void) {
   HAL_PIN_OUTPUT(SERVO_LEFT);
   schedule_start(0);
   safety_start();
-  hal_start_serial(500000);
+  hal_start_serial(5000);
   UCSR0B = 0;
   link_start(5000);
   link_use_seed(SEED);

@@ -45,21 +45,19 @@ class Row(NamedTuple):
 
 ROWS = (
     Row("a set-point's age by its tick", "safety.c", "age >= life || ", "", "safety"),
-    Row("order of set-points", "safety.c", "|| has_newer(answers_tick, sequence) ", "", "safety"),
+    Row("order of set-points", "safety.c", "|| has_newer(self, answers_tick, sequence) ", "", "safety"),
     Row(
-        "set-points from before arming", "safety.c", "ticks_are_over && (int16_t)(answers_tick", "false && (0", "safety"
-    ),
-    Row(
-        "copies from before a dead-man stop",
+        "set-points from before arming",
         "safety.c",
-        "STATUS_DEAD_MAN;\n    end_ticks(last_tick);",
-        "STATUS_DEAD_MAN;",
+        "self->ticks_are_over && (int16_t)(answers_tick",
+        "false && (0",
         "safety",
     ),
-    Row("latch", "safety.c", "latch != LATCH_NONE || ", "", "safety"),
+    Row("copies from before a dead-man stop", "safety.c", "  end_ticks(self, self->last_tick);\n", "", "safety"),
+    Row("latch", "safety.c", "self->latch != LATCH_NONE || ", "", "safety"),
     Row("longest time to live", "safety.c", "time_to_live > TIME_TO_LIVE_MAX", "false", "safety"),
-    Row("arm names the latch that it ends", "safety.c", "known_latches != latches", "false", "safety"),
-    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - deadline) >= 0", "false", "safety"),
+    Row("arm names the latch that it ends", "safety.c", "known_latches != self->latches", "false", "safety"),
+    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - self->deadline) >= 0", "false", "safety"),
     Row("no arming below the supply's minimum", "safety.c", "supply_low() || ", "", "safety"),
     Row("no arming before the supply is measured", "safety.c", "|| supply_voltage() == 0", "", "safety"),
     Row("a low supply latches", "safety.c", "if (supply_low()) {", "if (false) {", "safety"),
@@ -81,13 +79,13 @@ ROWS = (
     Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
     Row("what finds the queue full is told later", "link/events.c", "counters_count(deferred);", "return;", "events"),
     Row("touches that were merged", "link/events.c", "EVENT_KIND_WHISKERS) {", "UINT8_MAX) {", "events"),
-    Row("cells of the EEPROM are read back", "storage.c", "!= record.bytes[step_first]", "< 0", "storage"),
+    Row("cells of the EEPROM are read back", "storage.c", "!= self->record.bytes[self->step_first]", "< 0", "storage"),
     Row("the mark is void during a write", "storage.c", "= MARK_VOID;", "= MARK_VALID;", "storage"),
     Row("a record's checksum", "storage.c", "&& crc == expected", "", "storage"),
     Row("range of a loaded parameter", "link/parameters.c", "!is_allowed(parameter, kept[", "0 && (kept[", "storage"),
     Row("no save while the supply is low", "storage.c", "supply_low()) {\n    return", "0) {\n    return", "storage"),
     Row("no cell while the supply is low", "storage.c", "supply_low()) {\n    give", "0) {\n    give", "storage"),
-    Row("a start counts after 10 s", "storage.c", "run_ticks == RUN_TICKS && ", "", "storage"),
+    Row("a start counts after 10 s", "storage.c", "self->run_ticks == RUN_TICKS && ", "", "storage"),
 )
 SUITES = tuple(sorted({row.suite for row in ROWS}))
 

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 2u
-#define SCHEMA_HASH 0x29215B62ul
+#define SCHEMA_HASH 0x2253866Eul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
@@ -320,14 +320,6 @@ typedef struct __attribute__((packed)) {
   uint8_t latches; /* as in the telemetry that the host knows; refused (latched_again) if there has been another since */
 } msg_arm;
 
-/* Asks how long a task took at most since this was last asked of it, or since the board started; from now on anew. */
-#define MSG_TAKE_TASK_TIME_ID 0x25u
-#define MSG_TAKE_TASK_TIME_LENGTH 3u
-typedef struct __attribute__((packed)) {
-  uint16_t number; /* of the request */
-  uint8_t task; /* task; another number is out_of_range */
-} msg_take_task_time;
-
 /* The event of this number has arrived. */
 #define MSG_ACKNOWLEDGE_ID 0x28u
 #define MSG_ACKNOWLEDGE_LENGTH 2u
@@ -374,7 +366,7 @@ typedef struct __attribute__((packed)) {
   uint8_t overruns; /* control ticks overrun since reset, modulo 256 */
 } msg_telemetry;
 
-/* What the board's end of the link has counted since reset, modulo 65536; sent every 64 ticks or less often. */
+/* What the board's end of the link has counted since reset, modulo 65536; sent in turn with task_time. */
 #define MSG_COUNTERS_ID 0x91u
 #define MSG_COUNTERS_LENGTH 20u
 typedef struct __attribute__((packed)) {
@@ -427,13 +419,21 @@ typedef struct __attribute__((packed)) {
 #define MSG_DEVICES_TELEMETRY_LIGHT_RIGHT_MIN (0)
 #define MSG_DEVICES_TELEMETRY_LIGHT_RIGHT_MAX (14000)
 
+/* How long one of the firmware's tasks took at most since the session was opened; one task after another, then the counters, every 4 ticks or less often. */
+#define MSG_TASK_TIME_ID 0x93u
+#define MSG_TASK_TIME_LENGTH 3u
+typedef struct __attribute__((packed)) {
+  uint8_t task; /* task */
+  uint16_t longest; /* 0.0625 us; from call to return, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board */
+} msg_task_time;
+
 /* Answer to a numbered request. */
 #define MSG_ANSWER_ID 0xA0u
 #define MSG_ANSWER_LENGTH 7u
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the request */
   uint8_t status; /* answer_status */
-  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board */
+  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale */
 } msg_answer;
 
 /* Something happened. Sent again until acknowledged. */
@@ -487,8 +487,6 @@ static inline int16_t message_length_to_board(uint8_t id) {
       return MSG_RESET_PARAMETERS_LENGTH;
     case MSG_ARM_ID:
       return MSG_ARM_LENGTH;
-    case MSG_TAKE_TASK_TIME_ID:
-      return MSG_TAKE_TASK_TIME_LENGTH;
     case MSG_ACKNOWLEDGE_ID:
       return MSG_ACKNOWLEDGE_LENGTH;
     case MSG_CLOCK_PROBE_ID:
@@ -515,6 +513,8 @@ static inline int16_t message_length_to_host(uint8_t id) {
       return MSG_COUNTERS_LENGTH;
     case MSG_DEVICES_TELEMETRY_ID:
       return MSG_DEVICES_TELEMETRY_LENGTH;
+    case MSG_TASK_TIME_ID:
+      return MSG_TASK_TIME_LENGTH;
     case MSG_ANSWER_ID:
       return MSG_ANSWER_LENGTH;
     case MSG_EVENT_ID:
@@ -559,7 +559,6 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x22, 2, 0x1DEAD58Cul)  \
   X(0x23, 2, 0x5C7C21EEul)  \
   X(0x24, 3, 0x7A25B50Eul)  \
-  X(0x25, 3, 0x1ADDF94Dul)  \
   X(0x28, 2, 0x306E772Cul)  \
   X(0x30, 2, 0x1011476Bul)  \
   X(0x80, 44, 0xDFD6FEB4ul) \
@@ -569,6 +568,7 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x90, 38, 0x425355C1ul) \
   X(0x91, 20, 0x7EF8DA38ul) \
   X(0x92, 31, 0xFF7B65CCul) \
+  X(0x93, 3, 0xF7716504ul)  \
   X(0xA0, 7, 0x754ACE51ul)  \
   X(0xA1, 9, 0xCCFD276Eul)  \
   X(0xB0, 6, 0xFC092B76ul)

@@ -31,11 +31,10 @@
 #define HAL_CYCLES_PER_US 16u
 
 /* Changes of the encoders' port, stamped by the pin-change interrupt and worked off by the main loop: a ring whose
- * indices are bytes into it, so that they wrap by themselves. Its first place is also its last, so that the change
- * before a place is always next to it: the change after index i is at hal_changes[i / HAL_CHANGE_BYTES + 1].
+ * indices are bytes into it, so that they wrap by themselves.
  *
  * The interrupt outranks all others, so it must not come back to back for long. When HAL_CHANGES_STORM changes in a row
- * were closer to the one before than HAL_CHANGES_CLOSE cycles, or when the ring is full, it masks all lines, which
+ * came at most HAL_CHANGES_CLOSE cycles after the one before, or when the ring is full, it masks all lines, which
  * hal_changes_stopped() tells. Wheels that turn never do that: among four lines of which each changes once in 2300 cycles
  * or slower (69 edges in a tick), four gaps add up to more than four close ones, even if other interrupts took 1269 cycles
  * of them. */
@@ -49,6 +48,16 @@ typedef struct {
 } hal_change;
 #define HAL_CHANGE_BYTES 4u /* the size of one; its index is a multiple */
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+extern hal_change hal_changes[HAL_CHANGES];
+extern volatile uint8_t hal_changes_head; /* the last change stamped */
+extern volatile uint8_t hal_changes_tail; /* the last change worked off */
+#ifdef __cplusplus
+}
+#endif
+
 #ifdef __AVR__
 #include "hal/avr/hal_avr.h"
 #else
@@ -59,12 +68,8 @@ typedef struct {
 extern "C" {
 #endif
 
-extern hal_change hal_changes[HAL_CHANGES + 1u];
-extern volatile uint8_t hal_changes_head; /* the last change stamped */
-extern volatile uint8_t hal_changes_tail; /* the last change worked off */
-
-static inline volatile hal_change *hal_change_after(uint8_t index) {
-  return (volatile hal_change *)(void *)((uint8_t *)hal_changes + HAL_CHANGE_BYTES + index);
+static inline __attribute__((always_inline)) volatile hal_change *hal_change_after(uint8_t index) {
+  return hal_change_at((uint8_t)(index + HAL_CHANGE_BYTES));
 }
 
 /* Why the chip says that it started, RESET_CAUSE_... of generated/messages.h; unknown behind a bootloader that took the
@@ -78,8 +83,8 @@ void *hal_noinit(void);
 /* A hash of memory that nobody has written since the start: what RAM held when the power came, if it just came. */
 uint32_t hal_memory_noise(void);
 
-/* Line at that rate (9600 ... 1000000 bit/s, as near as the clock allows), 8N1. Call once, before the timers. */
-void hal_start_serial(uint32_t baud);
+/* Line at that rate (96 ... 10000, in 100 bit/s; as near as the clock allows), 8N1. Call once, before the timers. */
+void hal_start_serial(uint16_t baud);
 
 /* Starts the time and the slots. Interrupts are enabled from here on. */
 void hal_start_timers(void);
@@ -107,7 +112,7 @@ void hal_tone_stop(void);
 /* Queues bytes for sending. The caller has asked for room; as has who writes them to hal_serial_place() himself. */
 void hal_serial_send(const uint8_t *bytes, uint8_t count);
 
-/* Whether received bytes were lost since the last call. */
+/* Whether received bytes were lost, or may have been, since the last call. */
 bool hal_serial_overrun(void);
 
 /* Turns a carrier on the LED of one side on or off, half a period given in cycles (at most 256); off leaves the LED dark.
@@ -133,7 +138,7 @@ enum {
   HAL_TWO_WIRE_LAST_READ = 0x58,
 };
 
-/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 50 ms. */
+/* Bytes of flash that the image fills, and their CRC-32; 0 and 0 where there is no flash. Takes some 0.1 s. */
 uint32_t hal_image_size(void);
 uint32_t hal_image_hash(void);
 
@@ -150,6 +155,7 @@ uint32_t hal_image_hash(void);
  *   uint16_t hal_capture_time(void)               when the captured edge came
  *   void hal_capture_falling(void)                next, capture the falling edge
  *   void hal_capture_stop(void)
+ *   volatile hal_change *hal_change_at(index)     the change at an index of their ring
  *   uint8_t hal_changes_stopped(void)             not 0 if the pin-change interrupt has masked all lines, and
  *   void hal_changes_resume(void)                 forgets it
  *   void hal_pin_change_mask(uint8_t bits)        encoder lines (bits of their port) that interrupt; changes of lines
@@ -193,8 +199,10 @@ uint32_t hal_image_hash(void);
  *   void hal_eeprom_write_start(uint16_t address, uint8_t value)   returns at once; not while it is busy
  *   void hal_eeprom_interrupt(bool on)            whether HAL_INTERRUPT_EEPROM runs when it is ready
  *   void hal_eeprom_wait(void)
- *   HAL_TABLE, hal_table_byte(p), hal_table_copy  constant tables in flash
+ *   HAL_TABLE, hal_table_byte(p), hal_table_word(p), hal_table_copy   constant tables in flash
  *   HAL_ZERO(variable)                            once, at the start: makes it zero, where the start-up code has not
+ *   HAL_NEAR(pointer)                             the same pointer; what a function reads and writes by it is then reached
+ *                                                 from there, half of the flash of an address for each
  *   HAL_NAMED                                     in front of a variable that the board's assembly names
  */
 

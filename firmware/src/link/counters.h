@@ -1,4 +1,4 @@
-/* counters.h: what this end of the link has counted, and its message. */
+/* counters.h: what this end of the link has counted; its message, and those of the tasks' times, one after another. */
 #ifndef LINK_COUNTERS_H
 #define LINK_COUNTERS_H
 
@@ -20,7 +20,8 @@ void counters_start(void);
 #define counters_count(field) counters_count_at(offsetof(msg_counters, field))
 void counters_count_at(uint8_t offset);
 
-/* In every tick: looks whether received bytes were lost; in a session sends the counters now and then. */
+/* In every tick: looks whether received bytes were lost; in a session sends one task's longest time or the counters
+ * now and then. */
 void counters_task(void) __attribute__((noinline));
 
 /* Whether received bytes were lost since the last call. */

@@ -4,7 +4,6 @@
 #include <stdbool.h>
 
 #include "analog.h"
-#include "bounds.h"
 #include "buzzer.h"
 #include "compass.h"
 #include "generated/messages.h"
@@ -27,18 +26,8 @@
 static uint8_t line_period; /* ticks */
 static uint8_t since;       /* ticks, saturating */
 
-/* That of the slowest line, 9600 bit/s. */
-#define LINE_PERIOD_MAX 17u
-_Static_assert(96ull * SCHEDULE_TICK_US * LINE_PERIOD_MAX >=
-                   LINE_SHARE * (MSG_DEVICES_TELEMETRY_LENGTH + FRAME_OVERHEAD) * 100000ull,
-               "no line has a longer one");
-
 void devices_start_line(void) {
-  const uint32_t needed = LINE_SHARE * send_time(MSG_DEVICES_TELEMETRY_LENGTH + FRAME_OVERHEAD); /* us */
-  line_period = 1;
-  BOUNDED(LINE_PERIOD_MAX - 1u, while (line_period * (uint32_t)SCHEDULE_TICK_US < needed)) {
-    line_period++;
-  }
+  line_period = send_ticks(LINE_SHARE * (MSG_DEVICES_TELEMETRY_LENGTH + FRAME_OVERHEAD));
   since = 0;
 }
 

@@ -144,7 +144,6 @@ uint8_t dispatch_room(uint8_t id) {
     case MSG_SAVE_PARAMETERS_ID:
     case MSG_RESET_PARAMETERS_ID:
     case MSG_ARM_ID:
-    case MSG_TAKE_TASK_TIME_ID:
       return SEND_RESERVE + MSG_ANSWER_LENGTH;
     default:
       return 0;

@@ -12,16 +12,20 @@
 #include "link/session.h"
 #include "schedule.h"
 
-#define PLACES 4u
+#define QUEUE 4u
 #define KINDS (EVENT_KIND_DEAD_MAN + 1u)
+#define PLACES (QUEUE + KINDS)
 #define RETRY_BYTES 200u /* on the line, besides two ticks */
 #define TICK (SCHEDULE_TICK_US / 500u)
 #define SLOT (TICK / SCHEDULE_SLOTS_PER_TICK)
 
-/* In the order in which they happened. The first is under way; behind the PLACES of the queue stands what found no room in
- * it, at most one of each kind. Numbers are given when they are sent. */
-static msg_event queue[PLACES + KINDS];
-static msg_event *end;  /* behind the last */
+/* The first `count` of `order` are the places of those that wait, in the order in which they happened: the first is under
+ * way; behind the QUEUE of them stands what found no room there, at most one of each kind. The others are free. Numbers are
+ * given when they are sent. */
+static msg_event events[PLACES];
+static uint8_t order[PLACES];
+static uint8_t count;
+
 static uint16_t number; /* of the event under way, or of the next one */
 static bool sent;       /* it was sent at least once */
 static uint16_t wait;   /* half milliseconds until it is sent again */
@@ -32,29 +36,43 @@ static __attribute__((noinline)) void none_under_way(void) {
 }
 
 void events_start(void) {
-  end = queue;
+  BOUNDED(PLACES, for (uint8_t i = 0; i < PLACES; i++)) {
+    order[i] = i;
+  }
+  count = 0;
   number = 1;
   none_under_way();
+}
+
+/* Frees the place of the event that is there in the order. */
+static void forget(uint8_t *at) {
+  const uint8_t place = *at;
+  BOUNDED(PLACES - 1u, for (; at != &order[PLACES - 1u]; at++)) {
+    at[0] = at[1];
+  }
+  *at = place;
+  count--;
 }
 
 void events_raise(uint8_t kind, uint16_t value) {
   if (!session_is_open()) {
     return;
   }
-  if (end >= queue + PLACES) {
+  if (count >= QUEUE) {
     counters_count(deferred);
-    msg_event *kept = queue + PLACES;
-    BOUNDED(KINDS, for (const msg_event *event = kept; event < end; event++)) {
-      if (event->kind != kind) {
-        *kept++ = *event;
-      } else if (kind ==
-                 EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
-        value = (uint16_t)(value | (event->value & 0xFF00u));
-      }
-    }
-    end = kept;
   }
-  msg_event *const event = end++;
+  BOUNDED(KINDS, for (uint8_t *at = &order[QUEUE]; at < &order[count]; at++)) {
+    const msg_event *const before = &events[*at];
+    if (before->kind == kind) {
+      if (kind == EVENT_KIND_WHISKERS) { /* the new one has the latest value; the high byte: all that closed since */
+        value = (uint16_t)(value | (before->value & 0xFF00u));
+      }
+      forget(at);
+      break;
+    }
+  }
+  msg_event *const event = &events[order[count]];
+  count++;
   event->kind = kind;
   event->value = value;
   event->time = schedule_time();
@@ -66,10 +84,7 @@ void events_acknowledge(uint16_t arrived) {
   }
   number++;
   none_under_way();
-  end--;
-  BOUNDED(PLACES + KINDS - 1u, for (msg_event *event = queue; event != end; event++)) {
-    event[0] = event[1];
-  }
+  forget(order);
 }
 
 /* From one sending to the next, in half milliseconds. */
@@ -84,11 +99,12 @@ void events_task(void) {
     return;
   }
   /* Repetitions must not take the room that a message waits for. */
-  if (end == queue || link_room != 0 || !send_has_room(MSG_EVENT_LENGTH)) {
+  if (count == 0 || link_room != 0 || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
-  queue->number = number;
-  send_message(MSG_EVENT_ID, queue, sizeof *queue);
+  msg_event *const first = &events[order[0]];
+  first->number = number;
+  send_message(MSG_EVENT_ID, first, sizeof *first);
   if (sent) {
     counters_count(retransmitted);
   }

@@ -59,7 +59,7 @@ bool identity_send_hello(void) {
       .session_time_out = parameters_u16(PARAMETER_SESSION_TIME_OUT),
       .telemetry_period = telemetry_period(),
       .boot_counter = storage_boot_counter(),
-      .reset_cause = reset_cause_and_task(),
+      .reset_cause = reset_cause(),
       .parameters_saved = storage_parameters_loaded(),
       .devices = parameters_u16(PARAMETER_DEVICES),
   };

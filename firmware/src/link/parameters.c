@@ -10,15 +10,12 @@
 #include "storage.h"
 
 typedef struct {
-  uint16_t minimum; /* as the values are kept */
+  uint16_t minimum; /* as the values are kept; of an i16 it is negative, of a u16 below 32768, which tells them apart */
   uint16_t span;    /* from minimum to maximum */
-  uint8_t is_signed;
 } parameter_range;
 
-enum { TYPE_u16 = 0, TYPE_i16 = 1 };
-
 #define RANGE(name, type, minimum, maximum, initial) \
-  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)((maximum) - (minimum)), TYPE_##type},
+  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)((maximum) - (minimum))},
 HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
 #undef RANGE
 
@@ -31,12 +28,15 @@ HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
 #define BAUD_RATES (sizeof baud_rates / sizeof *baud_rates)
 
 #define LIMIT_MIN_u16 0
+#define LIMIT_MIN_MAX_u16 INT16_MAX
 #define LIMIT_MAX_u16 UINT16_MAX
 #define LIMIT_MIN_i16 INT16_MIN
+#define LIMIT_MIN_MAX_i16 (-1)
 #define LIMIT_MAX_i16 INT16_MAX
-#define WITHIN(name, type, minimum, maximum, initial)                                    \
-  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name); \
-  _Static_assert((minimum) >= LIMIT_MIN_##type && (maximum) <= LIMIT_MAX_##type, "type of " #name);
+#define WITHIN(name, type, minimum, maximum, initial)                                                                 \
+  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);                              \
+  _Static_assert((minimum) >= LIMIT_MIN_##type && (minimum) <= LIMIT_MIN_MAX_##type && (maximum) <= LIMIT_MAX_##type, \
+                 "type of " #name);
 PARAMETER_LIST(WITHIN)
 #undef WITHIN
 _Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a device without pins");
@@ -44,21 +44,19 @@ _Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a
 static uint16_t values[PARAMETER_COUNT];
 
 static __attribute__((noinline)) parameter_range range_of(uint8_t parameter) {
-  parameter_range range;
-  hal_table_copy(&range, &ranges[parameter], sizeof range);
-  return range;
+  return (parameter_range){hal_table_word(&ranges[parameter].minimum), hal_table_word(&ranges[parameter].span)};
 }
 
-static int32_t meant(uint16_t kept, uint8_t is_signed) { return is_signed ? (int32_t)(int16_t)kept : (int32_t)kept; }
+static int32_t meant(uint16_t kept, parameter_range range) {
+  return (int16_t)range.minimum < 0 ? (int32_t)(int16_t)kept : (int32_t)kept;
+}
 
 /* Only devices that the pin map has can be switched on. */
 static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUILT) == 0; }
 
 static bool is_baud_rate(uint16_t value) {
   BOUNDED(BAUD_RATES, for (uint8_t i = 0; i < BAUD_RATES; i++)) {
-    uint16_t rate = 0;
-    hal_table_copy(&rate, &baud_rates[i], sizeof rate);
-    if (value == rate) {
+    if (value == hal_table_word(&baud_rates[i])) {
       return true;
     }
   }
@@ -66,8 +64,8 @@ static bool is_baud_rate(uint16_t value) {
 }
 
 /* A value as it is kept: counted from the minimum, modulo 65536, none outside is within the span. */
-static bool is_allowed(uint8_t parameter, uint16_t kept, const parameter_range *range) {
-  if ((uint16_t)(kept - range->minimum) > range->span) {
+static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) {
+  if ((uint16_t)(kept - range.minimum) > range.span) {
     return false;
   }
   switch (parameter) {
@@ -92,7 +90,7 @@ uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
 int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
 
 __attribute__((noinline)) int32_t parameters_get(uint8_t parameter) {
-  return parameter < PARAMETER_COUNT ? meant(values[parameter], hal_table_byte(&ranges[parameter].is_signed)) : 0;
+  return parameter < PARAMETER_COUNT ? meant(values[parameter], range_of(parameter)) : 0;
 }
 
 uint8_t parameters_set(uint8_t parameter, int32_t value) {
@@ -101,7 +99,7 @@ uint8_t parameters_set(uint8_t parameter, int32_t value) {
   }
   const parameter_range range = range_of(parameter);
   const uint16_t kept = (uint16_t)value;
-  if (meant(kept, range.is_signed) != value || !is_allowed(parameter, kept, &range)) {
+  if (meant(kept, range) != value || !is_allowed(parameter, kept, range)) {
     return ANSWER_STATUS_OUT_OF_RANGE;
   }
   values[parameter] = kept;
@@ -114,8 +112,7 @@ const uint16_t *parameters_values(void) { return values; }
 
 bool parameters_restore(const uint16_t *kept) {
   BOUNDED(PARAMETER_COUNT, for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++)) {
-    const parameter_range range = range_of(parameter);
-    if (!is_allowed(parameter, kept[parameter], &range)) {
+    if (!is_allowed(parameter, kept[parameter], range_of(parameter))) {
       return false;
     }
   }

@@ -10,7 +10,6 @@
 #include "link/send.h"
 #include "safety.h"
 #include "storage.h"
-#include "task_times.h"
 
 /* Beside the statuses that are sent. */
 enum {
@@ -70,15 +69,6 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *val
     case MSG_RESET_PARAMETERS_ID:
       parameters_reset();
       break;
-    case MSG_TAKE_TASK_TIME_ID: {
-      const uint8_t task = payload[offsetof(msg_take_task_time, task)];
-      if (task >= TASKS) {
-        status = ANSWER_STATUS_OUT_OF_RANGE;
-      } else {
-        *value = task_times_take(task);
-      }
-      break;
-    }
     default: /* MSG_ARM_ID */
       status = safety_arm(payload[offsetof(msg_arm, latches)]);
       break;

@@ -4,6 +4,7 @@
 #include "hal/hal.h"
 #include "link/counters.h"
 #include "link/session.h"
+#include "schedule.h"
 
 #define BYTE_US 100000u /* at 100 bit/s: 10 bits */
 
@@ -27,7 +28,11 @@ bool send_message(uint8_t id, const void *payload, uint8_t length) {
 
 bool send_has_room(uint8_t length) { return hal_serial_room((uint8_t)(length + SEND_RESERVE)); }
 
-uint32_t send_time(uint16_t bytes) { return (uint32_t)bytes * BYTE_US / baud_rate; }
+uint8_t send_ticks(uint16_t bytes) {
+  const uint16_t bits = (uint16_t)(bytes * 10u);
+  return (uint8_t)((uint16_t)(bits + baud_rate - 1u) / baud_rate); /* so many bits fit in a tick */
+}
+_Static_assert(SCHEDULE_TICK_RATE == 100u, "a tick's bits are the rate in 100 bit/s");
 
 uint16_t send_half_ms(uint8_t bytes) { return (uint16_t)(bytes * (uint16_t)(BYTE_US / 500u)) / baud_rate; }
 _Static_assert(UINT8_MAX *(BYTE_US / 500u) <= UINT16_MAX, "in 16 bits");

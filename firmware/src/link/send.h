@@ -24,10 +24,10 @@ bool send_message(uint8_t id, const void *payload, uint8_t length);
 #define SEND_RESERVE (MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD) /* beside the payload */
 bool send_has_room(uint8_t length);
 
-/* Time in us that so many bytes take on the line. */
-uint32_t send_time(uint16_t bytes);
+/* Time that so many bytes take on the line: in ticks, rounded up, */
+uint8_t send_ticks(uint16_t bytes);
 
-/* The same in half milliseconds, rounded down. */
+/* and in half milliseconds, rounded down. */
 uint16_t send_half_ms(uint8_t bytes);
 
 #ifdef __cplusplus

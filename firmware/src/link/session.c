@@ -14,6 +14,7 @@
 #include "reset.h"
 #include "safety.h"
 #include "schedule.h"
+#include "task_times.h"
 
 #define TICK_MS (SCHEDULE_TICK_US / 1000u)
 #define HELLO_PERIOD_ALONE 10u /* ticks */
@@ -50,6 +51,7 @@ static void begin(uint32_t new_seed) {
   requests_start();
   events_start();
   telemetry_start();
+  task_times_start();
   buzzer_start_session();
   session_heard();
   hello_in = 0;

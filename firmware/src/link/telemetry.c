@@ -1,7 +1,6 @@
 /* telemetry.c: see telemetry.h. */
 #include "link/telemetry.h"
 
-#include "bounds.h"
 #include "encoder.h"
 #include "generated/messages.h"
 #include "infrared.h"
@@ -24,18 +23,10 @@ static uint8_t line_period; /* ticks */
 static uint8_t due_in;      /* ticks until the next is sent */
 
 void telemetry_start_line(void) {
-  static const uint8_t factors[] = {2, 5, 10};                                   /* 1, 2, 5, 10, 20, 50, 100 */
-  const uint32_t needed = 2u * send_time(MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD); /* us */
-  line_period = 1;
-  BOUNDED(
-      6, for (uint8_t i = 0, decade = 1; line_period * (uint32_t)SCHEDULE_TICK_US < needed && line_period < 100; i++)) {
-    if (i == sizeof factors) {
-      i = 0;
-      decade = 10;
-    }
-    line_period = (uint8_t)(decade * factors[i]);
-  }
+  const uint8_t least = send_ticks(2u * (MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD));
+  line_period = least <= 2u ? least : least <= 5u ? 5u : 10u; /* 1, 2, 5, 10 */
 }
+_Static_assert(10u * 2u * (MSG_TELEMETRY_LENGTH + FRAME_OVERHEAD) <= 10u * 96u, "9600 bit/s need no longer one");
 
 void telemetry_start(void) { due_in = 1; }
 
@@ -60,7 +51,7 @@ static uint16_t status_bits(const encoder_reading *left, const encoder_reading *
   if (counters_bytes_lost()) {
     status |= STATUS_RECEIVE_OVERRUN;
   }
-  if (reset_cause() == RESET_CAUSE_WATCHDOG) {
+  if (reset_cause() >= RESET_CAUSE_WATCHDOG) {
     status |= STATUS_WATCHDOG_RESET;
   }
   if (supply_low()) {

@@ -1,4 +1,5 @@
-/* What the board counts, how often it says so, and how telemetry thins where the line is slow. */
+/* What the board counts and how long its tasks took, how often it says so, and how telemetry thins where the line is
+ * slow. */
 #include <doctest.h>
 
 #include <initializer_list>
@@ -8,6 +9,7 @@
 #include "link/counters.h"
 #include "link/send.h"
 #include "link/telemetry.h"
+#include "task_times.h"
 
 namespace {
 
@@ -20,6 +22,30 @@ std::vector<uint64_t> gaps(const std::vector<message> &all) {
   return found;
 }
 
+constexpr uint64_t TURN = 4;                   /* ticks from one message about the board itself to the next */
+constexpr uint64_t ROUND = TURN * (TASKS + 1); /* each task's time, and the counters */
+
+/* As if a task had run for so long. */
+void ran(native_bench &bench, uint8_t task, uint32_t cycles) {
+  task_begins(task);
+  bench.machine.now += cycles;
+  task_has_ended();
+}
+
+/* What the board tells of a task; waits for it. */
+uint16_t told(native_bench &bench, uint8_t task) {
+  bench.messages.clear();
+  bench.run_in_session(ROUND * TICK);
+  std::vector<uint16_t> found;
+  for (const message &m : bench.all(MSG_TASK_TIME_ID)) {
+    if (m.as<msg_task_time>().task == task) {
+      found.push_back(m.as<msg_task_time>().longest);
+    }
+  }
+  REQUIRE(found.size() == 1);
+  return found[0];
+}
+
 /* As if the line had been started at that rate, in 100 bit/s. */
 void line_of(uint16_t baud) {
   send_start(baud);
@@ -28,17 +54,70 @@ void line_of(uint16_t baud) {
 
 }  // namespace
 
-TEST_CASE("the counters are sent every 64 ticks in a session, and never without") {
+TEST_CASE("the counters are sent once in a round of all tasks in a session, and never without") {
   native_bench bench;
   bench.run(200 * TICK);
   CHECK(bench.count(MSG_COUNTERS_ID) == 0);
+  CHECK(bench.count(MSG_TASK_TIME_ID) == 0);
   bench.open();
-  bench.run_in_session(500 * TICK);
+  bench.run_in_session(7 * ROUND * TICK);
   const std::vector<uint64_t> all = gaps(bench.all(MSG_COUNTERS_ID));
   REQUIRE(all.size() >= 6);
   for (uint64_t gap : all) {
-    CHECK(gap == 64);
+    CHECK(gap == ROUND);
   }
+}
+
+TEST_CASE("the times of the tasks are told one after another, the counters between the last and the first") {
+  native_bench bench;
+  bench.open();
+  bench.run_in_session(3 * ROUND * TICK);
+  std::vector<message> own;
+  for (const message &m : bench.messages) {
+    if (m.id == MSG_TASK_TIME_ID || m.id == MSG_COUNTERS_ID) {
+      own.push_back(m);
+    }
+  }
+  REQUIRE(own.size() >= 2 * (TASKS + 1));
+  for (uint64_t gap : gaps(own)) {
+    CHECK(gap == TURN);
+  }
+  const auto turn = [](const message &m) {
+    return m.id == MSG_COUNTERS_ID ? static_cast<uint8_t>(TASKS) : m.as<msg_task_time>().task;
+  };
+  for (size_t i = 1; i < own.size(); i++) {
+    CHECK(turn(own[i]) == (turn(own[i - 1]) + 1) % (TASKS + 1));
+  }
+}
+
+TEST_CASE("what is told of a task is its longest run of the session, and stays") {
+  native_bench bench;
+  bench.start();
+  CHECK(told(bench, TASK_turret) == 0);
+  ran(bench, TASK_turret, 1234);
+  ran(bench, TASK_turret, 1233);
+  ran(bench, TASK_whisker, 4321);
+  CHECK(told(bench, TASK_turret) == 1234);
+  CHECK(told(bench, TASK_turret) == 1234);
+  ran(bench, TASK_turret, 1235);
+  CHECK(told(bench, TASK_turret) == 1235);
+  CHECK(told(bench, TASK_whisker) == 4321);
+}
+
+TEST_CASE("the longest times start anew with each session, also where it takes the place of another") {
+  native_bench bench;
+  bench.start();
+  for (uint32_t nonce : {0x11111u, 0x22222u}) {
+    ran(bench, TASK_turret, 1234);
+    CHECK(told(bench, TASK_turret) == 1234);
+    bench.run_in_session(20 * TICK); /* a hello with the next nonce */
+    bench.open(nonce);
+    CHECK(told(bench, TASK_turret) == 0);
+  }
+  ran(bench, TASK_turret, 1234);
+  bench.run(2000 * MILLISECOND); /* silence ends the session */
+  bench.open(0x33333);
+  CHECK(told(bench, TASK_turret) == 0);
 }
 
 TEST_CASE("good frames, damaged ones and the finding back are counted") {
@@ -139,23 +218,31 @@ TEST_CASE("telemetry fills half of the line at most, at every rate") {
       CHECK(gap == line.period);
     }
     bench.messages.clear();
-    bench.run_in_session(2000 * TICK);
+    bench.run_in_session(3 * ROUND * line.period * TICK);
     const std::vector<uint64_t> all = gaps(bench.all(MSG_COUNTERS_ID));
-    REQUIRE(all.size() >= 2);
+    REQUIRE(all.size() >= 1);
     for (uint64_t gap : all) {
-      CHECK(gap == 64u * line.period);
+      CHECK(gap == ROUND * line.period);
     }
+    const size_t own = TASKS * (MSG_TASK_TIME_LENGTH + FRAME_OVERHEAD) + MSG_COUNTERS_LENGTH + FRAME_OVERHEAD;
+    CHECK(own * 10.0 / (line.baud * 100) <= 0.035 * 0.010 * ROUND * line.period); /* a small part of the line */
   }
 }
 
 TEST_CASE("the time of bytes on the line follows from its rate") {
   native_bench bench;
   line_of(96);
-  CHECK(send_time(96) == 100000);
+  CHECK(send_ticks(96) == 10); /* 100 ms */
+  CHECK(send_ticks(97) == 11);
+  CHECK(send_half_ms(96) == 200);
   line_of(5000);
-  CHECK(send_time(200) == 4000);
+  CHECK(send_ticks(500) == 1); /* 10 ms */
+  CHECK(send_ticks(501) == 2);
+  CHECK(send_half_ms(200) == 8);
   line_of(10000);
-  CHECK(send_time(1) == 10);
+  CHECK(send_ticks(1) == 1);
+  CHECK(send_half_ms(49) == 0); /* 0.49 ms */
+  CHECK(send_half_ms(50) == 1);
 }
 
 TEST_CASE("the parameter makes telemetry rarer, never more frequent than the line allows") {

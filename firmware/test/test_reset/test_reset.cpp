@@ -6,6 +6,7 @@
 #include "../memory_bench.h"
 #include "hal/hal.h"
 #include "reset.h"
+#include "task_times.h"
 
 namespace {
 
@@ -50,6 +51,61 @@ TEST_CASE("behind such a bootloader a watchdog that spoke before it bit is told,
   CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
   bench.reset(RESET_CAUSE_UNKNOWN);
   CHECK(reset_cause() == RESET_CAUSE_UNKNOWN);
+}
+
+TEST_CASE("a watchdog reset is told with the task that ran, and with none between tasks") {
+  for (const uint8_t chip : {RESET_CAUSE_WATCHDOG, RESET_CAUSE_UNKNOWN}) { /* the latter behind such a bootloader */
+    memory_bench bench;
+    bench.power_on();
+    for (uint8_t task = 0; task < TASKS; task++) {
+      bench.run(memory_bench::TICK);
+      task_begins(task);
+      hal_native_watchdog();
+      bench.reset(chip);
+      CHECK(reset_cause() == RESET_CAUSE_WATCHDOG + 1 + task);
+      bench.run(memory_bench::TICK);
+      CHECK(reset_cause() == RESET_CAUSE_WATCHDOG + 1 + task); /* as long as this run lasts */
+    }
+    task_begins(TASK_encoder);
+    task_has_ended();
+    hal_native_watchdog();
+    bench.reset(chip);
+    CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
+  }
+}
+
+TEST_CASE("a task that ran at a reset of another cause is not told, nor at the next watchdog reset") {
+  memory_bench bench;
+  bench.power_on();
+  for (const uint8_t cause : {RESET_CAUSE_EXTERNAL, RESET_CAUSE_BROWN_OUT}) {
+    bench.run(memory_bench::TICK);
+    task_begins(TASK_encoder);
+    bench.reset(cause);
+    CHECK(reset_cause() == cause);
+    bench.reset(RESET_CAUSE_WATCHDOG); /* before any task has run */
+    CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
+  }
+}
+
+TEST_CASE("a number that is no task's is not believed") {
+  memory_bench bench;
+  for (const int number : {TASKS + 1, 255}) {
+    bench.power_on();
+    reset_note_running(static_cast<uint8_t>(number));
+    bench.reset(RESET_CAUSE_WATCHDOG);
+    CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
+  }
+}
+
+TEST_CASE("after a power failure no task is told") {
+  memory_bench bench;
+  for (int i = 0; i < 100; i++) {
+    bench.power_on();
+    task_begins(TASK_encoder);
+    bench.spoil();
+    bench.reset(RESET_CAUSE_WATCHDOG);
+    CHECK(reset_cause() == RESET_CAUSE_WATCHDOG);
+  }
 }
 
 TEST_CASE("what the chip tells counts more than the record") {

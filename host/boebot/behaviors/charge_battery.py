@@ -1,4 +1,4 @@
-"""To the charging station, by the lamp on it, and stay there (sections 4.4 and 6.3.8 of the specification).
+"""To the charging station, by the lamp on it, and stay there (notes, section 4.4.2 and Fig. 5.1).
 
     seek      phototaxis; in the dark a round on the spot, then some way straight on, for light may be hidden
     under     what was bright ahead is dark by now: the lamp has been passed; a body's radius further is the station

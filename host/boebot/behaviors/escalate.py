@@ -1,4 +1,4 @@
-"""Escalating avoidance, as the trumpet animalcule Stentor has it: equations (7.11) to (7.15) of the notes, section 7.3.
+"""Escalating avoidance, as the trumpet animalcule Stentor has it: equations (7.11) to (7.15) of the notes, section 7.2.
 
     dU_i/dt + a_i U_i = b_i X      (7.12)          U_0 = C          i_sel = argmax U_i      (7.13)
     dX/dt + k_1 X = X_1     while touched          dX/dt + k_2 X = X_2     else             (7.14), (7.15)
@@ -35,7 +35,7 @@ class Link(NamedTuple):
 
 
 STENTOR = (Link(8.5, 12.0), Link(4.3, 6.6), Link(1.6, 2.75), Link(0.75, 1.45))
-"""turn away, reverse, contract, detach (section 6.2 of the specification)"""
+"""turn away, reverse, contract, detach (such that Fig. 7.4 comes out)"""
 
 
 class LeakyChain:

@@ -1,4 +1,4 @@
-"""Escape from a touch: a fixed action pattern (sections 4.7 and 4.9 of the specification).
+"""Escape from a touch: a fixed action pattern (notes, section 4.4.3; steps: the kit's own).
 
 Reverse 0.4 s, turn 120 degrees away from the touched side, forward 0.3 s; once begun it runs to its end, whatever the
 whiskers say meanwhile. How long the turn takes follows from the robot's lengths: rate = 2 s v / track width.

@@ -1,4 +1,4 @@
-"""The moth's two-threshold escape from bats (section 4.8 of the specification, last line).
+"""The moth's two-threshold escape from bats (notes, section 5.1; thresholds: the kit's own).
 
 A weak signal, a bat far off, makes the moth steer away; a strong one, a bat that has found it, makes it fly erratically
 and then drop:

@@ -1,4 +1,4 @@
-"""Follow a wall at a distance (named in section 5 of the notes; law of section 4.9 of the specification).
+"""Follow a wall at a distance (named in Fig. 5.1 of the notes; the law is the kit's own).
 
     e = S_side - S_ref,   s_L = s_0 ∓ k e,   s_R = s_0 ± k e        upper signs: the wall is on the right
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 LOOK_RAD = 1.047  # 60 degrees: obliquely ahead, so that the robot also notices when it heads for the wall or from it
 SETTLING_S = 0.4  # the turret's way there, and a new echo
 HELD = 0.05  # rad; the turret has been told to look elsewhere, or has been released
-ECHOES = 3  # Ping misses some: the median of the last ones counts (section 1.6 of the specification)
+ECHOES = 3  # Ping misses some: the median of the last ones counts
 
 
 @dataclass(kw_only=True)

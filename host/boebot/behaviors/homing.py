@@ -1,5 +1,5 @@
-"""Homing by path integration, and a search where home should be (chapter 4 of the notes; section 4.8 of the
-specification).
+"""Homing by path integration, and a search where home should be (section 4.4.4 of the notes; search: the
+kit's own).
 
     inbound: straight along the home vector h, φ_ref = atan2(h), until |h| < 0.1 m
     search:  an expanding square spiral about the place where h = 0, until something says that home is found

@@ -1,4 +1,4 @@
-"""Kinesis: how active an animal is depends on the stimulus, where it goes does not (section 4.5 of the specification).
+"""Kinesis: how active an animal is depends on the stimulus, where it goes does not (notes, section 4.4.2).
 
 Wood lice hurry where it is dry and linger where it is humid:
 

@@ -1,6 +1,9 @@
-"""Taxis: movement along a gradient, to the light or away from it (section 4.4 of the specification).
+"""Taxis: movement along a gradient, to the light or away from it (notes, section 4.4.2).
 
-With two sensors, crossed excitation:   a = (I_l - I_r) / (I_l + I_r),   s_L = s_0 - k a,   s_R = s_0 + k a
+With two sensors, crossed excitation (V. Braitenberg, "Vehicles", 1984):
+
+    a = (I_l - I_r) / (I_l + I_r),   s_L = s_0 - k a,   s_R = s_0 + k a
+
 With one (klinotaxis), as fly maggots do: swing to one side and to the other, and go where it was brighter.
 """
 

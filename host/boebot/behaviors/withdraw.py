@@ -1,4 +1,4 @@
-"""A reflex that warms up and gets tired (section 4.1 of the notes; model of section 4.3 of the specification).
+"""A reflex that warms up and gets tired (section 4.4.1 of the notes; the model is the kit's own).
 
     τ_w dW/dt = S - W (warm-up),   τ_f dF/dt = W - F (fatigue),   ρ = max(0, W - g F)
 

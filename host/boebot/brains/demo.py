@@ -1,7 +1,7 @@
 """Three behaviors chosen by utility: wander about, avoid what is near, charge the battery when it runs low.
 
 It is for `shieldbot-charging` in the arena `station`: `boebot run demo --robot shieldbot-charging --arena station`. The
-weights are those of section 7.5 of the specification; E is the battery's level, low = 1 - E:
+weights are chosen; E is the battery's level, low = 1 - E:
 
     wander   tanh(0.5), always
     avoid    tanh(-1 + 3 near + 4 contact)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json as json_module
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import typer
 
 from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
+from boebot.link import reset_cause
 from boebot.link.session import Link, text
 from boebot.link.transport import BaudSelectable
 from boebot.robots import load_robot
 
 _PERIOD_S = 1.0
 _WAIT_S = 0.05
+_CYCLES_PER_US = 16
+_TABLES = ("host", "board_end", "task_longest_us")
 
 
 def link(
@@ -84,6 +87,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
         "session": None if hello is None or not watched.is_open else f"{hello.session:06x}",
         "telemetry_period_ms": None if hello is None else round(1000 * hello.telemetry_period / hello.tick_rate, 3),
+        "last_reset": None if hello is None else reset_cause.in_words(hello.reset_cause),
         "session_time_out_ms": None if hello is None else hello.session_time_out,
         "frame_rate_hz": round((watched.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
         "round_trip_p50_ms": _ms(trips.quantile(0.5)),
@@ -94,6 +98,9 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "clock_restarts": clock.restarts,
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
+        "task_longest_us": {
+            name: None if cycles is None else cycles / _CYCLES_PER_US for name, cycles in watched.task_times.items()
+        },
     }
 
 
@@ -116,10 +123,11 @@ def _show_table(watched: Link, seconds: float, once: bool) -> None:
 
 def _table(seen: dict[str, Any]) -> Any:
     from rich import box
+    from rich.columns import Columns
     from rich.console import Group
     from rich.table import Table
 
-    state = output.table({name: value for name, value in seen.items() if name not in ("host", "board_end")})
+    state = output.table({name: value for name, value in seen.items() if name not in _TABLES})
     counted = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     counted.add_column("counted", style="dim")
     counted.add_column("host", justify="right")
@@ -128,4 +136,17 @@ def _table(seen: dict[str, Any]) -> Any:
     for name in dict.fromkeys((*seen["host"], *board)):
         cells = [f"{end[name]:,}" if name in end else "" for end in (seen["host"], board)]
         counted.add_row(name.replace("_", " "), *cells)
-    return Group(state, counted)
+    return Group(state, Columns([counted, _tasks(seen["task_longest_us"])], padding=(0, 4)))
+
+
+def _tasks(longest_us: Mapping[str, float | None]) -> Any:
+    """The longest time of each task, if the board takes any."""
+    from rich import box
+    from rich.table import Table
+
+    tasks = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    tasks.add_column("task", style="dim")
+    tasks.add_column("longest, us", justify="right")
+    for name, took_us in longest_us.items():
+        tasks.add_row(name, "" if took_us is None else f"{took_us:,.0f}")
+    return tasks if any(longest_us.values()) else ""

@@ -3,7 +3,7 @@ whether a robot, a brain and a line are realisable in time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output, timing_tables
+from boebot.cli import options, output, timing_board, timing_tables
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -21,18 +21,25 @@ if TYPE_CHECKING:
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 GROUP = "boebot.timing"
-_LOOK_S = 0.05
 _CYCLES_PER_S = 16_000_000
+_LONGEST_S = 3600.0  # of a scenario
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
-  boebot timing                            the bundled image: bounds, emulator, budgets
+  boebot timing                         the bundled image, emulator too
 
-  boebot timing --elf F --no-measure       any image, from its machine code alone
+  boebot timing --elf F --no-measure    any image, by its machine code
 
-  boebot timing --robot R --brain B        are these sensors, this brain and this line realisable?
+  boebot timing --port /dev/ttyACM0     with what a board measures itself
 
---out DIR writes the timing diagram, timing.png and timing.svg, and timing.json. Exit code: 1 a budget or a limit is
-broken, or the robot is not realisable; 2 bad input, or an image whose timing cannot be told."""
+  boebot timing --robot R --brain B     do sensors, brain and line fit?
+
+Times are cycles of 1/16 us. bound: the most that the machine code can take; emulator, board: the longest that was
+measured; slack: what the bound leaves of the budget; response: the latest end after a slot begins, interrupts included.
+
+--out DIR writes the timing diagram, timing.png and timing.svg, and timing.json; with --jitter also the distributions.
+
+Exit code: 0 all is well; 1 a budget or a limit is broken, or the robot is not realisable; 2 bad input, or an image
+whose timing cannot be told; 130 after Ctrl-C."""
 
 
 def timing(
@@ -41,27 +48,31 @@ def timing(
     ] = None,
     robot: options.RobotName = "shieldbot",
     load: Annotated[
-        str, typer.Option("--load", metavar="L", help="What interrupts are asked for: figures or saturated.")
+        str, typer.Option("--load", metavar="L", help="How often interrupts come: figures, saturated or everything.")
     ] = "figures",
     measure: Annotated[
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
     ] = True,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.1, help="Of the board's time, of each scenario that is measured.")
+        float,
+        typer.Option(metavar="S", min=0.1, max=_LONGEST_S, help="Of the board's time, for each that is measured."),
     ] = 1.0,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the scenarios.")] = 1,
     port: Annotated[
-        str | None, typer.Option("--port", metavar="P", help="Board whose own maxima are read: a port, avr or native.")
+        str | None,
+        typer.Option(
+            "--port", metavar="P", help="Board whose own maxima are read: a port, or avr. It must run this image."
+        ),
     ] = None,
     brain: Annotated[
         str | None, typer.Option("--brain", metavar="B", help="Measure the steps of this brain in a simulated run.")
     ] = None,
     step: Annotated[
-        float | None, typer.Option("--step", metavar="MS", help="What a step of the brain takes, if it is known.")
+        float | None, typer.Option("--step", metavar="MS", help="What a step of the brain takes (ms), if it is known.")
     ] = None,
     period: options.Period = None,
     baud: Annotated[
-        int | None, typer.Option("--baud", metavar="RATE", help="Of the line, bit/s. Else as the robot says.")
+        int | None, typer.Option("--baud", metavar="RATE", help="Of the line (bit/s). Else as the robot says.")
     ] = None,
     jitter: Annotated[
         bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
@@ -151,12 +162,13 @@ def _answer(
     image = _image(elf, description)
     found = None
     if image is not None:
+        board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
         measured = _measured("emulated", image, seconds, seed) if measure else None
-        found = budget.prove(image, asked, measured, _board_maxima(port, description, seconds))
+        found = budget.prove(image, asked, measured, board)
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
-    board = None if found is None else _board_times(found)
-    verdict = realisable.judge(description, period_s, board=board, brain_s=brain_s, baud=baud)
+    times = None if found is None else _board_times(found)
+    verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
     distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
     answer = Answer(found, verdict, distributions, ())
     if out is not None:
@@ -192,30 +204,6 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
 
 
-def _board_maxima(port: str | None, robot: RobotDescription, seconds: float) -> Mapping[str, int]:
-    """What a board measures of its own tasks, in cycles by their names: since it was last asked, and so long from now
-    on. Nothing moves."""
-    if port is None:
-        return {}
-    from boebot.boards import BoardRequest, open_board
-    from boebot.link.session import Link
-
-    session = open_board(port, BoardRequest(robot=robot, record=False, realtime=True))
-    try:
-        link = Link(session.transport, record=False)
-        link.open()
-        end = link.transport.now() + seconds
-        while link.transport.now() < end:
-            link.poll(_LOOK_S)
-        found = {name: cycles for name, cycles in link.take_task_times().items() if cycles}
-        link.close()
-    finally:
-        session.close()
-    if not found:
-        output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
-    return found
-
-
 def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
     """What a step of the brain takes at most (s; 0: not known), as given or as measured, and the brain's own period."""
     if brain is None:
@@ -238,8 +226,8 @@ def _board_times(report: Report) -> Any:
 
     if report.responses is None:
         return BoardTimes.of(report.table)
-    telemetry, gap = report.responses.pieces.get("telemetry", 0), report.gap or 0
-    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, gap / _CYCLES_PER_S)
+    telemetry, taken = report.responses.pieces.get("telemetry", 0), report.taken or 0
+    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, taken / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:

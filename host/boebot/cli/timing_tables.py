@@ -98,6 +98,8 @@ def _sums(report: Report) -> dict[str, Any]:
         "poll_gap_bound_cycles": report.gap,
         "poll_gap_in_emulator_cycles": own.between_polls if own else None,
         "receive_ring_needed_bytes": report.ring,
+        "frames_coming_per_tick": round(report.frames_coming, 1),
+        "frames_proven_per_tick": round(report.frames_proven, 1),
         "stack_bound_bytes": memory.stack,
         "stack_in_emulator_bytes": memory.stack_seen,
         "static_ram_bytes": memory.static,

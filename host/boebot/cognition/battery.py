@@ -5,8 +5,8 @@
 No robot of the notes has a sensor for its charger: the voltage rises on it, and that is all. So it is charging from
 when V has risen by `rise` above its lowest value since it last left a charger, and no more from when V has fallen by
 `fall` below its highest value since. In between neither changes: on a charger that is full, or weak, it stays charging.
-The state variable "charging" is what keeps a robot there until it is full (section 6.3.8 of the specification:
-without it, it leaves as soon as it is a little less hungry, and comes back at once).
+The state variable "charging" is what keeps a robot there until it is full (without
+it, it leaves as soon as it is a little less hungry, and comes back at once).
 """
 
 from __future__ import annotations

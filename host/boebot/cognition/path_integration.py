@@ -1,5 +1,5 @@
-"""Path integration as desert ants do it: where home is, from compass headings and the way of the wheels (chapter 4 of
-the notes; section 4.8 of the specification).
+"""Path integration as desert ants do it: where home is, from compass headings and the way of the wheels (notes,
+section 4.4.4).
 
     h = -Σ Δs_k (cos φ_k, sin φ_k)
 

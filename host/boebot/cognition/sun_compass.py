@@ -2,8 +2,8 @@
 
     φ = θ_sky + ψ(t),   ψ(t) = ψ_0 + ω_s t,   ω_s = 2π / 86,400 s
 
-θ_sky is the heading against the pattern, ψ the sun's azimuth, taken to grow evenly through the day (section 4.8 of the
-specification). Here a magnetic or given heading plays the sky's part.
+θ_sky is the heading against the pattern, ψ the sun's azimuth, taken to grow evenly through the day (notes,
+section 4.4.4). Here a magnetic or given heading plays the sky's part.
 """
 
 from __future__ import annotations

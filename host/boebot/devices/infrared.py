@@ -2,7 +2,8 @@
 
 The firmware reads both pairs every few ticks; between two readings the last one stands, with its age. With the
 parameter infrared_sweep on it flashes at 38, 39, 40, 41 and 42 kHz in turn, at which the receiver is less and less
-sensitive: the nearer the object, the more of the five show it (HARDWARE: zones of a few centimetres).
+sensitive: the nearer the object, the more of the five show it (zones of a few centimetres: Parallax,
+"Robotics with the Board of Education Shield for Arduino", chapter 8).
 """
 
 from __future__ import annotations

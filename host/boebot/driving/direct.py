@@ -1,6 +1,6 @@
 """Drives a robot without a board: motor signals in, readings out, in steps of the simulated world.
 
-The order of a step is that of the notes' loop (Fig. 3.1, THEORY section 3.1): sense, process, send motor signals, move.
+The order of a step is that of the notes' loop (Fig. 3.1): sense, process, send motor signals, move.
 Time stands still while the brain thinks. A command in speed becomes a motor signal as in the firmware: the share of the
 wheels' greatest speed.
 """

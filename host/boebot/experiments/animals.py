@@ -1,7 +1,7 @@
 """Two needs and one animal: the isocline and the lethal boundary of Fig. 7.2 of the notes (section 7.2).
 
 An animal's state is a point: how well it is off for water and for nutrients, 1 all it can hold. Living uses both up;
-beyond the lethal boundary it dies. The rule of section 6.1 of the specification:
+beyond the lethal boundary it dies. The rule, after McFarland:
 
     deficit_i = 1 - level_i,   tendency_i = deficit_i × cue_i,   and it does what the larger tendency asks for,
 

@@ -1,4 +1,4 @@
-"""What a brain may see, and that it sees no more: section 7.3 of the specification, E66.
+"""What a brain may see, and that it sees no more: section 3.2.3 of the notes, E66.
 
 Two checks. *Static*: no module that brains are made of imports the simulator, or what opens boards and knows the truth
 of a run. *At run time*: from the robot that a brain is handed no chain of attributes, private ones included, of
@@ -183,10 +183,10 @@ RUNS = (("shieldbot", "native"), ("arsim", "direct"))
 @experiment(
     "E66",
     title="No truth can be reached from a brain",
-    source="section 1.2.4, Fig. 1.18; section 7.3 of the specification",
+    source="section 1.2.4, Fig. 1.18; section 3.2.3",
     caption="Objects that a brain can reach from the robot that it is handed, by the module of their class.",
     robot="shieldbot (native), arsim",
-    criterion="The specification: none. The walk must find devices and readings, on arsim of infra-red, odometer and "
+    criterion="None. The walk must find devices and readings, on arsim of infra-red, odometer and "
     "compass, on shieldbot of more, or it has not looked.",
 )
 def no_truth(seed: int, progress: Progress) -> Outcome:

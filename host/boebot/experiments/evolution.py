@@ -1,6 +1,6 @@
 """Utility functions found by evolution, and what performance is: section 8.2 of the notes and the opening of chapter 8.
 
-The toy of the specification (section 6.3.8): a robot patrols a place that is 5 s away from its charger for 300 s. Its
+A toy: a robot patrols a place that is 5 s away from its charger for 300 s. Its
 battery, E = 1 at first, loses 0.02 in each second and gains 0.1 while the robot charges; at E = 0 the robot is dead.
 Two behaviors: B1 patrol with u_1 = tanh 0.5, and B2 charge, which goes to the charger and stays there, with
 
@@ -149,8 +149,8 @@ def evolve(
     source="section 8.2 and Wahde (2003)",
     caption="Left: performance of the best individual over the generations of three restarts; dashed: never "
     "charging. Right: utilities of the best of all over time, its battery, and where it is.",
-    criterion="The specification's toy and figures. What it leaves open is chosen: patrol counts only in its place, "
-    "5 s from the charger, where the robot starts; going there and back costs energy; a charging robot loses none.",
+    criterion="A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the robot "
+    "starts; going there and back costs energy; a charging robot loses none.",
     slow=True,
 )
 def evolution(seed: int, progress: Progress) -> Outcome:

@@ -127,7 +127,7 @@ class Experiment:
     @property
     def section(self) -> str:
         """The first section or chapter of the notes that `source` names; "" where it names none."""
-        found = re.search(r"(?:sections?|chapter) (\d+(?:\.\d+)*)\b(?!\.\d| of the specification)", self.source)
+        found = re.search(r"(?:sections?|chapter) (\d+(?:\.\d+)*)\b(?!\.\d)", self.source)
         return found[1] if found else ""
 
 

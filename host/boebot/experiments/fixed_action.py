@@ -1,5 +1,5 @@
 """Fixed action patterns: released by a sign stimulus, they run to their end without it. Section 4.4.3 of the notes (egg
-rolling of the goose); section 4.7 of the specification, E34.
+rolling of the goose), E34.
 
 The robot stands still until something comes near; then it escapes: back for 0.4 s, a turn of 120 degrees, ahead for
 0.3 s. In one run the stimulus stays, in the other it is gone at once.

@@ -1,7 +1,7 @@
 """Cataglyphis, the desert ant that runs straight home from wherever it has strayed: section 4.4.4 of the notes, E33.
 
 The brain wanders until it has found food, which here lies at the end of a way of given length; then it goes home by its
-home vector and searches there (section 4.8 of the specification).
+home vector and searches there (docs/reference/notes.md).
 """
 
 from __future__ import annotations

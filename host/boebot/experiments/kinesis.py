@@ -1,5 +1,4 @@
-"""Kinesis: wood lice are where it is humid because they are slow there. Section 4.4.2 of the notes; section 4.5 of the
-specification, E28.
+"""Kinesis: wood lice are where it is humid because they are slow there. Section 4.4.2 of the notes, E28.
 
 Density is proportional to 1/V: with speeds of 0.2 and 1 m/s the humid half of the floor has a share of 1/(1 + 0.2).
 """

@@ -113,7 +113,7 @@ def arc_error(believed: float, track_width: float) -> float:
 
 
 def judge_notes(trial: Straight) -> list[Measured]:
-    """What section 8 of the specification asks, and the closed form."""
+    """What is asked, and the closed form."""
     told = trial.result.odometry
     expected = arc_error(math.hypot(*ghost(trial)[:2]), trial.result.robot.body.track_width_m)
     return [

@@ -66,7 +66,7 @@ class Approach(MotorBehavior):
 
 
 def behavior_based() -> Brain:
-    """Approach, and Avoid with the figures of section 4.9 of the specification; 3 near - 0.4 > 0.5 where near > 0.3."""
+    """Approach, and Avoid with a threshold of 0.3; 3 near - 0.4 > 0.5 where near > 0.3."""
     approach = Approach(utility=Utility(b=0.5, tau=PERIOD))
     avoid = Avoid(turn=TURN, clear=CLEAR, after=AFTER, utility=Utility(b=-0.4, w={"near": 0.9 / SEEN}, tau=PERIOD / 10))
     return Brain([approach, avoid], [near()], period=PERIOD)

@@ -1,5 +1,5 @@
 """Predator and prey: M. xanthus feeds on E. coli, moves some 200 times slower, and lures it. Section 4.4.2 of the
-notes; end of section 4.6 of the specification.
+notes.
 
 The predator is the source of what its prey takes for food: prey that follows (4.1) up the attractant gathers around it.
 """

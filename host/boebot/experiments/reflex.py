@@ -1,4 +1,4 @@
-"""Reflexes that warm up and tire: section 4.4.1 of the notes; section 4.3 of the specification. E25 and E26.
+"""Reflexes that warm up and tire: section 4.4.1 of the notes, E25 and E26. The model is the kit's own:
 
 τ_w dW/dt = S - W,   τ_f dF/dt = W - F,   ρ = max(0, W - g F)
 """

@@ -55,7 +55,7 @@ def disagreements(run: RunResult, brain: object) -> int:
 @experiment(
     "E68",
     title="The same brain and seed command the same on both boards, as long as telemetry agrees",
-    source="section 3.1; section 7.3 of the specification",
+    source="section 3.1",
     caption="Motor signals that two brains commanded on the native board and on the emulated ATmega328P, and where "
     "first telemetry, then infrared or whiskers, then their commands differ.",
     robot="shieldbot (native, avr)",

@@ -4,8 +4,8 @@
     i_sel = argmax U_i                                         (7.13)
     dX/dt + k_1 X = X_1 while it feeds,  dX/dt + k_2 X = X_2 otherwise      (7.14), (7.15)
 
-The parameters are lost; these reproduce Fig. 7.4 (section 6.2 of the specification). Two ways through the equations
-stand here: Euler's method, in which the specification measured its times, and the exact one, from switch to switch.
+The notes do not give the parameters; these reproduce Fig. 7.4. Two ways through the equations stand here: Euler's
+method, by which the expected times were found, and the exact one, from switch to switch.
 """
 
 from __future__ import annotations
@@ -158,8 +158,8 @@ def _data(found: Response) -> dict[str, Any]:
     source="section 7.2, equations (7.11)-(7.15), Fig. 7.4",
     caption="Left: utilities of Stentor's five behaviors under a lasting disturbance, and which of them is active. "
     "Right: concentration X of the noxious substance.",
-    criterion="The specification's order and times, which it measured by Euler's method with steps of 1 ms, X "
-    "first: so is it done here. Later starts follow from short returns to feeding and feel the step; the last two "
+    criterion="The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first: so is it done "
+    "here. Later starts follow from short returns to feeding and feel the step; the last two "
     "of the exact solution, which come 0.06 s later, stand beside them with the times that an independent "
     "integrator gives.",
 )
@@ -187,8 +187,8 @@ def sequence(seed: int, progress: Progress) -> Outcome:
     source="section 7.2, equation (7.14)",
     caption="Utilities of Stentor's behaviors under a disturbance of less than half the strength, and its X: it "
     "returns to feeding four times before it detaches.",
-    criterion="Not the specification's, which says for X_1 = 1.0: 1-2-3-4-1-4-1-4 and never B5 within 4 s. Its "
-    "equations with its parameters begin with that order, but go on to B5 at 2.64 s, by Euler's method as well as "
+    criterion="With X_1 = 1.0 the order 1-2-3-4-1-4-1-4 was expected, and never B5 within 4 s. The equations "
+    "begin with that order, but go on to B5 at 2.64 s, by Euler's method as well as "
     "exactly: an independent integrator with located switches gives the order and the time that are expected here.",
 )
 def dose(seed: int, progress: Progress) -> Outcome:

@@ -29,8 +29,8 @@ AT_REST_S = 0.5  # without moving, at the end of a run
 
 
 def runner(*, period: float, least: float = 0.0, hold: float = 0.0, factors: tuple[float, float] = (1.0, 1.0)) -> Brain:
-    """The notes' parameters; `least` and `hold` as rule s_min and the optional heading hold of section 4.2 of the
-    specification, for servos."""
+    """The notes' parameters; `least` and `hold` as rule s_min and the optional heading hold, for servos (the kit's
+    own)."""
     return Brain([StraightRun(least=least, heading_gain=hold), Odometry(factors=factors)], period=period)
 
 
@@ -131,7 +131,7 @@ def draw_runs(runs: Sequence[Straight]) -> Draw:
 
 
 def judge_notes(trial: Straight) -> list[Measured]:
-    """What section 8 of the specification asks of the notes' robot."""
+    """What is asked of the notes' robot."""
     return [
         Measured("d at the stop command", trial.believed, "m", 0.980, 0.982),
         Measured("d at rest", trial.rest, "m", 0.980, 0.985),
@@ -154,8 +154,8 @@ def notes_run(seed: int, progress: Progress) -> Outcome:
 
 # The shieldbot. Its servos run at v(s) = 0.178 m/s tanh(k s), k = 200 / 78.5 = 2.55, and stand still within 9 us =
 # 0.045 of their centre: s_min = 0.06 as in E23. They are centred, as is done before a robot's first run: one that is
-# not creeps on at the signal 0. They differ by 2.9 % (1 σ), so it holds its heading, k = 0.5 (section 4.2 of the
-# specification), yet by little at the beginning, where another signal hardly changes the speed.
+# not creeps on at the signal 0. They differ by 2.9 % (1 σ), so it holds its heading, k = 0.5, yet by
+# little at the beginning, where another signal hardly changes the speed.
 #   time     (5.1) down to s_min takes ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k) = 8.5 s, the last 0.047 m at
 #            v(0.06) = 0.027 m/s 1.7 s, the lag 0.1 s: 10.3 s. The mean of two servos differs by 2.1 %, three of those
 #            are 0.65 s; headings off by up to 0.4 rad make the way 5 % longer, 0.5 s: together 1.2 s
@@ -170,7 +170,7 @@ _BY_SERVO = (
     "differ by 2.9 % (1 σ): heading hold k = 0.5. Time: 8.5 s by (5.1) down to s_min, 1.7 s at v(0.06), 0.1 s lag; 3 σ "
     "of the mean of two servos are 0.65 s, a curved way 0.5 s. Believed d: 0.98 m and at most an edge (3.3 mm). "
     "True d at rest: ± an edge (3.3 mm) and up to three misses or flickers of 2 edges of one wheel (9.8 mm; more in "
-    "one run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as the specification asks of 10 repeats"
+    "one run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as is asked of 10 repeats"
 )
 
 

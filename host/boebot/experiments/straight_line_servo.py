@@ -1,7 +1,7 @@
 """The straight odometric run on servos and coarse encoders: what a dead band does to (5.1); E23.
 
-A servo stands still within its dead band, and (5.1) asks for less and less: without a least motor signal s_min (section
-4.2 of the specification) the robot never gets there.
+A servo stands still within its dead band, and (5.1) asks for less and less: without a least motor signal s_min the
+robot never gets there.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _telemetry(tick: int, edges: int, signal: float) -> messages.Telemetry:
 
 
 def judge_model(with_least: ServoRun, without: ServoRun) -> list[Measured]:
-    """What section 8 of the specification asks."""
+    """What is asked."""
     return [
         exactly("with s_min: stops (1: yes)", with_least.behavior.arrived, 1),
         Measured("with s_min: d at rest", with_least.distances[-1], "m", 0.98, 0.995),
@@ -129,7 +129,7 @@ def _draw(figure: Figure, rows: list[Series], dead_band: float) -> None:
 @experiment(
     "E23",
     title="A metre straight ahead on servos with a dead band",
-    source="section 5.4, equation (5.1); sections 1.11 and 4.2 of the specification",
+    source="section 5.4, equation (5.1)",
     caption="The straight run on the servo model (dead band 0.05, lag 50 ms, encoder edges of 13.08 mm): the last "
     "fifth of the way with and without a least motor signal of 0.06.",
     robot="shieldbot (16 edges, as a model of its servos)",
@@ -180,7 +180,7 @@ def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
 @experiment(
     "E23-shieldbot",
     title="A metre straight ahead on a shieldbot with coarse encoders",
-    source="section 5.4, equation (5.1); sections 1.11 and 4.2 of the specification",
+    source="section 5.4, equation (5.1)",
     caption="The straight run of a shieldbot with encoders of 16 edges (13.0 mm): the last fifth of the way with and "
     "without a least motor signal of 0.06.",
     robot="shieldbot (native)",

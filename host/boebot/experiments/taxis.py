@@ -1,6 +1,6 @@
 """Phototaxis: two light sensors, crossed excitation, to the lamp from anywhere (section 4.4.2 of the notes; E27).
 
-Section 4.4 of the specification; the behavior itself is boebot.behaviors.phototaxis.
+The behavior itself is boebot.behaviors.phototaxis.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def straight_time(setting: Setting) -> float:
 
 
 def judge(setting: Setting, times: Sequence[float], straight: float) -> list[Measured]:
-    """What section 8 of the specification asks, of 60 starts."""
+    """What is asked of 60 starts."""
     reached = sum(time < math.inf for time in times)
     return [
         Measured("starts that reach the lamp", reached, least=round(58 / 60 * len(times))),
@@ -165,7 +165,7 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E27",
     title="Taxis: to the lamp from everywhere",
-    source="section 4.4.2; section 4.4 of the specification",
+    source="section 4.4.2",
     caption="Phototaxis from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, and times.",
     robot="arsim",
     slow=True,
@@ -177,7 +177,7 @@ def taxis(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E27-shieldbot",
     title="Taxis: the same brain on a board",
-    source="section 4.4.2; section 4.4 of the specification",
+    source="section 4.4.2",
     caption="Phototaxis of a shieldbot from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, "
     "and times.",
     robot="shieldbot (native)",

@@ -1,6 +1,6 @@
 """Variants for one experiment: bundled robots with some devices or lengths changed, and arenas written down for it.
 
-Not an experiment itself. Robots keep to section 1.2 of the specification but for what is said; arenas have the keys of
+Not an experiment itself. Robots keep to docs/reference/notes.md but for what is said; arenas have the keys of
 docs/reference/arenas.md.
 """
 

@@ -1,6 +1,4 @@
-"""Following the walls of a room: named in chapter 5 of the notes, Fig. 5.1; the law is that of section 4.9 of the
-specification. E35.
-"""
+"""Following the walls of a room: named in chapter 5 of the notes, Fig. 5.1; the law is the kit's own. E35."""
 
 from __future__ import annotations
 
@@ -40,7 +38,7 @@ def follower() -> Brain:
 
 
 def small_arsim() -> RobotDescription:
-    """arsim in the size of a Boe-Bot (section 1.2 of the specification), one IR sensor ahead and one at -60 degrees."""
+    """arsim in the size of a Boe-Bot (docs/reference/notes.md), one IR sensor ahead and one at -60 degrees."""
     sensor = partial(InfraredProximity, range_m=0.8, c1_m2=0.012, c2=0.02, sigma=0.03)
     motor = RegulatedMotor(gain_n_s=1.2, torque_maximum_n_m=0.268)
     body = {
@@ -120,7 +118,7 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
 @experiment(
     "E35",
     title="A lap along the walls",
-    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1",
     caption="Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them.",
     robot="arsim in the size of a Boe-Bot, IR ahead and at -60 degrees",
 )
@@ -150,7 +148,7 @@ def pinger() -> RobotDescription:
 @experiment(
     "E35-shieldbot",
     title="A lap along the walls by Ping and IR pairs",
-    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1",
     caption="Path of shieldbot with the same brain: Ping on its turret looks to the wall, IR pairs look ahead.",
     robot="shieldbot with its turret (native)",
     criterion=DERIVED,
@@ -162,7 +160,7 @@ def wall_native(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E35-avr",
     title="A lap along the walls, with the firmware's AVR image",
-    source="chapter 5, Fig. 5.1; section 4.9 of the specification",
+    source="chapter 5, Fig. 5.1",
     caption="The same on the emulated ATmega328P.",
     robot="shieldbot with its turret (avr)",
     criterion=DERIVED,

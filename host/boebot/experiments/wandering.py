@@ -63,7 +63,7 @@ def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], lis
 
 
 def judge_stays(forward: list[int], turning: list[int], lefts: list[bool]) -> list[Measured]:
-    """What section 8 of the specification asks of them."""
+    """What is asked of them."""
     return [
         about("mean steps in state 1, forward", float(np.mean(forward)), 100, 5),
         about("mean steps in state 2, turning", float(np.mean(turning)), 33.3, 2),
@@ -142,7 +142,7 @@ def wanderer(setting: Setting) -> Brain:
 def avoider(setting: Setting) -> Brain:
     """Wandering and avoiding: tanh(10 near - 0.5) exceeds tanh(0.5) where near exceeds 0.10.
 
-    The specification's threshold of 0.3 was met by luck: with it 1 to 3 of 12 runs collide at most seeds, whatever the
+    A threshold of 0.3 was met by luck: with it 1 to 3 of 12 runs collide at most seeds, whatever the
     utility's lag (boebot.behaviors.avoid says why).
     """
     avoid = Avoid(utility=Utility(b=-0.5, w={"near": 10.0}, tau=0.05))
@@ -286,12 +286,12 @@ def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E21",
     title="Wandering and avoiding",
-    source="section 5.3.2 and Fig. 5.1; section 4.9 of the specification",
+    source="section 5.3.2 and Fig. 5.1",
     caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.10: all paths, and the "
     "first one with the behavior that was active.",
     robot="arsim",
-    criterion="The specification's: no run of 12 collides. Its threshold of 0.3 does not keep it (1 to 3 collide at "
-    "most seeds), nor quite does one of 0.15 (1 of 60 runs grazes a pillar's corner). Things are heeded from 0.10 on "
+    criterion="No run of 12 collides. A threshold of 0.3 does not keep that (1 to 3 collide at most "
+    "seeds), nor quite does one of 0.15 (1 of 60 runs grazes a pillar's corner). Things are heeded from 0.10 on "
     "here: 1 run of 420, of the seeds 1 to 35, grazes one after it has turned to where no beam had looked.",
     slow=True,
 )
@@ -313,7 +313,7 @@ _SEEN = (
 @experiment(
     "E21-shieldbot",
     title="Wandering and avoiding: the same brain on a board",
-    source="section 5.3.2 and Fig. 5.1; section 4.9 of the specification",
+    source="section 5.3.2 and Fig. 5.1",
     caption="The shieldbot wandering and avoiding in ARSim's arena at its own scale: all paths, and the first one with "
     "the behavior that was active.",
     robot="shieldbot (native)",
@@ -327,7 +327,7 @@ def avoiding_shieldbot(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E21-avr",
     title="Wandering and avoiding: the same brain on the AVR image",
-    source="section 5.3.2 and Fig. 5.1; section 4.9 of the specification",
+    source="section 5.3.2 and Fig. 5.1",
     caption="The shieldbot with the image of its ATmega328P, wandering and avoiding in ARSim's arena at its own scale: "
     "all paths, and the first one with the behavior that was active.",
     robot="shieldbot (avr)",

@@ -26,7 +26,6 @@ RequestKind = (
     | type[messages.SaveParameters]
     | type[messages.ResetParameters]
     | type[messages.Arm]
-    | type[messages.TakeTaskTime]
 )
 
 

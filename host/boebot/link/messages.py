@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 2
-SCHEMA_HASH = 0x29215B62
+SCHEMA_HASH = 0x2253866E
 
 
 class Whiskers(IntFlag):
@@ -636,31 +636,6 @@ class Arm(_ArmFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
-class _TakeTaskTimeFields(NamedTuple):
-    number: int  # of the request
-    task: int  # task; another number is out_of_range
-
-
-class TakeTaskTime(_TakeTaskTimeFields):
-    """Asks how long a task took at most since this was last asked of it, or since the board started; from now on anew."""
-
-    __slots__ = ()
-    ID: ClassVar[int] = 0x25
-    NAME: ClassVar[str] = "take_task_time"
-    DELIVERY: ClassVar[str] = "exactly_once"
-    LENGTH: ClassVar[int] = 3
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
-
-    def pack(self) -> bytes:
-        """The payload."""
-        return self.STRUCT.pack(*self)
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Self:
-        """The message in a payload of exactly its length."""
-        return cls(*cls.STRUCT.unpack(payload))
-
-
 class _AcknowledgeFields(NamedTuple):
     number: int  # of the event
 
@@ -789,7 +764,7 @@ class _CountersFields(NamedTuple):
 
 
 class Counters(_CountersFields):
-    """What the board's end of the link has counted since reset, modulo 65536; sent every 64 ticks or less often."""
+    """What the board's end of the link has counted since reset, modulo 65536; sent in turn with task_time."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x91
@@ -850,10 +825,35 @@ class DevicesTelemetry(_DevicesTelemetryFields):
         return cls(*cls.STRUCT.unpack(payload))
 
 
+class _TaskTimeFields(NamedTuple):
+    task: int  # task
+    longest: int  # 0.0625 us; from call to return, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board
+
+
+class TaskTime(_TaskTimeFields):
+    """How long one of the firmware's tasks took at most since the session was opened; one task after another, then the counters, every 4 ticks or less often."""
+
+    __slots__ = ()
+    ID: ClassVar[int] = 0x93
+    NAME: ClassVar[str] = "task_time"
+    DELIVERY: ClassVar[str] = "telemetry"
+    LENGTH: ClassVar[int] = 3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH")
+
+    def pack(self) -> bytes:
+        """The payload."""
+        return self.STRUCT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """The message in a payload of exactly its length."""
+        return cls(*cls.STRUCT.unpack(payload))
+
+
 class _AnswerFields(NamedTuple):
     number: int  # of the request
     status: int  # answer_status
-    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale; of take_task_time: cycles of 1/16 us, interrupts on top included; 65535: so long or longer; 0: it has not run, or took no time, as on the native board
+    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale
 
 
 class Answer(_AnswerFields):
@@ -947,13 +947,13 @@ Message = (
     | SaveParameters
     | ResetParameters
     | Arm
-    | TakeTaskTime
     | Acknowledge
     | ClockProbe
     | Stopped
     | Telemetry
     | Counters
     | DevicesTelemetry
+    | TaskTime
     | Answer
     | Event
     | ClockAnswer
@@ -978,13 +978,13 @@ MESSAGES: dict[int, type[Message]] = {
     0x22: SaveParameters,
     0x23: ResetParameters,
     0x24: Arm,
-    0x25: TakeTaskTime,
     0x28: Acknowledge,
     0x30: ClockProbe,
     0x88: Stopped,
     0x90: Telemetry,
     0x91: Counters,
     0x92: DevicesTelemetry,
+    0x93: TaskTime,
     0xA0: Answer,
     0xA1: Event,
     0xB0: ClockAnswer,
@@ -1010,13 +1010,13 @@ HASHES: dict[int, int] = {
     0x22: 0x1DEAD58C,
     0x23: 0x5C7C21EE,
     0x24: 0x7A25B50E,
-    0x25: 0x1ADDF94D,
     0x28: 0x306E772C,
     0x30: 0x1011476B,
     0x88: 0x24E076A5,
     0x90: 0x425355C1,
     0x91: 0x7EF8DA38,
     0x92: 0xFF7B65CC,
+    0x93: 0xF7716504,
     0xA0: 0x754ACE51,
     0xA1: 0xCCFD276E,
     0xB0: 0xFC092B76,

@@ -12,6 +12,13 @@ def by_watchdog(cause: int) -> bool:
     return cause >= messages.ResetCause.WATCHDOG
 
 
+def hang_in_words(cause: int) -> str:
+    """What a reset by the watchdog tells of the firmware. An interrupt that hung is told as what it interrupted."""
+    name = in_words(cause).removeprefix("watchdog, ")
+    also = "an interrupt meanwhile" if name.startswith("in task") else "the link, the main loop or an interrupt"
+    return f"its watchdog, {name}: the firmware hung there, in {also}, or fell behind for good"
+
+
 def in_words(cause: int) -> str:
     """As in "watchdog, in task encoder"; a cause that this kit does not know is told by its number."""
     try:

@@ -10,7 +10,7 @@ Everything that crossed the wire is kept with its stamp when `record` is true.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from boebot.devices.buzzer import next_token
 from boebot.errors import BoardError
@@ -27,6 +27,9 @@ _SIGNAL = messages.SetpointSignal
 _SPEED = messages.SetpointSpeed
 _COAST = messages.SetpointCoast
 _BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
+_ROUND_PERIODS = 4 * (len(messages.Task) + 1)  # of telemetry: each task's time and the counters, a message in four
+_ROUNDS = 4  # in which each task was told at least once, or something is wrong
+_LOOK_S = 0.05
 _ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop so much before what was waited for
 
 # offsets in telemetry
@@ -243,24 +246,37 @@ class Link(Traffic):
         if answer.status != messages.AnswerStatus.OK:
             raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
 
-    def take_task_times(self) -> dict[str, int | None]:
-        """How long each task of the firmware took at most, in cycles of 1/16 us, interrupts on top included, since
-        this was last asked, or since the board started; from now on anew. 65535: so long or longer. None: it has not
-        run, or takes no time (on the native board, where only the Ping's pulse does).
+    # ---- the board's own timing --------------------------------------------------------------------------------------
 
-        How many ticks overran is in the telemetry: `overruns`.
+    def measure_task_times(
+        self, seconds: float, progress: Callable[[float], object] = lambda _: None
+    ) -> dict[str, int]:
+        """Lets the board work for so long and returns `task_times` then: of all since the session was opened. Telemetry
+        and events that come meanwhile are left aside.
+
+        Args:
+            seconds: by the transport's clock. The board tells one task after another, so that some are told up to 0.8 s
+                later, or more where the line is slow.
+            progress: told how much of it is over, 0 to 1.
 
         Raises:
-            BoardError: as `request`.
+            BoardError: the board has not told all of them, in four times the time that it needs; or as `poll`.
         """
-        times: dict[str, int | None] = {}
-        for task in messages.Task:
-            what = f"tell the time of its task {task.name.lower()}"
-            answer = self.request(messages.TakeTaskTime, task, what=what)
-            if answer.status != messages.AnswerStatus.OK:
-                raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
-            times[task.name.lower()] = answer.value or None
-        return times
+        assert self.hello is not None, "a session is open"
+        round_s = _ROUND_PERIODS * self.hello.telemetry_period * self._tick_s
+        begun = self._now()
+        least, most = seconds + round_s, seconds + _ROUNDS * round_s
+        while (passed := self._now() - begun) < least or (None in self.task_times.values() and passed < most):
+            progress(min(passed / least, 1.0))
+            self.poll(_LOOK_S)
+            self.events()
+        missing = [name for name, cycles in self.task_times.items() if cycles is None]
+        if missing:
+            raise BoardError(
+                f"the board at {self.transport.name} did not tell the times of its tasks {', '.join(missing)} within "
+                f"{most:.1f} s; expected one task after another"
+            )
+        return {name: cycles for name, cycles in self.task_times.items() if cycles is not None}
 
     def _request_when_free(
         self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None

@@ -4,6 +4,9 @@ Bounds come from the machine code alone; they are compared with what the image's
 measured in the emulator or on the board, wherever somebody has. A measured figure above its bound means that the bound
 is wrong, and counts like any broken budget. What a task or an interrupt takes by itself, and the stack, hold for every
 scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
+
+What must end in time is the tick: tasks, interrupts, edges. Frames are worked off in what they leave, and never keep a
+slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget.
 """
 
 from __future__ import annotations
@@ -15,14 +18,14 @@ from typing import Any
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import WAKE
-from boebot.timing.costs import Costs, costs
+from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
 from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
 from boebot.timing.program import Program, Table
-from boebot.timing.response import Responses, Schedule, Source, load, misses, poll_gap, receive_backlog, responses
-from boebot.timing.stack import Stack
+from boebot.timing.response import Responses, Schedule, Source, background, load, longest_gap, misses, responses
+from boebot.timing.stack import VECTORS, Stack
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
@@ -31,6 +34,7 @@ RECEIVE_RING = 256  # bytes, of which one stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
+STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +89,11 @@ class Report:
     schedule: Schedule
     sources: tuple[Source, ...]
     responses: Responses | None
-    gap: int | None  # cycles between two polls of the link
-    ring: int | None  # bytes that wait in the receive ring
+    gap: int | None  # cycles between two polls of the link, while slots wait
+    ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
+    taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
+    frames: Source  # that the host sends
+    frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
     memory: Memory
     measured: Measurement | None = None
 
@@ -102,16 +109,31 @@ class Report:
 
     @property
     def demand(self) -> int:
-        """Cycles of all tasks and interrupts that can come in one tick, whether they fit into it or not."""
+        """Cycles of all slots and interrupts that can come in one tick, whether they fit into it or not."""
         coming = sum(source.cycles * source.requests(self.tick_cycles) for source in self.sources)
         return self.schedule.blocking + self.tick_work + coming
 
     @property
     def executed(self) -> int:
-        """Cycles of a tick in which instructions run at most: each interrupt also wakes the main loop for a round."""
+        """Cycles of a tick in which instructions run at most: with frames, and a pass of the main loop for whatever
+        wakes it."""
         names = {row.name for row in self.rows if row.kind == "interrupt"}
         wakes = sum(source.requests(self.tick_cycles) for source in self.sources if source.name in names)
-        return min(self.tick_cycles, self.demand + wakes * (WAKE + self.costs.round))
+        frames = self.frames.cycles * (self.frames.requests(self.tick_cycles) + 1)  # one may have waited
+        return min(self.tick_cycles, self.demand + frames + wakes * (WAKE + self.costs.loop + self.costs.edges))
+
+    @property
+    def frames_coming(self) -> float:
+        """The host's frames in a tick, in the long run."""
+        return float(self.frames.load / self.frames.cycles * self.tick_cycles) if self.frames.cycles else 0.0
+
+    @property
+    def edge_age(self) -> int | None:
+        """Cycles from an edge to the moment at which the time is told of it: each slot begins with that. None: there is
+        overload, or no encoder."""
+        if self.responses is None or not self.costs.change:
+            return None
+        return self.schedule.slot_cycles + self.responses.pieces[SLOT_BEGINS]
 
     @property
     def own(self) -> Measurement | None:
@@ -123,7 +145,7 @@ class Report:
 
     @property
     def load_bound(self) -> float:
-        """Share of all cycles that tasks and interrupts take at most in the long run, 0..1; above 1: overload."""
+        """Share of all cycles that slots and interrupts take at most in the long run, 0..1; above 1: overload."""
         return float(load(self.sources) + self.schedule.mean_load)
 
     @property
@@ -173,6 +195,12 @@ class Report:
             "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
             "receive_ring_bytes": RECEIVE_RING - 1,
+            "frame_bound_cycles": self.frames.cycles,
+            "frame_taken_bound_cycles": self.taken,
+            "edge_age_bound_cycles": self.edge_age,
+            "frames_coming_per_tick": round(self.frames_coming, 2),
+            "frames_proven_per_tick": round(self.frames_proven, 2),
+            "losses_in_emulator": None if own is None else own.losses,
             "ram_static_bytes": memory.static,
             "stack_bound_bytes": memory.stack,
             "stack_emulator_max_bytes": memory.stack_seen,
@@ -205,13 +233,15 @@ def prove(
     """
     image = read_image(path)
     program = program or program_of(image)
-    if not program.table.tasks:
-        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    _check(path, program)
     found = costs(program, asked)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
+    between = (*sources, *found.between(program, asked))
+    frames = found.of_frames(asked)
+    gap, ring, taken = _of_link(program, found, schedule, between, asked)
     return Report(
         path=str(path),
         table=program.table,
@@ -221,11 +251,34 @@ def prove(
         schedule=schedule,
         sources=sources,
         responses=answers,
-        gap=poll_gap(schedule, sources),
-        ring=_ring(program, found, schedule, sources, asked),
+        gap=gap,
+        ring=ring,
+        taken=taken,
+        frames=frames,
+        frames_proven=_proven(schedule, between, frames),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
+
+
+def _check(path: Path, program: Program) -> None:
+    """Raises TimingError: it is not a program with a schedule, or its table not that of this program."""
+    if not program.table.tasks:
+        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    if "main" not in program.by_name:
+        raise TimingError(f"{path} has no function main; expected an image with its symbols (not stripped)")
+    for row in program.table.interrupts:
+        if 4 * row.vector not in program.functions:
+            raise TimingError(
+                f"{path}: row {row.name!r} of its timing table is of interrupt {row.vector}; expected one that is used"
+            )
+    said = {row.vector for row in program.table.interrupts}
+    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in said]
+    if unsaid:
+        raise TimingError(
+            f"{path} uses interrupt {unsaid[0]} at {program.where(4 * unsaid[0])}, of which its timing table does not "
+            "say how often it comes; expected an INTERRUPT row of it"
+        )
 
 
 def _rows(
@@ -262,13 +315,36 @@ def _rows(
     return rows
 
 
-def _ring(program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load) -> int | None:
-    """Bytes that wait in the receive ring at most; 0: the image receives nothing."""
+def _of_link(
+    program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load
+) -> tuple[int | None, int | None, int | None]:
+    """The longest time between two polls of the link, the bytes that wait in its ring then, and the longest time from a
+    frame's last byte to its end; each None: overload.
+
+    A poll takes a whole frame at its beginning: after it only what has come since waits. A main loop that was idle or
+    at the encoders may have left some bytes of a frame that had not ended.
+    """
+    after = found.loop + found.edges + found.loop  # edges that are due go before
+    gap = longest_gap(schedule, sources, found.blocking, after)
+    taken = longest_gap(schedule, sources, found.blocking, after + found.frame)
+    idle = longest_gap(schedule, sources, found.idle, after)
     row = next((row for row in program.table.interrupts if row.vector == RECEIVE), None)
     if row is None:
-        return 0
-    (receive,) = asked.sources(row, found.interrupts[row.name])
-    return receive_backlog(schedule, sources, receive, asked.frame_least, IDLE_LEAVES)
+        return gap, 0, taken
+    if gap is None or idle is None:
+        return gap, None, taken
+    bytes_ = asked.sources(row, found.interrupts[row.name])
+
+    def come(window: int) -> int:
+        return sum(source.requests(window + 1) for source in bytes_)
+
+    return gap, max(come(gap), IDLE_LEAVES + come(idle)), taken
+
+
+def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:
+    """Frames that slots and interrupts leave time for in a tick."""
+    left = background(schedule, sources) * schedule.tick_cycles
+    return float(left / frames.cycles) if frames.cycles else 0.0
 
 
 def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
@@ -298,7 +374,7 @@ def _above(says: str, number: int, what: str, limit: int) -> str:
 def _tick_broken(report: Report) -> list[str]:
     if report.responses is None:
         return [
-            f"overload: under the load {report.load.name!r} tasks and interrupts may take "
+            f"overload: under the load {report.load.name!r} the tick and interrupts may take "
             f"{100 * report.load_bound:.1f} % of all cycles"
         ]
     found = []
@@ -311,6 +387,8 @@ def _tick_broken(report: Report) -> list[str]:
         )
     if report.ring is not None and report.ring > RECEIVE_RING - 1:
         found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {RECEIVE_RING - 1}")
+    if report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
+        found.append(f"the time of an edge may be asked for after {report.edge_age} cycles; its stamp has 16 bits")
     return found
 
 

@@ -9,7 +9,7 @@ and behind it, and stores through pointers do not reach the registers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 from boebot.timing.instructions import BRANCHES, SKIPS
@@ -24,11 +24,13 @@ VECTORS_END = 4 * 26  # addresses below are interrupt vectors: there r1 may hold
 KEEPS = BRANCHES | SKIPS
 KEEPS |= frozenset(("ldi", "mov", "movw", "ld", "ldd", "lds", "lpm", "pop", "in", "bld", "swap"))
 KEEPS |= frozenset(("st", "std", "sts", "out", "push", "sbi", "cbi", "nop", "wdr", "sleep", "sei", "cli", "bst"))
-KEEPS |= frozenset(("set", "clt", "seh", "clh", "jmp", "rjmp", "ijmp", "ret", "reti"))
+KEEPS |= frozenset(("seh", "clh", "jmp", "rjmp", "ijmp", "ret", "reti"))
+SETS = {"sec": ("C", True), "clc": ("C", False), "set": ("T", True), "clt": ("T", False)}
 # Of each branch: the flag that decides and the value with which it is taken; S is N xor V.
 CONDITIONS = {
     "brcs": ("C", True), "brcc": ("C", False), "breq": ("Z", True), "brne": ("Z", False), "brmi": ("N", True),
     "brpl": ("N", False), "brvs": ("V", True), "brvc": ("V", False), "brlt": ("S", True), "brge": ("S", False),
+    "brts": ("T", True), "brtc": ("T", False),
 }  # fmt: skip
 
 Context = tuple[tuple[int, int], ...]  # registers and what they hold, at the entry of a function
@@ -36,7 +38,8 @@ Context = tuple[tuple[int, int], ...]  # registers and what they hold, at the en
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What is known at a place: registers by number, flags by letter. None of both may be changed."""
+    """What is known at a place: registers by number, flags by letter (of these C, Z, N, V and T are followed). None of
+    both may be changed."""
 
     registers: dict[int, int] = field(default_factory=dict)
     flags: dict[str, bool] = field(default_factory=dict)
@@ -95,19 +98,45 @@ def known(function: Function, context: Context) -> Known:
     work = [function.entry]
     while work:
         block = function.blocks[work.pop()]
-        state = states[block.start]
-        for instruction in block.instructions[:-1]:
-            state = step(instruction, state)
-        taken[block.start] = [edge for edge in block.edges if _may_take(block.instructions[-1], edge, state)]
-        state = step(block.instructions[-1], state)
-        for edge in taken[block.start]:
-            old = states.get(edge.to)
-            new = state if old is None else old.merge(state)
-            if new != old:
-                states[edge.to] = new
-                work.append(edge.to)
+        taken[block.start], state = _through(block, states[block.start])
+        work += [edge.to for edge in taken[block.start] if _arrive(states, edge.to, state)]
     blocks = {start: replace(function.blocks[start], edges=tuple(edges)) for start, edges in sorted(taken.items())}
     return Known(replace(function, blocks=blocks), context, states)
+
+
+def once_round(function: Function, header: int, nodes: Collection[int], state: State) -> State | None:
+    """What is known at a loop's header after one pass, from what was known before it; None: no way leads back to it.
+
+    Args:
+        nodes: the blocks of the loop.
+    """
+    states = {header: state}
+    back: dict[int, State] = {}
+    work = [header]
+    while work:
+        block = function.blocks[work.pop()]
+        edges, after = _through(block, states[block.start])
+        for edge in edges:
+            if edge.to == header:
+                _arrive(back, header, after)
+            elif edge.to in nodes and _arrive(states, edge.to, after):
+                work.append(edge.to)
+    return back.get(header)
+
+
+def _through(block: Block, state: State) -> tuple[list[Edge], State]:
+    """The edges that can be taken behind a block, and what is known there."""
+    for instruction in block.instructions[:-1]:
+        state = step(instruction, state)
+    last = block.instructions[-1]
+    return [edge for edge in block.edges if _may_take(last, edge, state)], step(last, state)
+
+
+def _arrive(states: dict[int, State], place: int, state: State) -> bool:
+    """One way more that leads to a place; whether less is known there now."""
+    old = states.get(place)
+    states[place] = state if old is None else old.merge(state)
+    return states[place] != old
 
 
 def _may_take(last: Instruction, edge: Edge, state: State) -> bool:
@@ -153,13 +182,28 @@ def step(instruction: Instruction, state: State) -> State:
     flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
     for register, value in _moved(name, operands, state):
         registers[register] = value
-    if name in ("sec", "clc"):
-        flags = {f: value for f, value in state.flags.items() if f != "C"} | {"C": name == "sec"}
+    if name in SETS:
+        flag, value = SETS[name]
+        flags = state.flags | {flag: value}
+    elif name == "bst":
+        flags = _stored(operands, state)
     elif name in _BYTES:
-        flags = _byte(name, operands, state, registers)
+        flags = _transfer(state) | _byte(name, operands, state, registers)
     elif name in ("adiw", "sbiw"):
-        flags = _word(name, operands, state, registers)
+        flags = _transfer(state) | _word(name, operands, state, registers)
     return State(registers, flags)
+
+
+def _transfer(state: State) -> dict[str, bool]:
+    """Flag T, which arithmetic keeps."""
+    return {"T": state.flags["T"]} if "T" in state.flags else {}
+
+
+def _stored(operands: tuple[int, ...], state: State) -> dict[str, bool]:
+    """The flags behind `bst`."""
+    kept = {f: value for f, value in state.flags.items() if f != "T"}
+    held = state.registers.get(operands[0])
+    return kept if held is None else kept | {"T": held >> operands[1] & 1 == 1}
 
 
 def _without(registers: dict[int, int], changed: frozenset[int]) -> dict[int, int]:
@@ -180,6 +224,9 @@ def _moved(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple
     elif name == "swap" and operands[0] in state.registers:
         value = state.registers[operands[0]]
         yield operands[0], value << 4 & 0xF0 | value >> 4
+    elif name == "bld" and operands[0] in state.registers and "T" in state.flags:
+        bit = 1 << operands[1]
+        yield operands[0], state.registers[operands[0]] & ~bit | bit * state.flags["T"]
 
 
 @dataclass(frozen=True, slots=True)

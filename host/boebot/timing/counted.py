@@ -1,19 +1,21 @@
 """Bounds of loops that show in the machine code itself: those that the compiler and its library make.
 
-The source has no place for an annotation of them: copies of structures, delays, shifts, divisions. Found are loops
-whose every pass counts a register down that nothing else in the loop writes, from what it is known to hold where the
-loop is entered. Shifts by a variable count are bounded by the language: a count that is not less than the width of the
+The source has no place for an annotation of them: copies of structures, delays, shifts, divisions, `ATOMIC_BLOCK`.
+Found are loops whose every pass counts a register down that nothing else in the loop writes, from what it is known to
+hold where the loop is entered; and those that end, with what is known there, after a few passes, worked through one by
+one. Shifts by a variable count are bounded by the language: a count that is not less than the width of the
 operand has no meaning (C11, 6.5.7).
 """
 
 from __future__ import annotations
 
-from boebot.timing.constants import Known, State
+from boebot.timing.constants import Known, State, once_round
 from boebot.timing.loops import Loop
 from boebot.timing.program import Block, Function, Instruction
 from boebot.timing.registers import KEEPS_FLAGS, before, written
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
+MOST_WORKED = 256  # passes that are worked through
 SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
 CALLS = frozenset(("call", "rcall", "icall"))
 
@@ -21,9 +23,7 @@ CALLS = frozenset(("call", "rcall", "icall"))
 def passes(loop: Loop[int], known: Known) -> int | None:
     """How often the header runs at most for each entry of the loop; None if its code does not show it."""
     function = known.function
-    entering = [known.behind(block) for block in before(function)[loop.header] if block.start not in loop.nodes]
-    if loop.header == function.entry:
-        entering.append(State(dict(known.context)))
+    entering = _entering(loop, known)
     inner = frozenset(node for each in loop.inner for node in each.nodes)
     found: list[int] = []
     for start in loop.nodes - inner:
@@ -33,6 +33,32 @@ def passes(loop: Loop[int], known: Known) -> int | None:
             if count is not None:
                 found.append(count)
     return min(found, default=None)
+
+
+def worked(loop: Loop[int], known: Known) -> int | None:
+    """The same by working through the passes one by one: how often the header runs until what is known of registers and
+    flags lets no way lead back to it. None: it never comes to that, or not soon."""
+    counts = [_worked(loop, known.function, state) for state in _entering(loop, known)]
+    return None if None in counts else max((count for count in counts if count is not None), default=None)
+
+
+def _worked(loop: Loop[int], function: Function, state: State) -> int | None:
+    for count in range(1, MOST_WORKED + 1):
+        after = once_round(function, loop.header, loop.nodes, state)
+        if after is None:
+            return count
+        if after == state:  # all passes are like this one
+            return None
+        state = after
+    return None
+
+
+def _entering(loop: Loop[int], known: Known) -> list[State]:
+    """What is known on each way into a loop."""
+    found = [known.behind(block) for block in before(known.function)[loop.header] if block.start not in loop.nodes]
+    if loop.header == known.function.entry:
+        found.append(State(dict(known.context)))
+    return found
 
 
 def in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:

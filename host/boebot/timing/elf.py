@@ -57,6 +57,7 @@ class Image:
     symbols: tuple[Symbol, ...]  # those of flash, by address
     flash_bytes: int  # written to flash: code, constants, initial values of variables
     ram_bytes: int  # of all variables
+    variables: dict[str, int]  # bytes of each variable that has a name
     ram_end: int  # first address behind the last variable
     stack_start: int  # first value of the stack pointer
     lines: dict[int, str] = field(default_factory=dict)
@@ -94,6 +95,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         symbols=symbols,
         flash_bytes=written,
         ram_bytes=sum(size for _, size in ram),
+        variables=_variables(elf),
         ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
         stack_start=stack_start,
         lines=source_lines(elf, len(code)),
@@ -159,6 +161,17 @@ def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
                 strength = STRENGTH.get(info["bind"], 2)
                 found.append(Symbol(symbol.name, address, symbol["st_size"], info["type"], strength))
     return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
+
+
+def _variables(elf: ELFFile) -> dict[str, int]:
+    """Sizes of the variables in RAM, by name without what a compiler appends (`.lto_priv.3`)."""
+    return {
+        symbol.name.partition(".")[0]: symbol["st_size"]
+        for section in elf.iter_sections()
+        if isinstance(section, SymbolTableSection)
+        for symbol in section.iter_symbols()
+        if symbol["st_info"]["type"] == "STT_OBJECT" and RAM_START <= symbol["st_value"] < RAM_END
+    }
 
 
 def _section(path: Path, elf: ELFFile, name: str) -> bytes:

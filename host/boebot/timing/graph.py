@@ -7,7 +7,9 @@ instructions say, so nothing depends on the compiler:
   has blocks of code that other functions have too (libgcc's `__prologue_saves__`, for instance).
 * `rcall .+0` makes room for two bytes on the stack and is no call: an instruction like others, which ends no block.
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
+* What writes registers, the stack pointer or SREG by their data addresses is refused.
 * Where `ijmp` and `icall` lead is found by `jumps`, or refused.
+* Loops with several entries get one each, by copies of blocks (split.py).
 
 The vectors are functions too: that of interrupt N is at address 4·N, with the jump to `__vector_N` as its tail call, so
 that its time is that of the interrupt from the end of the entry's four cycles.
@@ -25,9 +27,12 @@ from boebot.timing.elf import Image, Symbol, read_image
 from boebot.timing.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
 from boebot.timing.jumps import NotProvenError, Step, targets_of
 from boebot.timing.program import Block, Edge, Function, Instruction, Program
+from boebot.timing.split import reducible
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
+REGISTERS = 32  # at data addresses 0 to 31
+CORE = {0x5D: "the stack pointer", 0x5E: "the stack pointer", 0x5F: "SREG"}  # data addresses
 
 
 def load_program(path: Path) -> Program:
@@ -42,7 +47,7 @@ def program_of(image: Image) -> Program:
     explorer = _Explorer(image, names, program)
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
-        program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
+        program.functions[entry] = Function(names.of(entry), entry, reducible(_blocks(draft), entry))
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:
@@ -188,6 +193,9 @@ class _Explorer:
             return _Flow(instruction, [])
         if name == "spm":
             raise self._refusal(address, "`spm` writes the flash, which takes no fixed time")
+        if name == "sts" and (instruction.operands[0] < REGISTERS or instruction.operands[0] in CORE):
+            what = CORE.get(instruction.operands[0], f"register r{instruction.operands[0]}")
+            raise self._refusal(address, f"`sts` writes {what}, which cannot be followed; expected `out` or `mov`")
         return _Flow(instruction, [Edge(behind, instruction.cycles)], ends=False)
 
     def _jump(self, draft: _Draft, instruction: Instruction, targets: list[int]) -> _Flow:
@@ -243,7 +251,8 @@ class _Explorer:
             targets = targets_of(self.image.code, self._way_to(draft, address))
         except NotProvenError as error:
             name = flow.instruction.mnemonic
-            raise self._refusal(address, f"where `{name}` leads cannot be proven: {error}") from error
+            text = f"where `{name}` leads cannot be proven: {error}"
+            raise self._refusal(address, f"{text}; expected a call by name, or a table with a limited index") from error
         if targets == draft.computed[address]:
             return
         draft.computed[address] = targets
@@ -289,7 +298,9 @@ class _Explorer:
             raise self._refusal(address, f"leads out of the code, to 0x{target:04X}")
 
     def _refusal(self, address: int, text: str) -> TimingError:
-        return TimingError(f"{self.image.path}: {self.where(address)}: {text}")
+        known = address in self.image.lines
+        place = self.where(address) if known else f"0x{address:04X} (in {self.names.of(address)})"
+        return TimingError(f"{self.image.path}: {place}: {text}")
 
 
 def _blocks(draft: _Draft) -> dict[int, Block]:

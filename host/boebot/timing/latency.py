@@ -19,6 +19,8 @@ priority was waiting may be the one at which the request before this one was acc
 was at most L after the request before; so it need not be heeded where no two of its requests come within L and the time
 that passes, by the same formula, from that acceptance on.
 
+Received bytes queue, and are taken by other interrupts than their own: they are looked at in received.py.
+
 How often they come is said in loads.py, of each load or (`densest`) of any. That is not the rate in the long run: edges
 of the IR carrier come 190 cycles apart within bursts, and a few changes of the encoders all at once.
 """
@@ -29,9 +31,11 @@ from collections.abc import Mapping, Sequence
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import Blocked
-from boebot.timing.loads import APART, densest
+from boebot.timing.loads import APART, RECEIVE, densest
+from boebot.timing.received import Line, Other, longest_wait
 from boebot.timing.response import Source
 from boebot.timing.steps import Steps
+from boebot.timing.taken import Taken
 
 HORIZON = 1 << 20  # cycles, 65 ms: who waits longer waits for ever
 
@@ -65,10 +69,28 @@ class Latencies:
                     "comes is not said; expected an INTERRUPT row of it"
                 )
         lower = max((self.spans[number][0] for number in others if number > vector), default=0)
+        if vector == RECEIVE and self.requests.get(vector):
+            return self._received(higher, lower)
         wait, after_own = self._behind(lower, higher), self._behind(self.spans[vector][0], higher)
         own = self.requests.get(vector)
         again = own is None or sum(one.requests(wait + after_own + 1) for one in own) > 1
         return max(wait, after_own) if again else wait
+
+    def _received(self, higher: Sequence[int], lower: int) -> int:
+        """Of a byte, which the receiver keeps until somebody takes it."""
+        worst = self.blocked.worst_case
+        others: dict[int, Other] = {}
+        for number in higher:
+            if (latency := self.of(number)) >= HORIZON:
+                return HORIZON
+            others[number] = Other(Taken(worst, 4 * number), self.requests[number], latency, self.spans[number][0])
+        inner = any(self.spans[number][1] is not None for number in higher)
+
+        def steps(count: int) -> int:
+            return self.steps.most(count, count if inner else 0)
+
+        line = Line(Taken(worst, 4 * RECEIVE), self.requests[RECEIVE], others, lower, steps)
+        return longest_wait(line, HORIZON)
 
     def _behind(self, begun: int, higher: Sequence[int]) -> int:
         """The wait where one that takes so long has just begun."""

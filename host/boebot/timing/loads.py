@@ -31,34 +31,33 @@ _SET_POINT = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """Requests at least `interval` cycles apart, where given at most `burst` in each `period`; interval 0: the table's
-    own. So many as `close` more may come at once, early by so many intervals."""
+    """Requests at least `interval` cycles apart, and for each (n, period) of `bursts` at most n in each period.
+
+    Interval 0: the table's own. So many as `close` more may come at once, early by so many intervals.
+    """
 
     interval: int = 0
-    burst: int = 0
-    period: int = 0
+    bursts: tuple[tuple[int, int], ...] = ()
     close: int = 0
 
     def source(self, row: InterruptRow, cycles: int) -> Source:
         """As what asks for an interrupt of so many cycles."""
         interval = self.interval or row.interval
-        return Source(row.name, cycles, interval, self.close * interval, self.burst, self.period)
+        return Source(row.name, cycles, interval, self.close * interval, self.bursts)
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
     """Streams by vector, several where several lines share one; vectors in `off` are not asked for at all.
 
-    The host's frames are at least `frame_least` bytes long and at most `frame_most`; `frame_burst`: so many in so many
-    cycles, (0, 0): as the line carries them.
+    The host's frames are of at least `frame_least` bytes, and come as the line carries them, or in `frame_bursts`.
     """
 
     name: str
     says: str
     streams: Mapping[int, tuple[Stream, ...]]
-    frame_burst: tuple[int, int]
+    frame_bursts: tuple[tuple[int, int], ...]
     frame_least: int
-    frame_most: int
     off: frozenset[int] = field(default_factory=frozenset)
     byte_interval: int = BYTE
 
@@ -77,17 +76,18 @@ class Load:
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
+# Cycles in which three of them can be: the left wheel's longest pulse ends 35,200 into slot 0, the right wheel's
+# shortest begins 8,000 into slot 1 and ends 28,800 into it; four: and the burst ends 16,000 into slot 2.
+_THREE_EDGES, _FOUR_EDGES = 33_600, 60_800
 _ECHO = 115 * 16  # the shortest, from rise to fall
 _HALF_PERIOD = 190  # of the carrier's highest frequency
 _BUS_STEP = 160  # the shortest of the two-wire bus, a bit at 100 kHz
-_COMPASS = Stream(_BUS_STEP, 11, 4 * TICK)
-_SERVOS_AND_BURSTS = Stream(
-    _EDGE_TO_EDGE, 10, 2 * TICK
-)  # two edges of two wheels and the turret, two ends of IR bursts a tick
-_SWEEP = Stream(
-    _HALF_PERIOD, 2 * 85, TICK
-)  # two bursts of 1 ms in each tick, at the highest of its frequencies 85 toggles each
-_ECHOES = Stream(_ECHO, 2, 4 * TICK)  # rise and fall; the Ping's shortest period is four ticks
+_BURST, _BURST_TO_BURST = 85, 39_000  # edges of the carrier in 1 ms, at its highest; bursts are in slots 2 and 3
+_COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK),))
+# In a servo frame: two edges of two wheels and of the turret, and four ends of IR bursts.
+_SERVOS_AND_BURSTS = Stream(_EDGE_TO_EDGE, ((2, _THREE_EDGES), (3, _FOUR_EDGES), (10, 2 * TICK)))
+_SWEEP = Stream(_HALF_PERIOD, ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)))
+_ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
 _DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
@@ -96,16 +96,15 @@ LOADS: dict[str, Load] = {
         "100 Hz tick, both servos, two encoder lines of 1,500 edges/s, IR sweep, Ping at its fastest, telemetry and a "
         "set-point each tick",
         {
-            RECEIVE: (Stream(BYTE, _SET_POINT, TICK),),
-            SEND: (Stream(BYTE, _TELEMETRY, TICK), Stream(BYTE, _DEVICES, 2 * TICK)),
+            RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
+            SEND: (Stream(BYTE, ((_TELEMETRY, TICK),)), Stream(BYTE, ((_DEVICES, 2 * TICK),))),
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
-        frame_burst=(1, TICK),
+        frame_bursts=((1, TICK),),
         frame_least=_SET_POINT,
-        frame_most=_SET_POINT,
         off=_DEVICES_OFF,
     ),
     "saturated": Load(
@@ -119,9 +118,8 @@ LOADS: dict[str, Load] = {
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
-        frame_burst=(0, 0),
+        frame_bursts=(),
         frame_least=20,
-        frame_most=40,
         off=_DEVICES_OFF,
     ),
 }
@@ -131,7 +129,7 @@ LOADS["everything"] = replace(
     says="the load of the figures with every device built in: light, a tone of 8 kHz, compass, parameters being stored",
     streams={
         **LOADS["figures"].streams,
-        STAMP: (Stream(0, 1, 2 * TICK),),
+        STAMP: (Stream(0, ((1, 2 * TICK),)),),
         BUZZER: (Stream(),),
         EEPROM: (Stream(),),
         TWO_WIRE: (_COMPASS,),

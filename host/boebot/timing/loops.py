@@ -11,6 +11,8 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from boebot.errors import TimingError
+
 N = TypeVar("N", bound=Hashable)
 
 
@@ -24,11 +26,12 @@ class Loop(Generic[N]):
     inner: tuple[Loop[N], ...] = ()
 
 
-class IrreducibleError(Exception):
+class IrreducibleError(TimingError):
     """A cycle can be entered at two places; `at` is one of them."""
 
     def __init__(self, at: object) -> None:
-        super().__init__(at)
+        place = f"0x{at:04X}" if isinstance(at, int) else at
+        super().__init__(f"the loop at {place} can be entered at two places; expected loops with one entry")
         self.at = at
 
 

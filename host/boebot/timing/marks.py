@@ -20,7 +20,7 @@ from boebot.timing import counted
 from boebot.timing.constants import Known
 from boebot.timing.loops import IrreducibleError, Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Mark
-from boebot.timing.program import Function, Program
+from boebot.timing.program import COPY, Function, Program
 
 _Marks = dict[int, list[Mark]]
 _Found = list[tuple[Loop[int], Loop[int] | None]]
@@ -30,6 +30,7 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     """The bounds of a function's loops, by the blocks whose runs they count, in the context of `known`."""
     result = _said(program, function)
     whole = _with_parents(function)
+    _drop_copies(result, whole)
     for loop, parent in whole:
         if parent is not None:
             _move_out(result, loop, parent)
@@ -39,9 +40,23 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     _drop_others(result, whole, loops)
     for loop, _ in loops:
         shown = counted.passes(loop, known)
+        if shown is None and not any(result.get(node) for node in _own(loop)):
+            shown = counted.worked(loop, known)
         if shown is not None:
             _lesser(result, loop, known.function, shown)
     return result
+
+
+def _drop_copies(marks: _Marks, loops: _Found) -> None:
+    """Rows in copies of blocks (split.py) that are in no copy of their loop."""
+    nodes: dict[int, frozenset[int]] = {}
+    for loop, _ in loops:  # inner ones first
+        for node in loop.nodes:
+            nodes.setdefault(node, loop.nodes)
+    for node in marks:
+        around = {inside % COPY for inside in nodes.get(node, ())}
+        if node >= COPY and not around <= {inside % COPY for inside in nodes.get(node % COPY, ())}:
+            marks[node] = []
 
 
 def _drop_unrolled(marks: _Marks, loop: Loop[int], function: Function) -> None:
@@ -109,7 +124,7 @@ def _said(program: Program, function: Function) -> _Marks:
         source = (program.lines.get(bound.address, bound.address), nth, bound.passes, bound.cycles)
         for block in function.blocks.values():
             last = block.instructions[-1]
-            if block.start <= bound.address < last.address + last.size:
+            if block.instructions[0].address <= bound.address < last.address + last.size:
                 result.setdefault(block.start, []).append(Mark(source, bound.passes, bound.cycles))
     return result
 

@@ -63,7 +63,7 @@ class Measurement:
     scenarios: tuple[str, ...] = field(default_factory=tuple)
     functions: dict[str, Spans] = field(default_factory=dict)  # others that were watched, as the link's poll
     busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
-    between_polls: int = 0  # most cycles from one poll of the link to the next, sleep not counted
+    between_polls: int = 0  # most cycles from one poll of the link to the next without sleep
     tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
     losses: dict[str, int] = field(default_factory=dict)  # what should have come and did not, counted by kind
     by_scenario: dict[str, Measurement] = field(default_factory=dict)  # where there were several

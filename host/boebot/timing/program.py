@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+COPY = 0x10000  # behind all addresses: what a copy of a block has above its own (split.py)
+
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
@@ -39,7 +41,7 @@ class Block:
 
     A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
     call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
-    instruction takes then.
+    instruction takes then. A copy (split.py) has `start` above its first instruction's address.
     """
 
     start: int
@@ -133,6 +135,10 @@ class Program:
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
 
     def where(self, address: int) -> str:
-        """A place for people: `0x1A2C (safety.c:57)`."""
-        line = self.lines.get(address)
-        return f"0x{address:04X}" + (f" ({line})" if line else "")
+        """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""
+        address %= COPY
+        text = f"0x{address:04X}"
+        if line := self.lines.get(address):
+            return f"{text} ({line})"
+        entry = max((entry for entry in self.functions if entry <= address), default=None)
+        return text if entry is None else f"{text} (in {self.functions[entry].name})"

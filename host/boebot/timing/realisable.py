@@ -70,12 +70,13 @@ class BoardTimes:
 
     @classmethod
     def of(cls, table: Table, cycles_per_second: int = 16_000_000) -> BoardTimes:
-        """By the budgets of an image's table: tasks up to telemetry's, and the longest task before the next poll."""
+        """By the budgets of an image's table: tasks up to telemetry's; those of the fullest slot, which go first."""
         names = [row.name for row in table.tasks]
         before = table.tasks[: names.index("telemetry") + 1] if "telemetry" in names else ()
         first = sum(row.budget for row in before if row.phase == 0)
-        longest = max((row.budget for row in table.tasks), default=0)
-        return cls(table.sensors, first / cycles_per_second, longest / cycles_per_second)
+        slots = range(max((row.period for row in table.tasks), default=1))
+        fullest = max(sum(row.budget for row in table.tasks if slot % row.period == row.phase) for slot in slots)
+        return cls(table.sensors, first / cycles_per_second, fullest / cycles_per_second)
 
 
 @dataclass(frozen=True, slots=True)

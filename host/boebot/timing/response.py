@@ -24,33 +24,32 @@ HORIZON = 1 << 24  # a second of 16 MHz: what has not ended by then is overload
 class Source:
     """What requests an interrupt, and what each time costs.
 
-    In any window of w cycles it comes at most ceil((w + jitter) / interval) times; where `burst` is given, also at most
-    `burst` times in each `period`, as the bytes of one frame a tick do.
+    In any window of w cycles it comes at most ceil((w + jitter) / interval) times; and for each (n, period) of `bursts`
+    at most n times in each period, as the bytes of one frame a tick do.
     """
 
     name: str
     cycles: int
     interval: int
     jitter: int = 0
-    burst: int = 0  # 0: the interval says all
-    period: int = 0
+    bursts: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
-        if self.cycles < 0 or self.interval <= 0 or self.jitter < 0 or (self.burst > 0) != (self.period > 0):
+        limits = (number for burst in self.bursts for number in burst)
+        if self.cycles < 0 or self.interval <= 0 or self.jitter < 0 or any(number <= 0 for number in limits):
             raise ValueError(f"{self.name}: no source of interrupts: {self}")
 
     def requests(self, window: int) -> int:
         """The most that can come in a window of so many cycles."""
         if window <= 0:
             return 0
-        most = _ceil(window + self.jitter, self.interval)
-        return min(most, self.burst * _ceil(window + self.jitter, self.period)) if self.burst else most
+        limits = ((1, self.interval), *self.bursts)
+        return min(most * _ceil(window + self.jitter, period) for most, period in limits)
 
     @property
     def load(self) -> Fraction:
         """Its share of all cycles in the long run."""
-        each = Fraction(self.cycles, self.interval)
-        return min(each, Fraction(self.burst * self.cycles, self.period)) if self.burst else each
+        return min(Fraction(most * self.cycles, period) for most, period in ((1, self.interval), *self.bursts))
 
 
 def _ceil(a: int, b: int) -> int:
@@ -77,14 +76,13 @@ class Piece:
 
     name: str
     cycles: int
-    polls: int = 0  # times that the link has been polled at its end
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
     """A cyclic executive: the pieces of each slot of a whole cycle, in their order.
 
-    `blocking` is what the main loop may be at when a slot begins and it was idle, as a poll that it does not leave.
+    `blocking` is what the main loop may be at when a slot begins and no other waits: it does not leave it.
     Where a piece ends later than `latest` after its slot began, the executive does something else than this; 0: never.
     """
 
@@ -165,45 +163,28 @@ def misses(schedule: Schedule, slots: Sequence[int]) -> list[int]:
     return [slot for slot, cycles in enumerate(slots) if cycles > left[slot] * schedule.slot_cycles]
 
 
-def poll_gap(schedule: Schedule, sources: Sequence[Source]) -> int | None:
-    """The longest time from one poll of the link to the end of the next one; None: overload."""
-    longest, since = schedule.blocking, 0
-    for piece in (piece for _ in range(2) for slot in schedule.slots for piece in slot):
-        since += piece.cycles
-        longest = max(longest, since)
-        if piece.polls:
-            since = 0
-    return response(longest, sources)
+def background(schedule: Schedule, sources: Sequence[Source]) -> Fraction:
+    """The share of all cycles that slots and interrupts leave to other work at least, in the long run; 0: none."""
+    return max(Fraction(0), 1 - load(sources) - schedule.mean_load)
 
 
-def receive_backlog(
-    schedule: Schedule, sources: Sequence[Source], bytes_: Source, frame_least: int, idle_most: int
-) -> int | None:
-    """Bytes that the receive ring must hold; None: overload.
-
-    Each poll takes one frame, of at least `frame_least` bytes, if there is a whole one. An idle main loop leaves at
-    most `idle_most` bytes, of a frame that has not ended. The most that waits is counted from the last moment at which
-    there was no whole frame; each piece may be the one that begins just then.
-    """
-    pieces = [piece for slot in schedule.slots for piece in slot]
+def longest_gap(schedule: Schedule, sources: Sequence[Source], before: int, after: int) -> int | None:
+    """The longest time for which the main loop does nothing but slots, with so many cycles of other work before them,
+    during which the first one begins, and after them; None: overload."""
     if load(sources) + schedule.mean_load >= 1:
         return None
-    most = 0
-    for first in range(len(pieces)):
-        work, taken, index = schedule.blocking, 0, first
+    longest = 0
+    for first in range(len(schedule.slots)):
+        work, slot, due = before, first, 0
         while True:
-            piece = pieces[index % len(pieces)]
-            work += piece.cycles
-            time = response(work, sources)
-            if time is None:
+            work, slot, due = work + schedule.work(slot), slot + 1, due + schedule.slot_cycles
+            ended = response(work + after, sources)
+            if ended is None:
                 return None
-            waiting = idle_most + bytes_.requests(time + 1) - taken
-            most = max(most, waiting)
-            taken += piece.polls * frame_least
-            index += 1
-            if waiting - piece.polls * frame_least <= idle_most or index - first > 4 * len(pieces):
+            if ended <= due:
                 break
-    return most
+        longest = max(longest, ended)
+    return longest
 
 
 def _least(needed: Callable[[int], int], time: int) -> int | None:

@@ -7,6 +7,7 @@ version 1.2, book I: the file's header, its section headers, and the table of th
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 
@@ -15,6 +16,10 @@ from boebot.timing.program import InterruptRow, SensorRow, Table, TaskRow
 
 SECTION = ".boebot.timing"
 MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
+MOST = 0xFFFFFFFF  # of any number in a row
+VECTORS = 25  # interrupts of the ATmega328P (data sheet, table 12-6), the reset not counted
+LONGEST_CYCLE = 4096  # slots until the schedule repeats: ten seconds
+_DIGITS = 12  # of a number; longer ones are too large anyway
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
 _SECTION = struct.Struct("<10I")
 
@@ -41,8 +46,21 @@ def read_table(path: Path) -> Table:
 
 
 def table_of(path: Path, data: bytes) -> Table:
-    """The rows of `.boebot.timing`: lines as "TASK whisker 1 0 200", each ended by a zero byte."""
+    """The rows of `.boebot.timing`: lines as "TASK whisker 1 0 200", each ended by a zero byte.
+
+    Raises:
+        TimingError: a row is none, or contradicts itself or another.
+    """
     rows = [_row(path, text) for text in data.split(b"\0") if text]
+    names = [(type(row), row.name) for row in rows]
+    double = next((name for kind, name in names if names.count((kind, name)) > 1), None)
+    if double is not None:
+        raise TimingError(f"{path}: its timing table has two rows of the name {double!r}; expected one")
+    cycle = math.lcm(*(row.period for row in rows if isinstance(row, TaskRow)))
+    if cycle > LONGEST_CYCLE:
+        raise TimingError(
+            f"{path}: the periods of its tasks repeat after {cycle} slots only; expected at most {LONGEST_CYCLE}"
+        )
     return Table(
         tasks=tuple(row for row in rows if isinstance(row, TaskRow)),
         interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
@@ -80,4 +98,24 @@ def _row(path: Path, data: bytes) -> TaskRow | InterruptRow | SensorRow:
         )
     if len(words) != 1 + numbers or not all(word.isascii() and word.isdigit() for word in words[1:]):
         raise TimingError(f"{path}: row {text!r} of its timing table: a name and {numbers} whole numbers are expected")
-    return row(words[0], *(int(word) for word in words[1:]))
+    numbers_of = [int(word[:_DIGITS]) for word in words[1:]]
+    if wrong := _contradiction(row, numbers_of):
+        raise TimingError(f"{path}: row {text!r} of its timing table: {wrong}")
+    return row(words[0], *numbers_of)
+
+
+def _contradiction(row: type[TaskRow] | type[InterruptRow] | type[SensorRow], numbers: list[int]) -> str | None:
+    """What of a row cannot be; None: nothing."""
+    if max(numbers) > MOST:
+        return f"{max(numbers)} is too large; expected at most {MOST}"
+    if row is TaskRow:
+        period, phase, budget = numbers
+        if not 0 <= phase < period:
+            return f"phase {phase} of period {period}; expected a phase below its period"
+        return None if budget else "a budget of 0 cycles; expected at least 1"
+    if row is InterruptRow:
+        vector, budget, _, interval = numbers
+        if not 1 <= vector <= VECTORS:
+            return f"vector {vector}; expected 1 to {VECTORS}, as the ATmega328P has"
+        return None if budget and interval else "a budget or an interval of 0 cycles; expected at least 1"
+    return None if numbers[1] else "a period of 0 ticks; expected at least 1"

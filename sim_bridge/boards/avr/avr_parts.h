@@ -210,6 +210,7 @@ typedef struct {
 } line_queue;
 
 typedef struct {
+  uint64_t arrived; /* cycle */
   uint8_t byte;
   bool framing_error;
   bool overrun; /* a byte was lost before this one */

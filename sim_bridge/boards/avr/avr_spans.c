@@ -104,6 +104,9 @@ void spans_request_gone(avr_board *b, uint8_t vector) {
 void spans_accept(avr_board *b, uint8_t vector, uint64_t begin) {
   avr_recorder *r = b->recorder;
   uint64_t request = r->request[vector];
+  if (vector == VECTOR_USART_RX && request < b->usart.buffer[0].arrived) { /* code has taken the bytes before it */
+    request = b->usart.buffer[0].arrived;
+  }
   r->request[vector] = r->next_request[vector]; /* of one whose flag stays: what it was raised for again */
   r->next_request[vector] = NEVER;
   r->stack = (uint16_t)(_avr_sp_get(b->avr) - 2u);

@@ -132,7 +132,7 @@ static void start_bit(avr_board *b) {
 static void stop_bit(avr_board *b) {
   usart_state *u = &b->usart;
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
-  received_byte r = {0};
+  received_byte r = {.arrived = b->clock};
   for (unsigned bit = 0; bit < u->data_bits && bit < 8; bit++) {
     if (line_level(&u->to_board, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
   }

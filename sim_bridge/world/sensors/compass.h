@@ -1,7 +1,8 @@
 /* compass.h: a magnetic compass: heading by the horizontal field that it measures in the body's frame.
  *
- * Without disturbance it reads wrap(heading + bias + sigma xi) (THEORY section 1.8). Iron on the robot shifts the field
- * (hard iron: found as the centre of the circle in one full turn in place), and so do the motors' currents.
+ * Without disturbance it reads wrap(heading + bias + sigma xi) (ARSim's GetCompassReading; notes, section
+ * 3.2.3). Iron on the robot shifts the field (hard iron: found as the centre of the circle in one full turn in place), and
+ * so do the motors' currents.
  */
 #ifndef SENSORS_COMPASS_H
 #define SENSORS_COMPASS_H

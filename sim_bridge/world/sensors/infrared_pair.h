@@ -1,8 +1,9 @@
 /* infrared_pair.h: the light between an infra-red LED and the 38 kHz receiver beside it.
  *
  * What returns falls with the square of the distance, so the range goes with the square root of the receiver's sensitivity
- * at the carrier's frequency (peak 38.5 kHz, 50 % at 40, 20 % at 42: HARDWARE section 5) and of the surface's reflectance.
- * A sweep over five frequencies sorts objects into zones. Another robot's burst is seen directly, from much farther away.
+ * at the carrier's frequency (peak 38.5 kHz, 50 % at 40, 20 % at 42: Parallax, "Robotics with the Board of Education
+ * Shield for Arduino", chapter 8) and of the surface's reflectance. A sweep over five frequencies sorts objects into zones.
+ * Another robot's burst is seen directly, from much farther away.
  */
 #ifndef SENSORS_INFRARED_PAIR_H
 #define SENSORS_INFRARED_PAIR_H

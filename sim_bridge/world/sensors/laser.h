@@ -1,7 +1,8 @@
-/* laser.h: a laser range finder: a fan of thin beams, as the Hokuyo URG-04LX (THEORY section 1.7).
+/* laser.h: a laser range finder: a fan of thin beams, as the Hokuyo URG-04LX (notes, section 3.2.3).
  *
  * S_i is the distance along ray i, from right to left, or -1 beyond the range; noise by (3.1) for each ray, clamped to
- * [0, D]. 683 directions over 239.77 degrees (steps 44 ... 725 of 1024 to a turn, the middle one is straight ahead).
+ * [0, D]. 683 directions over 239.77 degrees (steps 44 ... 725 of 1024 to a turn, the middle one is straight ahead,
+ * after Hokuyo's data sheet).
  */
 #ifndef SENSORS_LASER_H
 #define SENSORS_LASER_H

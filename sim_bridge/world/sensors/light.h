@@ -1,5 +1,6 @@
-/* light.h: a phototransistor: L = sum over the lamps of P max(0, cos theta) / (d0^2 + d^2) (THEORY section 1.9).
+/* light.h: a phototransistor: L = sum over the lamps of P max(0, cos theta) / (d0^2 + d^2).
  *
+ * The law is the kit's own (docs/reference/notes.md).
  * A lamp behind something as high as the sensor does not count. Read by a capacitor's decay, bright light is a short time.
  */
 #ifndef SENSORS_LIGHT_H

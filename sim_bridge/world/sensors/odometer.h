@@ -1,8 +1,8 @@
-/* odometer.h: a pose estimated from the travel of the wheels, (2.7)-(2.9), by the midpoint rule.
+/* odometer.h: a pose estimated from the travel of the wheels, (2.7)-(2.9) of the notes, by the midpoint rule.
  *
- * Two kinds of noise (THEORY section 1.4), either can be off: ARSim's, sigma xi metres per wheel and step of 10 ms (scaled by
- * the root of the step, so that drift does not depend on it); and the kit's, a factor per wheel, spread in proportion to
- * the travel, whole edges only, and slips that lose edges.
+ * Two kinds of noise, either can be off: that of ARSim's GetOdometerReading, sigma xi metres per wheel and step of 10 ms
+ * (scaled by the root of the step, so that drift does not depend on it); and the kit's, a factor per wheel, spread
+ * in proportion to the travel, whole edges only, and slips that lose edges.
  */
 #ifndef SENSORS_ODOMETER_H
 #define SENSORS_ODOMETER_H

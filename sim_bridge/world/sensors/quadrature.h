@@ -1,5 +1,5 @@
-/* quadrature.h: decoding of two detectors a quarter period apart (THEORY section 1.4): steps with direction, and what cannot
- * be, both lines changing at once, is counted as illegal and moves nothing. */
+/* quadrature.h: decoding of two detectors a quarter period apart (notes, section 1.2.2 and Fig. 1.6): steps with
+ * direction, and what cannot be, both lines changing at once, is counted as illegal and moves nothing. */
 #ifndef SENSORS_QUADRATURE_H
 #define SENSORS_QUADRATURE_H
 

@@ -1,7 +1,7 @@
 /* sharp_infrared.h: Sharp GP2Y0A21 / GP2D12, an IR triangulation sensor with a voltage at its output.
  *
  * V = 33.9 / (d + 4.74) with d in cm; below 10 cm the voltage falls again, so a near object looks like a far one. A new
- * value every 38.3 +- 9.6 ms, which is at the output 7.6 ms later (HARDWARE section 5).
+ * value every 38.3 +- 9.6 ms, which is at the output 7.6 ms later (data sheet of the GP2D12).
  */
 #ifndef SENSORS_SHARP_INFRARED_H
 #define SENSORS_SHARP_INFRARED_H

@@ -1,8 +1,8 @@
 /* sonar.h: an ultrasonic range finder: a beam of rays, of which the nearest surface that sends sound back counts.
  *
  * Two readings of the same echo: the notes' (nearest distance with probability p, else D_max; never below D_min; noise by
- * (3.1)) and the Ping's, which is the echo's time at c = 331.5 + 0.6 T (HARDWARE section 6). Surfaces met too flatly turn
- * the sound away; soft ones swallow it.
+ * (3.1)) and the Ping's, which is the echo's time at c = 331.5 + 0.6 T (Parallax, document 28015). Surfaces met too
+ * flatly turn the sound away; soft ones swallow it.
  */
 #ifndef SENSORS_SONAR_H
 #define SENSORS_SONAR_H

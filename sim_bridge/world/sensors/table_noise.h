@@ -1,4 +1,4 @@
-/* table_noise.h: a sensor known by what it was seen to read (rule S3 of THEORY section 1.3).
+/* table_noise.h: a sensor known by what it was seen to read (the lookup tables of the notes' section 3.2.2).
  *
  * Readings of the real sensor are stored by distance and angle of incidence. A simulated reading draws one of them from each
  * of the four bins around the question and interpolates bilinearly, so the noise is the sensor's own. One table per serial

@@ -43,7 +43,7 @@ void hal_start_timers(void) {
 enum { CARRIER_LEFT = 0, CARRIER_RIGHT = 1 }; /* bits of GPIOR0 */
 
 /* Toggles the LEDs that GPIOR0 names, 13 cycles with entry and return; neither flags nor registers change. */
-ISR(TIMER2_COMPA_vect, ISR_NAKED) {
+HAL_ISR(TIMER2_COMPA_vect) {
   __asm__ volatile(
       "sbic %[which], %[left]            \n"
       "sbi %[left_pin], %[left_bit]      \n"
@@ -82,7 +82,7 @@ void hal_carrier_stop(void) {
 
 /* 13 cycles with entry, vector and return; neither flags nor registers change. Compare B is somebody else's (hal_avr.h), and in this
  * mode it may be anything. */
-ISR(TIMER0_COMPA_vect, ISR_NAKED) {
+HAL_ISR(TIMER0_COMPA_vect) {
   __asm__ volatile(
       "sbi %[pin], %[bit] \n"
       "reti               \n"
@@ -129,18 +129,18 @@ extern const uint8_t __data_load_end[]; /* by the linker: the first byte of flas
 
 uint32_t hal_image_size(void) { return (uint16_t)(uintptr_t)__data_load_end; }
 
-/* CRC-32 as of zlib, four bits at a time. */
+/* CRC-32 as of zlib, bit by bit: a table would take 64 bytes more, and no less time in an 8-bit CPU. */
 uint32_t hal_image_hash(void) {
-  static const uint32_t table[16] PROGMEM = {
-      0x00000000ul, 0x1DB71064ul, 0x3B6E20C8ul, 0x26D930ACul, 0x76DC4190ul, 0x6B6B51F4ul, 0x4DB26158ul, 0x5005713Cul,
-      0xEDB88320ul, 0xF00F9344ul, 0xD6D6A3E8ul, 0xCB61B38Cul, 0x9B64C2B0ul, 0x86D3D2D4ul, 0xA00AE278ul, 0xBDBDF21Cul};
   uint32_t crc = 0xFFFFFFFFul;
   const uint16_t size = (uint16_t)hal_image_size();
   BOUNDED(FLASHEND + 1ul, for (uint16_t address = 0; address < size; address++)) {
-    uint8_t byte = pgm_read_byte(address);
-    BOUNDED(2, for (uint8_t half = 2; half > 0; half--)) {
-      crc = crc >> 4 ^ pgm_read_dword(&table[((uint8_t)crc ^ byte) & 0x0Fu]);
-      byte = (uint8_t)(byte >> 4);
+    crc ^= pgm_read_byte(address);
+    BOUNDED(8, for (uint8_t bit = 0; bit < 8u; bit++)) {
+      const bool carry = ((uint8_t)crc & 1u) != 0;
+      crc >>= 1;
+      if (carry) {
+        crc ^= 0xEDB88320ul;
+      }
     }
   }
   return ~crc;

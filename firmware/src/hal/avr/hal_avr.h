@@ -23,9 +23,14 @@
 
 #include "bounds.h"
 
-#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect)
-#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect)
-#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect)
+/* Interrupts stand near the vectors, whose jumps then take a cycle less. Those that come most are written out, and need not
+ * save what they use: the registers r2 to r7 are theirs alone, for the compiler is told to leave them (platformio.ini).
+ *   r2  0      r3  scratch, and UCSR0A for who jumps to hal_receive_rest      r4, r5  Z      r6  SREG      r7  scratch */
+#define HAL_BY_VECTORS __attribute__((section(".lowtext")))
+#define HAL_ISR(vector) ISR(vector, ISR_NAKED HAL_BY_VECTORS)
+#define HAL_INTERRUPT_SLOT ISR(TIMER1_COMPB_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_EDGE ISR(TIMER1_COMPA_vect, HAL_BY_VECTORS)
+#define HAL_INTERRUPT_CAPTURE ISR(TIMER1_CAPT_vect, HAL_BY_VECTORS)
 #define HAL_INTERRUPT_WATCHDOG ISR(WDT_vect)
 
 /* Runs with interrupts on; that of the EEPROM itself is off until asked for again (eeprom_avr.c). */
@@ -41,6 +46,13 @@
 /* A variable that assembly names: the optimisation of the whole program keeps it, and its name. */
 #define HAL_NAMED __attribute__((used, externally_visible))
 
+/* The compiler shall not see that it is a constant. */
+#define HAL_NEAR(pointer)                  \
+  ({                                       \
+    __typeof__(pointer) near_ = (pointer); \
+    __asm__("" : [near_] "+b"(near_));     \
+    near_;                                 \
+  })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
@@ -53,15 +65,15 @@ enum {
 };
 
 /* Covers what can stand before the edge's interrupt, its latency in the table, which the analysis of the image shows for
- * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 79 and 16 to stop it), a stamped
- * change and a capture; and its own prologue. */
-#define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 79u + 16u)
+ * both loads; also, as they mostly are, one that has begun, a storm of pin changes (5 x 81 and 12 to stop it), a stamped
+ * change and a capture; and its own prologue up to the reading of the time. */
+#define HAL_STORM_CYCLES ((HAL_CHANGES_STORM + 1u) * 81u + 12u)
 _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BUDGET_capture <= HAL_LATENCY_edge,
                "lead");
-#define HAL_EDGE_PROLOGUE 50u
+#define HAL_EDGE_PROLOGUE 65u
 #define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
-#define HAL_EDGE_CLOSE 150u /* cycles before it from which nothing else is done */
-#define HAL_EDGE_TAKES 35u  /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
+#define HAL_EDGE_CLOSE 70u /* cycles before it from which nothing else is done */
+#define HAL_EDGE_TAKES 35u /* from the time given to hal_edge_wait() to the reading in hal_edge_delay(), if punctual */
 
 #define HAL_PIN_BIT(name) ((uint8_t)(1u << name##_BIT))
 #define HAL_PIN_OUTPUT(name) (name##_DDR = (uint8_t)(name##_DDR | HAL_PIN_BIT(name)))
@@ -77,6 +89,7 @@ _Static_assert(HAL_BUDGET_receive + HAL_STORM_CYCLES + HAL_BUDGET_stamp + HAL_BU
 
 #define HAL_TABLE static const __attribute__((__progmem__))
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return pgm_read_byte(byte); }
+static inline uint16_t hal_table_word(const uint16_t *word) { return pgm_read_word(word); }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy_P(to, from, size); }
 
 /* Interrupt context or HAL_ATOMIC: the two halves of the count share a latch. */
@@ -101,7 +114,18 @@ static inline void hal_capture_falling(void) {
   TIFR1 = _BV(ICF1);
 }
 
-static inline void hal_capture_stop(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1)); }
+static inline __attribute__((always_inline)) void hal_capture_stop(void) {
+  TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(ICIE1));
+}
+
+/* The place at that low byte in a ring that begins at a multiple of 256. */
+#define HAL_RING_PLACE(place, ring, low) __asm__("mov %A0, %1 \n ldi %B0, hi8(" #ring ")" : "=&d"(place) : "r"(low))
+
+static inline __attribute__((always_inline)) volatile hal_change *hal_change_at(uint8_t index) {
+  volatile hal_change *place;
+  HAL_RING_PLACE(place, hal_changes, index);
+  return place;
+}
 
 #define HAL_STOPPED_BIT 3 /* of GPIOR0 */
 static inline uint8_t hal_changes_stopped(void) { return GPIOR0 & _BV(HAL_STOPPED_BIT); }
@@ -181,7 +205,7 @@ static inline void hal_eeprom_write_start(uint16_t address, uint8_t value) {
   }
 }
 
-static inline void hal_eeprom_interrupt(bool on) {
+static inline __attribute__((always_inline)) void hal_eeprom_interrupt(bool on) {
   if (on) {
     EECR |= _BV(EERIE);
   } else {
@@ -203,25 +227,16 @@ extern volatile uint8_t hal_send_head;
 #define HAL_LOST_BIT 2 /* of GPIOR0 */
 #define HAL_ZERO_BIT 4
 
-/* What the receive interrupt does, for code that keeps it waiting. */
-static inline __attribute__((always_inline)) void hal_serial_take(void) {
-  const uint8_t status = UCSR0A;
-  if ((status & _BV(RXC0)) == 0) {
-    return;
-  }
-  const uint8_t head = HAL_RECEIVE_HEAD;
-  const uint8_t byte = UDR0;
-  hal_receive_ring[head] = byte; /* the place at the head is always free */
-  if (byte == 0) {
-    GPIOR0 |= _BV(HAL_ZERO_BIT);
-  }
-  const uint8_t next = (uint8_t)(head + 1u);
-  if ((status & _BV(DOR0)) != 0 || next == HAL_RECEIVE_TAIL) {
-    GPIOR0 |= _BV(HAL_LOST_BIT);
-  }
-  if (next != HAL_RECEIVE_TAIL) {
-    HAL_RECEIVE_HEAD = next;
-  }
+/* Takes a received byte, if one waits, as the receive interrupt would, in code that keeps it waiting: 4 cycles if not. */
+void hal_serial_take(void);
+static inline __attribute__((always_inline)) void hal_serial_look(void) {
+  __asm__ volatile(
+      "lds r3, %[status]         \n"
+      "sbrc r3, %[received]      \n"
+      "call hal_serial_take      \n"
+      :
+      : [status] "n"(_SFR_MEM_ADDR(UCSR0A)), [received] "I"(RXC0)
+      : "memory");
 }
 
 static inline uint8_t hal_serial_due(void) {
@@ -234,9 +249,18 @@ static inline void hal_serial_again(void) { GPIOR0 |= _BV(HAL_ZERO_BIT); }
 
 static inline bool hal_serial_received(void) { return HAL_RECEIVE_HEAD != HAL_RECEIVE_TAIL; }
 
+/* Bytes that wait. A full ring may have lost some. */
+static inline __attribute__((always_inline)) uint8_t hal_serial_waiting(void) {
+  const uint8_t waiting = (uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL);
+  if (waiting == UINT8_MAX) {
+    GPIOR0 |= _BV(HAL_LOST_BIT);
+  }
+  return waiting;
+}
+
 static inline bool hal_serial_receive(uint8_t *byte) {
   const uint8_t tail = HAL_RECEIVE_TAIL;
-  if (HAL_RECEIVE_HEAD == tail) {
+  if (hal_serial_waiting() == 0) {
     return false;
   }
   *byte = hal_receive_ring[tail];
@@ -244,14 +268,11 @@ static inline bool hal_serial_receive(uint8_t *byte) {
   return true;
 }
 
-/* The place at that low byte in a ring. */
-#define HAL_RING_PLACE(place, ring, low) __asm__("mov %A0, %1 \n ldi %B0, hi8(" #ring ")" : "=&d"(place) : "r"(low))
-
 /* 10 cycles a byte. */
 static inline __attribute__((always_inline)) bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count,
                                                                            uint8_t size) {
   const uint8_t tail = HAL_RECEIVE_TAIL;
-  uint8_t left = (uint8_t)(HAL_RECEIVE_HEAD - tail);
+  uint8_t left = hal_serial_waiting();
   if (left == 0) {
     return false;
   }
@@ -334,7 +355,7 @@ void hal_serial_queue(uint8_t count);
  * takes the rest three by three, the branches after it the last 0 to 2. */
 static inline __attribute__((always_inline)) void hal_edge_wait(uint16_t time) {
   BOUNDED_TIME(HAL_EDGE_LEAD - HAL_EDGE_CLOSE, while ((int16_t)(time - TCNT1) > (int16_t)HAL_EDGE_CLOSE)) {
-    hal_serial_take();
+    hal_serial_look();
   }
   uint16_t left;
   __asm__ volatile(

@@ -32,7 +32,7 @@ static uint8_t *port_of(uint8_t pin) {
 
 static uint8_t bit_of(uint8_t pin) { return (uint8_t)(1u << (pin < 8 ? pin : pin < 14 ? pin - 8 : pin - 14)); }
 
-hal_change hal_changes[HAL_CHANGES + 1u];
+hal_change hal_changes[HAL_CHANGES];
 volatile uint8_t hal_changes_head, hal_changes_tail;
 static bool changes_stopped;
 
@@ -43,10 +43,10 @@ void hal_changes_resume(void) { changes_stopped = false; }
 /* The pin-change interrupt. */
 static void pin_change(void) {
   volatile hal_change *place = hal_change_after(hal_changes_head);
-  const volatile hal_change *previous = place - 1;
+  const volatile hal_change *previous = hal_change_at(hal_changes_head);
   place->time = hal_time();
   place->bits = PINC;
-  place->close = (uint16_t)(place->time - previous->time) < HAL_CHANGES_CLOSE ? (uint8_t)(previous->close + 1u) : 0u;
+  place->close = (uint16_t)(place->time - previous->time) <= HAL_CHANGES_CLOSE ? (uint8_t)(previous->close + 1u) : 0u;
   const uint8_t next = (uint8_t)(hal_changes_head + HAL_CHANGE_BYTES);
   const bool full = next == hal_changes_tail;
   if (full || place->close >= HAL_CHANGES_STORM) {
@@ -55,9 +55,6 @@ static void pin_change(void) {
   }
   if (!full) {
     hal_changes_head = next;
-    if (next == 0) { /* the last place is also the first */
-      hal_changes[0] = *place;
-    }
   }
 }
 

@@ -70,6 +70,7 @@ static inline uint16_t hal_edge_delay(uint16_t time) {
 uint16_t hal_capture_time(void);
 void hal_capture_falling(void);
 void hal_capture_stop(void);
+static inline volatile hal_change *hal_change_at(uint8_t index) { return &hal_changes[index / sizeof(hal_change)]; }
 uint8_t hal_changes_stopped(void);
 void hal_changes_resume(void);
 void hal_pin_change_mask(uint8_t bits);
@@ -93,6 +94,7 @@ bool hal_serial_received(void);
 uint8_t hal_serial_due(void);
 void hal_serial_seen(void);
 void hal_serial_again(void);
+static inline void hal_serial_look(void) {}
 bool hal_serial_receive(uint8_t *byte);
 static inline bool hal_serial_receive_block(uint8_t *bytes, uint8_t *count, uint8_t size) {
   uint8_t byte = 0;
@@ -124,9 +126,11 @@ void hal_eeprom_interrupt(bool on);
 
 #define HAL_TABLE static const
 #define HAL_NAMED
+#define HAL_NEAR(pointer) (pointer)
 #define HAL_ZERO(variable) hal_native_zero((void *)&(variable), sizeof(variable)) /* a process starts more than once */
 static inline void hal_native_zero(void *at, size_t size) { memset(at, 0, size); }
 static inline uint8_t hal_table_byte(const uint8_t *byte) { return *byte; }
+static inline uint16_t hal_table_word(const uint16_t *word) { return *word; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
 
 #ifdef __cplusplus

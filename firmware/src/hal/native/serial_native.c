@@ -18,9 +18,9 @@ void native_serial_reset(void) {
   overrun = zero_received = false;
 }
 
-void hal_start_serial(uint32_t baud) {
+void hal_start_serial(uint16_t baud) {
   sender_free = native->now;
-  native->baud = baud;
+  native->baud = 100ul * baud;
 }
 
 bool hal_serial_receive(uint8_t *byte) {

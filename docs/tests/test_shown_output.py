@@ -1,0 +1,31 @@
+"""What pages show of the output of commands is what the commands print today."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tools import shown_output
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [page for page in sorted(ROOT.glob("docs/**/*.md")) if "```console\n" in page.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_page_shows_what_is_printed(page: Path) -> None:
+    shown = page.read_text(encoding="utf-8")
+    assert shown_output.renewed(shown) == shown, (
+        f"renew it: build/venv/bin/python -m tools.shown_output {page.relative_to(ROOT)}"
+    )
+
+
+def test_a_line_that_is_not_printed_any_more_is_named() -> None:
+    with pytest.raises(ValueError, match="prints no line that begins with 'no such row'"):
+        shown_output.renewed("```console\n$ boebot timing --help\nno such row  12\n```\n")
+
+
+def test_numbers_are_renewed_and_what_is_left_out_stays() -> None:
+    page = "Text.\n\n```console\n$ boebot timing --robot arsim\n…\nrobot 'arsim' with 7\n…\n```\n"
+    shown = shown_output.renewed(page.replace("with 7", "with a brain period of 7 ms"))
+    assert "\n…\nrobot 'arsim' with a brain period of 50 ms: nothing is known of its times" in shown

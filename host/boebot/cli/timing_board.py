@@ -1,0 +1,76 @@
+"""The board's column of `boebot timing`: what a connected board measures of its own tasks, if it runs the image that is
+judged."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from boebot.cli import output
+from boebot.errors import TimingError
+
+if TYPE_CHECKING:
+    from boebot.link import messages
+    from boebot.robots import RobotDescription
+
+
+def maxima(
+    port: str, robot: RobotDescription, image: Path, seconds: float, loaded: Path | None = None
+) -> Mapping[str, int]:
+    """What a board measures of its own tasks in a session of so long, in cycles by their names. Nothing moves.
+
+    Args:
+        image: the one that is judged.
+        loaded: what an emulated board is to run; None: its own.
+
+    Raises:
+        BoardError: there is no board at the port, or it does not answer.
+        TimingError: the board runs another image.
+    """
+    from boebot.boards import BoardRequest, open_board
+    from boebot.link.session import Link
+    from boebot.timing.elf import read_image
+
+    code = read_image(image).code
+    request = BoardRequest(
+        robot=robot, record=False, realtime=True, image=None if loaded is None else str(loaded.resolve())
+    )
+    session = open_board(port, request)
+    try:
+        link = Link(session.transport, record=False)
+        link.open()
+        for notice in link.notices:
+            output.say(notice)
+        check_image(link.identity(), code, image.name, port)
+        label = f"listening to {port}"
+        with output.share_bars([label]) as watch:
+            found = link.measure_task_times(seconds, lambda share: watch({label: share}))
+        link.close()
+    finally:
+        session.close()
+    measured = {name: cycles for name, cycles in found.items() if cycles}
+    if not measured:
+        output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
+    return measured
+
+
+def check_image(identity: messages.Identity, code: bytes, name: str, port: str) -> None:
+    """Whether the flash of a board holds an image: by its size and CRC-32, as the board read them back.
+
+    Args:
+        code: the image, from address 0.
+
+    Raises:
+        TimingError: it holds another one.
+    """
+    if identity.image_size == 0:  # a board without a flash
+        return
+    found, wanted = (identity.image_size, identity.image_hash), (len(code), zlib.crc32(code))
+    if found != wanted:
+        runs, judged = (f"{size} bytes with CRC-32 {crc:08x}" for size, crc in (found, wanted))
+        raise TimingError(
+            f"the board {port} runs another image ({runs}) than {name} ({judged}); "
+            "expected the same: flash it, name the board's own with --elf, or leave out --port"
+        )

@@ -1,0 +1,132 @@
+"""Images that are unusual, or damaged, or not this firmware's: each is proved, or refused in one clear sentence."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+import timing_program
+from elftools.elf.elffile import ELFFile
+from hypothesis import given
+from hypothesis import strategies as st
+
+from boebot.errors import TimingError
+from boebot.timing import budget
+from boebot.timing.loads import LOADS
+from boebot.timing.table import read_table
+
+FIGURES = LOADS["figures"]
+TASK = "__attribute__((noinline)) void first_task(void) { NOPS(100); }"
+LONG_JUMP = "#include <setjmp.h>\nstatic jmp_buf env;"
+POINTER = "static void one(void) { PORTB = 1; }\nvoid (*volatile pointer)(void) = one;"
+TABLE = """
+__attribute__((noinline)) static void one(void) { NOPS(10); }
+__attribute__((noinline)) static void two(void) { NOPS(20); }
+#include <avr/pgmspace.h>
+static void (*const table[])(void) PROGMEM = {one, two};
+volatile unsigned char number;
+"""
+LOOKED_UP = "unsigned char i = number; if (i < 2) { ((void (*)(void))pgm_read_word(&table[i]))(); }"
+RECURSION = "volatile int v;\n__attribute__((noinline)) static int f(int n) { return n <= 1 ? 1 : n * f(n - 1) + v; }"
+ROOM = "#include <alloca.h>\nvolatile unsigned char n;\n__attribute__((noinline)) static void use(char *p) { *p = 1; }"
+GOTO = "static void *const places[] = {&&x, &&y}; goto *places[number]; x: PORTB = 1; return; y: PORTB = 2;"
+NUMBER = "volatile unsigned char number;"
+NO_BOUND = r"the loop at 0x[0-9A-F]{4} \(program\.c:\d+\) has no bound"
+
+
+def program(folder: Path, head: str, body: str, **changes: str) -> Path:
+    """The small program with another first task."""
+    source = timing_program.text().replace(
+        TASK, f"{head}\n__attribute__((noinline)) void first_task(void) {{ {body} }}"
+    )
+    for old, new in changes.items():
+        source = source.replace(old, new)
+    return timing_program.compiled(folder, source, "-gdwarf-2")
+
+
+@pytest.mark.parametrize(
+    ("head", "body", "words"),
+    [
+        (LONG_JUMP, "if (setjmp(env) == 0) { longjmp(env, 1); }", r"0x[0-9A-F]{4} \(in setjmp.*\): where `ijmp`"),
+        (RECURSION, "v = f(v);", r"recursion at 0x[0-9A-F]{4} \(program\.c:\d+\): f calls itself"),
+        (POINTER, "pointer();", r"0x[0-9A-F]{4} \(program\.c:\d+\): where `icall` leads cannot be proven"),
+        (ROOM, "char *p = alloca(n); use(p);", r"the stack pointer gets a value .* 0x[0-9A-F]{4} \(program\.c:\d+\)"),
+        (NUMBER, GOTO, r"0x[0-9A-F]{4} \(program\.c:\d+\): where `ijmp` leads cannot be proven"),
+        ("", '__asm__("jmp 0x7FFE");', r"\(program\.c:\d+\): leads out of the code, to 0x7FFE"),
+        ("", '__asm__("sts 0x5E, r1");', r"\(program\.c:\d+\): `sts` writes the stack pointer"),
+        ("", '__asm__("sts 0x1C, r1");', r"\(program\.c:\d+\): `sts` writes register r28"),
+        ("", '__asm__("push r24\\n push r25");', r"first_task returns at 0x[0-9A-F]{4} .* with 2 bytes on the stack"),
+        ("", "for (;;) {}", NO_BOUND),
+        ("", "while (PINB != 0) {}", NO_BOUND),
+        ("ISR(TIMER0_OVF_vect) { PORTB++; }", "", r"uses interrupt 16 at 0x0040 .* expected an INTERRUPT row"),
+    ],
+    ids=["setjmp", "recursion", "pointer", "alloca", "computed goto", "wild jump", "writes SP", "writes a register",
+         "pushes", "endless", "waits", "interrupt not in the table"],
+)  # fmt: skip
+def test_refused_in_a_sentence(tmp_path: Path, head: str, body: str, words: str) -> None:
+    with pytest.raises(TimingError, match=words) as caught:
+        budget.prove(program(tmp_path, head, body), FIGURES)
+    assert "\n" not in str(caught.value)
+
+
+def test_table_of_functions_with_a_checked_index_is_proved(tmp_path: Path) -> None:
+    found = budget.prove(program(tmp_path, TABLE, LOOKED_UP), FIGURES).costs.tasks["first"]
+    assert 20 + 4 < found < 20 + 4 + 30  # the longer callee and its return; what looks it up
+
+
+def test_stripped_image_is_refused(tmp_path: Path) -> None:
+    image = timing_program.build(tmp_path)
+    subprocess.run(["avr-strip", image], check=True)
+    with pytest.raises(TimingError, match="has no function main; expected an image with its symbols"):
+        budget.prove(image, FIGURES)
+
+
+def test_row_of_an_interrupt_that_is_not_used_is_refused(tmp_path: Path) -> None:
+    source = timing_program.text().replace("INTERRUPT slot 12", "INTERRUPT slot 13")
+    with pytest.raises(
+        TimingError, match="row 'slot' of its timing table is of interrupt 13; expected one that is used"
+    ):
+        budget.prove(timing_program.compiled(tmp_path, source), FIGURES)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes, list[range]]:
+    """Where mutants go, the image that they are of, and its parts: headers and the sections that are read."""
+    folder = tmp_path_factory.mktemp("mutants")
+    source = timing_program.text().replace(TASK, '#include "bounds.h"\n' + TASK.replace("NOPS(100);", LOOPS))
+    image = timing_program.compiled(folder, source, "-gdwarf-2", f"-I{timing_program.FIRMWARE}")
+    with image.open("rb") as stream:
+        elf = ELFFile(stream)
+        header = elf.header
+        parts = [range(52)]
+        parts.append(range(header["e_phoff"], header["e_phoff"] + header["e_phnum"] * header["e_phentsize"]))
+        parts.append(range(header["e_shoff"], header["e_shoff"] + header["e_shnum"] * header["e_shentsize"]))
+        for name in (".boebot.timing", ".boebot.loops", ".symtab", ".strtab", ".text", ".debug_line", ".debug_info"):
+            section = elf.get_section_by_name(name)
+            assert section is not None and section["sh_size"] > 0
+            parts.append(range(section["sh_offset"], section["sh_offset"] + section["sh_size"]))
+    return folder / "mutant.elf", image.read_bytes(), parts
+
+
+LOOPS = "BOUNDED(5, while (PINB != 0)) { PORTB = 1; }"
+
+
+@pytest.mark.hypothesis
+@given(data=st.data())
+def test_damaged_images_end_in_a_report_or_in_a_sentence(
+    whole: tuple[Path, bytes, list[range]], data: st.DataObject
+) -> None:
+    path, image, parts = whole
+    mutant = bytearray(image)
+    part = data.draw(st.sampled_from(parts))
+    for _ in range(data.draw(st.integers(1, 8))):
+        mutant[data.draw(st.sampled_from(part))] = data.draw(st.integers(0, 255))
+    path.write_bytes(mutant)
+    for judge in (lambda: read_table(path), lambda: budget.prove(path, FIGURES).as_dict()):
+        sentence = ""
+        try:
+            judge()
+        except TimingError as error:  # anything else fails the test
+            sentence = str(error)
+        assert "\n" not in sentence
