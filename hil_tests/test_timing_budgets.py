@@ -17,7 +17,7 @@ import pytest
 from boebot import resources
 from boebot.cli import timing
 from boebot.robots import load_robot
-from boebot.timing.budget import FLASH_BYTES, RATIO_MOST, RECEIVE_RING, STAMP_ROLLS_OVER, Report, Row, prove
+from boebot.timing.budget import FLASH_BYTES, RATIO_MOST, STAMP_ROLLS_OVER, Report, Row, prove
 from boebot.timing.graph import load_program
 from boebot.timing.loads import LOADS
 from boebot.timing.measured import Measurement, merged
@@ -36,6 +36,7 @@ WORK_MOST = 25 * TICK // 100  # of the fullest tick, by static bound
 MEMORY_MOST = 1_600  # static RAM and the deepest stack
 FLASH_MOST = 16 * 1024
 PLANTED = 200  # cycles
+FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +111,10 @@ def _tick_checks(report: Report) -> Iterator[Check]:
     yield Check(f"{load}: slots that end in the next tick", late, 0)
     yield Check(f"{load}: measured tick <= bound", own.worst_tick, report.demand)
     yield Check(f"{load}: measured busiest tick <= bound", own.busiest_tick, report.executed)
-    assert report.gap is not None and report.ring is not None and report.edge_age is not None
+    assert report.gap is not None and report.edge_age is not None
+    assert report.ring is not None and report.ring_holds is not None
     yield Check(f"{load}: measured gap of polls <= bound", own.between_polls, report.gap)
-    yield Check(f"{load}: bytes in the receive ring", report.ring, RECEIVE_RING - 1)
+    yield Check(f"{load}: bytes in the receive ring", report.ring, report.ring_holds)
     yield Check(f"{load}: age of an edge when its time is told", report.edge_age, STAMP_ROLLS_OVER - 1)
 
 
@@ -176,7 +178,7 @@ def test_planted_slow_task_breaks_the_gate(
         return next(row for row in report.rows if row.name == "turret")
 
     sound, slowed = task(resources.folder("images") / "shieldbot.elf"), task(image)
-    assert sound.slack >= 0 and slowed.bound == sound.bound + PLANTED
+    assert sound.slack >= 0 and 0 <= slowed.bound - sound.bound - PLANTED <= FARTHER
     (check,) = [check for check in _row_checks(slowed) if check.what == "task turret: bound <= budget"]
     assert not check.holds and check.what not in {entry.what for entry in KNOWN}
     code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure")

@@ -34,6 +34,7 @@ static const uint8_t line_bit[LINES_PER_SIDE * SIDES] = {0, 0};
 #define PORT_BITS() HAL_PORT_C()
 
 #define LINES (LINES_PER_SIDE * SIDES)
+#define ANY_LINES (ENCODER_LINES != 0)
 
 /* The lines of one wheel among bits of the port. `side` is a constant; neighbours are but shifted. */
 enum { A = 1, B = 2 };
@@ -281,6 +282,9 @@ void encoder_poll(void) {
   if (stopped) {
     go_on(head);
   }
+  if (returning != 0) {
+    take_back();
+  }
 }
 
 /* The schedule_now() of a stamp: not later than `now`, and less than 2^16 cycles before it. */
@@ -306,15 +310,14 @@ static __attribute__((noinline)) void update_wheel(wheel *w, uint32_t now) {
 void encoder_update(void) {
   encoder_poll();
   const uint32_t now = schedule_now();
-  update_wheel(&wheels[LEFT], now);
-  update_wheel(&wheels[RIGHT], now);
+  if (ANY_LINES) {
+    update_wheel(&wheels[LEFT], now);
+    update_wheel(&wheels[RIGHT], now);
+  }
   if (OTHER_BIT != 0 && other == STAMPED) {
     other_edge = time_of(other_stamp, now);
     other = (int32_t)(other_edge - other_from) >= 0 ? SEEN : AWAITED;
     listen();
-  }
-  if (returning != 0) {
-    take_back();
   }
 }
 
@@ -323,11 +326,14 @@ static uint8_t lines_on(void) {
   return parameters_device_on(DEVICES_ENCODERS) ? (uint8_t)(SIDE_BITS(LEFT) | SIDE_BITS(RIGHT)) : 0u;
 }
 
-/* A wheel's lines may make as many edges again as the parameter allows; one more masks them. */
-static void begin_tick(wheel *w) {
-  phantoms = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
-  BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    w->left[i] = phantoms;
+/* Each line may make as many edges again as the parameter allows; one more masks it. */
+static void begin_tick(void) {
+  const uint8_t edges = (uint8_t)(parameters_u16(PARAMETER_ENCODER_LIMIT) + 1u);
+  phantoms = edges;
+  BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
+    BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
+      wheels[side].left[i] = edges;
+    }
   }
 }
 
@@ -348,8 +354,8 @@ void encoder_start(void) {
   HAL_ZERO(other);
   BOUNDED(SIDES, for (uint8_t side = LEFT; side < SIDES; side++)) {
     wheels[side] = (wheel){.silence = SILENT_TICKS};
-    begin_tick(&wheels[side]);
   }
+  begin_tick();
   before = PORT_BITS();
   hal_change_at(0)->bits = before; /* the change before the first one; the start-up code has not made the ring zero */
   hal_change_at(0)->close = 0;
@@ -367,7 +373,7 @@ static uint16_t period_of(uint32_t gap) {
 static void close_wheel(uint8_t side) {
   wheel *w = &wheels[side];
   w->reading.count = w->count;
-  if (ENCODER_LINES != 0 && w->edges != 0) {
+  if (w->edges != 0) {
     /* After a long silence the edge before the first is too old for its stamp to tell. */
     w->reading.period = w->edges >= 2 || w->silence < SILENT_TICKS ? period_of(w->gap) : 0u;
     w->silence = 0;
@@ -379,12 +385,11 @@ static void close_wheel(uint8_t side) {
   w->edges = 0;
   w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
-    if (ENCODER_LINES != 0 && w->left[i] == 0) {
+    if (w->left[i] == 0) {
       w->reading.masked = true;
       w->reading.period = 0;
     }
   }
-  begin_tick(w);
 }
 
 /* What a line does that did not count says nothing about the time to its next edge. */
@@ -395,8 +400,14 @@ static void forget_gap(uint8_t side, uint8_t back, uint8_t lines) {
 }
 
 void encoder_task(void) {
-  close_wheel(LEFT);
-  close_wheel(RIGHT);
+  if (ANY_LINES) {
+    close_wheel(LEFT);
+    close_wheel(RIGHT);
+  }
+  begin_tick();
+  if (!ANY_LINES) {
+    return;
+  }
   const uint8_t lines = lines_on();
   returning = (uint8_t)(lines & (uint8_t)~watched);
   forget_gap(LEFT, returning, lines);
