@@ -26,6 +26,7 @@ ROOM = 4096  # bytes that are taken from the line at once
 EDGE = np.dtype(  # board_edge of board_access.h, sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
 )
+NO_EDGES = np.empty(0, dtype=EDGE)
 
 
 class Level(IntEnum):
@@ -239,7 +240,7 @@ class BoardAccess(BoardMemory):
         """The same as an array (dtype EDGE)."""
         log = self._access.log
         if not log.count:
-            return np.empty(0, dtype=EDGE)
+            return NO_EDGES
         found = np.frombuffer(self._ffi.buffer(log.edges, log.count * EDGE.itemsize)[:], dtype=EDGE)
         self._lib.board_log_clear(self._ffi.addressof(self._access, "log"))
         return found

@@ -80,6 +80,8 @@ class PinEdges:
 
     def __getitem__(self, pin: int) -> list[Edge]:
         seen, found = self._found.get(pin, (0, []))
+        if seen == len(self._pieces):
+            return found
         for piece in self._pieces[seen:]:
             of_pin = piece[piece["pin"] == pin]
             found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]

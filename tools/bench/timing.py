@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 import time
-from functools import cache
+from functools import partial
 
 from boebot.robots import load_robot
 from boebot.timing import budget, loads
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.timing.loads import Bench
 from sim_bridge.timing.measure import CLOCK_HZ, Run, run
-from tools.bench.figures import figure
+from sim_bridge.timing.scenarios import load, numbers_of, prepare
+from tools.bench.figures import Peer, figure
 
 SECONDS = 1.0  # of the board's time
 
 
-@cache
-def _recorded(pin_map: str, scenario: str) -> tuple[Run, float]:
-    """A run, and the seconds of CPU that it and its evaluation took."""
-    started = time.process_time()
-    result = run(avr_image(pin_map), load_robot(pin_map), scenario, SECONDS, 1, losses=False)
-    result.measurement()
-    return result, time.process_time() - started
+def _recorded(pin_map: str, scenario: str) -> Run:
+    return run(avr_image(pin_map), load_robot(pin_map), scenario, SECONDS, 1, losses=False)
 
 
 def _speed(scenario: str) -> float:
-    result, took = _recorded("shieldbot", scenario)
-    return (result.loaded_from + result.cycles) / CLOCK_HZ / took
+    """Of a run with all its tasks and interrupts recorded, and its evaluation, by the processor's time."""
+    started = time.process_time()
+    result = _recorded("shieldbot", scenario)
+    result.measurement()
+    return (result.loaded_from + result.cycles) / CLOCK_HZ / (time.process_time() - started)
+
+
+def _unrecorded(scenario: str) -> float:
+    """Of the same run without a recorder."""
+    robot, started = load_robot("shieldbot"), time.process_time()
+    with Bench(avr_image("shieldbot")) as bench:
+        line = prepare(bench, robot, scenario)
+        load(bench, line, robot, scenario, numbers_of(1), round(SECONDS * CLOCK_HZ))
+        bench.run(round(SECONDS * CLOCK_HZ))
+        return bench.now / CLOCK_HZ / (time.process_time() - started)
 
 
 @figure("timing: static bounds of the Shield-Bot's image, all of them", "s")
@@ -35,18 +45,30 @@ def bounds() -> float:
     return time.process_time() - started
 
 
-@figure("timing: untouched image recorded at the figures' load", "× real time", at_least=10)
+@figure(
+    "timing: untouched image recorded at the figures' load",
+    "× real time",
+    at_least=10,
+    peers=[Peer("the same, not recorded", partial(_unrecorded, "figures"))],
+    rounds=3,
+)
 def recorded_figures() -> float:
     return _speed("figures")
 
 
-@figure("timing: untouched image recorded, line full both ways", "× real time", at_least=10)
+@figure(
+    "timing: untouched image recorded, line full both ways",
+    "× real time",
+    at_least=10,
+    peers=[Peer("the same, not recorded", partial(_unrecorded, "saturated"))],
+    rounds=3,
+)
 def recorded_saturated() -> float:
     return _speed("saturated")
 
 
 def _load(pin_map: str) -> float:
-    return 100.0 * _recorded(pin_map, "figures")[0].measurement().load
+    return 100.0 * _recorded(pin_map, "figures").measurement().load
 
 
 @figure("timing: CPU load at the figures, boebot", "% of its cycles", at_most=40)

@@ -102,6 +102,10 @@ class AvrBoard:
         board = self._ffi.cast("board *", self.pointer)
         return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
 
+    def one_by_one(self) -> None:
+        """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
+        self._lib.avr_board_one_by_one(self._running)
+
     # ---- recorder ----------------------------------------------------------------------------------------------------
 
     @property

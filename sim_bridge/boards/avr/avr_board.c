@@ -218,6 +218,8 @@ static const board_operations OPERATIONS = {
     .extension = extension,
 };
 
+void avr_board_one_by_one(board *self) { ((avr_board *)self)->one_by_one = true; }
+
 static void say_nothing(avr_t *avr, const int level, const char *format, va_list arguments) {
   (void)avr;
   (void)level;

@@ -14,6 +14,9 @@
  * and one sentence in `error`. */
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 
+/* For tests of what else is faster: from now on each instruction is executed by itself, and by simavr's core. */
+void avr_board_one_by_one(board *self);
+
 /* The board's extension "flash": its program memory. */
 #define AVR_BOARD_FLASH "flash"
 #define AVR_BOARD_FLASH_SIZE 0x8000u

@@ -1,10 +1,10 @@
 /* avr_parts.h: what the files of the emulated ATmega328P know of each other.
  *
- * simavr (sim_core.c) executes instructions and keeps the data space. Everything that has to do with time or pins is
- * here: run loop and interrupts (avr_run.c), registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
- * avr_timer_count.c), USART
- * (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c), EEPROM (avr_eeprom.c),
- * program image (avr_image.c), recorder (avr_spans.c).
+ * simavr (sim_core.c) executes the less common instructions and keeps the data space. Everything that has to do with
+ * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
+ * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
+ * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c),
+ * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
@@ -346,6 +346,7 @@ typedef struct avr_board {
   char fault[160];
   uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
   uint32_t image_end;            /* behind the last byte of flash that the image fills */
+  bool one_by_one;               /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
   flag_register flag_registers[FLAG_REGISTERS];
@@ -365,10 +366,10 @@ typedef struct avr_board {
 
 /* avr_run.c */
 board_state run_until(avr_board *b, uint64_t until);
-/* The core has stopped, or sleeps, before the instruction at `pc`; false: it cannot go on. */
-bool core_stopped(avr_board *b, uint32_t pc);
-void restart(avr_board *b);   /* for the causes in `reset_wanted` */
-void hear_core(avr_board *b); /* what simavr's core tells, from each of its resets on */
+bool core_stopped(avr_board *b);           /* because it sleeps, or not; false: it cannot go on */
+uint64_t next_of_simavr(const avr_t *avr); /* when the next of simavr's own timers is due, or NEVER */
+void restart(avr_board *b);                /* for the causes in `reset_wanted` */
+void hear_core(avr_board *b);              /* what simavr's core tells, from each of its resets on */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
 void raise_flag(avr_board *b, uint8_t vector);
 void clear_flag(avr_board *b, uint8_t vector);

@@ -1,15 +1,16 @@
 /* avr_run.c: run loop, interrupts and resets of the emulated ATmega328P.
  *
- * The loop keeps lockstep with the outside: it never waits for the host's clock, counts every cycle, and lets simavr's
- * core run exactly to the next event or to the end of the call. An instruction is never split: what is due while it
- * runs happens, at its own cycle, before the next one. Interrupts are taken between instructions: 4 cycles, 4 more from
- * sleep (12.7), and one instruction always runs after SEI, RETI and a write that sets I.
+ * The loop keeps lockstep with the outside: it never waits for the host's clock, counts every cycle, and lets
+ * instructions run exactly to the next event or to the end of the call. An instruction is never split: what is due
+ * while it runs happens, at its own cycle, before the next one. Interrupts are taken between instructions: 4 cycles, 4
+ * more from sleep (12.7), and one instruction always runs after SEI, RETI and a write that sets I.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdarg.h>
 #include <stdio.h>
 
+#include "avr_instructions.h"
 #include "avr_parts.h"
 #include "sim_core.h"
 
@@ -262,11 +263,9 @@ void restart(avr_board *b) {
 
 static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-static uint64_t next_of_simavr(const avr_t *avr) {
-  return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER;
-}
+uint64_t next_of_simavr(const avr_t *avr) { return avr->cycle_timers.timer ? avr->cycle_timers.timer->when : NEVER; }
 
-bool core_stopped(avr_board *b, uint32_t pc) {
+bool core_stopped(avr_board *b) {
   avr_t *avr = b->avr;
   if (avr->state == cpu_Sleeping) {
     b->sleeping = avr->data[REG_SMCR] & SLEEP_ENABLED;
@@ -275,7 +274,6 @@ bool core_stopped(avr_board *b, uint32_t pc) {
     if (!b->crashed) crash_at(b, NO_ADDRESS, "the program ran off the end of the flash");
     return false;
   }
-  avr->pc = pc;
   return true;
 }
 
@@ -293,8 +291,8 @@ static void execute(avr_board *b, uint64_t until) {
   } else if (b->recorder) {
     run_recorded(b, until);
   } else {
-    avr->run_cycle_count = until - start;
-    core_stopped(b, (uint32_t)avr_run_one(avr));
+    execute_instructions(b, until, NULL);
+    core_stopped(b);
     b->counters.executed_cycles += avr->cycle - start;
   }
 }

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "avr_board.h"
-#include "avr_core.h"
+#include "avr_instructions.h"
 #include "avr_parts.h"
 #include "sim_core.h"
 
@@ -29,7 +29,7 @@ typedef struct {
 } open_span;
 
 typedef struct avr_recorder {
-  avr_core_stops stops; /* marked: 1 + index of the function that begins there, or NOT_CODE */
+  instruction_stops stops; /* marked: 1 + index of the function that begins there, or NOT_CODE */
   avr_watch watch;
   avr_span *spans;
   size_t count, capacity;
@@ -184,12 +184,11 @@ void run_recorded(avr_board *b, uint64_t until) {
   avr_recorder *r = b->recorder;
   uint64_t start = avr->cycle;
   if (until > r->hangs_at) until = r->hangs_at;
+  if (r->half_written) until = start + 1;
   choose_stops(r);
-  avr->run_cycle_count = r->half_written || until <= start ? 1 : until - start;
-  uint32_t next = avr_run_stopping(avr, &r->stops), address = (uint32_t)avr->pc;
-  avr->pc = next;
+  uint32_t address = execute_instructions(b, until, &r->stops), next = (uint32_t)avr->pc;
   b->counters.executed_cycles += avr->cycle - start;
-  if (avr->state != cpu_Running) core_stopped(b, next);
+  if (avr->state != cpu_Running) core_stopped(b);
   if (b->crashed) return;
   if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
   if (next >= AVR_BOARD_FLASH_SIZE || r->stops.marked[next / 2]) reached(b, address);

@@ -1,9 +1,10 @@
 /* avr_spans.h: a recorder of what an untouched program does in time: the span of every interrupt and of chosen
  * functions, the depth of its stack, and where it goes wrong. Off until `avr_board_record`, and then free.
  *
- * While it records, the core stops where a function begins and where the stack pointer leaves the range in which nothing
- * ends and nothing is new; cycles, edges and bytes are the same as without it. An interrupt's span begins with the first of its four entry cycles, a function's with its first instruction; each ends
- * with the instruction that takes the return address off the stack.
+ * While it records, the core stops where a watched function begins and where the stack pointer leaves the range in
+ * which nothing ends and nothing is new; cycles, edges and bytes are the same as without it. An interrupt's span begins
+ * with the first of its four entry cycles, a function's with its first instruction; each ends with the instruction that
+ * takes the return address off the stack.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */

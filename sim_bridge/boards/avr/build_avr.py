@@ -24,6 +24,7 @@ SIMAVR_SOURCES = (
     *(
         "sim_avr",
         "sim_cmds",
+        "sim_core",
         "sim_cycle_timers",
         "sim_elf",
         "sim_gdb",
@@ -47,31 +48,6 @@ CONFIGURATION_HEADERS = {
     ),
 }
 
-# The instruction loop in its own file of the build folder, with a second face: `avr_run_stopping` of avr_core.h. Each
-# piece of text stands exactly once in sim_core.c.
-CORE = "sim_core.c"
-CORE_CHANGES = (
-    (
-        '#include "avr_watchdog.h"\n',
-        '#include "avr_watchdog.h"\n#include "avr_core.h"\n',
-    ),
-    (
-        "avr_flashaddr_t avr_run_one(avr_t * avr)\n{\n",
-        "static inline __attribute__((always_inline)) avr_flashaddr_t\n"
-        "run_instructions(avr_t *avr, const avr_core_stops *stops)\n{\n",
-    ),
-    (
-        "(avr->interrupt_state == 0))\n\t{\n\t\tavr->run_cycle_count -= cycle;",
-        "(avr->interrupt_state == 0) &&\n\t\t!(stops && core_stops_before(avr, stops, new_pc)))\n"
-        "\t{\n\t\tavr->run_cycle_count -= cycle;",
-    ),
-)
-CORE_FACES = """
-avr_flashaddr_t avr_run_one(avr_t *avr) { return run_instructions(avr, NULL); }
-
-avr_flashaddr_t avr_run_stopping(avr_t *avr, const avr_core_stops *stops) { return run_instructions(avr, stops); }
-"""
-
 # -w: simavr has warnings; ours are errors in tools/warnings.sh. The other flags let the compiler join the core's many
 # small functions: a quarter faster than -O2.
 COMPILER_FLAGS = [
@@ -83,6 +59,7 @@ DECLARATIONS = """
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 void avr_board_destroy(board *self);
 uint8_t *avr_board_data(board *self);
+void avr_board_one_by_one(board *self);
 typedef struct { uint64_t begin, executed; uint32_t gross, net, latency; uint16_t id, depth; ...; } avr_span;
 typedef struct {
   const uint32_t *entries;
@@ -128,22 +105,6 @@ def write_configuration() -> None:
             file.write_text(text, encoding="ascii")
 
 
-def write_core(simavr: Path) -> Path:
-    """Writes simavr's instruction loop with its second face; returns the file."""
-    text = (ROOT / simavr / "sim" / CORE).read_text(encoding="utf-8")
-    for there, instead in CORE_CHANGES:
-        if text.count(there) != 1:
-            raise SystemExit(
-                f"simavr's {CORE} is not the one that was expected: {there.splitlines()[0]!r} is not in it"
-            )
-        text = text.replace(there, instead)
-    file = CONFIGURATION / CORE
-    text += CORE_FACES
-    if not (ROOT / file).exists() or (ROOT / file).read_text(encoding="utf-8") != text:
-        (ROOT / file).write_text(text, encoding="utf-8")
-    return file
-
-
 def headers() -> list[Path]:
     """Our headers."""
     return [*(ROOT / HERE).glob("*.h"), *(ROOT / BOARDS).glob("*.h")]
@@ -163,7 +124,6 @@ def make_ffi() -> FFI:
             *(str(source) for source in ours if source.name != "_avr.c"),
             str(BOARDS / "board_access.c"),
             *(str(simavr / "sim" / f"{name}.c") for name in SIMAVR_SOURCES),
-            str(write_core(simavr)),
             str(simavr / CHIP_SOURCE),
         ],
         include_dirs=[str(path) for path in (HERE, simavr / "sim", simavr / "cores", CONFIGURATION)],

@@ -1,0 +1,402 @@
+/* avr_instructions.c: see avr_instructions.h. After the AVR instruction set manual; cycles are those of AVRe+ with a
+ * 16-bit program counter. sim_bridge/tests/test_avr_common_instructions.py has all of them executed here and by simavr.
+ *
+ * Left to simavr is whatever reaches an I/O register or the interrupt system, or leaves flash or RAM.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include "avr_instructions.h"
+
+#include "avr_arithmetic.h"
+#include "avr_opcodes.h"
+#include "avr_parts.h"
+#include "sim_core.h"
+
+#define RAM_BEGIN 0x100u
+#define REG_SPMCSR 0x57u
+#define SP 0x5Du
+
+enum { X = 26, Y = 28, Z = 30 };
+
+/* Operands, by the letters of the manual. */
+#define D (opcode >> 4 & 0x1Fu)
+#define R ((opcode >> 5 & 0x10u) | (opcode & 0xFu))
+#define H ((opcode >> 4 & 0xFu) + 16u) /* d of an instruction with a constant */
+#define K ((uint8_t)((opcode >> 4 & 0xF0u) | (opcode & 0xFu)))
+
+/* ---- RAM; false: the address is not there ---- */
+
+static inline bool in_ram(uint16_t address) { return (uint16_t)(address - RAM_BEGIN) < BOARD_DATA_SIZE - RAM_BEGIN; }
+
+static inline bool load(uint8_t *data, unsigned opcode, uint16_t address) {
+  if (!in_ram(address)) return false;
+  data[D] = data[address];
+  return true;
+}
+
+static inline bool store(uint8_t *data, unsigned opcode, uint16_t address) {
+  if (!in_ram(address)) return false;
+  data[address] = data[D];
+  return true;
+}
+
+/* Y or Z, and q. */
+static inline uint16_t displaced(const uint8_t *data, unsigned opcode, unsigned pointer) {
+  return (uint16_t)(word_at(data, pointer) + ((opcode & 0x2000u) >> 8 | (opcode & 0x0C00u) >> 7 | (opcode & 7u)));
+}
+
+/* X, Y or Z, one less before or one more behind. */
+static inline bool load_moving(uint8_t *data, unsigned opcode, unsigned pointer) {
+  uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
+  if (!in_ram(address)) return false;
+  put_word(data, pointer, address + (opcode & 1u));
+  data[D] = data[address];
+  return true;
+}
+
+static inline bool store_moving(uint8_t *data, unsigned opcode, unsigned pointer) {
+  uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
+  if (!store(data, opcode, address)) return false;
+  put_word(data, pointer, address + (opcode & 1u));
+  return true;
+}
+
+static inline bool push(uint8_t *data, unsigned opcode) {
+  uint16_t stack = (uint16_t)word_at(data, SP);
+  if (!store(data, opcode, stack)) return false;
+  put_word(data, SP, stack - 1u);
+  return true;
+}
+
+static inline bool pop(uint8_t *data, unsigned opcode) {
+  uint16_t stack = (uint16_t)(word_at(data, SP) + 1u);
+  if (!load(data, opcode, stack)) return false;
+  put_word(data, SP, stack);
+  return true;
+}
+
+static inline bool push_address(uint8_t *data, uint32_t address) {
+  uint16_t stack = (uint16_t)word_at(data, SP);
+  if (!in_ram(stack) || !in_ram((uint16_t)(stack - 1u))) return false;
+  data[stack] = (uint8_t)(address >> 1);
+  data[stack - 1u] = (uint8_t)(address >> 9);
+  put_word(data, SP, stack - 2u);
+  return true;
+}
+
+static inline bool pop_address(uint8_t *data, uint32_t *address) {
+  uint16_t stack = (uint16_t)word_at(data, SP);
+  if (!in_ram((uint16_t)(stack + 1u)) || !in_ram((uint16_t)(stack + 2u))) return false;
+  *address = (uint32_t)(data[stack + 1u] << 8 | data[stack + 2u]) << 1;
+  put_word(data, SP, stack + 2u);
+  return true;
+}
+
+/* ---- program memory ---- */
+
+static inline uint32_t relative(uint32_t behind, unsigned opcode) {
+  int offset = (int16_t)(opcode << 4) >> 3;
+  return (uint32_t)((int)behind + offset) % AVR_BOARD_FLASH_SIZE;
+}
+
+static inline bool load_program(uint8_t *data, const uint8_t *flash, unsigned opcode) {
+  unsigned address = word_at(data, Z);
+  if (data[REG_SPMCSR]) return false; /* then it may read fuses */
+  data[D] = flash[address];
+  if (opcode & 1u) put_word(data, Z, address + 1u);
+  return true;
+}
+
+static inline bool skips(const uint8_t *data, unsigned opcode, unsigned kind) {
+  if (kind == CPSE) return data[D] == data[R];
+  return (data[D] >> (opcode & 7u) & 1u) == (kind == SKIP_SET);
+}
+
+/* ---- one by simavr ---- */
+
+static inline uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* False: the core is to stop behind it. `until` may come nearer by it. */
+static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
+  avr_t *avr = b->avr;
+  avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
+  *pc = (uint32_t)avr_run_one(avr);
+  *until = earlier(earlier(*until, b->next_due), next_of_simavr(avr));
+  return avr->run_cycle_count && avr->state == cpu_Running && !avr->interrupt_state;
+}
+
+/* ---- many ---- */
+
+static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t until,
+                                                          const instruction_stops *stops) {
+  avr_t *avr = b->avr;
+  uint8_t *const data = avr->data, *const f = avr->sreg;
+  const uint8_t *const flash = avr->flash;
+  uint64_t cycle = avr->cycle;
+  uint32_t at, pc = (uint32_t)avr->pc;
+  if (avr->interrupt_state || b->one_by_one) until = cycle + 1;
+  do {
+    unsigned opcode = 0, kind = UNCOMMON, takes = 1;
+    bool moves_stack = false, here = true; /* here: executed here */
+    at = pc;
+    if (at < AVR_BOARD_FLASH_SIZE && !b->one_by_one) {
+      opcode = word_at(flash, at);
+      kind = avr_kinds[opcode];
+    }
+    pc += 2;
+    switch (kind) {
+      case NOP:
+        break;
+      case MOVW:
+        put_word(data, (opcode >> 3 & 0x1Eu), word_at(data, opcode << 1 & 0x1Eu));
+        break;
+      case CPC:
+        subtract(f, data[D], data[R], f[S_C], true);
+        break;
+      case SBC:
+        data[D] = subtract(f, data[D], data[R], f[S_C], true);
+        break;
+      case ADD:
+        data[D] = add(f, data[D], data[R], 0);
+        break;
+      case CP:
+        subtract(f, data[D], data[R], 0, false);
+        break;
+      case SUB:
+        data[D] = subtract(f, data[D], data[R], 0, false);
+        break;
+      case ADC:
+        data[D] = add(f, data[D], data[R], f[S_C]);
+        break;
+      case AND:
+        flags_logic(f, data[D] &= data[R]);
+        break;
+      case EOR:
+        flags_logic(f, data[D] ^= data[R]);
+        break;
+      case OR:
+        flags_logic(f, data[D] |= data[R]);
+        break;
+      case MOV:
+        data[D] = data[R];
+        break;
+      case CPI:
+        subtract(f, data[H], K, 0, false);
+        break;
+      case SBCI:
+        data[H] = subtract(f, data[H], K, f[S_C], true);
+        break;
+      case SUBI:
+        data[H] = subtract(f, data[H], K, 0, false);
+        break;
+      case ORI:
+        flags_logic(f, data[H] |= K);
+        break;
+      case ANDI:
+        flags_logic(f, data[H] &= K);
+        break;
+      case LDI:
+        data[H] = K;
+        break;
+
+      case LDD_Y:
+      case LDD_Z:
+        here = load(data, opcode, displaced(data, opcode, kind == LDD_Y ? Y : Z));
+        takes = 2;
+        break;
+      case STD_Y:
+      case STD_Z:
+        here = store(data, opcode, displaced(data, opcode, kind == STD_Y ? Y : Z));
+        takes = 2;
+        break;
+      case LD_X:
+      case LD_X_UP:
+      case LD_X_DOWN:
+        here = load_moving(data, opcode, X);
+        takes = 2;
+        break;
+      case LD_Y_UP:
+      case LD_Y_DOWN:
+        here = load_moving(data, opcode, Y);
+        takes = 2;
+        break;
+      case LD_Z_UP:
+      case LD_Z_DOWN:
+        here = load_moving(data, opcode, Z);
+        takes = 2;
+        break;
+      case ST_X:
+      case ST_X_UP:
+      case ST_X_DOWN:
+        here = store_moving(data, opcode, X);
+        takes = 2;
+        break;
+      case ST_Y_UP:
+      case ST_Y_DOWN:
+        here = store_moving(data, opcode, Y);
+        takes = 2;
+        break;
+      case ST_Z_UP:
+      case ST_Z_DOWN:
+        here = store_moving(data, opcode, Z);
+        takes = 2;
+        break;
+      case LDS:
+        here = load(data, opcode, (uint16_t)word_at(flash, pc));
+        pc += 2;
+        takes = 2;
+        break;
+      case STS:
+        here = store(data, opcode, (uint16_t)word_at(flash, pc));
+        pc += 2;
+        takes = 2;
+        break;
+      case LPM:
+      case LPM_UP:
+        here = load_program(data, flash, opcode);
+        takes = 3;
+        break;
+      case PUSH:
+        here = push(data, opcode);
+        moves_stack = true;
+        takes = 2;
+        break;
+      case POP:
+        here = pop(data, opcode);
+        moves_stack = true;
+        takes = 2;
+        break;
+
+      case COM:
+        flags_logic(f, data[D] = (uint8_t)~data[D]);
+        f[S_C] = 1;
+        break;
+      case NEG:
+        data[D] = subtract(f, 0, data[D], 0, false);
+        break;
+      case SWAP:
+        data[D] = (uint8_t)(data[D] << 4 | data[D] >> 4);
+        break;
+      case INC:
+        data[D]++;
+        count(f, data[D], data[D] == 0x80);
+        break;
+      case DEC:
+        data[D]--;
+        count(f, data[D], data[D] == 0x7F);
+        break;
+      case ASR:
+        data[D] = shift_right(f, data[D], data[D] & 0x80);
+        break;
+      case LSR:
+        data[D] = shift_right(f, data[D], 0);
+        break;
+      case ROR:
+        data[D] = shift_right(f, data[D], (uint8_t)(f[S_C] << 7));
+        break;
+      case ADIW:
+      case SBIW: {
+        int number = (int)((opcode >> 2 & 0x30u) | (opcode & 0xFu));
+        add_word(f, data + 24 + (opcode >> 3 & 6u), kind == ADIW ? number : -number);
+        takes = 2;
+        break;
+      }
+      case MUL: {
+        unsigned product = (unsigned)data[D] * data[R];
+        put_word(data, 0, product);
+        f[S_Z] = product == 0;
+        f[S_C] = (uint8_t)(product >> 15);
+        takes = 2;
+        break;
+      }
+      case BLD:
+        data[D] = (uint8_t)((data[D] & ~(1u << (opcode & 7u))) | (unsigned)f[S_T] << (opcode & 7u));
+        break;
+      case BST:
+        f[S_T] = data[D] >> (opcode & 7u) & 1;
+        break;
+      case IN_SREG:
+        data[D] = data[R_SREG] = all_flags(f);
+        break;
+      case IN_STACK:
+        data[D] = data[0x20u + ((opcode >> 5 & 0x30u) | (opcode & 0xFu))];
+        break;
+
+      case JMP:
+        pc = word_at(flash, pc) << 1;
+        takes = 3;
+        break;
+      case RJMP:
+        pc = relative(pc, opcode);
+        takes = 2;
+        break;
+      case IJMP:
+        pc = word_at(data, Z) << 1;
+        takes = 2;
+        break;
+      case CALL:
+        here = push_address(data, pc + 2);
+        pc = word_at(flash, pc) << 1;
+        moves_stack = true;
+        takes = 4;
+        break;
+      case RCALL:
+        here = push_address(data, pc);
+        pc = relative(pc, opcode);
+        moves_stack = true;
+        takes = 3;
+        break;
+      case ICALL:
+        here = push_address(data, pc);
+        pc = word_at(data, Z) << 1;
+        moves_stack = true;
+        takes = 3;
+        break;
+      case RET:
+        here = pop_address(data, &pc);
+        moves_stack = true;
+        takes = 4;
+        break;
+      case BRANCH_SET:
+      case BRANCH_CLEAR:
+        if (f[opcode & 7u] == (kind == BRANCH_SET)) {
+          pc += (uint32_t)((int16_t)(opcode << 6) >> 9 << 1);
+          takes = 2;
+        }
+        break;
+      case CPSE:
+      case SKIP_CLEAR:
+      case SKIP_SET:
+        if (skips(data, opcode, kind)) {
+          takes = is_two_words(word_at(flash, pc)) ? 3 : 2;
+          pc += 2 * (takes - 1);
+        }
+        break;
+      default:
+        here = false;
+    }
+    if (!here) {
+      avr->pc = at;
+      avr->cycle = cycle;
+      if (!uncommon(b, &pc, &until)) until = 0;
+      cycle = avr->cycle;
+      moves_stack = true;
+      takes = 0;
+    }
+    cycle += takes;
+    if (stops) {
+      if (moves_stack) {
+        uint16_t above = (uint16_t)(word_at(data, SP) - stops->lowest);
+        if (above > (uint16_t)(stops->highest - stops->lowest)) break;
+      }
+      if (pc >= AVR_BOARD_FLASH_SIZE || stops->marked[pc / 2u]) break;
+    }
+  } while (cycle < until);
+  avr->pc = pc;
+  avr->cycle = cycle;
+  return at;
+}
+
+uint32_t execute_instructions(avr_board *b, uint64_t until, const instruction_stops *stops) {
+  return stops ? run(b, until, stops) : run(b, until, NULL);
+}

@@ -1,0 +1,30 @@
+/* avr_opcodes.h: which instruction an opcode is, among those that avr_instructions.c executes itself.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#ifndef AVR_OPCODES_H
+#define AVR_OPCODES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* clang-format off */
+enum {
+  UNCOMMON, /* any other: simavr's */
+  NOP, MOVW, CPC, SBC, ADD, CPSE, CP, SUB, ADC, AND, EOR, OR, MOV, CPI, SBCI, SUBI, ORI, ANDI, LDI,
+  LDD_Y, LDD_Z, STD_Y, STD_Z, LD_X, LD_X_UP, LD_X_DOWN, LD_Y_UP, LD_Y_DOWN, LD_Z_UP, LD_Z_DOWN,
+  ST_X, ST_X_UP, ST_X_DOWN, ST_Y_UP, ST_Y_DOWN, ST_Z_UP, ST_Z_DOWN, LDS, STS, LPM, LPM_UP, PUSH, POP,
+  COM, NEG, SWAP, INC, DEC, ASR, LSR, ROR, ADIW, SBIW, MUL, BLD, BST,
+  IN_SREG, IN_STACK, /* SPL or SPH */
+  JMP, RJMP, IJMP, CALL, RCALL, ICALL, RET, BRANCH_SET, BRANCH_CLEAR, SKIP_CLEAR, SKIP_SET
+};
+/* clang-format on */
+
+extern uint8_t avr_kinds[0x10000]; /* by opcode */
+
+static inline bool is_two_words(unsigned opcode) {
+  unsigned kind = avr_kinds[opcode & 0xFFFFu];
+  return kind == LDS || kind == STS || (opcode & 0xFE0Cu) == 0x940Cu /* JMP, CALL */;
+}
+
+#endif
