@@ -166,6 +166,8 @@ def _sums(report: Report) -> dict[str, str]:
         "between two polls of the link, bound (cycles)": _number(report.gap, "overload"),
         "between two polls of the link, emulator (cycles)": _number(own.between_polls if own else None, unknown),
         "in the receive ring, bound (bytes)": _number(report.ring, "overload"),
+        "frames that come in a tick": f"{report.frames_coming:.1f}",
+        "frames that the bound proves in a tick": f"{report.frames_proven:.1f}",
         "lost, emulator: bytes, frames, edges, ticks": lost(report),
     }
 
@@ -264,7 +266,7 @@ def verdict(image: str, report: Report) -> realisable.Verdict:
     """Of a step of the brain on the robot of that name, by the image's bounds."""
     found = report.responses
     telemetry = found.pieces["telemetry"] if found else 0
-    board = realisable.BoardTimes(report.table.sensors, telemetry / CLOCK_HZ, (report.gap or 0) / CLOCK_HZ)
+    board = realisable.BoardTimes(report.table.sensors, telemetry / CLOCK_HZ, (report.taken or 0) / CLOCK_HZ)
     return realisable.judge(load_robot(image), DEFAULT_PERIOD, board=board)
 
 
