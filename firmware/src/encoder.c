@@ -317,6 +317,7 @@ void encoder_update(void) {
     listen();
   }
   if (returning != 0) {
+    encoder_poll(); /* what has come meanwhile */
     take_back();
   }
 }
@@ -383,12 +384,14 @@ static void close_wheel(uint8_t side) {
     w->reading.period = 0;
   }
   w->edges = 0;
-  w->reading.masked = false;
+  w->reading.masked = (returning & SIDE_BITS(side)) != 0; /* in all of the tick */
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
     if (w->left[i] == 0) {
       w->reading.masked = true;
-      w->reading.period = 0;
     }
+  }
+  if (w->reading.masked) {
+    w->reading.period = 0;
   }
 }
 
