@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from boebot.boards import BoardRequest, open_board
+from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.session import Link
 from boebot.robots import load_robot
@@ -193,3 +194,29 @@ def test_the_host_says_in_words_where_the_board_hung(tmp_path: Path) -> None:
         while link.board_resets == resets and link.transport.now() < end:
             link.poll(TICK_S)
         assert any("watchdog, in task storage" in notice for notice in link.notices), link.notices
+
+
+def test_the_host_says_in_words_that_the_link_hangs_at_each_opening(tmp_path: Path) -> None:
+    words = r"no session within 2 s; its last reset was by its watchdog, outside of its tasks: .* the link"
+    with pytest.raises(BoardError, match=words):
+        next(linked("avr", planted(tmp_path, "link_take_frame", JUMP_TO_ITSELF)))
+
+
+def test_on_a_slow_line_telemetry_is_not_left_out_for_the_times_of_tasks() -> None:
+    """9,600 baud: telemetry every 10 ticks, and each task is told within ten times as long."""
+    host = session()
+    baud = messages.PARAMETERS["baud_rate"]
+    for request in ((messages.SetParameter, baud.id, 96), (messages.SaveParameters,)):
+        assert host.ask(*request).status == messages.AnswerStatus.OK
+    host.board.reset(ResetCause.EXTERNAL)
+    host.board.line_rate(9600)
+    assert host.open().telemetry_period == 10
+    heard = []
+    for _ in range(round(10 * ROUND_S / 0.4)):
+        heard += host.listen(0.4)
+        host.send(messages.ClockProbe(0))
+    ticks = [message.tick for message in heard if isinstance(message, messages.Telemetry)]
+    assert ticks == list(range(ticks[0], ticks[0] + 10 * len(ticks), 10))
+    assert len(ticks) >= 75
+    assert {time.task for time in heard if isinstance(time, messages.TaskTime)} == set(messages.Task)
+    assert [message.dropped for message in heard if isinstance(message, messages.Counters)] == [0]

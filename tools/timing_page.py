@@ -166,8 +166,8 @@ def _sums(report: Report) -> dict[str, str]:
         "between two polls of the link, bound (cycles)": _number(report.gap, "overload"),
         "between two polls of the link, emulator (cycles)": _number(own.between_polls if own else None, unknown),
         "in the receive ring, bound (bytes)": _number(report.ring, "overload"),
-        "frames that come in a tick": f"{report.frames_coming:.1f}",
-        "frames that the bound proves in a tick": f"{report.frames_proven:.1f}",
+        "frames that come": f"{report.frames_coming:.1f}",
+        "frames that can be worked off, bound": f"{report.frames_proven:.1f}",
         "lost, emulator: bytes, frames, edges, ticks": lost(report),
     }
 
@@ -214,6 +214,7 @@ def goals(of: Mapping[str, Reports], limits: Any) -> str:
     cells = [[what, goal, *(_goal(find(one["figures"])) for one in of.values())] for what, goal, find in rows]
     cells += [
         ["response of the tick, bound, `saturated`", "≤ 100 %", *(_response(one["saturated"]) for one in of.values())],
+        ["frames worked off in a tick, bound, `saturated`", "all", *(_frames(one["saturated"]) for one in of.values())],
         ["lost, emulator, `saturated`", "0", *(lost(one["saturated"]) for one in of.values())],
     ]
     return table(["figure", "goal", *of], cells, 2)
@@ -227,6 +228,10 @@ def _goal(figure: float | None) -> str:
     if figure is None:
         return UNMEASURED
     return f"{figure:,}" if isinstance(figure, int) else f"{figure:.1f} %"
+
+
+def _frames(report: Report) -> str:
+    return f"{report.frames_proven:.1f} of {report.frames_coming:.1f}"
 
 
 def _response(report: Report) -> str:

@@ -282,6 +282,9 @@ void encoder_poll(void) {
   if (stopped) {
     go_on(head);
   }
+  if (returning != 0) {
+    take_back();
+  }
 }
 
 /* The schedule_now() of a stamp: not later than `now`, and less than 2^16 cycles before it. */
@@ -315,10 +318,6 @@ void encoder_update(void) {
     other_edge = time_of(other_stamp, now);
     other = (int32_t)(other_edge - other_from) >= 0 ? SEEN : AWAITED;
     listen();
-  }
-  if (returning != 0) {
-    encoder_poll(); /* what has come meanwhile */
-    take_back();
   }
 }
 
@@ -384,14 +383,12 @@ static void close_wheel(uint8_t side) {
     w->reading.period = 0;
   }
   w->edges = 0;
-  w->reading.masked = (returning & SIDE_BITS(side)) != 0; /* in all of the tick */
+  w->reading.masked = false;
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
     if (w->left[i] == 0) {
       w->reading.masked = true;
+      w->reading.period = 0;
     }
-  }
-  if (w->reading.masked) {
-    w->reading.period = 0;
   }
 }
 

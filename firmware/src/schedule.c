@@ -76,8 +76,8 @@ void schedule_start(uint32_t first_tick) {
 }
 
 HAL_INTERRUPT_SLOT {
-  hal_serial_look();
   schedule_slot++;
+  hal_serial_look();
   schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
   slot_cycles += HAL_SLOT_CYCLES;
   slot_us += SLOT_US;

@@ -33,7 +33,7 @@ def test_figures_of_the_numbers_from_1_to_1000() -> None:
 def test_no_values_are_no_numbers_and_break_nothing() -> None:
     none = distribution([], -2, 2)
     assert np.isnan(none.maximum) and none.broken == 0
-    assert none.summary()["max"] is None
+    assert none.summary()["max_cycles"] is None
     report = JitterReport((none,), (Losses("figures", 0, 0, 0, 0, 0, 0, 0),))
     assert json.loads(json.dumps(report.as_json(), allow_nan=False))["distributions"][0]["count"] == 0
     assert rows([none])[1][4:8] == ("-", "-", "-", "-")

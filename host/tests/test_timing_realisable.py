@@ -111,6 +111,12 @@ def test_faster_line_is_named_where_it_would_do() -> None:
     ).is_realisable
 
 
+def test_json_names_the_events_that_break() -> None:
+    robot = load_robot("shieldbot")
+    assert judge(robot, 0.05, baud=123).as_dict()["breaking_events"] == ["telemetry, 46 B"]  # 46 bytes in 3.7 s
+    assert judge(robot, 0.05).as_dict()["breaking_events"] == []
+
+
 def test_worked_example_of_a_boe_bot() -> None:
     """The rule of Fig. 3.2 by hand: with a sonar of 19.5 ms in the step the sum is 24 ms: 50 ms do, 20 ms not;
     without it they do. Its readings in turn, as by one processor; the line as time of the first and last event."""

@@ -82,6 +82,36 @@ def test_stripped_image_is_refused(tmp_path: Path) -> None:
         budget.prove(image, FIGURES)
 
 
+MAIN = "    schedule_poll();\n"
+ROW = '__asm__ volatile(".Lrow: .pushsection .boebot.loops,\\"\\",@progbits\\n .long .Lrow, 5, -1\\n .popsection");'
+
+
+def test_pass_of_the_main_loop_counts_all_that_is_in_it(tmp_path: Path) -> None:
+    def round_of(more: str) -> int:
+        source = timing_program.text().replace(MAIN, MAIN + more)
+        return budget.prove(timing_program.compiled(tmp_path, source, "-gdwarf-2"), FIGURES).costs.round
+
+    plain = round_of("")
+    assert round_of("NOPS(50);") == plain + 50
+    five = round_of(f"while (PINB != 0) {{ {ROW} NOPS(50); }}")
+    assert 5 * 50 + 5 * (1 + 1 + 2) <= five - plain <= 6 * (50 + 1 + 1 + 2)  # in, a test, a branch; once more the test
+    assert round_of('while (PINB != 0) { __asm__ volatile("sleep"); }') < plain + 20  # waits for work
+    with pytest.raises(TimingError, match=NO_BOUND):
+        round_of("while (PINB != 0) { NOPS(50); }")
+
+
+def test_slots_of_another_length_are_refused(tmp_path: Path) -> None:
+    source = timing_program.text().replace("1000 40000", "1000 20000")
+    with pytest.raises(TimingError, match="a slot has 20000 cycles; expected 40000, 4 of them in a tick of 10 ms"):
+        budget.prove(timing_program.compiled(tmp_path, source), FIGURES)
+
+
+@pytest.mark.parametrize("size", [64, 300])
+def test_receive_ring_is_the_images_own(tmp_path: Path, size: int) -> None:
+    ring = f"unsigned char hal_receive_ring[{size}];"
+    assert budget.prove(program(tmp_path, ring, "hal_receive_ring[0] = PINB;"), FIGURES).ring_holds == size - 1
+
+
 def test_row_of_an_interrupt_that_is_not_used_is_refused(tmp_path: Path) -> None:
     source = timing_program.text().replace("INTERRUPT slot 12", "INTERRUPT slot 13")
     with pytest.raises(

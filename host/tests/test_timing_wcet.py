@@ -99,6 +99,8 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
     ("source", "words"),
     [
         (WHILE.replace("bounded 5", "nop"), "has no bound"),
+        (NESTED.replace("bounded 3", "nop"), "has no bound"),
+        (NESTED.replace("bounded 4", "nop"), "has no bound"),
         ("main: set\n bld r1, 3\n 1: lsr r24\n asr r1\n sec\n brcs 1b\n ret", "has no bound"),
         ("main: ldi r24, 1\n rjmp 2f\n 1: ldi r24, 2\n 2: cpse r24, r1\n rjmp 1b\n ret", "has no bound"),
         ("main: bst r25, 5\n bld r1, 3\n 1: nop\n dec r1\n brne 1b\n ret", "has no bound"),

@@ -16,7 +16,7 @@ from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import TICK_CYCLES, Bench
-from sim_bridge.timing.losses import MASKED
+from sim_bridge.timing.losses import COUNTERS_TICKS, MASKED
 from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
 from sim_bridge.timing.scenarios import RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
 
@@ -117,12 +117,13 @@ def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
         bench.run(40 * TICK_CYCLES)
         line.acknowledges = True
         bench.sources.clear()
-        bench.run(40 * TICK_CYCLES)
+        after = len(line.heard)
+        bench.run(COUNTERS_TICKS * TICK_CYCLES)
         seen = {heard.message.status & MASKED for heard in line.telemetry}
         events = {
             heard.message.number: heard.message for heard in line.heard[since:] if isinstance(heard.message, Event)
         }
-        told = line.wait(Counters, len(line.heard))
+        told = line.wait(Counters, after)
     kinds = [events[number].kind for number in sorted(events)]
     waited = kinds[4 : 4 + len(EventKind)]
     assert sorted(waited) == sorted(EventKind), kinds

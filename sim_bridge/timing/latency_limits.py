@@ -25,9 +25,9 @@ class Limits(NamedTuple):
 EXACT = Limits(-2, 2)  # servo width and period: the figure to reach
 ECHO_STAMP = Limits(-8, 8)  # the same
 
-# What can stand before an interrupt that waits for none of its own kind is what HAL_EDGE_LEAD allows for (hal_avr.h):
-# no exact edge is near the start of a slot (tasks.def).
-TICK_START = Limits(0, 672)
+# A tick begins with slot 0 or 4, where no exact edge and no burst is near, so that the slot's interrupt waits for what
+# that of an exact edge does: 600 (tasks.def, the latency of `edge`). It counts the slot within 50 cycles more.
+TICK_START = Limits(0, 600 + 50)
 
 RISE = 8_000  # from the slot's start to the rising edge (servo.c)
 TELEMETRY_BYTES = 46

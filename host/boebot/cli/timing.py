@@ -164,7 +164,10 @@ def _answer(
     if image is not None:
         board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
         measured = _measured("emulated", image, seconds, seed) if measure else None
-        found = budget.prove(image, asked, measured, board)
+        label = f"bounds of {image.name}"
+        with output.share_bars([label]) as watch:
+            watch({label: 0.0})
+            found = budget.prove(image, asked, measured, board)
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
     times = None if found is None else _board_times(found)

@@ -16,7 +16,7 @@ from boebot.timing.budget import FOR_EVER
 
 if TYPE_CHECKING:
     from boebot.timing.budget import Report, Row
-    from boebot.timing.distributions import JitterReport
+    from boebot.timing.distributions import Distribution, JitterReport
     from boebot.timing.realisable import Verdict
 
 _UNKNOWN = "–"
@@ -143,7 +143,7 @@ def show_jitter(report: JitterReport) -> None:
 
 def _show_broken(console: Console, report: JitterReport) -> None:
     for one in report.broken:
-        says = f"{one.quantity}, {one.load}: {one.broken} of {one.count} values are not {_limits(one.summary())}"
+        says = f"{one.quantity}, {one.load}: {one.broken} of {one.count} values are not {_limits(one)}"
         console.print(Text(f"broken: {says}", style=_BROKEN))
     for losses in report.losses:
         lost = [f"{number} {name.replace('_', ' ')}" for name, number in losses.counts.items() if number]
@@ -153,8 +153,8 @@ def _show_broken(console: Console, report: JitterReport) -> None:
         console.print(Text(f"note: {note}", style=_ASIDE))
 
 
-def _limits(summary: dict[str, Any]) -> str:
-    least, most = summary["least"], summary["most"]
+def _limits(one: Distribution) -> str:
+    least, most = one.least, one.most
     if least is None or most is None:
         return f"at most {most} cycles" if least is None else f"at least {least} cycles"
     return f"from {least} to {most} cycles"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import messages
+from boebot.link import messages, reset_cause
 from boebot.link.frame import SEED, checksum
 from boebot.link.transport import BaudSelectable, Transport
 
@@ -51,12 +51,17 @@ class Heard:
         """How many bytes came at the present rate."""
         return len(self._sample)
 
-    def verdict(self, transport: Transport, limit_s: float, greeted: bool) -> BoebotError:
-        """Why there is no session: one sentence. `greeted`: the board has said hello."""
+    def verdict(self, transport: Transport, limit_s: float, hello: messages.Hello | None) -> BoebotError:
+        """Why there is no session: one sentence. `hello`: the last that the board has said."""
         where = transport.name
         baud = transport.baud if isinstance(transport, BaudSelectable) else None
         self.rate_changes(baud)
-        if greeted:
+        if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
+            return BoardError(
+                f"the board at {where} says hello, but there is no session within {limit_s:g} s; its last reset was by "
+                f"{reset_cause.hang_in_words(hello.reset_cause)}"
+            )
+        if hello is not None:
             return BoardError(f"the board at {where} says hello, but does not hear us: no session within {limit_s:g} s")
         if not self.count:
             return BoardError(f"nothing answers at {where} within {limit_s:g} s: is the robot on and flashed?")

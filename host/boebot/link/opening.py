@@ -107,7 +107,7 @@ class Opening(Line):
             if self._foreign_since is not None:
                 self._wait_for_other_host(now)
             elif now >= search.end_s:
-                raise self._heard.verdict(self.transport, limit_s, greeted=self.hello is not None)
+                raise self._heard.verdict(self.transport, limit_s, self.hello)
             elif self.hello is None:
                 baud = search.next_baud(now, self._heard)
                 if baud is not None:

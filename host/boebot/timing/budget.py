@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from boebot.errors import TimingError
 from boebot.timing.blocked import WAKE
 from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
@@ -25,12 +24,13 @@ from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
 from boebot.timing.program import Program, Table
 from boebot.timing.response import Responses, Schedule, Source, background, load, longest_gap, misses, responses
-from boebot.timing.stack import VECTORS, Stack
+from boebot.timing.stack import Stack
+from boebot.timing.table_check import check_table
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
 FLASH_BYTES = 0x8000
-RECEIVE_RING = 256  # bytes, of which one stays free
+RECEIVE_RING = "hal_receive_ring"  # the variable in which received bytes wait; one of them stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
@@ -91,6 +91,7 @@ class Report:
     responses: Responses | None
     gap: int | None  # cycles between two polls of the link, while slots wait
     ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
+    ring_holds: int | None  # bytes for which it has room; None: the image has no such ring
     taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
     frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
@@ -155,12 +156,15 @@ class Report:
 
     @property
     def notes(self) -> list[str]:
-        """Bounds of tasks that are far above what was measured: nothing is broken, but one of both could be better."""
-        return [
+        """What is not broken: bounds far above what was measured, of which one could be better; what is not known."""
+        found = [
             f"task {row.name}: its bound of {row.bound} cycles is {row.ratio:.2f} times the {row.emulator} measured"
             for row in self.rows
             if row.kind == "task" and row.ratio is not None and row.ratio > RATIO_MOST
         ]
+        if self.ring and self.ring_holds is None:
+            found.append(f"whether {self.ring} bytes fit its receive ring is not known: it has no {RECEIVE_RING}")
+        return found
 
     @property
     def is_met(self) -> bool:
@@ -194,7 +198,7 @@ class Report:
             "poll_gap_bound_cycles": self.gap,
             "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
-            "receive_ring_bytes": RECEIVE_RING - 1,
+            "receive_ring_bytes": self.ring_holds,
             "frame_bound_cycles": self.frames.cycles,
             "frame_taken_bound_cycles": self.taken,
             "edge_age_bound_cycles": self.edge_age,
@@ -233,7 +237,7 @@ def prove(
     """
     image = read_image(path)
     program = program or program_of(image)
-    _check(path, program)
+    check_table(path, program)
     found = costs(program, asked)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
@@ -253,32 +257,13 @@ def prove(
         responses=answers,
         gap=gap,
         ring=ring,
+        ring_holds=image.variables[RECEIVE_RING] - 1 if RECEIVE_RING in image.variables else None,
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
-
-
-def _check(path: Path, program: Program) -> None:
-    """Raises TimingError: it is not a program with a schedule, or its table not that of this program."""
-    if not program.table.tasks:
-        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
-    if "main" not in program.by_name:
-        raise TimingError(f"{path} has no function main; expected an image with its symbols (not stripped)")
-    for row in program.table.interrupts:
-        if 4 * row.vector not in program.functions:
-            raise TimingError(
-                f"{path}: row {row.name!r} of its timing table is of interrupt {row.vector}; expected one that is used"
-            )
-    said = {row.vector for row in program.table.interrupts}
-    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in said]
-    if unsaid:
-        raise TimingError(
-            f"{path} uses interrupt {unsaid[0]} at {program.where(4 * unsaid[0])}, of which its timing table does not "
-            "say how often it comes; expected an INTERRUPT row of it"
-        )
 
 
 def _rows(
@@ -385,8 +370,8 @@ def _tick_broken(report: Report) -> list[str]:
         found.append(
             f"slot {slot} may end {report.responses.slots[slot]} cycles after it began, when the next tick has begun"
         )
-    if report.ring is not None and report.ring > RECEIVE_RING - 1:
-        found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {RECEIVE_RING - 1}")
+    if report.ring is not None and report.ring_holds is not None and report.ring > report.ring_holds:
+        found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {report.ring_holds}")
     if report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
         found.append(f"the time of an edge may be asked for after {report.edge_age} cycles; its stamp has 16 bits")
     return found

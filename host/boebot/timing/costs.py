@@ -20,13 +20,14 @@ from dataclasses import dataclass, replace
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import ENTRY, Blocked
-from boebot.timing.constants import Context
+from boebot.timing.constants import Context, Known
 from boebot.timing.latency import Latencies
-from boebot.timing.loads import ENCODERS, TICK, Load
+from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
 from boebot.timing.loops import Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
-from boebot.timing.program import Function, Program, TaskRow
+from boebot.timing.program import Block, Function, Program, TaskRow
 from boebot.timing.response import Piece, Schedule, Source
+from boebot.timing.taken import Taken
 from boebot.timing.wcet import Bound, WorstCase
 
 SLOT_CYCLES = 40_000
@@ -60,6 +61,7 @@ class Costs:
 
     tasks: dict[str, int]
     interrupts: dict[str, int]  # from acceptance to the end of RETI
+    charged: dict[str, int]  # the same less the received bytes that they take, of which each is charged to its own
     latencies: dict[str, int]  # from request to acceptance, under this load
     loop: int  # a pass of the main loop, without what it does in it
     round: int  # such a pass, with the scheduler around a slot's tasks
@@ -73,7 +75,7 @@ class Costs:
 
     def sources(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load, and the edges that they leave to the main loop."""
-        found = [one for row in program.table.interrupts for one in load.sources(row, self.interrupts[row.name])]
+        found = [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
         if self.change:
             found += [replace(one, name="edges worked off") for one in self._changes(program, load, self.change)]
             found += [Source("light's edge worked off", self.other, 2 * TICK)] if self.other else []
@@ -139,6 +141,7 @@ def costs(program: Program, load: Load) -> Costs:
     return Costs(
         tasks={row.name: worst.bound(_task(program, row.name)).cycles for row in table.tasks},
         interrupts=interrupts,
+        charged=_charged(worst, interrupts),
         latencies=waits,
         loop=loop,
         round=loop + scheduler,
@@ -150,6 +153,14 @@ def costs(program: Program, load: Load) -> Costs:
         other=edges.other,
         storm=edges.storm,
     )
+
+
+def _charged(worst: WorstCase, interrupts: Mapping[str, int]) -> dict[str, int]:
+    rows = worst.program.table.interrupts
+    each = next((interrupts[row.name] for row in rows if row.vector == RECEIVE), 0)
+    others = {row.name: Taken(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
+    taking = {name: taken.charged(each) for name, taken in others.items() if taken.takes}
+    return {**interrupts, **taking}
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,10 +261,38 @@ def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> i
     known = given.inside(main)
     function = known.function
     loops = [loop for loop in _loops(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
+    return sum(_once(loop, given, known) for loop in loops)
+
+
+def _once(loop: Loop[int], given: Given, known: Known) -> int:
+    """Every block of a loop once. A loop within it that sleeps waits for work, and so counts once too; others with all
+    their passes.
+
+    Raises:
+        TimingError: one of these has no bound.
+    """
+    ways = {node: given.ways(known.function.blocks[node], known) for node in loop.nodes}
     cycles = 0
-    for start in frozenset[int]().union(*(loop.nodes for loop in loops)):
-        cycles += max(way.cycles for way in given.ways(function.blocks[start], known))
-    return cycles
+    for inner in loop.inner:
+        if any(_sleeps(known.function.blocks[node]) for node in inner.nodes):
+            cycles += _once(inner, given, known)
+        else:
+            inside = {node: [_within(way, inner.nodes) for way in ways[node]] for node in inner.nodes}
+            walk = longest(Graph(inner.header, inside, given.program.where, given.marks(known.function.entry)))
+            if walk is None:
+                raise TimingError(f"the loop at {given.program.where(inner.header)} in the main loop never ends")
+            cycles += walk.cycles
+    own = loop.nodes.difference(*(inner.nodes for inner in loop.inner))
+    return cycles + sum(max(way.cycles for way in ways[node]) for node in own)
+
+
+def _within(way: Way[int], nodes: Collection[int]) -> Way[int]:
+    """A way that leaves the graph where it leaves these nodes."""
+    return way if way.to in nodes else replace(way, to=None)
+
+
+def _sleeps(block: Block) -> bool:
+    return any(instruction.mnemonic == "sleep" for instruction in block.instructions)
 
 
 def _loops(function: Function) -> list[Loop[int]]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from boebot.report import style
 from boebot.timing.budget import Report
+from boebot.timing.costs import SLOT_BEGINS
 from boebot.timing.measured import Moment
 from boebot.timing.realisable import TICK_S, Event, Verdict, ms
 
@@ -24,9 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "timing"
+SCHEDULER = "scheduler"  # kind of a span before a slot's tasks
 _CYCLES_PER_MS = 16_000
 _COLOURS = {"task": "#0072b2", "interrupt": "#d55e00", "line": "#cc79a7", "process": "#009e73", "sense": "#e69f00"}
 _COLOURS["command"] = _COLOURS["task"]
+_ON = dict.fromkeys(_COLOURS, "white") | {"line": style.INK, "sense": style.INK}  # of text on these
 _LEGEND = {
     "task": "task",
     "interrupt": "interrupt",
@@ -49,7 +52,8 @@ def moments(report: Report) -> tuple[Moment, ...]:
     for slot in range(report.schedule.slots_per_tick):
         busy = max(busy, slot * report.schedule.slot_cycles)
         for piece in report.schedule.slots[slot % len(report.schedule.slots)]:
-            found.append(Moment(piece.name, "task", busy, busy + piece.cycles))
+            around, kind = (0, SCHEDULER) if piece.name == SLOT_BEGINS else (report.costs.around, "task")
+            found.append(Moment(piece.name, kind, busy, busy + piece.cycles - around))
             busy += piece.cycles
     return tuple(found)
 
@@ -148,7 +152,7 @@ def _event(axes: Axes, lane: int, event: Event, longest: float) -> None:
     axes.barh(lane, length, _HEIGHT, left=begin, color=_COLOURS[kind], linewidth=0)
     text = ms(event.seconds) + (f", every {ms(event.every)}" if event.beside else "")
     if length > 0.3 * longest:
-        axes.text(begin + length / 2, lane, text, ha="center", va="center", color="white", fontsize=8)
+        axes.text(begin + length / 2, lane, text, ha="center", va="center", color=_ON[kind], fontsize=8)
     else:
         axes.text(begin + length + 0.007 * longest, lane, text, ha="left", va="center", color=style.INK, fontsize=8)
 
@@ -168,7 +172,7 @@ def _tick(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
     """The whole tick with its slots: tasks, and interrupts below them."""
     slot_ms = report.schedule.slot_cycles / _CYCLES_PER_MS
     kinds = [kind for kind in ("task", "interrupt") if any(span.kind == kind for span in spans)]
-    for span in spans:
+    for span in (span for span in spans if span.kind in kinds):
         begin, length = span.begin / _CYCLES_PER_MS, (span.end - span.begin) / _CYCLES_PER_MS
         axes.barh(kinds.index(span.kind), length, _HEIGHT, left=begin, color=_COLOURS[span.kind], linewidth=0)
     for slot in range(report.schedule.slots_per_tick):
@@ -207,9 +211,10 @@ def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
 
 def _slot(axes: Axes, slot: int, row: Sequence[Moment], width: float) -> None:
     tasks = [span for span in row if span.kind == "task"]
-    for before, after in pairwise(tasks):
-        if after.begin > before.end:
-            axes.barh(slot, after.begin - before.end, 0.14, left=before.end, color=_BETWEEN, linewidth=0)
+    between = [(span.begin, span.end) for span in row if span.kind == SCHEDULER]
+    between += [(before.end, after.begin) for before, after in pairwise(tasks) if after.begin > before.end]
+    for begin, end in between:
+        axes.barh(slot, end - begin, 0.14, left=begin, color=_BETWEEN, linewidth=0)
     for number, span in enumerate(tasks):
         shade = 1.0 if number % 2 == 0 else 0.72  # neighbours differ
         axes.barh(slot, span.end - span.begin, 0.26, left=span.begin, color=_COLOURS["task"], alpha=shade, linewidth=0)

@@ -58,7 +58,7 @@ class Distribution:
         return below + above
 
     def summary(self) -> dict[str, Any]:
-        """What a table or a program reads of it: numbers in cycles and, with `_us` and `_ticks`, in those."""
+        """What a program reads of it; units in the keys."""
         numbers = {
             "min": self.minimum,
             "p50": self.percentile(50),
@@ -66,11 +66,12 @@ class Distribution:
             "max": self.maximum,
         }
         said = {name: value if self.count else None for name, value in numbers.items()}
+        cycles = {f"{name}_cycles": value for name, value in said.items()}
         us = {f"{name}_us": None if value is None else value / CYCLES_PER_US for name, value in said.items()}
         ticks = {"max_ticks": None if said["max"] is None else said["max"] / CYCLES_PER_TICK}
-        names = ("subject", "quantity", "meaning", "load", "least", "most")
-        texts = {name: getattr(self, name) for name in names}
-        return {**texts, "count": self.count, **said, **us, **ticks, "broken": self.broken}
+        texts = {name: getattr(self, name) for name in ("subject", "quantity", "meaning", "load")}
+        limits = {"least_cycles": self.least, "most_cycles": self.most}
+        return {**texts, **limits, "count": self.count, **cycles, **us, **ticks, "broken": self.broken}
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from boebot.errors import BoebotError
@@ -26,7 +27,11 @@ if TYPE_CHECKING:
 NAME = "jitter"
 COLUMNS = 3
 WIDTH_IN, HEIGHT_IN = 3.9, 2.4  # of one histogram
+FRAME_IN = 0.9  # for title and legend
 BINS = 60
+MARGIN = 3.0  # cycles, beside a single value
+TITLE = "Jitter and latency: in brackets, how many values"
+LIMIT: dict[str, Any] = {"color": style.INK, "ls": (0, (1, 1.5)), "lw": 1.4}
 FORMATS = (".svg", ".png", ".pdf")
 MILLISECONDS_FROM = 10_000.0  # cycles; shorter ones are shown as they are
 
@@ -64,8 +69,13 @@ def _drawn(distributions: Sequence[Distribution], kind: str) -> bytes:
     rows = -(-len(by_quantity) // COLUMNS)
     target = io.BytesIO()
     with rc_context({**style.PLOTS, "svg.hashsalt": "boebot", "text.parse_math": False}):
-        figure = Figure(figsize=(COLUMNS * WIDTH_IN, rows * HEIGHT_IN), layout="constrained")
+        figure = Figure(figsize=(COLUMNS * WIDTH_IN, rows * HEIGHT_IN + FRAME_IN), layout="constrained")
         FigureCanvasAgg(figure)
+        figure.suptitle(TITLE, color=style.INK, fontsize=13)
+        figure.supylabel("share of all values", color=style.INK, fontsize=10)
+        if any(limit is not None for one in distributions for limit in (one.least, one.most)):
+            handle = Line2D((), (), **LIMIT, label="limit: what the values may be; further away limits are not shown")
+            figure.legend(handles=[handle], loc="outside lower center", frameon=False, fontsize=9)
         fields = list(np.ravel(figure.subplots(rows, COLUMNS, squeeze=False)))
         for axes, (quantity, found) in zip(fields, by_quantity.items(), strict=False):
             _histogram(axes, quantity, found)
@@ -88,15 +98,15 @@ def _histogram(axes: Axes, quantity: str, found: Sequence[Distribution]) -> None
         label = one.load if one.subject == "boebot" else f"{one.subject}, {one.load}"
         shares = np.histogram(one.values, bins=edges)[0] / one.count
         axes.stairs(shares, edges / scale, label=f"{label} ({one.count})", color=colour, ls=dashes, lw=1.4)
-    span = max(high - low, 1.0)
+    span = max(high - low, MARGIN)
     for limit in limits:
         if low - span <= limit <= high + span:  # else it would squeeze the values
-            axes.axvline(limit / scale, color=style.ESTIMATE, ls=(0, (4, 2)), lw=1.0)
+            axes.axvline(limit / scale, **LIMIT)
     axes.set_yscale("log")
     axes.set_ylim(2e-4, 4.0)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g} %"))
     if high == low:
-        axes.set_xlim(low - 3.0, high + 3.0)
+        axes.set_xlim(low - MARGIN, high + MARGIN)
     axes.set_title(quantity)
     axes.set_xlabel("ms" if scale != 1.0 else "cycles")
     axes.legend(fontsize=6.5, loc="upper right")

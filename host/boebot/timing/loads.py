@@ -26,6 +26,8 @@ RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
 
 _TELEMETRY = messages.Telemetry.LENGTH + FRAME_OVERHEAD
 _DEVICES = messages.DevicesTelemetry.LENGTH + FRAME_OVERHEAD
+_OWN = messages.Counters.LENGTH + FRAME_OVERHEAD  # or one task's time, which is shorter
+_HELLO = messages.Hello.LENGTH + FRAME_OVERHEAD
 _SET_POINT = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 
 
@@ -97,7 +99,12 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
-            SEND: (Stream(BYTE, ((_TELEMETRY, TICK),)), Stream(BYTE, ((_DEVICES, 2 * TICK),))),
+            SEND: (
+                Stream(BYTE, ((_TELEMETRY, TICK),)),
+                Stream(BYTE, ((_DEVICES, 2 * TICK),)),
+                Stream(BYTE, ((_OWN, 4 * TICK),)),
+                Stream(BYTE, ((_HELLO, 20 * TICK),)),
+            ),
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),

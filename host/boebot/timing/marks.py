@@ -9,7 +9,8 @@ no ELF tells:
 
 * A loop whose body is empty may have its row at its test, which runs once more than the body; count it there.
 * Where a loop without a bound has one with a bound in it of which the compiler left one pass only, the row seems to be
-  its own. So every loop of the source needs a bound, not only those in which something is refused.
+  its own (source lines do not tell the two apart: those of branches are not reliable). So every loop of the source
+  needs a bound, not only those in which something is refused; a test of the firmware's sources keeps that.
 """
 
 from __future__ import annotations

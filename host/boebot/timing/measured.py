@@ -136,14 +136,14 @@ def statistics(cycles: NDArray[np.uint32]) -> dict[str, float]:
 
 
 def as_json(measurement: Measurement) -> dict[str, Any]:
-    """What was measured as plain numbers, for a file."""
+    """What was measured as plain numbers, for a file; units in the keys."""
 
     def rows(spans: dict[str, Spans]) -> dict[str, Any]:
         return {
             name: {
-                "net": statistics(one.net),
-                "gross": statistics(one.gross),
-                **({"latency": statistics(one.latency)} if len(one.latency) else {}),
+                "net_cycles": statistics(one.net),
+                "gross_cycles": statistics(one.gross),
+                **({"latency_cycles": statistics(one.latency)} if len(one.latency) else {}),
                 "worst": {"scenario": one.worst.scenario, "seed": one.worst.seed, "cycle": one.worst.cycle},
             }
             for name, one in spans.items()
@@ -155,11 +155,11 @@ def as_json(measurement: Measurement) -> dict[str, Any]:
         "functions": rows(measurement.functions),
         "scenarios": list(measurement.scenarios),
         "seconds": measurement.seconds,
-        "load": measurement.load,
-        "worst_tick": measurement.worst_tick,
-        "busiest_tick": measurement.busiest_tick,
-        "between_polls": measurement.between_polls,
-        "lowest_stack": measurement.lowest_stack,
+        "load_share": measurement.load,
+        "worst_tick_cycles": measurement.worst_tick,
+        "busiest_tick_cycles": measurement.busiest_tick,
+        "between_polls_cycles": measurement.between_polls,
+        "lowest_stack_address": measurement.lowest_stack,
         "losses": measurement.losses,
         "by_scenario": {name: as_json(one) for name, one in measurement.by_scenario.items()},
     }

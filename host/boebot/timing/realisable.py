@@ -97,6 +97,15 @@ class Verdict:
         return not self.faults
 
     @property
+    def breaking(self) -> list[str]:
+        """The names of the events that do not fit: each fault begins with its event."""
+        return [
+            event.name
+            for event in self.events
+            if any(fault.startswith((f"{event.name}, ", f"{event.name} every ")) for fault in self.faults)
+        ]
+
+    @property
     def seconds(self) -> float:
         """The critical path: what follows one another in a time step."""
         return sum(event.seconds for event in self.events if not event.beside)
@@ -120,6 +129,7 @@ class Verdict:
             "baud_rate_bit_s": self.baud or None,
             "taken_ms": round(self.seconds * 1000, 4),
             "realisable": self.is_realisable,
+            "breaking_events": self.breaking,
             "faults": list(self.faults),
             "notes": list(self.notes),
             "events": [

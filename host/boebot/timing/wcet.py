@@ -3,6 +3,8 @@
 From the function's first instruction to the end of its return, with all that it calls; the call itself is the
 caller's. A function is bounded once for each set of constants that calls hand to it (constants.py). Every path that
 these leave counts as possible; loops are bounded by what the image says of them and by their own code (counted.py).
+`main` never returns and so has no bound: one pass of its endless loop is taken apart in costs.py, and what comes before
+that loop is the start-up, of which only the stretches with interrupts off count (blocked.py).
 """
 
 from __future__ import annotations

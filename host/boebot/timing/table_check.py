@@ -1,0 +1,36 @@
+"""Whether an image's timing table is that of its program: before anything is worked out by it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from boebot.errors import TimingError
+from boebot.timing.costs import SLOT_CYCLES, SLOTS_PER_TICK
+from boebot.timing.loads import SLOT
+from boebot.timing.program import Program
+from boebot.timing.stack import VECTORS
+
+
+def check_table(path: Path, program: Program) -> None:
+    """Raises TimingError: it is not a program with a schedule, or its table not that of this program."""
+    if not program.table.tasks:
+        raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    if "main" not in program.by_name:
+        raise TimingError(f"{path} has no function main; expected an image with its symbols (not stripped)")
+    for row in program.table.interrupts:
+        if 4 * row.vector not in program.functions:
+            raise TimingError(
+                f"{path}: row {row.name!r} of its timing table is of interrupt {row.vector}; expected one that is used"
+            )
+        if row.vector == SLOT and row.interval != SLOT_CYCLES:
+            raise TimingError(
+                f"{path}: by row {row.name!r} of its timing table a slot has {row.interval} cycles; "
+                f"expected {SLOT_CYCLES}, {SLOTS_PER_TICK} of them in a tick of 10 ms"
+            )
+    said = {row.vector for row in program.table.interrupts}
+    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in said]
+    if unsaid:
+        raise TimingError(
+            f"{path} uses interrupt {unsaid[0]} at {program.where(4 * unsaid[0])}, of which its timing table does not "
+            "say how often it comes; expected an INTERRUPT row of it"
+        )
