@@ -37,7 +37,7 @@ def test_fuzzer_finds_a_missing_check(protection: str, tmp_path: Path) -> None:
 
 
 def test_fuzzer_of_the_link_finds_a_missing_latch(tmp_path: Path) -> None:
-    source, check = fuzz.FIRMWARE / "safety.c", "latch != LATCH_NONE || time_to_live"
+    source, check = fuzz.FIRMWARE / "safety.c", "self->latch != LATCH_NONE || time_to_live"
     text = source.read_text(encoding="utf-8")
     assert text.count(check) == 1
     mutant = tmp_path / "safety.c"
