@@ -157,7 +157,7 @@ check-images: $(IMAGES)
 .PHONY: ready-run ready-test ready-bench ready-check ready-firmware
 ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
-ready-bench: ready-test build/avr8js/.done
+ready-bench: ready-test build/.done-system-bench build/avr8js/.done
 ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 

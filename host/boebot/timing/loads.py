@@ -29,6 +29,7 @@ _DEVICES = messages.DevicesTelemetry.LENGTH + FRAME_OVERHEAD
 _OWN = messages.Counters.LENGTH + FRAME_OVERHEAD  # or one task's time, which is shorter
 _HELLO = messages.Hello.LENGTH + FRAME_OVERHEAD
 _SET_POINT = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
+_REQUEST = messages.SetParameter.LENGTH + FRAME_OVERHEAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +117,8 @@ LOADS: dict[str, Load] = {
     ),
     "saturated": Load(
         "saturated",
-        "the same with valid frames of 20 to 40 bytes, 50,000 bytes/s each way, four encoder lines of 4,000 edges/s",
+        "the same with frames of 15 and 16 bytes back to back (longer ones would be fewer), 50,000 bytes/s each way, four "
+        "encoder lines of 4,000 edges/s",
         {
             RECEIVE: (Stream(BYTE),),
             SEND: (Stream(BYTE),),
@@ -126,7 +128,7 @@ LOADS: dict[str, Load] = {
             CAPTURE: (_ECHOES,),
         },
         frame_bursts=(),
-        frame_least=20,
+        frame_least=_REQUEST,
         off=_DEVICES_OFF,
     ),
 }
