@@ -105,7 +105,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
     link.open()
     latencies = []
     draw = random.Random(5)
-    for index in range(300):
+    for index in range(900):
         listen(link, draw.uniform(0.0, TICK_S))  # at every phase of the tick
         value = 4 + index % 200
         begun = line.now()
