@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from timing_program import build
 
-from boebot.cli import timing
+from boebot.cli import timing, timing_tables
 from boebot.errors import BoebotError, TimingError
 from boebot.robots import load_robot
 from boebot.timing import budget, diagram, loads, realisable
@@ -153,6 +153,38 @@ def test_bound_far_above_what_was_measured_is_noted(image: Path) -> None:
     assert budget.prove(image, FIGURES, measurement(first=70)).notes == []
     (note,) = budget.prove(image, FIGURES, measurement(first=69)).notes
     assert note == "task first: its bound of 104 cycles is 1.51 times the 69 measured"
+
+
+@pytest.mark.parametrize(
+    ("measured", "says"),
+    [
+        (None, "that none of the others is lost is not proven, and nothing was measured"),
+        (measurement(), "that none of the others is lost is measured, not proven"),
+        (replace(measurement(), losses={"frames": 3, "bytes": 40}), "the emulator lost 3 frames and 40 bytes"),
+    ],
+)
+def test_frames_beyond_the_proven_ones_are_noted(
+    report: budget.Report, measured: Measurement | None, says: str
+) -> None:
+    """Frames that come 25 times in a tick of 160,000 cycles; of these the bound proves fewer."""
+    frames = replace(report.frames, cycles=100, interval=6_400, bursts=())
+    coming = replace(report, frames=frames, frames_proven=9.88, measured=measured, ring=129, ring_holds=255)
+    (note,) = coming.notes
+    assert (
+        note == f"frames: the bound proves 9.9 of the 25 that come per tick; {says}; the receive ring holds 255 bytes"
+    )
+    assert replace(coming, frames_proven=25.0).notes == []
+
+
+def test_ring_that_is_needed_stands_beside_the_one_there_is(
+    report: budget.Report, capsys: pytest.CaptureFixture[str]
+) -> None:
+    timing_tables.show_report(replace(report, ring=129, ring_holds=255))
+    rows = {line.split("  ")[0].strip(): line.split() for line in capsys.readouterr().out.splitlines()}
+    assert rows["receive ring needed"][3:] == ["129", "of", "255", "bytes"]
+    assert rows["poll gap bound (bytes wait in the ring)"][-2:] == [f"{report.gap:,}", "cycles"]
+    as_dict = replace(report, ring=129, ring_holds=255).as_dict()
+    assert (as_dict["receive_ring_needed_bytes"], as_dict["receive_ring_bytes"]) == (129, 255)
 
 
 def test_board_above_its_bound_is_a_fault(image: Path, report: budget.Report) -> None:

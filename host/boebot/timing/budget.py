@@ -164,7 +164,7 @@ class Report:
         ]
         if self.ring and self.ring_holds is None:
             found.append(f"whether {self.ring} bytes fit its receive ring is not known: it has no {RECEIVE_RING}")
-        return found
+        return found + _frames_unproven(self)
 
     @property
     def is_met(self) -> bool:
@@ -389,6 +389,21 @@ def _measured_broken(report: Report) -> list[str]:
     if report.gap is not None:
         figures.append((f"{own.between_polls} cycles passed between two polls", own.between_polls, report.gap))
     return [_above(f"{says} in the emulator", took, "bound", most) for says, took, most in figures if took > most]
+
+
+def _frames_unproven(report: Report) -> list[str]:
+    """What is known of the frames that the bound leaves no time for."""
+    proven, coming = round(report.frames_proven, 1), round(report.frames_coming, 1)
+    if proven >= coming:
+        return []
+    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick; "
+    if report.own is None:
+        says += "that none of the others is lost is not proven, and nothing was measured"
+    elif any(lost := [report.own.losses.get(kind, 0) for kind in ("frames", "bytes")]):
+        says += f"the emulator lost {lost[0]} frames and {lost[1]} bytes"
+    else:
+        says += "that none of the others is lost is measured, not proven"
+    return [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
 
 
 def _memory_broken(memory: Memory) -> list[str]:
