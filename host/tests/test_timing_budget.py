@@ -53,6 +53,13 @@ def measurement(first: int = 104, slot: int = 31, lowest_stack: int = 0x8F8, wor
     )
 
 
+def test_progress_is_the_share_of_tasks_and_interrupts_that_are_done(image: Path, report: budget.Report) -> None:
+    """Two tasks and one interrupt."""
+    shares: list[float] = []
+    assert budget.prove(image, FIGURES, progress=shares.append).rows == report.rows
+    assert shares == pytest.approx([1 / 3, 2 / 3, 1])
+
+
 def test_bounds_are_those_counted_by_hand(report: budget.Report) -> None:
     """Nops and a return of 4; an interrupt has 4 of its entry and 3 of its vector besides."""
     assert {row.name: row.bound for row in report.rows} == {"first": 104, "second": 204, "slot": 4 + 3 + 20 + 4}
@@ -252,6 +259,10 @@ def test_command_prints_the_table_and_its_code_says_whether_budgets_are_met(
         (("--robot", "nobody"), "nobody"),
         (("--robot", "arsim", "--baud", "9600"), "robot 'arsim' has no board"),
         (("--robot", "arsim", "--brain", "nobody"), "nobody"),
+        (("--seconds", "0"), "0 s cannot be measured; expected --seconds 0.1 to 3600"),
+        (("--seconds", "3601"), "3601 s cannot be measured"),
+        (("--seconds", "nan"), "nan s cannot be measured"),
+        (("--seed", "-1"), "-1 is no seed; expected --seed 0 or more"),
     ],
 )
 def test_bad_input_is_one_sentence_and_code_2(
@@ -330,6 +341,7 @@ def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
     assert found == diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05)), "the same again"
     root = ElementTree.fromstring(found["timing.svg"])
     texts = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "bytes on the line"} <= texts
+    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "scheduler", "bytes on the line"} <= texts
+    assert not any("poll" in (text or "") for text in texts), "the link is polled when no slot waits"
     (tmp_path / "timing.png").write_bytes(found["timing.png"])
     assert matplotlib.image.imread(tmp_path / "timing.png").shape[1] > 1000

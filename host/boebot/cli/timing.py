@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 GROUP = "boebot.timing"
 _CYCLES_PER_S = 16_000_000
-_LONGEST_S = 3600.0  # of a scenario
+_SHORTEST_S, _LONGEST_S = 0.1, 3600.0  # of a scenario
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
   boebot timing                         the bundled image, emulator too
@@ -54,10 +54,9 @@ def timing(
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
     ] = True,
     seconds: Annotated[
-        float,
-        typer.Option(metavar="S", min=0.1, max=_LONGEST_S, help="Of the board's time, for each that is measured."),
+        float, typer.Option(metavar="S", help="Of the board's time, for each that is measured: 0.1 to 3600.")
     ] = 1.0,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the scenarios.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios, 0 or more.")] = 1,
     port: Annotated[
         str | None,
         typer.Option(
@@ -155,6 +154,10 @@ def _answer(
     from boebot.tasks import DEFAULT_PERIOD
     from boebot.timing import budget, loads, realisable
 
+    if not _SHORTEST_S <= seconds <= _LONGEST_S:
+        raise TimingError(f"{seconds:g} s cannot be measured; expected --seconds {_SHORTEST_S:g} to {_LONGEST_S:g}")
+    if seed < 0:
+        raise TimingError(f"{seed} is no seed; expected --seed 0 or more")
     description = load_robot(robot)
     asked = loads.load_named(load)
     if out is not None:
@@ -167,7 +170,7 @@ def _answer(
         label = f"bounds of {image.name}"
         with output.share_bars([label]) as watch:
             watch({label: 0.0})
-            found = budget.prove(image, asked, measured, board)
+            found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
     times = None if found is None else _board_times(found)

@@ -11,7 +11,7 @@ slot waiting longer than one of them takes. So what of them the bound can prove 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -222,6 +222,7 @@ def prove(
     measured: Measurement | None = None,
     board: Mapping[str, int] | None = None,
     program: Program | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Report:
     """The report of an image.
 
@@ -231,6 +232,7 @@ def prove(
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
         program: the image's, if it has been read already.
+        progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
 
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
@@ -238,7 +240,7 @@ def prove(
     image = read_image(path)
     program = program or program_of(image)
     check_table(path, program)
-    found = costs(program, asked)
+    found = costs(program, asked, progress)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
