@@ -383,12 +383,14 @@ static void close_wheel(uint8_t side) {
     w->reading.period = 0;
   }
   w->edges = 0;
-  w->reading.masked = false;
+  w->reading.masked = (returning & SIDE_BITS(side)) != 0; /* it has not come back in the whole tick */
   BOUNDED(LINES_PER_SIDE, for (uint8_t i = 0; i < LINES_PER_SIDE; i++)) {
     if (w->left[i] == 0) {
       w->reading.masked = true;
-      w->reading.period = 0;
     }
+  }
+  if (w->reading.masked) {
+    w->reading.period = 0;
   }
 }
 

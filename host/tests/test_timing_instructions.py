@@ -83,7 +83,7 @@ def test_cycles_are_those_of_the_data_sheet() -> None:
         ("cbi EECR, EERIE", 2),
         ("out EECR, r24", 1 + 4),  # at most
         ("sts 0x3F, r24", 2 + 4),
-        ("sts 0x1F, r24", 2),
+        ("sts 0x40, r24", 2),  # EEDR
         ("out EEDR, r24", 1),
         ("in r24, EECR", 1),
     ],

@@ -17,7 +17,6 @@ from boebot.timing.program import Block, Edge, Function, Instruction
 from boebot.timing.registers import ZERO, pushes_only, written
 
 ARGUMENTS = range(8, 26)  # registers in which values are handed to a callee
-REGISTERS = 32
 SREG_IO, SREG_DATA = 0x3F, 0x5F
 VECTORS_END = 4 * 26  # addresses below are interrupt vectors: there r1 may hold anything
 # What changes neither C, Z, N nor V.
@@ -175,8 +174,6 @@ def step(instruction: Instruction, state: State) -> State:
     name, operands = instruction.mnemonic, instruction.operands
     if name in ("call", "rcall", "icall") and not pushes_only(instruction):
         return State(_without(state.registers, written(instruction)) | {ZERO: 0})
-    if name == "sts" and operands[0] < REGISTERS:
-        return State()
     registers = _without(state.registers, written(instruction))
     writes_flags = (name == "out" and operands[0] == SREG_IO) or (name == "sts" and operands[0] == SREG_DATA)
     flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
