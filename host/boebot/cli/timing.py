@@ -31,6 +31,8 @@ _HELP = """What the firmware may take, what it took, and whether that fits its b
 
   boebot timing --port /dev/ttyACM0     with what a board measures itself
 
+  boebot timing --where NAME            the worst path of a task or interrupt
+
   boebot timing --robot R --brain B     do sensors, brain and line fit?
 
 Times are cycles of 1/16 us. bound: the most that the machine code can take; emulator, board: the longest that was
@@ -73,6 +75,10 @@ def timing(
     baud: Annotated[
         int | None, typer.Option("--baud", metavar="RATE", help="Of the line (bit/s). Else as the robot says.")
     ] = None,
+    where: Annotated[
+        str | None,
+        typer.Option("--where", metavar="NAME", help="Only this: where the bound of a task or an interrupt goes."),
+    ] = None,
     jitter: Annotated[
         bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
     ] = False,
@@ -83,6 +89,9 @@ def timing(
 ) -> None:
     """See `_HELP`."""
     try:
+        if where is not None:
+            _show_where(elf, robot, where, json)
+            return
         answer = _answer(elf, robot, load, measure, seconds, seed, port, brain, step, period, baud, jitter, out)
     except BoebotError as error:
         output.say(str(error))
@@ -180,6 +189,22 @@ def _answer(
     if out is not None:
         answer.files = _write(answer, out)
     return answer
+
+
+def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
+    """The worst path of a task or an interrupt. Raises BoebotError where there is none."""
+    from boebot.robots import load_robot
+    from boebot.timing.graph import load_program
+    from boebot.timing.worst_path import worst_path
+
+    image = _image(elf, load_robot(robot))
+    if image is None:
+        raise TimingError(f"robot {robot!r} has no board, and so no image; expected --elf F")
+    path = worst_path(load_program(image), name)
+    if json:
+        output.print_json({"elf": str(image)} | path.as_dict())
+    else:
+        timing_tables.show_path(path)
 
 
 def _image(elf: Path | None, robot: RobotDescription) -> Path | None:

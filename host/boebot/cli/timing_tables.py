@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from boebot.timing.budget import Report, Row
     from boebot.timing.distributions import Distribution, JitterReport
     from boebot.timing.realisable import Verdict
+    from boebot.timing.worst_path import WorstPath
 
 _UNKNOWN = "–"
 _BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
@@ -113,6 +114,20 @@ def _of(number: int | None, most: int | None) -> str | None:
     if number is None or most is None:
         return None if number is None else f"{number:,}"
     return f"{number:,} of {most:,}"
+
+
+def show_path(path: WorstPath) -> None:
+    """The lines of a worst path; their cycles in sum are the bound."""
+    shown = _table("function")
+    shown.add_column("line")
+    for title in ("cycles", "runs", "passes"):
+        shown.add_column(title, justify="right", no_wrap=True)
+    for row in path.rows:
+        passes = ", ".join(f"{passes:,}" for passes in row.passes)
+        shown.add_row(row.function, row.line or _UNKNOWN, f"{row.cycles:,}", f"{row.runs:,}", passes)
+    console = Console(highlight=False)
+    console.print(Text(f"the worst path of {path.kind} {path.name}: {path.cycles:,} cycles", style="bold"))
+    console.print(shown)
 
 
 def show_verdict(verdict: Verdict) -> None:

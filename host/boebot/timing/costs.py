@@ -139,7 +139,7 @@ def costs(program: Program, load: Load, progress: Callable[[float], None] = lamb
     tasks, interrupts, waits = {}, {}, {}
     rows = len(table.tasks) + len(table.interrupts)
     for done, task in enumerate(table.tasks, 1):
-        tasks[task.name] = worst.bound(_task(program, task.name)).cycles
+        tasks[task.name] = worst.bound(task_entry(program, task.name)).cycles
         progress(done / rows)
     latencies = Latencies(Blocked(program, worst), {row.vector: load.sources(row, 1) for row in table.interrupts})
     for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
@@ -343,7 +343,12 @@ def _entry(program: Program, name: str) -> int | None:
     return found[0] if len(found) == 1 else None
 
 
-def _task(program: Program, name: str) -> int:
+def task_entry(program: Program, name: str) -> int:
+    """Of the function of a task.
+
+    Raises:
+        TimingError: it is no function.
+    """
     entry = _entry(program, f"{name}_task")
     if entry is None:
         raise TimingError(f"{program.path} has no function {name}_task")
