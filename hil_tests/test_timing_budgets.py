@@ -115,6 +115,7 @@ def _tick_checks(report: Report) -> Iterator[Check]:
     assert report.ring is not None and report.ring_holds is not None
     yield Check(f"{load}: measured gap of polls <= bound", own.between_polls, report.gap)
     yield Check(f"{load}: bytes in the receive ring", report.ring, report.ring_holds)
+    yield Check(f"{load}: changes in their ring", report.changes or 0, report.changes_held or 0)
     yield Check(f"{load}: age of an edge when its time is told", report.edge_age, STAMP_ROLLS_OVER - 1)
 
 

@@ -73,9 +73,13 @@ class Costs:
     other: int  # more, when it is the light sensor's
     storm: int  # more, to stop a line that comes too often; 0: under this load none does
 
+    def requested(self, program: Program, load: Load) -> list[Source]:
+        """The interrupts under a load."""
+        return [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
+
     def sources(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load, and the edges that they leave to the main loop."""
-        found = [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
+        found = self.requested(program, load)
         if self.change:
             found += [replace(one, name="edges worked off") for one in self._changes(program, load, self.change)]
             found += [Source("light's edge worked off", self.other, 2 * TICK)] if self.other else []
