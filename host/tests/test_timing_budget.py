@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from timing_program import build
 
-from boebot.cli import timing
+from boebot.cli import timing, timing_tables
 from boebot.errors import BoebotError, TimingError
 from boebot.robots import load_robot
 from boebot.timing import budget, diagram, loads, realisable
@@ -51,6 +51,13 @@ def measurement(first: int = 104, slot: int = 31, lowest_stack: int = 0x8F8, wor
         worst_tick=worst_tick,
         scenarios=("figures",),
     )
+
+
+def test_progress_is_the_share_of_tasks_and_interrupts_that_are_done(image: Path, report: budget.Report) -> None:
+    """Two tasks and one interrupt."""
+    shares: list[float] = []
+    assert budget.prove(image, FIGURES, progress=shares.append).rows == report.rows
+    assert shares == pytest.approx([1 / 3, 2 / 3, 1])
 
 
 def test_bounds_are_those_counted_by_hand(report: budget.Report) -> None:
@@ -155,6 +162,38 @@ def test_bound_far_above_what_was_measured_is_noted(image: Path) -> None:
     assert note == "task first: its bound of 104 cycles is 1.51 times the 69 measured"
 
 
+@pytest.mark.parametrize(
+    ("measured", "says"),
+    [
+        (None, "that none of the others is lost is not proven, and nothing was measured"),
+        (measurement(), "that none of the others is lost is measured, not proven"),
+        (replace(measurement(), losses={"frames": 3, "bytes": 40}), "the emulator lost 3 frames and 40 bytes"),
+    ],
+)
+def test_frames_beyond_the_proven_ones_are_noted(
+    report: budget.Report, measured: Measurement | None, says: str
+) -> None:
+    """Frames that come 25 times in a tick of 160,000 cycles; of these the bound proves fewer."""
+    frames = replace(report.frames, cycles=100, interval=6_400, bursts=())
+    coming = replace(report, frames=frames, frames_proven=9.88, measured=measured, ring=129, ring_holds=255)
+    (note,) = coming.notes
+    assert (
+        note == f"frames: the bound proves 9.9 of the 25 that come per tick; {says}; the receive ring holds 255 bytes"
+    )
+    assert replace(coming, frames_proven=25.0).notes == []
+
+
+def test_ring_that_is_needed_stands_beside_the_one_there_is(
+    report: budget.Report, capsys: pytest.CaptureFixture[str]
+) -> None:
+    timing_tables.show_report(replace(report, ring=129, ring_holds=255))
+    rows = {line.split("  ")[0].strip(): line.split() for line in capsys.readouterr().out.splitlines()}
+    assert rows["receive ring needed"][3:] == ["129", "of", "255", "bytes"]
+    assert rows["poll gap bound (bytes wait in the ring)"][-2:] == [f"{report.gap:,}", "cycles"]
+    as_dict = replace(report, ring=129, ring_holds=255).as_dict()
+    assert (as_dict["receive_ring_needed_bytes"], as_dict["receive_ring_bytes"]) == (129, 255)
+
+
 def test_board_above_its_bound_is_a_fault(image: Path, report: budget.Report) -> None:
     """A board counts the interrupts in between, so its figure stands against the response."""
     assert report.responses is not None
@@ -220,6 +259,10 @@ def test_command_prints_the_table_and_its_code_says_whether_budgets_are_met(
         (("--robot", "nobody"), "nobody"),
         (("--robot", "arsim", "--baud", "9600"), "robot 'arsim' has no board"),
         (("--robot", "arsim", "--brain", "nobody"), "nobody"),
+        (("--seconds", "0"), "0 s cannot be measured; expected --seconds 0.1 to 3600"),
+        (("--seconds", "3601"), "3601 s cannot be measured"),
+        (("--seconds", "nan"), "nan s cannot be measured"),
+        (("--seed", "-1"), "-1 is no seed; expected --seed 0 or more"),
     ],
 )
 def test_bad_input_is_one_sentence_and_code_2(
@@ -234,6 +277,20 @@ def test_robot_without_a_board_is_judged_by_its_sensors(capsys: pytest.CaptureFi
     answer = json.loads(out)
     assert code == timing.EXIT_BROKEN and answer["image"] is None
     assert "brain, 12 ms, ends 12 ms after the step began" in answer["realisable"]["faults"][0]
+
+
+def test_line_too_slow_for_the_period_that_is_asked_for_is_code_1(
+    image: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("timing", "--elf", str(image), "--no-measure", "--baud", "9600", "--period")
+    code, out, _ = command(capsys, *arguments, "50")
+    said = " ".join(out.split())
+    assert code == timing.EXIT_BROKEN and "all budgets are met" in said
+    assert "brain period of 50 ms is not realisable: telemetry, " in said
+    assert "expected a period of 100 ms or a line of 19200 bit/s" in said
+    code, out, _ = command(capsys, *arguments, "100", "--json")
+    answer = json.loads(out)["realisable"]
+    assert code == 0 and answer["realisable"] and answer["period_ms"] == answer["period_forced_ms"] == 100
 
 
 def test_brain_is_measured(capsys: pytest.CaptureFixture[str]) -> None:
@@ -284,6 +341,7 @@ def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
     assert found == diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05)), "the same again"
     root = ElementTree.fromstring(found["timing.svg"])
     texts = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "bytes on the line"} <= texts
+    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "scheduler", "bytes on the line"} <= texts
+    assert not any("poll" in (text or "") for text in texts), "the link is polled when no slot waits"
     (tmp_path / "timing.png").write_bytes(found["timing.png"])
     assert matplotlib.image.imread(tmp_path / "timing.png").shape[1] > 1000

@@ -9,13 +9,14 @@ import msgspec
 import pytest
 
 import boebot
-from boebot import Member
+from boebot import Member, runner
 from boebot.errors import BoebotError
 from boebot.robots import RobotDescription, load_robot, robot_names
 from boebot.timing import realisable
 from boebot.timing.program import SensorRow, Table, TaskRow
 from boebot.timing.realisable import BoardTimes, NotRealisableError, judge, telemetry_ticks
 from command import boebot as command
+from peer import InProcess, Peer
 
 SENSORS = ("infrared_left", "infrared_right", "infrared_back_left", "infrared_back_right")
 PING = SensorRow("ping", 18_500, 5, 20_000)
@@ -111,6 +112,54 @@ def test_faster_line_is_named_where_it_would_do() -> None:
     ).is_realisable
 
 
+def test_line_too_slow_for_each_step_is_no() -> None:
+    """46 bytes at 9600 bit/s are 47.9 ms, at half of the line 95.8: every 100 ms. At 19,200 bit/s every 50 ms."""
+    verdict = judge(load_robot("shieldbot"), 0.05, baud=9600, telemetry_bytes=46, command_bytes=16)
+    assert verdict.faults == (
+        "telemetry, 46 B, comes every 100 ms over a line of 9600 bit/s, which a step every 50 ms does not go with; "
+        "expected a period of 100 ms or a line of 19200 bit/s",
+    )
+    assert verdict.breaking == ["telemetry, 46 B"] and "with a brain period of 50 ms is not" in verdict.sentence
+    assert judge(load_robot("shieldbot"), 0.1, baud=9600, telemetry_bytes=46, command_bytes=16).is_realisable
+    assert judge(load_robot("shieldbot"), 0.05, baud=19_200, telemetry_bytes=46, command_bytes=16).is_realisable
+    between = judge(load_robot("shieldbot"), 0.07, baud=19_200, telemetry_bytes=46, command_bytes=16)
+    assert "expected a period of 100 ms or a line of 115200 bit/s" in between.faults[0], "10 ms, as 20 ms do not go"
+
+
+def test_full_step_over_a_slow_line_wants_a_period_that_the_line_goes_with() -> None:
+    """47.9 + 16.7 ms of the line and 40 of the brain are 104.6 ms: of the multiples of 100 ms the second."""
+    robot = load_robot("shieldbot")
+    verdict = judge(robot, 0.1, baud=9600, brain_s=0.04, telemetry_bytes=46, command_bytes=16)
+    assert "expected a period of 200 ms" in verdict.faults[0]
+    assert verdict.faults[1] == "a line of 19200 bit/s would do, too"
+
+
+def slow_robot() -> RobotDescription:
+    robot = load_robot("shieldbot")
+    uart = msgspec.structs.replace(robot.device["uart"], baud=9600)
+    return msgspec.structs.replace(robot, device=robot.device | {"uart": uart})
+
+
+def test_run_over_a_slow_line_is_refused_and_takes_the_longer_period_by_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A board whose line is as slow as the description says sends telemetry every 100 ms."""
+
+    def slow_board(url: object, request: object) -> InProcess:
+        peer = Peer()
+        peer.telemetry_period = 10
+        return InProcess(peer)
+
+    monkeypatch.setattr(runner, "open_board", slow_board)
+    robot = slow_robot()
+    with pytest.raises(NotRealisableError, match=r"telemetry, .* expected a period of 100 ms or a line of 19200 bit/s"):
+        boebot.run(lambda robot: None, robot=robot, period=0.05, seconds=1)
+    forced = boebot.run(lambda robot: None, robot=robot, period=0.05, seconds=1, force_timing=True)
+    verdict = judge(robot, 0.05, board=realisable.of_image(robot))
+    assert forced.period == pytest.approx(verdict.forced_s) == pytest.approx(0.1)
+    assert forced.unrealisable == verdict.sentence
+    fine = boebot.run(lambda robot: None, robot=robot, period=0.1, seconds=1)
+    assert fine.period == pytest.approx(0.1) and fine.unrealisable is None
+
+
 def test_json_names_the_events_that_break() -> None:
     robot = load_robot("shieldbot")
     assert judge(robot, 0.05, baud=123).as_dict()["breaking_events"] == ["telemetry, 46 B"]  # 46 bytes in 3.7 s
@@ -160,6 +209,8 @@ def test_table_of_an_image_gives_the_boards_times() -> None:
     [
         ("shieldbot", {"period_s": 0.0}, "a brain period of 0 ms is none"),
         ("shieldbot", {"period_s": float("nan")}, "a brain period of nan ms is none"),
+        ("shieldbot", {"period_s": 0.015}, "a brain period of 15 ms does not fit; expected a multiple of 10 ms"),
+        ("shieldbot", {"period_s": 0.81}, "a brain period of 810 ms is too long; expected at most 800 ms"),
         ("shieldbot", {"baud": 0}, "a line of 0 bit/s is none"),
         ("shieldbot", {"brain_s": -1.0}, "a step of the brain cannot take -1000 ms"),
         ("arsim", {"baud": 9600}, "robot 'arsim' has no board"),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 GROUP = "boebot.timing"
 _CYCLES_PER_S = 16_000_000
-_LONGEST_S = 3600.0  # of a scenario
+_SHORTEST_S, _LONGEST_S = 0.1, 3600.0  # of a scenario
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
   boebot timing                         the bundled image, emulator too
@@ -30,6 +30,8 @@ _HELP = """What the firmware may take, what it took, and whether that fits its b
   boebot timing --elf F --no-measure    any image, by its machine code
 
   boebot timing --port /dev/ttyACM0     with what a board measures itself
+
+  boebot timing --where NAME            the worst path of a task or interrupt
 
   boebot timing --robot R --brain B     do sensors, brain and line fit?
 
@@ -54,10 +56,9 @@ def timing(
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
     ] = True,
     seconds: Annotated[
-        float,
-        typer.Option(metavar="S", min=0.1, max=_LONGEST_S, help="Of the board's time, for each that is measured."),
+        float, typer.Option(metavar="S", help="Of the board's time, for each that is measured: 0.1 to 3600.")
     ] = 1.0,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the scenarios.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios, 0 or more.")] = 1,
     port: Annotated[
         str | None,
         typer.Option(
@@ -74,6 +75,10 @@ def timing(
     baud: Annotated[
         int | None, typer.Option("--baud", metavar="RATE", help="Of the line (bit/s). Else as the robot says.")
     ] = None,
+    where: Annotated[
+        str | None,
+        typer.Option("--where", metavar="NAME", help="Only this: where the bound of a task or an interrupt goes."),
+    ] = None,
     jitter: Annotated[
         bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
     ] = False,
@@ -84,6 +89,9 @@ def timing(
 ) -> None:
     """See `_HELP`."""
     try:
+        if where is not None:
+            _show_where(elf, robot, where, json)
+            return
         answer = _answer(elf, robot, load, measure, seconds, seed, port, brain, step, period, baud, jitter, out)
     except BoebotError as error:
         output.say(str(error))
@@ -155,6 +163,10 @@ def _answer(
     from boebot.tasks import DEFAULT_PERIOD
     from boebot.timing import budget, loads, realisable
 
+    if not _SHORTEST_S <= seconds <= _LONGEST_S:
+        raise TimingError(f"{seconds:g} s cannot be measured; expected --seconds {_SHORTEST_S:g} to {_LONGEST_S:g}")
+    if seed < 0:
+        raise TimingError(f"{seed} is no seed; expected --seed 0 or more")
     description = load_robot(robot)
     asked = loads.load_named(load)
     if out is not None:
@@ -167,7 +179,7 @@ def _answer(
         label = f"bounds of {image.name}"
         with output.share_bars([label]) as watch:
             watch({label: 0.0})
-            found = budget.prove(image, asked, measured, board)
+            found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
     brain_s, own_period = _brain(brain, step, description, seed)
     period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
     times = None if found is None else _board_times(found)
@@ -177,6 +189,22 @@ def _answer(
     if out is not None:
         answer.files = _write(answer, out)
     return answer
+
+
+def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
+    """The worst path of a task or an interrupt. Raises BoebotError where there is none."""
+    from boebot.robots import load_robot
+    from boebot.timing.graph import load_program
+    from boebot.timing.worst_path import worst_path
+
+    image = _image(elf, load_robot(robot))
+    if image is None:
+        raise TimingError(f"robot {robot!r} has no board, and so no image; expected --elf F")
+    path = worst_path(load_program(image), name)
+    if json:
+        output.print_json({"elf": str(image)} | path.as_dict())
+    else:
+        timing_tables.show_path(path)
 
 
 def _image(elf: Path | None, robot: RobotDescription) -> Path | None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from boebot.timing.budget import Report, Row
     from boebot.timing.distributions import Distribution, JitterReport
     from boebot.timing.realisable import Verdict
+    from boebot.timing.worst_path import WorstPath
 
 _UNKNOWN = "–"
 _BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
@@ -95,9 +96,10 @@ def _sums(report: Report) -> dict[str, Any]:
         "busiest_tick_in_emulator_percent": percent(own.busiest_tick if own else None),
         "load_bound_percent": round(100 * report.load_bound, 1),
         "load_in_emulator_percent": None if own is None else round(100 * own.load, 1),
-        "poll_gap_bound_cycles": report.gap,
+        "poll_gap_bound_(bytes_wait_in_the_ring)_cycles": report.gap,
         "poll_gap_in_emulator_cycles": own.between_polls if own else None,
-        "receive_ring_needed_bytes": report.ring,
+        "receive_ring_needed_bytes": _of(report.ring, report.ring_holds),
+        "changes_ring_needed": _of(report.changes, report.changes_held),
         "frames_coming_per_tick": round(report.frames_coming, 1),
         "frames_proven_per_tick": round(report.frames_proven, 1),
         "stack_bound_bytes": memory.stack,
@@ -106,6 +108,27 @@ def _sums(report: Report) -> dict[str, Any]:
         "ram_and_stack_bytes": memory.static + memory.stack,
         "flash_bytes": memory.flash,
     }
+
+
+def _of(number: int | None, most: int | None) -> str | None:
+    """A figure beside what there is."""
+    if number is None or most is None:
+        return None if number is None else f"{number:,}"
+    return f"{number:,} of {most:,}"
+
+
+def show_path(path: WorstPath) -> None:
+    """The lines of a worst path; their cycles in sum are the bound."""
+    shown = _table("function")
+    shown.add_column("line")
+    for title in ("cycles", "runs", "passes"):
+        shown.add_column(title, justify="right", no_wrap=True)
+    for row in path.rows:
+        passes = ", ".join(f"{passes:,}" for passes in row.passes)
+        shown.add_row(row.function, row.line or _UNKNOWN, f"{row.cycles:,}", f"{row.runs:,}", passes)
+    console = Console(highlight=False)
+    console.print(Text(f"the worst path of {path.kind} {path.name}: {path.cycles:,} cycles", style="bold"))
+    console.print(shown)
 
 
 def show_verdict(verdict: Verdict) -> None:

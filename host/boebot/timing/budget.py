@@ -11,7 +11,7 @@ slot waiting longer than one of them takes. So what of them the bound can prove 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -170,7 +170,7 @@ class Report:
             found.append(f"whether {self.ring} bytes fit its receive ring is not known: it has no {RECEIVE_RING}")
         if self.changes and self.changes_held is None:
             found.append(f"whether {self.changes} changes fit its ring of them is not known: it has no {CHANGES_RING}")
-        return found
+        return found + _frames_unproven(self)
 
     @property
     def is_met(self) -> bool:
@@ -230,6 +230,7 @@ def prove(
     measured: Measurement | None = None,
     board: Mapping[str, int] | None = None,
     program: Program | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Report:
     """The report of an image.
 
@@ -239,6 +240,7 @@ def prove(
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
         program: the image's, if it has been read already.
+        progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
 
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
@@ -246,7 +248,7 @@ def prove(
     image = read_image(path)
     program = program or program_of(image)
     check_table(path, program)
-    found = costs(program, asked)
+    found = costs(program, asked, progress)
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
@@ -403,6 +405,21 @@ def _measured_broken(report: Report) -> list[str]:
     if report.gap is not None:
         figures.append((f"{own.between_polls} cycles passed between two polls", own.between_polls, report.gap))
     return [_above(f"{says} in the emulator", took, "bound", most) for says, took, most in figures if took > most]
+
+
+def _frames_unproven(report: Report) -> list[str]:
+    """What is known of the frames that the bound leaves no time for."""
+    proven, coming = round(report.frames_proven, 1), round(report.frames_coming, 1)
+    if proven >= coming:
+        return []
+    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick; "
+    if report.own is None:
+        says += "that none of the others is lost is not proven, and nothing was measured"
+    elif any(lost := [report.own.losses.get(kind, 0) for kind in ("frames", "bytes")]):
+        says += f"the emulator lost {lost[0]} frames and {lost[1]} bytes"
+    else:
+        says += "that none of the others is lost is measured, not proven"
+    return [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
 
 
 def _memory_broken(memory: Memory) -> list[str]:

@@ -15,7 +15,7 @@ appends to a name (`.lto_priv.3`) does not matter.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from boebot.errors import TimingError
@@ -128,22 +128,33 @@ def _is_due(row: TaskRow, slot: int) -> bool:
     return slot % row.period == row.phase
 
 
-def costs(program: Program, load: Load) -> Costs:
+def costs(program: Program, load: Load, progress: Callable[[float], None] = lambda _: None) -> Costs:
     """Of an image under a load.
+
+    Args:
+        program: the image's.
+        load: how often its interrupts come.
+        progress: called with the share of tasks and interrupts that are done, 0 to 1.
 
     Raises:
         TimingError: a task or the scheduler is no function, or has no bound.
     """
     worst, table = WorstCase(program), program.table
-    blocked = Blocked(program, worst)
-    interrupts = {row.name: ENTRY + worst.bound(4 * row.vector).cycles for row in table.interrupts}
-    latencies = Latencies(blocked, {row.vector: load.sources(row, 1) for row in table.interrupts})
-    waits = {row.name: latencies.of(row.vector) for row in table.interrupts}
+    tasks, interrupts, waits = {}, {}, {}
+    rows = len(table.tasks) + len(table.interrupts)
+    for done, task in enumerate(table.tasks, 1):
+        tasks[task.name] = worst.bound(task_entry(program, task.name)).cycles
+        progress(done / rows)
+    latencies = Latencies(Blocked(program, worst), {row.vector: load.sources(row, 1) for row in table.interrupts})
+    for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
+        interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
+        waits[row.name] = latencies.of(row.vector)
+        progress(done / rows)
     storm = not load.is_calm(next((waits[row.name] for row in table.interrupts if row.vector == ENCODERS), 0))
     edges = _edges(program, storm)
     loop, scheduler = _rounds(program, edges.nothing)
     return Costs(
-        tasks={row.name: worst.bound(_task(program, row.name)).cycles for row in table.tasks},
+        tasks=tasks,
         interrupts=interrupts,
         charged=_charged(worst, interrupts),
         latencies=waits,
@@ -336,7 +347,12 @@ def _entry(program: Program, name: str) -> int | None:
     return found[0] if len(found) == 1 else None
 
 
-def _task(program: Program, name: str) -> int:
+def task_entry(program: Program, name: str) -> int:
+    """Of the function of a task.
+
+    Raises:
+        TimingError: it is no function.
+    """
     entry = _entry(program, f"{name}_task")
     if entry is None:
         raise TimingError(f"{program.path} has no function {name}_task")

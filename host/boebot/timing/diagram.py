@@ -37,7 +37,7 @@ _LEGEND = {
     "process": "brain",
     "sense": "reading, in hardware of its own",
 }
-_BETWEEN = "#d9dee5"  # scheduler and polls
+_BETWEEN = "#d9dee5"  # the scheduler, before a slot's tasks and between them
 _HEIGHT = 0.66  # of a box, in lanes
 _LANE_IN, _SLOT_IN, _FRAME_IN = 0.24, 0.98, 1.0  # heights
 _APART = 0.024  # of the names of tasks, as a share of the axes
@@ -114,7 +114,7 @@ def _legend(drawn: Figure, kinds: set[str]) -> None:
     from matplotlib.patches import Patch
 
     shown = [Patch(color=_COLOURS[kind], label=label) for kind, label in _LEGEND.items() if kind in kinds]
-    shown.insert(1, Patch(color=_BETWEEN, label="scheduler and polls of the link"))
+    shown.insert(1, Patch(color=_BETWEEN, label=SCHEDULER))
     drawn.legend(handles=shown, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)
 
 

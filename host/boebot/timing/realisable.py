@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from boebot import resources
-from boebot.driving import check_period
+from boebot.driving import check_period, whole_ticks
+from boebot.driving.board import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
 from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
@@ -30,6 +31,7 @@ COMMAND_BYTES = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 BITS_PER_BYTE = 10  # 8N1
 SERVO_FRAME_S = 0.02
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200, 230400, 250000, 500000, 1000000)
+_LONGEST_PERIOD_S = TIME_TO_LIVE_LIMIT_MS / 2500  # of a brain on a board: 2.5 of them have to fit
 _TELEMETRY_TICKS = (1, 2, 5, 10, 20, 50, 100)  # that a slow line leads to (PROTOCOL.md, "Delivery")
 
 
@@ -84,8 +86,8 @@ class Verdict:
     """The answer."""
 
     robot: str
-    asked_s: float  # the period that was asked for
-    period_s: float  # the one that is run: a line may be too slow for telemetry each tick
+    period_s: float  # the one that was asked for
+    forced_s: float  # the one that a forced run takes: the next for which the line brings telemetry
     baud: int  # 0: no line
     events: tuple[Event, ...]
     faults: tuple[str, ...]  # each a sentence without its end: what breaks, and what would mend it
@@ -124,8 +126,8 @@ class Verdict:
         """For programs; units in the keys."""
         return {
             "robot": self.robot,
-            "period_asked_ms": round(self.asked_s * 1000, 3),
             "period_ms": round(self.period_s * 1000, 3),
+            "period_forced_ms": round(self.forced_s * 1000, 3),
             "baud_rate_bit_s": self.baud or None,
             "taken_ms": round(self.seconds * 1000, 4),
             "realisable": self.is_realisable,
@@ -229,7 +231,7 @@ def _of_vehicle(robot: RobotDescription, period_s: float, brain_s: float) -> Ver
 
 def _of_board(
     robot: RobotDescription,
-    asked_s: float,
+    period_s: float,
     board: BoardTimes,
     brain_s: float,
     baud: int | None,
@@ -240,9 +242,9 @@ def _of_board(
     rate = baud if baud is not None else uart.baud if isinstance(uart, Uart) else 500_000
     if rate <= 0:
         raise BoebotError(f"a line of {rate} bit/s is none; expected more than 0")
-    line_ticks = telemetry_ticks(rate, telemetry_bytes)
-    ticks = max(1, math.ceil(asked_s / TICK_S - 1e-6))
-    period_s = -(-ticks // line_ticks) * line_ticks * TICK_S
+    check_time_to_live(period_s)
+    line_s = telemetry_ticks(rate, telemetry_bytes) * TICK_S
+    forced_s = _next_multiple(whole_ticks(period_s, TICK_S) * TICK_S, line_s)
     byte_s = BITS_PER_BYTE / rate
     path = [
         Event("telemetry task", "sense", board.telemetry_s),
@@ -255,9 +257,19 @@ def _of_board(
     events = (*_one_after_another([event for event in path if event.seconds > 0]), *beside)
     slow = [event for event in beside if event.seconds > event.every + 1e-9]
     faults = [_slow_sensor(event, "period_ticks") for event in slow if _is_asked(robot, event.name)]
-    if late := _overfull(events, period_s, None):
-        faults += late + _faster_line(events, period_s, rate, telemetry_bytes + command_bytes)
-    return Verdict(robot.name, asked_s, period_s, rate, events, tuple(faults), _notes(beside, asked_s, period_s, rate))
+    if forced_s > period_s + 1e-9:
+        faults.append(_slow_line(events, period_s, rate, telemetry_bytes, command_bytes))
+    elif late := _overfull(events, period_s, None, line_s):
+        faults += late
+        if faster := _faster_line(events, period_s, rate, telemetry_bytes, command_bytes):
+            faults.append(f"{faster} would do, too")
+    notes = _notes(beside, period_s, forced_s, rate)
+    return Verdict(robot.name, period_s, forced_s, rate, events, tuple(faults), notes)
+
+
+def _next_multiple(period_s: float, grain_s: float) -> float:
+    """The least multiple of `grain_s` that is not shorter."""
+    return math.ceil(period_s / grain_s - 1e-6) * grain_s
 
 
 def _has(robot: RobotDescription, row: SensorRow) -> bool:
@@ -278,11 +290,10 @@ def _is_asked(robot: RobotDescription, name: str) -> bool:
 
 
 def _notes(beside: list[Event], asked_s: float, period_s: float, rate: int) -> tuple[str, ...]:
+    """`period_s`: the one that is run, if need be by force."""
     notes = []
     if period_s > asked_s + 1e-9:
-        notes.append(
-            f"the brain steps every {ms(period_s)}, not every {ms(asked_s)}: at {rate} bit/s telemetry comes no oftener"
-        )
+        notes.append(f"a forced run steps every {ms(period_s)}: at {rate} bit/s telemetry comes no oftener")
     for event in beside:
         if event.seconds > event.every + 1e-9:
             notes.append(
@@ -318,16 +329,18 @@ def _slow_sensor(event: Event, key: str) -> str:
     )
 
 
-def _overfull(events: tuple[Event, ...], period_s: float, own_period: tuple[str, str] | None) -> list[str]:
-    """Which event of those that follow one another does not fit any more, and what would mend that."""
+def _overfull(
+    events: tuple[Event, ...], period_s: float, own_period: tuple[str, str] | None, grain_s: float = TICK_S
+) -> list[str]:
+    """Which event of those that follow one another does not fit any more, and what would mend that; periods are
+    multiples of `grain_s`."""
     path = [event for event in events if not event.beside]
     broken = next((event for event in path if event.end >= period_s - 1e-12), None)
     if broken is None:
         return []
     total = path[-1].end
     longest = max(path, key=lambda event: event.seconds)
-    enough = (math.floor(total / TICK_S + 1e-9) + 1) * TICK_S
-    mend = [f"a period of {ms(enough)}"]
+    mend = [f"a period of {ms(_enough(total, grain_s))}"]
     rest = total - longest.seconds
     if rest < period_s:
         if longest.kind == "process":
@@ -340,10 +353,33 @@ def _overfull(events: tuple[Event, ...], period_s: float, own_period: tuple[str,
     ]
 
 
-def _faster_line(events: tuple[Event, ...], period_s: float, rate: int, line_bytes: int) -> list[str]:
-    """The lowest usual rate at which the line would leave enough time."""
+def _enough(seconds: float, grain_s: float) -> float:
+    """The least period in which so much can happen."""
+    return (math.floor(seconds / grain_s + 1e-9) + 1) * grain_s
+
+
+def _slow_line(events: tuple[Event, ...], period_s: float, rate: int, telemetry_bytes: int, command_bytes: int) -> str:
+    """A line that does not bring telemetry for each step, and what would mend that."""
+    line_s = telemetry_ticks(rate, telemetry_bytes) * TICK_S
+    total = sum(event.seconds for event in events if not event.beside)
+    longer = max(_next_multiple(period_s, line_s), _enough(total, line_s))
+    mend = [f"a period of {ms(longer)}"] if longer <= _LONGEST_PERIOD_S else []
+    if faster := _faster_line(events, period_s, rate, telemetry_bytes, command_bytes):
+        mend.append(faster)
+    return (
+        f"telemetry, {telemetry_bytes} B, comes every {ms(line_s)} over a line of {rate} bit/s, which a step every "
+        f"{ms(period_s)} does not go with; expected {' or '.join(mend) or 'a faster line'}"
+    )
+
+
+def _faster_line(
+    events: tuple[Event, ...], period_s: float, rate: int, telemetry_bytes: int, command_bytes: int
+) -> str | None:
+    """The lowest usual rate at which there is telemetry for each step, and time enough."""
     rest = sum(event.seconds for event in events if not event.beside and event.kind != "line")
     for faster in BAUD_RATES:
-        if faster > rate and rest + line_bytes * BITS_PER_BYTE / faster < period_s:
-            return [f"a line of {faster} bit/s would do, too"]
-    return []
+        line_s = telemetry_ticks(faster, telemetry_bytes) * TICK_S
+        bytes_s = (telemetry_bytes + command_bytes) * BITS_PER_BYTE / faster
+        if faster > rate and _next_multiple(period_s, line_s) <= period_s + 1e-9 and rest + bytes_s < period_s:
+            return f"a line of {faster} bit/s"
+    return None

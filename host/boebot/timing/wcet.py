@@ -68,7 +68,8 @@ class WorstCase:
         if key not in self._bounds:
             if entry in self._under_way:
                 names = [self.program.functions[each].name for each in self._under_way]
-                chain = " calls ".join([*names[self._under_way.index(entry) :], self.program.functions[entry].name])
+                around = names[self._under_way.index(entry) :]
+                chain = " calls ".join([*around, around[0] if around[1:] else "itself"])
                 raise TimingError(
                     f"recursion at {self.program.where(entry)}: {chain}; expected functions that do not call themselves"
                 )
