@@ -99,6 +99,7 @@ def _sums(report: Report) -> dict[str, Any]:
         "poll_gap_bound_(bytes_wait_in_the_ring)_cycles": report.gap,
         "poll_gap_in_emulator_cycles": own.between_polls if own else None,
         "receive_ring_needed_bytes": _of(report.ring, report.ring_holds),
+        "changes_ring_needed": _of(report.changes, report.changes_held),
         "frames_coming_per_tick": round(report.frames_coming, 1),
         "frames_proven_per_tick": round(report.frames_proven, 1),
         "stack_bound_bytes": memory.stack,

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from boebot.timing.blocked import WAKE
+from boebot.timing.changes import CHANGE_BYTES, CHANGES_RING
+from boebot.timing.changes import of_image as changes_of
 from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
 from boebot.timing.graph import program_of
@@ -92,6 +94,8 @@ class Report:
     gap: int | None  # cycles between two polls of the link, while slots wait
     ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
     ring_holds: int | None  # bytes for which it has room; None: the image has no such ring
+    changes: int | None  # of the encoders' lines, that wait in their ring at most; None also: no encoders
+    changes_held: int | None  # for which it has room; None: the image has no such ring
     taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
     frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
@@ -164,6 +168,8 @@ class Report:
         ]
         if self.ring and self.ring_holds is None:
             found.append(f"whether {self.ring} bytes fit its receive ring is not known: it has no {RECEIVE_RING}")
+        if self.changes and self.changes_held is None:
+            found.append(f"whether {self.changes} changes fit its ring of them is not known: it has no {CHANGES_RING}")
         return found + _frames_unproven(self)
 
     @property
@@ -199,6 +205,8 @@ class Report:
             "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
             "receive_ring_bytes": self.ring_holds,
+            "changes_ring_needed_entries": self.changes,
+            "changes_ring_entries": self.changes_held,
             "frame_bound_cycles": self.frames.cycles,
             "frame_taken_bound_cycles": self.taken,
             "edge_age_bound_cycles": self.edge_age,
@@ -260,6 +268,8 @@ def prove(
         gap=gap,
         ring=ring,
         ring_holds=image.variables[RECEIVE_RING] - 1 if RECEIVE_RING in image.variables else None,
+        changes=None if answers is None else changes_of(program, found, schedule, asked),
+        changes_held=image.variables[CHANGES_RING] // CHANGE_BYTES - 1 if CHANGES_RING in image.variables else None,
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
@@ -374,6 +384,10 @@ def _tick_broken(report: Report) -> list[str]:
         )
     if report.ring is not None and report.ring_holds is not None and report.ring > report.ring_holds:
         found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {report.ring_holds}")
+    if report.changes is not None and report.changes_held is not None and report.changes > report.changes_held:
+        found.append(
+            f"ring of changes: {report.changes} may wait for a poll of the encoders; it holds {report.changes_held}"
+        )
     if report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
         found.append(f"the time of an edge may be asked for after {report.edge_age} cycles; its stamp has 16 bits")
     return found

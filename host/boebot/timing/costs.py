@@ -73,9 +73,13 @@ class Costs:
     other: int  # more, when it is the light sensor's
     storm: int  # more, to stop a line that comes too often; 0: under this load none does
 
+    def requested(self, program: Program, load: Load) -> list[Source]:
+        """The interrupts under a load."""
+        return [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
+
     def sources(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load, and the edges that they leave to the main loop."""
-        found = [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
+        found = self.requested(program, load)
         if self.change:
             found += [replace(one, name="edges worked off") for one in self._changes(program, load, self.change)]
             found += [Source("light's edge worked off", self.other, 2 * TICK)] if self.other else []
@@ -245,7 +249,7 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
     """One pass of the main loop at most, and the scheduler in it around a slot's tasks, with so many cycles to look for
     edges: of the scheduler its longest way, of the loop around it every block once.
 
-    The scheduler's own loop drops ticks when it has fallen behind. Where it has not (DROPS_FROM), it is not passed.
+    The scheduler's only loop drops ticks when it has fallen behind. Where it has not (DROPS_FROM), it is not passed.
     """
     scheduler = _entry(program, SCHEDULER)
     if scheduler is None:
@@ -255,7 +259,8 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
     names = (*(f"{row.name}_task" for row in program.table.tasks), *AROUND_TASK)
     elsewhere = dict.fromkeys(_entries(program, names), 0)
     polls = dict.fromkeys(_entries(program, (ENCODER_POLL, LINK_POLL)), edges)
-    cycles = Given(_passed(program, scheduler, 0), elsewhere | polls).bound(scheduler).cycles
+    alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
+    cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
     loop = _entry(program, LOOP)
     if loop is None:
