@@ -8,25 +8,19 @@ age that the row has to hold, and the next telemetry, a tick later at most, show
 
 from __future__ import annotations
 
-import heapq
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from boebot import resources
-from boebot.link import messages
 from boebot.link.messages import Devices, DevicesTelemetry, Telemetry
 from boebot.timing.table import read_table
 from hil_tests.device_bench import SLICE, TwoWireDevice
-from sim_bridge.boards import avr
-from sim_bridge.boards.board import BoardAccess, Level
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, Bench, Ping, wheels
+from hil_tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Surroundings
+from sim_bridge.boards.board import Level
+from sim_bridge.timing.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, wheels
 
 pytestmark = pytest.mark.emulated
 
@@ -37,7 +31,6 @@ ROWS = {row.name: row for row in read_table(IMAGE).sensors}
 SECONDS = 8.0  # of the board's time
 TELEMETRY_US = TICK_CYCLES // CYCLES_PER_US  # from one telemetry to the next
 JITTER_US = 1_000  # of a telemetry's first byte: what else its slot does, more in one tick than in the next
-PROBE_CYCLES = 1_600_000  # 0.1 s: a session lives as long as it hears of us
 WHISKER, RECEIVER, PING = 5, 10, 8
 LEDS = (9, 2)  # left and right, infra-red
 LIGHTS = (15, 6)
@@ -51,181 +44,15 @@ ADCSRA, ADSC = 0x7A, 0x40  # data sheet, 24.9.2: the bit is set while a conversi
 ADC_CLOCK_US = 8  # 125 kHz
 
 
-@dataclass
-class Stimulus:
-    """What one sensor sees: one of two states; when it changed into which."""
-
-    period: int
-    """cycles between two changes: longer than the age, and what remains of the sensor's period sweeps it"""
-    apply: Callable[[bool], None]
-    changes: list[tuple[int, bool]] = field(default_factory=lambda: [(0, False)])
-
-    def at(self, cycle: int) -> bool:
-        """The state at that time."""
-        return self.changes[bisect_right(self.changes, cycle, key=lambda change: change[0]) - 1][1]
-
-    @property
-    def now(self) -> bool:
-        """The newest state."""
-        return self.changes[-1][1]
-
-
-class Surroundings:
-    """A board on a bench, and what is around it; everything happens at the cycle for which it is due."""
-
-    def __init__(self, elf: Any = IMAGE) -> None:
-        self.board: BoardAccess = avr.create(elf).access()
-        self.bench = Bench(elf, self.board)
-        self.line = Line(self.bench)
-        self.stimuli: dict[str, Stimulus] = {}
-        self._due: list[tuple[int, int, Callable[[], None]]] = []
-        self._number = 0
-
-    def begin(self, devices: Devices) -> None:
-        """Opens a session with those devices on, each told as often as it can be."""
-        self.line.open()
-        self.line.set("devices", int(devices))
-        if devices & Devices.BATTERY:
-            self.line.set("devices_period", 1)
-        self.bench.run(20 * TICK_CYCLES)
-        self.each(self.bench.now + PROBE_CYCLES, PROBE_CYCLES, lambda: self.line.send(messages.ClockProbe(0)))
-
-    def at(self, cycle: int, action: Callable[[], Any]) -> None:
-        """Does something at that time."""
-        self._number += 1
-        heapq.heappush(self._due, (cycle, self._number, action))
-
-    def each(self, first: int, period: int, action: Callable[[], Any]) -> None:
-        """Does something again and again."""
-
-        def once(cycle: int) -> None:
-            action()
-            self.at(cycle + period, lambda: once(cycle + period))
-
-        self.at(first, lambda: once(first))
-
-    def change(self, name: str, first: int, period: int, apply: Callable[[bool], None]) -> None:
-        """Changes what a sensor sees, again and again."""
-        self.stimuli[name] = stimulus = Stimulus(period, apply)
-
-        def other() -> None:
-            stimulus.changes.append((self.bench.now, not stimulus.now))
-            apply(stimulus.now)
-
-        self.each(first, period, other)
-
-    def run(self, seconds: float, advance: Callable[[int], None] | None = None) -> None:
-        """Lets time pass."""
-        end = self.bench.now + round(seconds * 16e6)
-        while self._due and self._due[0][0] < end:
-            cycle, _, action = heapq.heappop(self._due)
-            (advance or self.bench.run_until)(cycle)
-            action()
-        (advance or self.bench.run_until)(end)
-
-    def ages(self, name: str, kind: type, shows: Callable[[Any, bool], bool]) -> Ages:
-        """Of all changes of a stimulus, by the telemetry of that kind. `shows(message, state)`: it is of that state
-        alone."""
-        told = [heard for heard in self.line.heard if isinstance(heard.message, kind)]
-        firsts = [heard.first for heard in told]
-        changes = self.stimuli[name].changes[1:]
-        ages, delays = [], []
-        for (cycle, state), (until, _) in pairwise(changes):
-            since = told[bisect_right(firsts, cycle) : bisect_right(firsts, until)]
-            old = [number for number, heard in enumerate(since) if not shows(heard.message, state)]
-            shown = old[-1] + 1 if old else 0
-            assert shown < len(since), f"{name}: a change was never told"
-            ages.append((since[shown - 1].first - cycle) / CYCLES_PER_US if old else 0.0)
-            delays.append((since[shown].first - cycle) / CYCLES_PER_US)
-        return Ages(name, np.array(ages), np.array(delays))
-
-
-@dataclass
-class Ages:
-    """us from each change to the last telemetry that did not show it, and to the first that did."""
-
-    name: str
-    ages: np.ndarray
-    delays: np.ndarray
-
-    def check(self, row: str, share: float) -> None:
-        """Against the row; the sweep has to find that share of it."""
-        most = ROWS[row].age
-        print(f"{row}: row {most} us, measured {self.ages.max():.0f} us, to telemetry {self.delays.max():.0f} us")
-        assert len(self.ages) >= 15
-        assert self.ages.max() <= most
-        assert self.delays.max() <= most + TELEMETRY_US
-        assert self.delays.max() <= self.ages.max() + TELEMETRY_US + JITTER_US, "telemetry was left out"
-        assert self.ages.max() >= share * most, "the row says nothing"
-
-
-class RangeFinder(Ping):
-    """Answers a trigger with the echo of what is there at that time."""
-
-    def __init__(self, pin: int, stimulus: Stimulus, lengths: tuple[int, int]) -> None:
-        super().__init__(pin)
-        self.stimulus, self.lengths = stimulus, lengths  # us
-
-    def _answer(self, bench: Bench, triggered: int) -> None:
-        if self.echoes and triggered < self.echoes[-1][1]:
-            return
-        rise = triggered + ECHO_DELAY_CYCLES
-        fall = rise + self.lengths[self.stimulus.at(triggered)] * CYCLES_PER_US
-        bench.access.drive(self.pin, Level.HIGH, at=rise)
-        bench.access.drive(self.pin, Level.LOW, at=fall)
-        self.echoes.append((rise, fall))
-
-
-class LightSensor:
-    """A capacitor that the board charges and the light discharges; `decays`: us, in either light."""
-
-    def __init__(self, pin: int, decays: tuple[int, int]) -> None:
-        self.pin, self.decays = pin, [us * CYCLES_PER_US for us in decays]
-        self.bright = False
-        self._seen = 0
-        self._left, self._since = 0.0, 0  # charge, of 1, and when it was that
-        self._falls: int | None = None
-
-    def queue(self, bench: Bench, until: int) -> None:
-        """See Source. A decay takes longer than a slice."""
-        del until
-        for edge in bench.edges[self.pin][self._seen :]:
-            self._seen += 1
-            if edge.level == Level.HIGH:
-                self._falls = None
-                bench.access.drive(self.pin, Level.HIGH)
-            else:
-                self._left, self._since = 1.0, edge.cycle
-                self._fall(bench)
-
-    def shine(self, bench: Bench, bright: bool) -> None:
-        """The light changes; what is left of the charge goes at the new rate."""
-        self.queue(bench, bench.now)
-        if self._falls is not None and bench.now < self._falls:
-            self._left -= (bench.now - self._since) / self.decays[self.bright]
-            self._since, self.bright = bench.now, bright
-            self._fall(bench)
-        self.bright = bright
-
-    def _fall(self, bench: Bench) -> None:
-        self._falls = self._since + round(self._left * self.decays[self.bright])
-        bench.access.drive(self.pin, Level.LOW, at=self._falls)
-
-
-class Held:
-    """A sensor with a clock of its own: what was there when a measurement began comes out `late` cycles after its end,
-    and stays until the next one does."""
-
-    def __init__(
-        self, around: Surroundings, name: str, first: int, timing: tuple[int, int], out: Callable[[bool], None]
-    ) -> None:
-        period, late = timing
-        self._around, self._name, self._out, self._takes = around, name, out, period + late
-        around.each(first, period, self._measure)
-
-    def _measure(self) -> None:
-        state = self._around.stimuli[self._name].now
-        self._around.at(self._around.bench.now + self._takes, lambda: self._out(state))
+def check(found: Ages, row: str, share: float) -> None:
+    """Against the row; the sweep has to find that share of it."""
+    most = ROWS[row].age
+    print(f"{row}: row {most} us, measured {found.ages.max():.0f} us, to telemetry {found.delays.max():.0f} us")
+    assert len(found.ages) >= 15
+    assert found.ages.max() <= most
+    assert found.delays.max() <= most + TELEMETRY_US
+    assert found.delays.max() <= found.ages.max() + TELEMETRY_US + JITTER_US, "telemetry was left out"
+    assert found.ages.max() >= share * most, "the row says nothing"
 
 
 DECAYS_US = (13_000, 2_000)
@@ -236,7 +63,7 @@ BATTERY_V, SHARP_V, SUPPLY_V = (1.0, 3.0), (0.4, 2.4), (5.0, 4.6)
 @pytest.fixture(scope="module")
 def around() -> Iterator[Surroundings]:
     """All sensors of the map but the compass, each of its own."""
-    here = Surroundings()
+    here = Surroundings(IMAGE)
     bench, board = here.bench, here.board
     for pin in (WHISKER, 7, RECEIVER, 3):
         board.drive(pin, Level.HIGH)
@@ -281,22 +108,22 @@ def volts(told: int) -> float:
 
 
 def test_whiskers(around: Surroundings) -> None:
-    around.ages("whiskers", Telemetry, lambda told, on: bool(told.whiskers & 1) == on).check("whiskers", 0.5)
+    check(around.ages("whiskers", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whiskers", 0.5)
 
 
 def test_infrared(around: Surroundings) -> None:
     """The left receiver, which is looked at first."""
-    around.ages("receiver", Telemetry, lambda told, on: bool(told.infrared & 1) == on).check("infrared", 0.9)
+    check(around.ages("receiver", Telemetry, lambda told, on: bool(told.infrared & 1) == on), "infrared", 0.9)
 
 
 def test_infrared_zone(around: Surroundings) -> None:
     found = around.ages("receiver", DevicesTelemetry, lambda told, on: bool(told.infrared_zone_left == (0, 5)[on]))
-    found.check("infrared_zone", 0.9)
+    check(found, "infrared_zone", 0.9)
 
 
 def test_ping(around: Surroundings) -> None:
     """Echoes as late as they come."""
-    around.ages("ping", Telemetry, lambda told, on: abs(told.ping_echo - ECHOES_US[on]) <= 1).check("ping", 0.9)
+    check(around.ages("ping", Telemetry, lambda told, on: abs(told.ping_echo - ECHOES_US[on]) <= 1), "ping", 0.9)
 
 
 def test_analog_infrared(around: Surroundings) -> None:
@@ -304,18 +131,18 @@ def test_analog_infrared(around: Surroundings) -> None:
     found = around.ages(
         "analog_infrared", DevicesTelemetry, lambda told, on: is_of(volts(told.analog_infrared), SHARP_V, on)
     )
-    found.check("analog_infrared", 0.9)
+    check(found, "analog_infrared", 0.9)
 
 
 def test_battery(around: Surroundings) -> None:
     found = around.ages("battery", DevicesTelemetry, lambda told, on: is_of(volts(told.battery), BATTERY_V, on))
-    found.check("battery", 0.5)
+    check(found, "battery", 0.5)
 
 
 def test_supply(around: Surroundings) -> None:
     """The row is of the worst slot that the bandgap's conversion may have come to; here it is that of the start."""
     found = around.ages("supply", Telemetry, lambda told, on: is_of(told.supply / 1000, SUPPLY_V, on))
-    found.check("supply", 0.5)
+    check(found, "supply", 0.5)
 
 
 def test_light(around: Surroundings) -> None:
@@ -324,7 +151,7 @@ def test_light(around: Surroundings) -> None:
     def shows(told: DevicesTelemetry, on: bool) -> bool:
         return all(abs(us - DECAYS_US[on]) <= 20 for us in (told.light_left, told.light_right))
 
-    around.ages("light", DevicesTelemetry, shows).check("light", 0.9)
+    check(around.ages("light", DevicesTelemetry, shows), "light", 0.9)
 
 
 def test_encoders() -> None:
@@ -359,7 +186,7 @@ def test_encoders() -> None:
 
 def test_compass() -> None:
     """A module that measures by its own clock; each transfer takes what its registers hold."""
-    around = Surroundings()
+    around = Surroundings(IMAGE)
     bench = around.bench
     try:
         device = TwoWireDevice(around.board, 0x1E)
@@ -389,7 +216,7 @@ def test_compass() -> None:
         found = around.ages("compass", DevicesTelemetry, lambda told, on: bool(told.compass_x == told_x[on]))
     finally:
         bench.close()
-    found.check("compass", 0.85)
+    check(found, "compass", 0.85)
 
 
 # ---- how long a reading takes in hardware ----------------------------------------------------------------------------
@@ -406,9 +233,7 @@ def test_infrared_takes_two_bursts_and_a_zone_five_of_both(around: Surroundings)
     left, right = (bursts(around, pin) for pin in LEDS)
     ends = [end for _, end in right]
     one = {round((ends[bisect_right(ends, begin)] - begin) / CYCLES_PER_US) for begin, _ in left[5:-5]}
-    assert max(abs(us - ROWS["infrared"].conversion) for us in one) <= 2 * 13, (
-        "but for half a period of the carrier at each end"
-    )
+    assert max(abs(us - ROWS["infrared"].conversion) for us in one) <= 2 * 13, "a half period at each end"
     five = {round((ends[bisect_right(ends, left[n][0]) + 4] - left[n][0]) / CYCLES_PER_US) for n in range(20, 120)}
     print(f"infrared: {min(one)} to {max(one)} us, five: {min(five)} to {max(five)} us")
     assert max(abs(us - ROWS["infrared_zone"].conversion) for us in five) <= 2 * 13
@@ -426,7 +251,7 @@ def test_ping_takes_trigger_hold_off_and_echo(around: Surroundings) -> None:
 
 def test_analog_conversions_take_13_of_the_converters_clocks() -> None:
     """From the bit's setting to its clearing, which waits for the clock's next edge (data sheet, 24.4)."""
-    around = Surroundings()
+    around = Surroundings(IMAGE)
     try:
         around.begin(Devices.BATTERY)
         began, spans = None, []
@@ -452,7 +277,7 @@ def test_analog_conversions_take_13_of_the_converters_clocks() -> None:
 @pytest.mark.parametrize("decay_us", [13_900, 16_000])
 def test_light_takes_its_longest_decay(decay_us: int) -> None:
     """All of it is waited for, and no more is told."""
-    around = Surroundings()
+    around = Surroundings(IMAGE)
     try:
         around.begin(Devices.LIGHT | Devices.BATTERY)
         around.bench.sources += [LightSensor(pin, (decay_us, decay_us)) for pin in LIGHTS]
