@@ -30,4 +30,4 @@ cd build/sanitized/lib
 LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0:malloc_context_size=4 PYTHONMALLOC=malloc BOEBOT_SANITIZED=1 \
   "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" sim_bridge/tests \
   -k "not schema_and_page and not example_of_the_reference and not every_compiler and not threads_end and not ctrl_c \
-      and not averaging and not served and not do_not_depend_on_steps and not the_example and not dropped_are_freed"
+      and not averaging and not continuous_mode and not served and not do_not_depend_on_steps and not the_example and not dropped_are_freed"

@@ -117,8 +117,8 @@ LOADS: dict[str, Load] = {
     ),
     "saturated": Load(
         "saturated",
-        "the same with frames of 15 and 16 bytes back to back (longer ones would be fewer), 50,000 bytes/s each way, four "
-        "encoder lines of 4,000 edges/s",
+        "the same with frames of 15 and 16 bytes back to back (longer ones would be fewer), 50,000 bytes/s each way, "
+        "four encoder lines of 4,000 edges/s",
         {
             RECEIVE: (Stream(BYTE),),
             SEND: (Stream(BYTE),),
