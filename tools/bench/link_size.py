@@ -1,27 +1,30 @@
 """Flash and RAM of the link's modules in the linked image: `python -m tools.bench.link_size`.
 
-The image is built once more with debugging information, which changes nothing of it, and each of its
-symbols is counted for the source file (DWARF compilation unit) that defines it: functions, tables in
-flash, variables, and what initialises them. What a compiler inlines elsewhere counts there. What all
-of the firmware shares (the C library, the code that saves registers) belongs to no module.
+The image is built once more with debugging information, which changes nothing of it. Code counts for the
+source file of its line, wherever the compiler has put it, for the program is optimised as a whole; tables
+in flash, variables and what initialises them for the file that declares them. What all of the firmware
+shares (the C library, the code that saves registers) belongs to no module.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from elftools.dwarf.die import DIE
 from elftools.dwarf.dwarf_expr import DWARFExprParser
+from elftools.dwarf.lineprogram import LineProgram
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import Symbol, SymbolTableSection
 
 from tools.bench.avr_program import SOURCES, build
 
-FRAME = ("link/frame.c",)
+FRAME = ("link/frame.c", "link/crc21.h", "link/cobs.h")
 DELIVERY = ("link/send.c", "link/requests.c", "link/events.c")
 SESSION = ("link/session.c", "link/link.c")
 COUNTED = FRAME + DELIVERY + SESSION  # what the 3 KB are for
@@ -36,6 +39,7 @@ BESIDE = (
 RINGS = ("hal_receive_ring", "hal_send_ring")
 DATA_SPACE = 0x800000  # where the linker puts RAM
 ADDRESS = 0x03  # DW_OP_addr
+STEMS_FROM = {"DW_AT_abstract_origin", "DW_AT_specification"}
 
 
 @dataclass(frozen=True)
@@ -47,27 +51,51 @@ class Size:
 
 
 def _files(elf: ELFFile) -> dict[int, str]:
-    """By address of a function or variable: the source file that defines it, from SOURCES on."""
+    """By address of a variable or table: the source file that declares it, from SOURCES on."""
     dwarf = elf.get_dwarf_info()
     found: dict[int, str] = {}
     for unit in dwarf.iter_CUs():
-        expressions = DWARFExprParser(unit.structs)
-        top = unit.get_top_DIE()
-        source = top.attributes.get("DW_AT_name")
-        path = Path(source.value.decode() if source else "").resolve()
-        if not path.is_relative_to(SOURCES):
-            continue  # a library
-        name = path.relative_to(SOURCES).as_posix()
+        expressions, lines = DWARFExprParser(unit.structs), dwarf.line_program_for_CU(unit)
         for entry in unit.iter_DIEs():
-            if entry.tag == "DW_TAG_subprogram" and "DW_AT_low_pc" in entry.attributes:
-                found[entry.attributes["DW_AT_low_pc"].value] = name
-            elif entry.tag == "DW_TAG_variable" and "DW_AT_location" in entry.attributes:
-                location = entry.attributes["DW_AT_location"]
-                if location.form == "DW_FORM_exprloc":
-                    operation = expressions.parse_expr(location.value)[0]
-                    if operation.op == ADDRESS:
-                        found[operation.args[0]] = name
+            address = _address(entry, expressions)
+            if address is None or lines is None:
+                continue
+            while (reference := STEMS_FROM & entry.attributes.keys()) and "DW_AT_decl_file" not in entry.attributes:
+                entry = entry.get_DIE_from_attribute(min(reference))
+            if (number := entry.attributes.get("DW_AT_decl_file")) is not None:
+                found[address] = _file(lines, number.value)
     return found
+
+
+def _file(lines: LineProgram, number: int) -> str:
+    """From SOURCES on; "": one of a library."""
+    file = lines["file_entry"][number - 1]
+    path = Path(lines["include_directory"][file.dir_index - 1].decode()) / file.name.decode()
+    return path.relative_to(SOURCES).as_posix() if path.is_relative_to(SOURCES) else ""
+
+
+def _code(elf: ELFFile) -> Counter[str]:
+    """Bytes of code by source file."""
+    dwarf = elf.get_dwarf_info()
+    found: Counter[str] = Counter()
+    for unit in dwarf.iter_CUs():
+        lines = dwarf.line_program_for_CU(unit)
+        if lines is None:
+            continue
+        rows = [entry.state for entry in lines.get_entries() if entry.state is not None]
+        for row, following in itertools.pairwise(rows):
+            if not row.end_sequence:
+                found[_file(lines, row.file)] += following.address - row.address
+    return found
+
+
+def _address(entry: DIE, expressions: DWARFExprParser) -> int | None:
+    """Of a variable; None: of anything else, or of one without a place of its own."""
+    if entry.tag != "DW_TAG_variable" or "DW_AT_location" not in entry.attributes:
+        return None
+    location = entry.attributes["DW_AT_location"]
+    operation = expressions.parse_expr(location.value)[0] if location.form == "DW_FORM_exprloc" else None
+    return int(operation.args[0]) if operation is not None and operation.op == ADDRESS else None
 
 
 def _symbols(elf: ELFFile) -> Iterator[Symbol]:
@@ -107,12 +135,11 @@ def _sizes(elf: ELFFile) -> dict[str, Size]:
     files, tables = _files(elf), _modules_of_tables(elf)
     by_name = {Path(name).name: name for name in files.values()}
     initialised = _span(elf, ".data")
-    flash: Counter[str] = Counter()
-    ram: Counter[str] = Counter()
+    flash, ram = _code(elf), Counter[str]()
     seen = set()
     for symbol in _symbols(elf):
         address, size = symbol["st_value"], symbol["st_size"]
-        if not size or symbol.name in RINGS or address in seen or symbol["st_info"]["type"] == "STT_SECTION":
+        if not size or symbol.name in RINGS or address in seen or symbol["st_info"]["type"] != "STT_OBJECT":
             continue
         seen.add(address)
         module = files.get(address) or by_name.get(tables.get(address, ""), "")
