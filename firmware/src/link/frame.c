@@ -18,7 +18,7 @@ static inline crc21 crc_from(uint32_t aligned) {
 static inline crc21 crc_start(uint32_t seed) { return crc_from(crc21_align(seed)); }
 
 /* The seed of a message, aligned; above 24 bits: none, for there is no session. */
-static __attribute__((noinline)) uint32_t aligned_seed(uint8_t id, uint32_t session) {
+static inline __attribute__((always_inline)) uint32_t aligned_seed(uint8_t id, uint32_t session) {
   return crc21_align(message_is_handshake(id) ? FRAME_SEED : session);
 }
 _Static_assert(FRAME_NO_SESSION > 0xFFFFFFul && FRAME_SEED_MAX << 3 <= 0xFFFFFFul, "seeds and none");
@@ -56,7 +56,8 @@ static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t 
     return false;
   }
   const uint8_t id = bytes[1];
-  if ((uint8_t)frame_accepted_length(id) != (uint8_t)(count - INSIDE_MIN)) {
+  const uint8_t off = (uint8_t)((uint8_t)frame_accepted_length(id) - (uint8_t)(count - INSIDE_MIN));
+  if (off != 0) {
     return false;
   }
   const uint32_t seed = decoder->seed;
