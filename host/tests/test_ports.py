@@ -452,25 +452,25 @@ def test_forbidden_file_says_so(tmp_path: Path) -> None:
 # ---- TCP ------------------------------------------------------------------------------------------------------------
 
 
-def test_socket_carries_bytes_both_ways() -> None:
-    for host in ("127.0.0.1", "[::1]"):
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        try:
-            server = socket.create_server((host.strip("[]"), 0), family=family)
-        except OSError:
-            pytest.skip("no IPv6 here")
-        with server:
-            transport = open_port(f"socket://{host}:{server.getsockname()[1]}", 500_000)
-            connection, _ = server.accept()
-            transport.write(b"there\0\xff")
-            assert connection.recv(100) == b"there\0\xff"
-            connection.sendall(b"back")
-            assert transport.read(1.0) == b"back"
-            assert transport.read(0.01) == b""
-            assert isinstance(transport, Stamping) and not isinstance(transport, BaudSelectable)
-            transport.close()
-            assert connection.recv(100) == b""
-            connection.close()
+@pytest.mark.parametrize(("host", "family"), [("127.0.0.1", socket.AF_INET), ("[::1]", socket.AF_INET6)])
+def test_socket_carries_bytes_both_ways(host: str, family: socket.AddressFamily) -> None:
+    try:
+        server = socket.create_server((host.strip("[]"), 0), family=family)
+    except OSError:
+        assert family == socket.AF_INET6
+        pytest.skip("this machine has no IPv6")
+    with server:
+        transport = open_port(f"socket://{host}:{server.getsockname()[1]}", 500_000)
+        connection, _ = server.accept()
+        transport.write(b"there\0\xff")
+        assert connection.recv(100) == b"there\0\xff"
+        connection.sendall(b"back")
+        assert transport.read(1.0) == b"back"
+        assert transport.read(0.01) == b""
+        assert isinstance(transport, Stamping) and not isinstance(transport, BaudSelectable)
+        transport.close()
+        assert connection.recv(100) == b""
+        connection.close()
 
 
 def free_port() -> int:

@@ -45,42 +45,19 @@ def bounds() -> float:
     return time.process_time() - started
 
 
-@figure(
-    "timing: untouched image recorded at the figures' load",
-    "× real time",
-    at_least=10,
-    peers=[Peer("the same, not recorded", partial(_unrecorded, "figures"))],
-    rounds=3,
-)
-def recorded_figures() -> float:
-    return _speed("figures")
-
-
-@figure(
-    "timing: untouched image recorded, line full both ways",
-    "× real time",
-    at_least=10,
-    peers=[Peer("the same, not recorded", partial(_unrecorded, "saturated"))],
-    rounds=3,
-)
-def recorded_saturated() -> float:
-    return _speed("saturated")
+for _scenario, _when in (("figures", " at the figures' load"), ("saturated", ", line full both ways")):
+    figure(
+        f"timing: untouched image recorded{_when}",
+        "× real time",
+        at_least=10,
+        peers=[Peer("the same, not recorded", partial(_unrecorded, _scenario))],
+        rounds=3,
+    )(partial(_speed, _scenario))
 
 
 def _load(pin_map: str) -> float:
     return 100.0 * _recorded(pin_map, "figures").measurement().load
 
 
-@figure("timing: CPU load at the figures, boebot", "% of its cycles", at_most=40)
-def load_boebot() -> float:
-    return _load("boebot")
-
-
-@figure("timing: CPU load at the figures, shieldbot", "% of its cycles", at_most=40)
-def load_shieldbot() -> float:
-    return _load("shieldbot")
-
-
-@figure("timing: CPU load at the figures, shieldbot-quad", "% of its cycles", at_most=40)
-def load_quad() -> float:
-    return _load("shieldbot-quad")
+for _pin_map in ("boebot", "shieldbot", "shieldbot-quad"):
+    figure(f"timing: CPU load at the figures, {_pin_map}", "% of its cycles", at_most=40)(partial(_load, _pin_map))

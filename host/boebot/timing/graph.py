@@ -27,11 +27,11 @@ from boebot.timing.elf import Image, Symbol, read_image
 from boebot.timing.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
 from boebot.timing.jumps import NotProvenError, Step, targets_of
 from boebot.timing.program import Block, Edge, Function, Instruction, Program
+from boebot.timing.registers import REGISTERS
 from boebot.timing.split import reducible
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
-REGISTERS = 32  # at data addresses 0 to 31
 CORE = {0x5D: "the stack pointer", 0x5E: "the stack pointer", 0x5F: "SREG"}  # data addresses
 
 

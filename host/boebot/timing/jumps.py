@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 
 from boebot.timing.instructions import BRANCHES, SKIPS
 from boebot.timing.program import Instruction
+from boebot.timing.registers import REGISTERS, ZERO
 
 Values = NDArray[np.int64]  # of one term, one for each choice of the unknown bytes
 LONGEST_WAY = 64  # instructions
 MOST_UNKNOWN = 2  # bytes: 65,536 choices
 MOST_PLACES = 255  # an index of one byte has 256 values when nothing limits it: this is no proof
-ZERO_REGISTER = 1
 Z = 30
-REGISTERS = 32
 SREG = 0x3F  # I/O address
 # Neither registers nor the flags C and Z change.
 INERT = frozenset(("nop", "std", "push", "cbi", "sbi", "sei", "cli", "wdr", "sleep", "bst", "jmp", "rjmp", "ijmp"))
@@ -144,7 +143,7 @@ class _Machine:
 
     def _forget(self) -> None:
         self._registers = [self._new() for _ in range(REGISTERS)]
-        self._registers[ZERO_REGISTER] = _constant(0)
+        self._registers[ZERO] = _constant(0)
         self._forget_flags()
 
     def _forget_flags(self) -> None:

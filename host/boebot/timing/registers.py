@@ -14,6 +14,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
+REGISTERS = 32  # at data addresses 0 to 31
 ZERO = 1  # holds zero wherever compiled code does not multiply
 CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
 NO_RESULT = _words(
