@@ -210,7 +210,7 @@ def full_lines(
     rows = {row.vector: row for row in program.table.interrupts}
     if not asked.is_full or not kinds or RECEIVE not in rows or SEND not in rows:
         return FullLines()
-    alone = asked.unanswered()
+    alone = asked.without_answers()
     sources = (*found.sources(program, alone), *found.between(program, alone))
     left = background(schedule, sources)
     free = 1 - sum(float(one.load) for one in _bytes(rows[SEND], alone)) * asked.byte_interval
