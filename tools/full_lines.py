@@ -10,6 +10,7 @@ import argparse
 import sys
 from collections.abc import Iterator
 
+from rich import box
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -36,32 +37,34 @@ def broken(line: FullLine, seen: Carried, is_proven: bool) -> Iterator[str]:
 
 
 def judge(image: str, seconds: float, seed: int, console: Console) -> int:
-    """Shows what came of each message in an image; how many sentences are broken."""
+    """Shows what came of each message in an image, what was seen before its bound; how many bounds are broken."""
     elf = resources.folder("images") / f"{image}.elf"
     report = prove(elf, LOADS["saturated"])
     lines = {line.cost.id: line for line in report.lines.lines}
-    shown = Table(title=image)
-    for title in ("a line full of", "come", "worked off", "", "poll", "seen", "ring", "seen", "lost", "broken"):
-        shown.add_column(title, justify="left" if title == "a line full of" else "right")
-    count = 0
+    shown = Table(title=image, box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    shown.add_column("a line full of", no_wrap=True)
+    for title in ("come", "bound", "", "poll", "bound", "ring", "bound", "lost"):
+        shown.add_column(title, justify="right", no_wrap=True)
+    sentences: list[str] = []
     for kind in track(TO_BOARD, description=image, console=console, transient=True):
         line, seen = lines[kind.ID], carry(elf, load_robot(image), kind, seconds, seed)
         found = list(broken(line, seen, line.is_proven(report.ring_holds)))
-        count += len(found)
         shown.add_row(
             line.cost.name,
             f"{seen.per_tick:.1f}",
             f"{line.least:.1f}",
-            "proven" if line.is_proven(report.ring_holds) else "–",
-            f"{line.cost.poll:,}",
+            "proven" if line.is_proven(report.ring_holds) else "",
             f"{seen.poll:,}",
-            "–" if line.ring is None else str(line.ring),
+            f"{line.cost.poll:,}",
             str(seen.waiting),
+            "–" if line.ring is None else str(line.ring),
             f"{seen.frames_lost} + {seen.bytes_lost} B",
-            "; ".join(found),
         )
+        sentences += [f"{image}, {line.cost.name}: {sentence}" for sentence in found]
     console.print(shown)
-    return count
+    for sentence in sentences:
+        console.print(f"broken: {sentence}")
+    return len(sentences)
 
 
 def main() -> int:
