@@ -6,6 +6,7 @@
 #include "buzzer.h"
 #include "compass.h"
 #include "encoder.h"
+#include "generated/messages.h"
 #include "infrared.h"
 #include "light.h"
 #include "link/counters.h"
@@ -36,13 +37,15 @@ _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go t
 
 #ifdef __AVR__
 /* The timing table as part of the image, so that an image can be judged without its sources: a text for each row, ended by
- * a zero byte, in a section that is not loaded. */
+ * a zero byte, in a section that is not loaded. Behind the rows of tasks.def there is one for each message to the board. */
 #define ROW(text) __asm__(".pushsection .boebot.timing, \"\", @progbits \n .asciz \"" text "\" \n .popsection");
 #define TASK(name, period, phase, budget) ROW("TASK " #name " " #period " " #phase " " #budget)
 #define INTERRUPT(name, vector, budget, latency, interval) \
   ROW("INTERRUPT " #name " " #vector " " #budget " " #latency " " #interval)
 #define SENSOR(name, conversion, period, age) ROW("SENSOR " #name " " #conversion " " #period " " #age)
 #include "tasks.def"
+#define FRAME(name, id, length) ROW("FRAME " #name " " #id " " #length)
+MESSAGES_TO_BOARD(FRAME)
 #endif
 
 HAL_NAMED volatile uint8_t schedule_slot;

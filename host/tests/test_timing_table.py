@@ -23,7 +23,7 @@ def test_table_is_that_of_the_section(pin_map: str) -> None:
         data = section.data()
     table = read_table(image)
     assert table == table_of(image, data)
-    assert len(table.tasks) + len(table.interrupts) + len(table.sensors) == data.count(b"\0")
+    assert len(table.tasks) + len(table.interrupts) + len(table.sensors) + len(table.frames) == data.count(b"\0")
 
 
 def test_file_without_a_table_has_no_rows(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@
 #include <stdint.h>
 
 #include "generated/messages.h"
+#include "holds_id.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -79,7 +80,11 @@ static inline bool frame_decode(frame_decoder *decoder, uint8_t byte) {
   return false;
 }
 
-static inline uint8_t frame_id(const frame_decoder *decoder) { return decoder->bytes[1]; }
+static inline uint8_t frame_id(const frame_decoder *decoder) {
+  uint8_t id = decoder->bytes[1];
+  HOLDS_ID(id);
+  return id;
+}
 static inline uint8_t frame_sequence(const frame_decoder *decoder) { return decoder->bytes[2]; }
 static inline const uint8_t *frame_payload(const frame_decoder *decoder) { return &decoder->bytes[3]; }
 

@@ -6,7 +6,9 @@ is wrong, and counts like any broken budget. What a task or an interrupt takes b
 scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
 
 What must end in time is the tick: tasks, interrupts, edges. Frames are worked off in what they leave, and never keep a
-slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget.
+slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget: for each
+kind of message whether a line full of it is worked off, and how many bytes wait meanwhile (full_line.py). The bytes of
+`ring` are those that come between two polls alone; they are all that wait where the link was not behind before.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from boebot.timing.changes import CHANGE_BYTES, CHANGES_RING
 from boebot.timing.changes import of_image as changes_of
 from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
+from boebot.timing.frames import frame_costs
+from boebot.timing.full_line import FullLines, full_lines
 from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
@@ -98,7 +102,8 @@ class Report:
     changes_held: int | None  # for which it has room; None: the image has no such ring
     taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
-    frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
+    frames_proven: float  # of these in a tick, so many are worked off whatever they are, in the long run
+    lines: FullLines  # a line full of each message
     memory: Memory
     measured: Measurement | None = None
 
@@ -212,6 +217,7 @@ class Report:
             "edge_age_bound_cycles": self.edge_age,
             "frames_coming_per_tick": round(self.frames_coming, 2),
             "frames_proven_per_tick": round(self.frames_proven, 2),
+            "full_lines": self.lines.as_dict(self.ring_holds),
             "losses_in_emulator": None if own is None else own.losses,
             "ram_static_bytes": memory.static,
             "stack_bound_bytes": memory.stack,
@@ -273,6 +279,7 @@ def prove(
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
+        lines=full_lines(program, found, schedule, asked, frame_costs(program) if asked.is_full else ()),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
@@ -412,14 +419,15 @@ def _frames_unproven(report: Report) -> list[str]:
     proven, coming = round(report.frames_proven, 1), round(report.frames_coming, 1)
     if proven >= coming:
         return []
-    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick; "
+    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick, if all are of the costliest; "
     if report.own is None:
         says += "that none of the others is lost is not proven, and nothing was measured"
     elif any(lost := [report.own.losses.get(kind, 0) for kind in ("frames", "bytes")]):
         says += f"the emulator lost {lost[0]} frames and {lost[1]} bytes"
     else:
         says += "that none of the others is lost is measured, not proven"
-    return [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
+    found = [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
+    return [*found, f"frames: {report.lines.says(report.ring_holds)}"] if report.lines.lines else found
 
 
 def _memory_broken(memory: Memory) -> list[str]:

@@ -160,8 +160,8 @@ def costs(program: Program, load: Load, progress: Callable[[float], None] = lamb
         latencies=waits,
         loop=loop,
         round=loop + scheduler,
-        around=sum(worst.bound(entry).cycles for entry in _entries(program, AROUND_TASK)),
-        frame=sum(worst.bound(entry).cycles for entry in _entries(program, (LINK_POLL,))),
+        around=sum(worst.bound(entry).cycles for entry in entries_of(program, AROUND_TASK)),
+        frame=sum(worst.bound(entry).cycles for entry in entries_of(program, (LINK_POLL,))),
         partial=_partial(program),
         edges=edges.nothing,
         change=edges.each,
@@ -194,14 +194,14 @@ def _edges(program: Program, storm: bool) -> _Edges:
 
     A change that is one edge calls WHEEL once. In one that is several, each of them has been charged a whole change.
     """
-    entry = _entry(program, ENCODER_POLL)
+    entry = entry_of(program, ENCODER_POLL)
     if entry is None:
         return _Edges()
     blocks, inside = program.functions[entry].blocks, _in_loops(program.functions[entry])
     outside = {callee for start, block in blocks.items() if start not in inside for callee in block.calls}
-    rare, wheel, other = (_entries(program, (name,)) for name in (RARE, WHEEL, OTHER))
+    rare, wheel, other = (entries_of(program, (name,)) for name in (RARE, WHEEL, OTHER))
     calm = dict.fromkeys((*outside, *rare, *wheel, *other), 0)
-    none, one, two = (Given(_passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
+    none, one, two = (Given(passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
     each = Given(program, dict.fromkeys(rare, 0))
     return _Edges(
         nothing=none,
@@ -216,14 +216,14 @@ def _partial(program: Program) -> int:
 
     The time for each of those bytes is counted with its frame.
     """
-    entry, take = _entry(program, LINK_POLL), _entry(program, TAKE)
+    entry, take = entry_of(program, LINK_POLL), entry_of(program, TAKE)
     if entry is None:
         return 0
     if take is None:  # in line: what finds no frame cannot be told from what finds one
         return WorstCase(program).bound(entry).cycles
-    decode = dict.fromkeys(_entries(program, (DECODE,)), 0)
-    room = {callee: WorstCase(program).bound(callee).cycles for callee in _entries(program, (ROOM,))}
-    taken = Given(_passed(program, take, 1, above=PIECES), decode).bound(take).cycles
+    decode = dict.fromkeys(entries_of(program, (DECODE,)), 0)
+    room = {callee: WorstCase(program).bound(callee).cycles for callee in entries_of(program, (ROOM,))}
+    taken = Given(passed(program, take, 1, above=PIECES), decode).bound(take).cycles
     return _nothing(program, entry, room | {take: taken})
 
 
@@ -251,18 +251,18 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
 
     The scheduler's only loop drops ticks when it has fallen behind. Where it has not (DROPS_FROM), it is not passed.
     """
-    scheduler = _entry(program, SCHEDULER)
+    scheduler = entry_of(program, SCHEDULER)
     if scheduler is None:
         raise TimingError(
             f"{program.path} has no function {SCHEDULER}; expected the scheduler as a function of its own, not in line"
         )
     names = (*(f"{row.name}_task" for row in program.table.tasks), *AROUND_TASK)
-    elsewhere = dict.fromkeys(_entries(program, names), 0)
-    polls = dict.fromkeys(_entries(program, (ENCODER_POLL, LINK_POLL)), edges)
+    elsewhere = dict.fromkeys(entries_of(program, names), 0)
+    polls = dict.fromkeys(entries_of(program, (ENCODER_POLL, LINK_POLL)), edges)
     alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
-    cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
+    cycles = Given(passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
-    loop = _entry(program, LOOP)
+    loop = entry_of(program, LOOP)
     if loop is None:
         return _main_loop(program, done, scheduler), cycles
     return Given(program, done).bound(loop).cycles + _main_loop(program, {loop: 0}, loop), cycles
@@ -270,7 +270,7 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
 
 def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> int:
     """All blocks once of the loops of `main` from which that is called."""
-    main = _entry(program, "main")
+    main = entry_of(program, "main")
     if main is None:
         return 0
     given = Given(program, elsewhere)
@@ -322,7 +322,7 @@ def _in_loops(function: Function) -> set[int]:
     return {node for loop in _loops(function) for node in loop.nodes}
 
 
-def _passed(program: Program, entry: int, passes: int, above: int = 0) -> Program:
+def passed(program: Program, entry: int, passes: int, above: int = 0) -> Program:
     """The program with each loop of a function passed so often at most, if it is bounded by more than `above`."""
     blocks = program.functions[entry].blocks.values()
     own = {instruction.address for block in blocks for instruction in block.instructions}
@@ -340,7 +340,7 @@ def _slots(program: Program) -> int:
     return math.lcm(SLOTS_PER_TICK, *(row.period for row in program.table.tasks))
 
 
-def _entry(program: Program, name: str) -> int | None:
+def entry_of(program: Program, name: str) -> int | None:
     """Of a function of the source; the compiler may have added to its name. None: there is none, or not one only."""
     if name in program.by_name:
         return program.by_name[name]
@@ -354,11 +354,11 @@ def task_entry(program: Program, name: str) -> int:
     Raises:
         TimingError: it is no function.
     """
-    entry = _entry(program, f"{name}_task")
+    entry = entry_of(program, f"{name}_task")
     if entry is None:
         raise TimingError(f"{program.path} has no function {name}_task")
     return entry
 
 
-def _entries(program: Program, names: Collection[str]) -> list[int]:
-    return [entry for entry in (_entry(program, name) for name in names) if entry is not None]
+def entries_of(program: Program, names: Collection[str]) -> list[int]:
+    return [entry for entry in (entry_of(program, name) for name in names) if entry is not None]

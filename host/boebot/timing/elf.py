@@ -1,7 +1,8 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
-What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the two sections
-in which the firmware describes itself, `.boebot.timing` and `.boebot.loops`. The file need not have the last three.
+What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the three sections in
+which the firmware describes itself, `.boebot.timing`, `.boebot.loops` and `.boebot.ids`. The file need not have the
+last four.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import TimingError
-from boebot.timing.program import LoopBound, Table
+from boebot.timing.program import IdPlace, LoopBound, Table
 from boebot.timing.source_lines import source_lines
 from boebot.timing.table import SECTION, table_of
 
@@ -27,6 +28,7 @@ DATA_SPACE = 0x800000
 EM_AVR = "EM_AVR"
 PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
 NOT_SAID = 0xFFFFFFFF
+REGISTERS = 32
 # What pyelftools raises on a damaged file.
 DAMAGE: tuple[type[Exception], ...] = (
     *(ELFError, DWARFError, ConstructError, struct.error, ValueError, LookupError),
@@ -63,6 +65,7 @@ class Image:
     lines: dict[int, str] = field(default_factory=dict)
     table: Table = field(default_factory=Table)
     bounds: tuple[LoopBound, ...] = ()
+    ids: tuple[IdPlace, ...] = ()
 
 
 def read_image(path: Path) -> Image:
@@ -101,6 +104,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
         bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
+        ids=_ids(path, _section(path, elf, ".boebot.ids"), len(code)),
     )
 
 
@@ -204,3 +208,17 @@ def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
         given = tuple(None if number == NOT_SAID else number for number in (passes, cycles))
         bounds.append(LoopBound(address, *given))
     return tuple(bounds)
+
+
+def _ids(path: Path, data: bytes, end: int) -> tuple[IdPlace, ...]:
+    """The records of `.boebot.ids`: address behind an instruction, register that holds a message's id; 32 bits each."""
+    if len(data) % 8:
+        raise TimingError(f"{path}: section .boebot.ids has {len(data)} bytes: records of 8 bytes are expected")
+    places = [IdPlace(address, register) for address, register in struct.iter_unpack("<II", data)]
+    for place in places:
+        if place.address >= end or place.address % 2 or place.register >= REGISTERS:
+            raise TimingError(
+                f"{path}: a message's id is said to be in register {place.register} at 0x{place.address:X}; expected "
+                f"one of {REGISTERS} registers and an instruction's address"
+            )
+    return tuple(places)

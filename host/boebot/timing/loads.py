@@ -70,6 +70,15 @@ class Load:
             return []
         return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]
 
+    @property
+    def is_full(self) -> bool:
+        """Frames come back to back."""
+        return not self.frame_bursts
+
+    def unanswered(self) -> Load:
+        """The same, where the board says what it says by itself and no more."""
+        return replace(self, streams={**self.streams, SEND: OWN_SENDING})
+
     def is_calm(self, latency: int) -> bool:
         """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of
         more changes than there are lines two are of one line, and a tick has no more of a line than the limit."""
@@ -91,6 +100,13 @@ _COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK),))
 _SERVOS_AND_BURSTS = Stream(_EDGE_TO_EDGE, ((2, _THREE_EDGES), (3, _FOUR_EDGES), (10, 2 * TICK)))
 _SWEEP = Stream(_HALF_PERIOD, ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)))
 _ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
+# What a board says by itself, at its fastest.
+OWN_SENDING = (
+    Stream(BYTE, ((_TELEMETRY, TICK),)),
+    Stream(BYTE, ((_DEVICES, 2 * TICK),)),
+    Stream(BYTE, ((_OWN, 4 * TICK),)),
+    Stream(BYTE, ((_HELLO, 20 * TICK),)),
+)
 _DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
@@ -100,12 +116,7 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
-            SEND: (
-                Stream(BYTE, ((_TELEMETRY, TICK),)),
-                Stream(BYTE, ((_DEVICES, 2 * TICK),)),
-                Stream(BYTE, ((_OWN, 4 * TICK),)),
-                Stream(BYTE, ((_HELLO, 20 * TICK),)),
-            ),
+            SEND: OWN_SENDING,
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),

@@ -115,12 +115,30 @@ class SensorRow:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameRow:
+    """A message that the program takes: its name, its id, and the bytes of its payload."""
+
+    name: str
+    id: int
+    length: int
+
+
+@dataclass(frozen=True, slots=True)
+class IdPlace:
+    """What the source says of a message's id: it is in `register` behind the instruction that ends at `address`."""
+
+    address: int
+    register: int
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """The timing table of an image, in its order."""
 
     tasks: tuple[TaskRow, ...] = ()
     interrupts: tuple[InterruptRow, ...] = ()
     sensors: tuple[SensorRow, ...] = ()
+    frames: tuple[FrameRow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +151,7 @@ class Program:
     bounds: tuple[LoopBound, ...] = ()
     table: Table = field(default_factory=Table)
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
+    ids: tuple[IdPlace, ...] = ()
 
     def where(self, address: int) -> str:
         """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""
