@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from boebot.errors import TimingError
-from boebot.timing.costs import SLOT_CYCLES, SLOTS_PER_TICK
-from boebot.timing.loads import SLOT
+from boebot.timing.loads import SLOT, TICK
 from boebot.timing.program import Program
 from boebot.timing.stack import VECTORS
 
@@ -15,6 +14,12 @@ def check_table(path: Path, program: Program) -> None:
     """Raises TimingError: it is not a program with a schedule, or its table not that of this program."""
     if not program.table.tasks:
         raise TimingError(f"{path} carries no timing table; expected TASK rows in its section .boebot.timing")
+    said = program.constants
+    if said.slot_cycles * said.slots_per_tick != TICK:
+        raise TimingError(
+            f"{path}: by its constants a tick is {said.slots_per_tick} slots of {said.slot_cycles} cycles; expected "
+            f"{TICK} cycles in all, 10 ms"
+        )
     if "main" not in program.by_name:
         raise TimingError(f"{path} has no function main; expected an image with its symbols (not stripped)")
     for row in program.table.interrupts:
@@ -22,13 +27,13 @@ def check_table(path: Path, program: Program) -> None:
             raise TimingError(
                 f"{path}: row {row.name!r} of its timing table is of interrupt {row.vector}; expected one that is used"
             )
-        if row.vector == SLOT and row.interval != SLOT_CYCLES:
+        if row.vector == SLOT and row.interval != said.slot_cycles:
             raise TimingError(
                 f"{path}: by row {row.name!r} of its timing table a slot has {row.interval} cycles; "
-                f"expected {SLOT_CYCLES}, {SLOTS_PER_TICK} of them in a tick of 10 ms"
+                f"expected {said.slot_cycles}, as its constants say"
             )
-    said = {row.vector for row in program.table.interrupts}
-    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in said]
+    named = {row.vector for row in program.table.interrupts}
+    unsaid = [number for number in VECTORS if 4 * number in program.functions and number not in named]
     if unsaid:
         raise TimingError(
             f"{path} uses interrupt {unsaid[0]} at {program.where(4 * unsaid[0])}, of which its timing table does not "
