@@ -146,6 +146,22 @@ def test_constants_that_are_not_all_there_or_contradict_are_refused(
         budget.prove(timing_program.compiled(tmp_path, constants(old, new)), FIGURES)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("slot 12 40 1000 40000", "slot 12 40001 1000 40000", "row 'slot' .* budget of 40001 cycles .* due each 40000"),
+        ("first 1 0 150", "first 1 0 40001", "row 'first' .* budget of 40001 cycles .* due each 40000"),
+        ("second 4 1 300", "second 4 1 160001", "row 'second' .* budget of 160001 cycles .* due each 160000"),
+        ("first 1 0 150", "first 1 0 39900", "each as often as it is due, are 100.0% of all cycles"),
+        ("ping 18500 5 20000", "ping 18500 5 18499", "row 'ping' .* reading of 18500 us is at most 18499 us old"),
+    ],
+)
+def test_table_that_promises_the_impossible_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    """Of the fourth: 39,900 of 40,000 cycles, 300 of 160,000 and 40 of 40,000 are 40 in 160,000 too many."""
+    with pytest.raises(TimingError, match=words):
+        budget.prove(timing_program.compiled(tmp_path, constants(old, new)), FIGURES)
+
+
 def test_image_without_constants_is_refused(tmp_path: Path) -> None:
     lines = [line for line in timing_program.text().splitlines() if "CONSTANT" not in line]
     image = timing_program.compiled(tmp_path, "\n".join(lines))
