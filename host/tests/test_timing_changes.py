@@ -222,3 +222,18 @@ def test_image_built_with_another_constant_has_another_bound(tmp_path: Path) -> 
     assert other.costs.change == sound.costs.change
     assert other.costs.idle - sound.costs.idle == 8 * sound.costs.change
     assert sound.changes is not None and other.changes is not None and other.changes > sound.changes
+
+
+def test_lines_that_come_back_are_counted_with_the_lights_edge(tmp_path: Path) -> None:
+    """Where it waits the task leaves them to the next poll, whatever the load: 50 cycles more there are 50 more."""
+    sources = tmp_path / "src"
+    shutil.copytree(avr_program.SOURCES, sources)
+    encoder = sources / "encoder.c"
+    text, begins = encoder.read_text(encoding="utf-8"), "take_back(void) {\n"
+    assert text.count(begins) == 1
+    nops = '  __asm__ volatile(".rept 50\\n nop\\n .endr");\n'
+    encoder.write_text(text.replace(begins, begins + nops), encoding="utf-8")
+    slow = avr_program.build(tmp_path / "slow.elf", folder=sources)
+    sound, slower = (budget.prove(image, LOADS["everything"]).costs for image in (shipped("shieldbot"), slow))
+    assert slower.other - sound.other == 50
+    assert slower.idle - sound.idle == 50

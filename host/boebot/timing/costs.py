@@ -34,7 +34,7 @@ SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
 AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task that runs
 ENCODER_POLL, LINK_POLL = "encoder_poll", "link_poll"
 TAKE, DECODE, ROOM = "link_take_frame", "frame_decode_end", "hal_serial_room"  # parts of a poll of the link
-RARE, WHEEL, OTHER = "keep_limit", "see_wheel", "see_other"  # parts of a poll of the encoders
+RARE, WHEEL, OTHER, BACK = "keep_limit", "see_wheel", "see_other", "take_back"  # parts of a poll of the encoders
 SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the scheduler does
 PIECES = 2  # passes of loops of TAKE that are not over bytes
 
@@ -66,7 +66,7 @@ class Costs:
     partial: int  # to take bytes and find no whole frame
     edges: int  # to look for edges
     change: int  # more, to work off one
-    other: int  # more, when it is the light sensor's
+    other: int  # more, when it is the light sensor's, and lines come back
     storm: int  # more, to stop a line that comes too often; 0: under this load none does
     changes_due: int  # so many changes the main loop works off between slots; fewer wait
 
@@ -193,6 +193,10 @@ class _Edges:
 def _edges(program: Program, storm: bool) -> _Edges:
     """Lines are stopped in functions of its own, outside its loop or RARE; where none ever is, they are not called.
 
+    BACK is one of these: lines come back that were stopped or switched off. The task that switches them on calls it
+    itself, and leaves it to the next poll only where a change waits. A line that was off brings none: it is the light
+    sensor's edge, with which it is counted.
+
     A change that is one edge calls WHEEL once. In one that is several, each of them has been charged a whole change.
     """
     entry = entry_of(program, ENCODER_POLL)
@@ -200,14 +204,14 @@ def _edges(program: Program, storm: bool) -> _Edges:
         return _Edges()
     blocks, inside = program.functions[entry].blocks, _in_loops(program.functions[entry])
     outside = {callee for start, block in blocks.items() if start not in inside for callee in block.calls}
-    rare, wheel, other = (entries_of(program, (name,)) for name in (RARE, WHEEL, OTHER))
+    rare, wheel, other, back = (entries_of(program, (name,)) for name in (RARE, WHEEL, OTHER, BACK))
     calm = dict.fromkeys((*outside, *rare, *wheel, *other), 0)
     none, one, two = (Given(passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
     each = Given(program, dict.fromkeys(rare, 0))
     return _Edges(
         nothing=none,
         each=max(one - none, two - one) + sum(each.bound(callee).cycles for callee in wheel),
-        other=sum(WorstCase(program).bound(callee).cycles for callee in other),
+        other=sum(WorstCase(program).bound(callee).cycles for callee in (*other, *(back if other else ()))),
         storm=sum(WorstCase(program).bound(callee).cycles for callee in (*outside, *rare)) if storm else 0,
     )
 
