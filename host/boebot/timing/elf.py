@@ -1,7 +1,8 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
-What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the two sections
-in which the firmware describes itself, `.boebot.timing` and `.boebot.loops`. The file need not have the last three.
+What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the sections in which the
+firmware describes itself, `.boebot.timing`, `.boebot.loops` and `.boebot.entries`. The file need not have the last
+four.
 """
 
 from __future__ import annotations
@@ -63,6 +64,7 @@ class Image:
     lines: dict[int, str] = field(default_factory=dict)
     table: Table = field(default_factory=Table)
     bounds: tuple[LoopBound, ...] = ()
+    entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
 
 
 def read_image(path: Path) -> Image:
@@ -87,6 +89,9 @@ def _image(path: Path, elf: ELFFile) -> Image:
     code, written = _flash(path, elf)
     ram = _ram(elf)
     symbols, stack_start = _symbols(elf)
+    entries = _entries(path, _section(path, elf, ".boebot.entries"), len(code))
+    bounds = _bounds(path, _section(path, elf, ".boebot.loops"), entries, len(code))
+    told = {bound.address for bound in bounds}
     return Image(
         path=str(path),
         code=code,
@@ -100,7 +105,8 @@ def _image(path: Path, elf: ELFFile) -> Image:
         stack_start=stack_start,
         lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
-        bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
+        bounds=bounds,
+        entries={address: line for address, line in entries.items() if address not in told},
     )
 
 
@@ -193,14 +199,28 @@ def _section(path: Path, elf: ELFFile, name: str) -> bytes:
     return data
 
 
-def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
+def _bounds(path: Path, data: bytes, entries: dict[int, int], end: int) -> tuple[LoopBound, ...]:
     """The records of `.boebot.loops`: address in a loop's body, most passes, most cycles, of 32 bits each."""
     if len(data) % 12:
         raise TimingError(f"{path}: section .boebot.loops has {len(data)} bytes: records of 12 bytes are expected")
     bounds = []
     for address, passes, cycles in struct.iter_unpack("<III", data):
-        if address >= end or address % 2:
-            raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")
-        given = tuple(None if number == NOT_SAID else number for number in (passes, cycles))
-        bounds.append(LoopBound(address, *given))
+        _check_place(path, address, end)
+        most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
+        bounds.append(LoopBound(address, most, longest, entries.get(address, 0)))
     return tuple(bounds)
+
+
+def _entries(path: Path, data: bytes, end: int) -> dict[int, int]:
+    """The records of `.boebot.entries`, of 32 bits each: address of a loop's entry or bound, line of the loop."""
+    if len(data) % 8:
+        raise TimingError(f"{path}: section .boebot.entries has {len(data)} bytes: records of 8 bytes are expected")
+    entries = dict(struct.iter_unpack("<II", data))
+    for address in entries:
+        _check_place(path, address, end)
+    return entries
+
+
+def _check_place(path: Path, address: int, end: int) -> None:
+    if address >= end or address % 2:
+        raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")
