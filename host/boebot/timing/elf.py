@@ -111,8 +111,8 @@ def _image(path: Path, elf: ELFFile) -> Image:
 
 
 def _lines(elf: ELFFile, end: int) -> dict[int, str]:
-    """The source lines; none where the debugging information is not one that pyelftools reads, as clang's for the AVR
-    with its addresses of two bytes. The program is all the same what it is."""
+    """The source lines; none where the debugging information is not one that pyelftools reads. The program is all the
+    same what it is."""
     try:
         return source_lines(elf, end)
     except DAMAGE:
