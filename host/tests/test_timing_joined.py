@@ -101,7 +101,7 @@ def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
 )
 def test_bound_of_a_loop_within_is_not_that_of_the_loop_around(tmp_path: Path, source: str, old: str, new: str) -> None:
     assert source.count(old) == 1
-    with pytest.raises(TimingError, match="0x.* has no bound"):
+    with pytest.raises(TimingError, match=r"0x.* has no bound"):
         cycles_of(tmp_path, source.replace(old, new))
 
 
