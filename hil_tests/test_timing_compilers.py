@@ -9,9 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from boebot.errors import TimingError
+from boebot.timing import budget
 from boebot.timing.graph import load_program
+from boebot.timing.loads import LOADS
 from boebot.timing.wcet import WorstCase
 from hil_tests.test_timing_bounds import HEAD, measured
+from tools import compilers
+from tools.bench import avr_program
 
 INCLUDES = "/usr/lib/avr/include"  # avr-libc's, as Debian has it; avr-gcc knows its place
 COMPILERS = {
@@ -72,13 +77,15 @@ def clang_knows_the_processor() -> bool:
     return "avr" in targets.split()
 
 
-def build(folder: Path, compiler: str, level: str, body: str) -> Path:
+def build(folder: Path, compiler: str, body: str, *options: str) -> Path:
     """The image of `f` with this body, called by the program in assembler."""
+    if compiler == "clang" and not clang_knows_the_processor():
+        pytest.skip("this machine's clang does not know the AVR")
     frame, source, code, image = (folder / name for name in ("frame.S", "f.c", "f.o", "f.elf"))
     frame.write_text(HEAD.replace(".type f, @function", ""), encoding="ascii")
     source.write_text(PROGRAM.format(body=body), encoding="ascii")
     for command in (
-        [*COMPILERS[compiler], level, "-mmcu=atmega328p", "-c", "-o", str(code), str(source)],
+        [*COMPILERS[compiler], *options, "-mmcu=atmega328p", "-c", "-o", str(code), str(source)],
         ["avr-gcc", "-mmcu=atmega328p", "-o", str(image), str(frame), str(code)],
     ):
         result = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -90,8 +97,42 @@ def build(folder: Path, compiler: str, level: str, body: str) -> Path:
 @pytest.mark.parametrize("level", ["-Os", "-O2"])
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_bound_is_what_the_longest_takes(tmp_path: Path, compiler: str, level: str, case: str) -> None:
-    if compiler == "clang" and not clang_knows_the_processor():
-        pytest.skip("this machine's clang does not know the AVR")
     body, inputs = CASES[case]
-    image = build(tmp_path, compiler, level, body)
+    image = build(tmp_path, compiler, body, level)
     assert WorstCase(load_program(image)).of("f").cycles == max(measured(image, given) for given in inputs)
+
+
+@pytest.mark.parametrize(("compiler", "debug"), [("avr-gcc", "-gdwarf-2"), ("clang", "-g")])
+def test_refusal_names_the_line(tmp_path: Path, compiler: str, debug: str) -> None:
+    image = build(tmp_path, compiler, "while (x != 0) { y = a; }\n  return b;", "-Os", debug)
+    line = PROGRAM.splitlines().index("  {body}") + 1
+    with pytest.raises(TimingError, match=rf"the loop at 0x[0-9A-F]{{4}} \(f\.c:{line}\) has no bound"):
+        WorstCase(load_program(image)).of("f")
+
+
+@pytest.fixture(scope="module", params=["-O2 by source", "-O3 unrolled"])
+def speedy(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The firmware, optimised for speed."""
+    return compilers.build(tmp_path_factory.mktemp("firmware") / "firmware.elf", compilers.OPTIONS[request.param])
+
+
+def test_firmware_optimised_for_speed_is_proved(speedy: Path) -> None:
+    """No task and no interrupt takes longer than its bound, and the bounds are not far above."""
+    rows = compilers.rows_of(speedy)
+    assert [row.name for row in rows if row.seen > row.bound] == []
+    ran = {row.name: row.bound / row.seen for row in rows if row.seen > 0}
+    assert len(ran) > 25 and max(ran.values()) < 2
+
+
+def test_a_bound_taken_out_is_missed(tmp_path: Path) -> None:
+    """The loop over the changes at the pins, of which avr-gcc 5 makes two with -O2."""
+    folder = tmp_path / "src"
+    shutil.copytree(avr_program.SOURCES, folder)
+    source = folder / "encoder.c"
+    text = source.read_text(encoding="utf-8")
+    bounded = "BOUNDED(HAL_CHANGES - 1u, while (tail != head))"
+    assert text.count(bounded) == 1
+    source.write_text(text.replace(bounded, "while (tail != head)"), encoding="utf-8")
+    mutant = avr_program.build(tmp_path / "mutant.elf", extra=("-fno-lto", "-O2"), folder=folder)
+    with pytest.raises(TimingError, match=r"the loop at 0x[0-9A-F]{4} \(encoder\.c:\d+\) has no bound"):
+        budget.prove(mutant, LOADS["figures"])
