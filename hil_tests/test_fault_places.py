@@ -57,5 +57,5 @@ def test_a_hang_is_told_as_the_watchdog_sees_it(
 def test_a_hang_has_its_place_where_the_image_is_measured(tmp_path: Path) -> None:
     image = Path(planted(tmp_path, FUNCTION, JUMP_TO_ITSELF))
     address = entry_of(image, FUNCTION)
-    with pytest.raises(BoardError, match=rf"watchdog reset the program at address 0x{address:04X} .* {PLACE}"):
+    with pytest.raises(BoardError, match=rf"found at address 0x{address:04X} .* {PLACE}"):
         run(image, load_robot("shieldbot"), "figures", 0.5, 1)

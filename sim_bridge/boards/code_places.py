@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from bisect import bisect_right
+from collections.abc import Sequence
 from pathlib import Path
 
+from boebot.boards import WatchdogReset
 from boebot.errors import TimingError
 from boebot.timing.elf import Image, read_image
+
+CLOCK_HZ = 16_000_000
 
 
 def place(image: Image, address: int) -> str:
@@ -34,3 +39,16 @@ def with_place(fault: str, elf: Path | None, address: int) -> str:
         return f"{fault} {place(read_image(elf), address)}".rstrip()
     except TimingError:
         return fault
+
+
+def watchdog_resets(log: Sequence[tuple[int, int]], elf: Path | None) -> list[WatchdogReset]:
+    """What the log of a board's watchdog says (`BoardMemory.watchdog_log`), with places by the image's file."""
+    places: dict[int, str] = {}
+    if log and elf is not None:
+        with contextlib.suppress(TimingError):
+            image = read_image(elf)
+            places = {address: place(image, address) for _, address in log}
+    return [
+        WatchdogReset(cycle=cycle, time_s=cycle / CLOCK_HZ, address=address, place=places.get(address, ""))
+        for cycle, address in log
+    ]

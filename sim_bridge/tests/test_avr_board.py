@@ -78,6 +78,15 @@ session.transport.read(0.1)
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+WILD = (
+    "invalid instruction 0x",
+    "the program goes to 0x",
+    "jumps to its start",
+    "the stack overflows: it reaches 0x",
+    "the stack pointer leaves the memory: 0x",
+)
+
+
 def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
     # under the sanitizers this finds what a wild program could reach
     size = 30_000
@@ -97,7 +106,7 @@ def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
             board.advance(200_000)
         except BoardError as error:
             crashes += 1
-            assert "invalid instruction" in str(error) or "ran off the end" in str(error)  # noqa: PT017
+            assert any(what in str(error) for what in WILD), error  # noqa: PT017
         board.close()
         machine.close()
     assert crashes > 10
