@@ -280,9 +280,10 @@ class BoardAccess(BoardMemory):
         text = self._lib.board_access_fault(self._access)
         if text == self._ffi.NULL:
             return None
-        return with_place(
-            self._ffi.string(text).decode(), self._elf, self._lib.board_access_fault_address(self._access)
-        )
+        data = self._lib.board_memory(self._pointer)
+        z = 0 if data == self._ffi.NULL else data[30] | data[31] << 8
+        address = self._lib.board_access_fault_address(self._access)
+        return with_place(self._ffi.string(text).decode(), self._elf, address, z)
 
     def close(self) -> None:
         """Lets go of the board."""

@@ -12,6 +12,7 @@ from boebot.errors import TimingError
 from boebot.timing.elf import Image, read_image
 
 CLOCK_HZ = 16_000_000
+PROLOGUE = "__prologue_saves__"  # of libgcc, without source lines: -mcall-prologues
 
 
 def place(image: Image, address: int) -> str:
@@ -31,14 +32,21 @@ def place(image: Image, address: int) -> str:
     return " ".join(part for part in parts if part)
 
 
-def with_place(fault: str, elf: Path | None, address: int) -> str:
-    """What went wrong, with the place of that address behind it, by the image's file; without where there is none."""
+def with_place(fault: str, elf: Path | None, address: int, z: int = 0) -> str:
+    """What went wrong, with the place of that address behind it, by the image's file; without where there is none.
+
+    `z`: the register Z then, by which a function says where it goes on to the code that saves registers for all.
+    """
     if elf is None or address < 0:
         return fault
     try:
-        return f"{fault} {place(read_image(elf), address)}".rstrip()
+        image = read_image(elf)
     except TimingError:
         return fault
+    where = place(image, address)
+    if where == f"in {PROLOGUE}" and (caller := place(image, 2 * z)):
+        where += f" of {caller.removeprefix('in ')}"
+    return f"{fault} {where}".rstrip()
 
 
 def watchdog_resets(log: Sequence[tuple[int, int]], elf: Path | None) -> list[WatchdogReset]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from boebot.errors import BoardError
 from boebot.robots import load_robot
 from boebot.timing.instructions import decode
 from sim_bridge.boards import avr
@@ -144,7 +145,7 @@ def test_a_stack_in_the_registers_is_a_fault_in_both() -> None:
     ours, simavr = Machine(source), Machine(source)
     simavr.avr.one_by_one()
     for machine in (ours, simavr):
-        with pytest.raises(BoardError, match="the stack overflows: it reaches 0x0014, variables end below 0x0100"):
+        with pytest.raises(BoardError, match="the stack overflows: it reaches 0x0015, variables end below 0x0100"):
             machine.board.run(400)
     assert ours.avr.data(0, 0x20) == simavr.avr.data(0, 0x20)
     assert ours.board.now == simavr.board.now

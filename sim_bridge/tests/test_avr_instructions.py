@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from boebot.errors import BoardError
+from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level, ResetCause
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.symbols import entry_of
 
 SBI_CYCLES = 2
 
@@ -154,11 +158,14 @@ def test_a_jump_to_where_no_instruction_is_is_a_crash(jump: str, address: int, w
         machine.board.run(100)
 
 
-def test_running_straight_off_the_image_is_a_crash_of_its_last_instruction() -> None:
-    machine = Machine("main: rjmp last\n .section .fini0, \"ax\"\n .fill 8, 2, 0\n last: nop")
-    end = machine.end
-    with pytest.raises(BoardError, match=f"ends at 0x{end:04X} at address 0x{end - 2:04X} "):
-        machine.board.run(1000)
+def test_running_straight_off_the_image_is_a_crash_of_its_last_instruction(tmp_path: Path) -> None:
+    whole, ending = assemble("main: ret"), b"\xf8\x94\xff\xcf"  # cli; rjmp .-2: where main returns to
+    assert whole.count(ending) == 1
+    image = tmp_path / "image.elf"
+    image.write_bytes(whole.replace(ending, b"\xf8\x94\x00\x00"))
+    last = entry_of(whole, "__stop_program")
+    with pytest.raises(BoardError, match=f"ends at 0x{last + 2:04X} at address 0x{last:04X} "):
+        create(image).access().run(1000)
 
 
 def test_memory_at_power_on_is_not_zero_and_always_the_same() -> None:
