@@ -12,9 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from boebot import robots
-from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession
+from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession, WatchdogReset
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.direct import DirectSession, add_vehicle
 from sim_bridge.opening import Wait, alone, new_sim, truth_of
@@ -118,6 +119,10 @@ class SimSession:
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
             "supply_voltage": self.robot.supply_voltage,
         }
+
+    def watchdog_resets(self) -> list[WatchdogReset]:
+        """Where the watchdog of an emulated ATmega328P found the program; none of a board without one."""
+        return watchdog_resets(self.board.watchdog_log(), self.robot.board.elf)
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""

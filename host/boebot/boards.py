@@ -68,6 +68,21 @@ class Truth:
     plan: FloorPlan = field(default_factory=FloorPlan)  # what stands and moves where it happened
 
 
+@dataclass(frozen=True, kw_only=True)
+class WatchdogReset:
+    """Where a board's watchdog found the program that it reset."""
+
+    cycle: int
+    time_s: float  # on the clock of the session's transport
+    address: int  # of the next instruction, in bytes of flash
+    place: str  # function and source line, as in "in storage_task (storage.c:57)"; "" where the image does not say them
+
+    def __str__(self) -> str:
+        """In the words of a fault."""
+        where = f"at address 0x{self.address:04X} in cycle {self.cycle} {self.place}".rstrip()
+        return f"the watchdog reset the program, which it found {where}"
+
+
 class BoardSession(Protocol):
     """An opened board. `close` gives everything back; nothing else is called after it."""
 
@@ -84,6 +99,9 @@ class BoardSession(Protocol):
 
     def counters(self) -> Mapping[str, float]:
         """What the board counted, by name; may be empty."""
+
+    def watchdog_resets(self) -> Sequence[WatchdogReset]:
+        """Those so far, oldest first; empty where nobody sees into the board."""
 
     def close(self) -> None:
         """Closes the board."""
@@ -207,6 +225,10 @@ class LiveSession:
     def counters(self) -> Mapping[str, float]:
         """A port counts nothing."""
         return {}
+
+    def watchdog_resets(self) -> Sequence[WatchdogReset]:
+        """Nobody sees into a real board; in which task it hung it says itself."""
+        return ()
 
     def close(self) -> None:
         """Closes the port."""

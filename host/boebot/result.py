@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from boebot import figures
-from boebot.boards import Truth
+from boebot import figures, hangs
+from boebot.boards import Truth, WatchdogReset
 from boebot.brain_record import BrainRecord
 from boebot.link.messages import Identity, Status
 from boebot.link.session import text
@@ -49,6 +49,7 @@ class RunResult:
         odometry_source: what the brain's own poses came from, where it kept any: "odometer", "encoders", or "commands"
             where the robot has neither.
         notices: what the user should know, in sentences.
+        watchdog_resets: where the watchdog of an emulated board found the program, oldest first.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
         brain_record: of a brain of processes: its steps and switches; None: a brain of another kind.
@@ -79,6 +80,7 @@ class RunResult:
     identity: Identity | None = None
     link: dict[str, dict[str, int]] = field(default_factory=dict)
     notices: list[str] = field(default_factory=list)
+    watchdog_resets: Sequence[WatchdogReset] = ()
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
@@ -270,6 +272,7 @@ class RunResult:
             "dead_man_stops": self.dead_man_stops if on_board else None,
             "resets": self.resets if on_board else None,
             "sessions_lost": self.sessions_lost if on_board else None,
+            "hung_at": hangs.places(self.watchdog_resets),
             "real_time_factor": round(self.real_time_factor, 2),
             "firmware": None if self.identity is None else text(self.identity.firmware_version),
             "compiler": None if self.identity is None else text(self.identity.compiler),

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
 
-from boebot import interrupts, report
+from boebot import hangs, interrupts, report
 from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
 from boebot.driving import Driver, Progress, Task
 from boebot.driving.board import BoardDriver
@@ -166,7 +166,13 @@ def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
         BoebotError: it cannot be driven so.
     """
     if task.request.robot.has_board:
-        return BoardDriver(cast(BoardSession, session), task)
+        board = cast(BoardSession, session)
+        try:
+            return BoardDriver(board, task)
+        except BoebotError as error:
+            for sentence in hangs.sentences(board.watchdog_resets()):
+                error.add_note(sentence)
+            raise
     return DirectDriver(cast(VehicleSession, session), task)
 
 

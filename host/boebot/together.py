@@ -145,7 +145,10 @@ def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
     """The error, saying which robot it is about, where there are several."""
     if count == 1 or not isinstance(error, BoebotError):
         return error
-    return type(error)(f"robot {number}: {error}")
+    told = type(error)(f"robot {number}: {error}")
+    for note in getattr(error, "__notes__", ()):
+        told.add_note(note)
+    return told
 
 
 class _Robot:

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from channel import Channel
 
-from boebot.boards import Truth
+from boebot.boards import Truth, WatchdogReset
 from boebot.errors import BoardError
 from boebot.floor_plan import FloorPlan, Solid
 from boebot.link import messages
@@ -688,6 +688,9 @@ class InProcess:
 
     def counters(self) -> Mapping[str, float]:
         return {}
+
+    def watchdog_resets(self) -> list[WatchdogReset]:
+        return []
 
     def close(self) -> None:
         self.closed = True

@@ -63,6 +63,8 @@ typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channe
 /* uint32_t: byte address in flash of the instruction that crashed the board; NULL: it has not crashed, or nobody knows. */
 #define BOARD_FAULT_ADDRESS "fault address"
 
+#define BOARD_WATCHDOG_LOG "watchdog log" /* a board_watchdog_log */
+
 /* What a cell of the EEPROM holds after the supply failed while it was being written. */
 typedef enum {
   BOARD_DAMAGE_ERASED, /* 0xFF */
@@ -76,6 +78,19 @@ typedef struct {
   board_damage damage;
   uint8_t garbage;
 } board_eeprom;
+
+/* Where the program was that the board's own watchdog reset: byte address in flash of the instruction that was next, and
+ * the cycle of that. With a watchdog that warns by an interrupt: when that came; what runs behind it does not tell who
+ * hung. */
+typedef struct {
+  uint64_t cycle;
+  uint32_t address;
+} board_watchdog_reset;
+
+typedef struct {
+  board_watchdog_reset *resets; /* oldest first */
+  size_t count;
+} board_watchdog_log;
 
 typedef struct {
   uint32_t version; /* BOARD_INTERFACE_VERSION */

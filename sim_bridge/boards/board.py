@@ -87,7 +87,8 @@ COUNTERS = (
 
 
 class BoardMemory(ABC):
-    """What lies inside a board: the data space of an AVR, the EEPROM of every kind of microcontroller."""
+    """What lies inside a board: the data space of an AVR, the EEPROM of every kind of microcontroller, the log of its
+    watchdog."""
 
     def __init__(self, lib: Any, ffi: Any) -> None:
         """By the functions of that extension."""
@@ -148,6 +149,14 @@ class BoardMemory(ABC):
         """What becomes of a cell whose write is cut short by a power-on or brown-out reset; `garbage`: for GARBAGE."""
         eeprom = self._eeprom()
         eeprom.damage, eeprom.garbage = int(damage), garbage
+
+    def watchdog_log(self) -> list[tuple[int, int]]:
+        """Cycle and address (bytes) at which its watchdog found the program, for each of its resets since power-on,
+        oldest first (board.h); empty where the board has none of its own, and of resets in its name from outside."""
+        log = self._memory_lib.board_watchdog_log_of(self._board)
+        if log == self._memory_ffi.NULL:
+            return []
+        return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.count)]
 
 
 def check_range(what: str, address: int, count: int, size: int) -> None:
@@ -271,9 +280,10 @@ class BoardAccess(BoardMemory):
         text = self._lib.board_access_fault(self._access)
         if text == self._ffi.NULL:
             return None
-        return with_place(
-            self._ffi.string(text).decode(), self._elf, self._lib.board_access_fault_address(self._access)
-        )
+        data = self._lib.board_memory(self._pointer)
+        z = 0 if data == self._ffi.NULL else data[30] | data[31] << 8
+        address = self._lib.board_access_fault_address(self._access)
+        return with_place(self._ffi.string(text).decode(), self._elf, address, z)
 
     def close(self) -> None:
         """Lets go of the board."""

@@ -106,3 +106,5 @@ int64_t board_access_fault_address(const board_access *self) {
 uint8_t *board_memory(board *self) { return self->op->extension(self, BOARD_DATA); }
 
 board_eeprom *board_eeprom_of(board *self) { return self->op->extension(self, BOARD_EEPROM); }
+
+const board_watchdog_log *board_watchdog_log_of(board *self) { return self->op->extension(self, BOARD_WATCHDOG_LOG); }

@@ -63,7 +63,9 @@ class EmulatedBoard:
         """What is wrong after a crash, with function and line where they are known."""
         text = lib.board_fault(self.address)
         why = "unknown fault" if text == ffi.NULL else ffi.string(text).decode()
-        return with_place(why, self.elf, lib.board_fault_address(self.address))
+        data = lib.board_memory(ffi.cast("board *", self.address))
+        z = 0 if data == ffi.NULL else data[30] | data[31] << 8
+        return with_place(why, self.elf, lib.board_fault_address(self.address), z)
 
     @property
     def can_repeat(self) -> bool:

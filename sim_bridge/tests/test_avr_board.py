@@ -13,6 +13,7 @@ from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Edge, Level, ResetCause, SentByte
 from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.symbols import entry_of
 
 # ---- images ----
 
@@ -78,6 +79,15 @@ session.transport.read(0.1)
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+WILD = (
+    "invalid instruction 0x",
+    "the program goes to 0x",
+    "jumps to its start",
+    "the stack overflows: it reaches 0x",
+    "the stack pointer leaves the memory: 0x",
+)
+
+
 def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
     # under the sanitizers this finds what a wild program could reach
     size = 30_000
@@ -97,7 +107,7 @@ def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
             board.advance(200_000)
         except BoardError as error:
             crashes += 1
-            assert "invalid instruction" in str(error) or "ran off the end" in str(error)  # noqa: PT017
+            assert any(what in str(error) for what in WILD), error  # noqa: PT017
         board.close()
         machine.close()
     assert crashes > 10
@@ -463,3 +473,47 @@ def test_runs_do_not_depend_on_steps(step: int, one_piece: tuple[list[Edge], lis
     assert edges == one_piece[0]
     assert sent == one_piece[1]
     assert counters == one_piece[2]
+
+
+# The watchdog warns, then resets. The warning ends the first loop.
+TWO_LOOPS = """
+  .global __vector_6
+  __vector_6: ldi r17, 1
+    {in_interrupt}
+    reti
+  main: ldi r24, 1 << WDCE | 1 << WDE
+    ldi r25, 1 << WDE | 1 << WDIE
+    wdr
+    sts WDTCSR, r24
+    sts WDTCSR, r25
+    ldi r17, 0
+    sei
+  first: tst r17
+    breq first
+    {then}
+  second: rjmp second
+"""
+
+
+@pytest.mark.parametrize(
+    ("in_interrupt", "then", "loop", "time_outs"),
+    [("", "", "first", 1), ("wdr", "", "first", 1), ("", "wdr", "second", 2), ("", "cli\n wdr", "first", 1)],
+    ids=["warned", "its interrupt kicks", "comes to itself", "kicks with interrupts off"],
+)
+def test_the_place_is_where_the_warning_found_the_program(
+    in_interrupt: str, then: str, loop: str, time_outs: int
+) -> None:
+    source = TWO_LOOPS.format(in_interrupt=in_interrupt, then=then)
+    machine = Machine(source)
+    machine.board.advance(2 * WATCHDOG_CYCLES + 1000)
+    ((cycle, address),) = machine.board.watchdog_log()
+    assert entry_of(assemble(source), loop) <= address <= entry_of(assemble(source), loop) + 2
+    assert abs(cycle - time_outs * WATCHDOG_CYCLES) < 100
+
+
+def test_a_reset_in_the_watchdogs_name_is_not_logged() -> None:
+    machine = Machine("main: rjmp main")
+    machine.board.reset(ResetCause.WATCHDOG)
+    machine.board.run(1000)
+    assert machine.board.counters()["resets"] == 1
+    assert machine.board.watchdog_log() == []

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from boebot.errors import BoardError
+from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level, ResetCause
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.symbols import entry_of
 
 SBI_CYCLES = 2
 
@@ -141,10 +145,27 @@ def test_bad_opcode_is_a_crash_until_the_next_reset() -> None:
     assert machine.board.counters()["resets"] == 1
 
 
-def test_running_off_the_flash_is_a_crash() -> None:
-    machine = Machine("main:\n ldi r30, 0x80\n ldi r31, 0x3f\n ijmp")
-    with pytest.raises(BoardError, match="ran off the end of the flash"):
-        machine.board.run(100_000)
+WILD_JUMPS = ["ijmp", "icall", "push r30\n push r31\n ret", "push r30\n push r31\n reti", "jmp 0x7F00", "call 0x7F00"]
+
+
+@pytest.mark.parametrize("jump", WILD_JUMPS)
+@pytest.mark.parametrize(("address", "what"), [(0x7F00, "goes to 0x7F00, but ends at"), (0, "jumps to its start")])
+def test_a_jump_to_where_no_instruction_is_is_a_crash(jump: str, address: int, what: str) -> None:
+    jump = jump.replace("0x7F00", str(address))
+    source = f"main: ldi r30, lo8({address // 2})\n ldi r31, hi8({address // 2})\n {jump}\n last: nop"
+    machine, length = Machine(source), 4 if jump[:2] in ("jm", "ca") else 2
+    with pytest.raises(BoardError, match=f"{what}.* at address 0x{entry_of(assemble(source), 'last') - length:04X} "):
+        machine.board.run(100)
+
+
+def test_running_straight_off_the_image_is_a_crash_of_its_last_instruction(tmp_path: Path) -> None:
+    whole, ending = assemble("main: ret"), b"\xf8\x94\xff\xcf"  # cli; rjmp .-2: where main returns to
+    assert whole.count(ending) == 1
+    image = tmp_path / "image.elf"
+    image.write_bytes(whole.replace(ending, b"\xf8\x94\x00\x00"))
+    last = entry_of(whole, "__stop_program")
+    with pytest.raises(BoardError, match=f"ends at 0x{last + 2:04X} at address 0x{last:04X} "):
+        create(image).access().run(1000)
 
 
 def test_memory_at_power_on_is_not_zero_and_always_the_same() -> None:

@@ -278,13 +278,13 @@ def test_lowest_stack_is_seen_and_half_written_pointers_are_not() -> None:
           out SPL, r28
         1: rjmp 1b
     """
-    machine, spans = recorded(source, 500, "deep", lowest_stack=0x07F2)
+    machine, spans = recorded(f"{source}\n .lcomm variables, {0x07F2 - 0x100}", 500, "deep")
     assert machine.avr.lowest_stack == 0x07F5 - 2 - 2
     assert list(spans["net"]) == [2 + 2 + 2 + 2 + RETURN]
 
 
 # The stack begins at 0x08FF, each return address takes 2 bytes: the first that lies below 0x0200 begins at 0x01FE.
-RECURSES = "main: rcall main\n rjmp main"
+RECURSES = "main: rcall main\n rjmp main\n .lcomm variables, 0x100"
 HANGS = "main: nop\n1: rjmp 1b"
 JUMPS = "main: ldi r30, 0\n ldi r31, 0x30\n ijmp"
 
@@ -292,8 +292,8 @@ JUMPS = "main: ldi r30, 0\n ldi r31, 0x30\n ijmp"
 @pytest.mark.parametrize(
     ("source", "watch", "fault"),
     [
-        (RECURSES, {"lowest_stack": 0x200}, "the stack overflows: it reaches 0x01FE"),
-        (JUMPS, {"code_end": 0x400}, "the program goes to 0x6000, but ends at 0x0400"),
+        (RECURSES, {}, "the stack overflows: it reaches 0x01FE"),
+        (JUMPS, {}, "the program goes to 0x6000, but ends at 0x"),
         ("main: ldi r30, 0\n ldi r31, 0\n ijmp", {}, "jumps to its start"),
         ("main: pop r24\n rjmp main", {}, "the stack pointer leaves the memory: 0x0900"),
         (HANGS, {"patience": 1000}, "the program hangs: it has not slept for 1000 cycles"),
@@ -324,18 +324,24 @@ def test_where_the_watchdog_found_the_program() -> None:
         stuck: rjmp stuck
     """
     machine, _ = recorded(source, 300_000)
-    reset = machine.avr.watchdog_reset
-    assert reset is not None
-    assert reset.address == entry_of(assemble(source), "stuck")
-    assert abs(reset.cycle - 2048 * 125) < 50  # 16 ms and what runs before WDR
+    ((cycle, address),) = machine.board.watchdog_log()
+    assert address == entry_of(assemble(source), "stuck")
+    assert abs(cycle - 2048 * 125) < 50  # 16 ms and what runs before WDR
     assert machine.board.counters()["resets"] == 1
 
 
-def test_without_a_recorder_a_program_that_leaves_its_image_stops_too() -> None:
-    machine = Machine(f"{JUMPS}")
-    machine.board.send(b"x" * 100)  # something happens now and then
-    with pytest.raises(BoardError, match="ran off the end of"):
-        machine.board.run(100_000)
+@pytest.mark.parametrize("source", [RECURSES, JUMPS, "main: pop r24\n rjmp main"])
+def test_without_a_recorder_the_faults_are_the_same(source: str) -> None:
+    faults = []
+    for is_recorded in (True, False):
+        machine = Machine(source)
+        machine.board.send(b"x" * 100)  # something happens now and then
+        if is_recorded:
+            machine.avr.record(Watch())
+        with pytest.raises(BoardError) as caught:
+            machine.board.run(100_000)
+        faults.append(str(caught.value))
+    assert faults[0] == faults[1]
 
 
 def test_recording_changes_nothing() -> None:

@@ -237,6 +237,6 @@ def test_a_fault_has_address_function_and_line(tmp_path: Path, fault: str, what:
     flags = ["-mmcu=atmega328p", "-Og", "-gdwarf-2", "-fno-optimize-sibling-calls"]
     subprocess.run(["avr-gcc", *flags, "-o", str(image), str(source)], check=True)
     board = avr.create(image)
-    board.record(Watch(code_end=0x1000, lowest_stack=0x300, patience=50_000))
+    board.record(Watch(patience=50_000))
     with pytest.raises(BoardError, match=rf"{what}.* at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"):
         board.access().run(1_000_000)

@@ -23,7 +23,7 @@ from boebot.timing.elf import Image, read_image
 from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
-from sim_bridge.boards.code_places import place
+from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.timing.line import Line
 from sim_bridge.timing.loads import TICK_CYCLES, Bench, Ping, PulseTrain
 from sim_bridge.timing.losses import losses as losses_of
@@ -112,12 +112,8 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
         wheels = load(bench, line, robot, scenario, numbers_of(seed), round(seconds * CLOCK_HZ))
         bench.run(round(seconds * CLOCK_HZ))
         after = bench.access.counters()
-        if (reset := board.watchdog_reset) is not None:
-            where = place(said, reset.address)
-            raise BoardError(
-                f"{image.name}, {under.scenario}, seed {seed}: the watchdog reset the program at address "
-                f"0x{reset.address:04X} in cycle {reset.cycle} {where}".rstrip()
-            )
+        if resets := watchdog_resets(bench.access.watchdog_log(), image):
+            raise BoardError(f"{image.name}, {under.scenario}, seed {seed}: {resets[0]}")
         record = board.spans()
         lowest_stack = board.lowest_stack
         board.stop_recording()

@@ -33,13 +33,11 @@ class Watched:
     entries: tuple[int, ...]
     names: tuple[str, ...]
     vectors: dict[int, str]
-    lowest_stack: int
-    code_end: int
 
     @property
     def watch(self) -> Watch:
         """For the recorder."""
-        return Watch(self.entries, self.code_end, self.lowest_stack, PATIENCE)
+        return Watch(self.entries, PATIENCE)
 
     @property
     def poll_id(self) -> int | None:
@@ -47,8 +45,8 @@ class Watched:
         return FUNCTION_IDS + self.names.index(POLL) if POLL in self.names else None
 
 
-def watched(image: Image, margin: int = 0) -> Watched:
-    """What there is to watch in an image. `margin`: bytes above the last variable that the stack shall not use."""
+def watched(image: Image) -> Watched:
+    """What there is to watch in an image."""
     functions = {s.name: s.address for s in image.symbols if s.kind in ("STT_FUNC", "STT_NOTYPE")}
     tasks = {row.name: f"{row.name}_task" for row in image.table.tasks} or {
         match[1]: match[0] for name in functions if (match := TASK.match(name))
@@ -67,8 +65,6 @@ def watched(image: Image, margin: int = 0) -> Watched:
         entries=tuple(found.values()),
         names=tuple(found),
         vectors=vectors,
-        lowest_stack=image.ram_end + margin,
-        code_end=max(place.stop for place in image.executable),
     )
 
 

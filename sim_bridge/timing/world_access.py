@@ -86,6 +86,10 @@ class WorldAccess:
         """What the board counted."""
         return self._pins.counters()
 
+    def watchdog_log(self) -> list[tuple[int, int]]:
+        """Cycles and addresses at which its watchdog found the program."""
+        return self._pins.watchdog_log()
+
     def close(self) -> None:
         """Frees world and board."""
         self._sim.close()

@@ -16,7 +16,7 @@ import time as wall
 from collections.abc import Iterator
 from struct import Struct
 
-from boebot import robots
+from boebot import hangs, robots
 from boebot.boards import BoardSession
 from boebot.brain_record import BrainRecord
 from boebot.devices import turret
@@ -24,7 +24,7 @@ from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, Told, told
 from boebot.driving import PROGRESS_S, Task, check_period, step_limit, whole_ticks
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import messages
+from boebot.link import messages, reset_cause
 from boebot.link.delivery import LatchedAgainError, SessionLostError
 from boebot.link.session import Link, text
 from boebot.link.session import Telemetry as Received
@@ -39,6 +39,7 @@ TIME_TO_LIVE_LIMIT_MS = 2000
 SILENCE_S = 3.0  # a board that says nothing for so long is lost; after a reset its boot loader waits for up to 2 s
 SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
 STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
+_READY_TRIES = 10  # sessions that may end, one after another, before the board is configured and armed
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
@@ -141,10 +142,17 @@ class BoardDriver:
         )
 
     def _make_ready(self) -> None:
-        """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile."""
+        """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile.
+
+        Raises:
+            BoardError: each session ends meanwhile, or the board refuses something.
+        """
         link = self.link
+        first = link.sessions
         while self._session != link.sessions:
             link.open()
+            if link.sessions - first >= _READY_TRIES:
+                raise self._never_ready()
             session = link.sessions
             try:
                 self.description = configure(link, self.task.request.robot)
@@ -154,6 +162,15 @@ class BoardDriver:
             except SessionLostError:
                 continue
             self._session = session
+
+    def _never_ready(self) -> BoardError:
+        hello, where = self.link.hello, self.session.transport.name
+        why = ""
+        if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
+            why = f"; its last reset was by {reset_cause.hang_in_words(hello.reset_cause)}"
+        return BoardError(
+            f"the board at {where} ended {_READY_TRIES} sessions in a row before it was configured and armed{why}"
+        )
 
     def _equipment(self) -> Equipment:
         """The devices as the board has them; how often it tells of slow ones it says itself."""
@@ -350,7 +367,8 @@ class BoardDriver:
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.driving.Driver`."""
-        link = self.link
+        link, watchdog_resets = self.link, self.session.watchdog_resets()
+        self.notices += hangs.sentences(watchdog_resets)
         return RunResult(
             brain=self.task.brain.name,
             robot=self.description,
@@ -378,6 +396,7 @@ class BoardDriver:
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
             notices=self.notices,
+            watchdog_resets=watchdog_resets,
             counters=dict(self.session.counters()),
             without=self.task.request.without,
             brain_record=BrainRecord.of(self.task.brain.brain, self.robot),

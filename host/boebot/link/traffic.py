@@ -302,8 +302,9 @@ class Traffic(Opening):
         assert self.hello is not None
         cause = self.hello.reset_cause
         if reset_cause.by_watchdog(cause):
-            where = self.transport.name
-            self.notices.append(f"the last reset of the board at {where} was by {reset_cause.hang_in_words(cause)}")
+            told = f"the last reset of the board at {self.transport.name} was by {reset_cause.hang_in_words(cause)}"
+            if told not in self.notices:
+                self.notices.append(told)
 
     def _hear_answer(self, payload: bytes, now: float) -> None:
         if not self.is_open:

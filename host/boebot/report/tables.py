@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,7 +83,10 @@ def write_brain(record: BrainRecord, folder: Path) -> list[Path]:
 
 def write_summary(result: RunResult, path: Path) -> Path:
     """summary.json"""
-    summary = {"format": FORMAT} | result.table() | {"counters": result.counters}
+    summary: dict[str, Any] = {"format": FORMAT} | result.table() | {"counters": result.counters}
+    summary["watchdog_resets"] = [
+        asdict(reset) | {"time_s": round(reset.time_s - result.clock_offset, 6)} for reset in result.watchdog_resets
+    ]
     path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     return path
 

@@ -37,27 +37,16 @@ SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What is recorded of a program, and what is a fault of it. Addresses in bytes.
+    """What is recorded of a program.
 
     Attributes:
-        functions: entries of the functions whose spans are recorded; ids are FUNCTION_IDS, FUNCTION_IDS + 1, ...
-        code_end: no instruction stands from here on.
-        lowest_stack: the lowest address in data memory that the stack may write.
+        functions: entries, in bytes, of the functions whose spans are recorded; ids are FUNCTION_IDS, FUNCTION_IDS + 1,
+            ...
         patience: cycles without sleep after which the program hangs; 0: any number.
     """
 
     functions: Sequence[int] = ()
-    code_end: int = 0x8000
-    lowest_stack: int = 0x100
     patience: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class WatchdogReset:
-    """Where a program was when the watchdog reset it: byte address of its next instruction, and cycle."""
-
-    address: int
-    cycle: int
 
 
 def _extension() -> Any:
@@ -132,8 +121,6 @@ class AvrBoard:
             {
                 "entries": entries,
                 "entry_count": len(watch.functions),
-                "code_end": watch.code_end,
-                "lowest_stack": watch.lowest_stack,
                 "patience": watch.patience,
             },
         )
@@ -160,14 +147,6 @@ class AvrBoard:
     def lowest_stack(self) -> int:
         """Lowest value of the stack pointer while it records."""
         return int(self._lib.avr_board_lowest_stack(self._running))
-
-    @property
-    def watchdog_reset(self) -> WatchdogReset | None:
-        """The first reset by the watchdog while it records."""
-        address, cycle = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
-        if not self._lib.avr_board_watchdog_reset(self._running, address, cycle):
-            return None
-        return WatchdogReset(int(address[0]), int(cycle[0]))
 
     def close(self) -> None:
         """Frees the board."""

@@ -141,6 +141,7 @@ static void destroy(board *self) {
   }
   pins_free(b);
   usart_free(b);
+  watchdog_free(b);
   spans_free(b);
   free(b);
 }
@@ -193,6 +194,7 @@ static void *extension(board *self, const char *name) {
   if (!strcmp(name, BOARD_DATA)) return b->avr->data;
   if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
   if (!strcmp(name, AVR_BOARD_FLASH)) return b->avr->flash;
+  if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_history.log;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;
   }

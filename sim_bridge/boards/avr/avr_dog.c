@@ -1,9 +1,12 @@
 /* avr_dog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact. In the
  * interrupt and system reset mode (WDE and WDIE) the first time-out asks for the interrupt, whose execution clears WDIE;
- * the next one resets, whether the interrupt was executed or not (table 11-1).
+ * the next one resets, whether the interrupt was executed or not (table 11-1). Of each reset it keeps where the program was:
+ * when the interrupt was executed, or else at the reset.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
+#include <stdlib.h>
+
 #include "avr_parts.h"
 
 #define OSCILLATOR_HZ 128000u
@@ -23,13 +26,32 @@ static void plan(avr_board *b) {
   set_due(b, DUE_WATCHDOG, runs ? b->watchdog.since + period(b) : NEVER);
 }
 
+static void note_reset(avr_board *b, uint64_t cycle) {
+  watchdog_history *history = &b->watchdog_history;
+  board_watchdog_log *log = &history->log;
+  if (log->count == history->capacity) {
+    size_t capacity = history->capacity ? 2 * history->capacity : 8;
+    board_watchdog_reset *resets = realloc(log->resets, capacity * sizeof *resets);
+    if (!resets) abort(); /* a log with a gap would lie */
+    log->resets = resets;
+    history->capacity = capacity;
+  }
+  bool warned = b->watchdog.warned_at != NO_ADDRESS;
+  log->resets[log->count++] = (board_watchdog_reset){
+      .cycle = warned ? b->watchdog.warned_cycle : cycle,
+      .address = warned ? b->watchdog.warned_at : (uint32_t)b->avr->pc,
+  };
+}
+
 void watchdog_due(avr_board *b, uint64_t cycle) {
   const uint8_t *control = &b->avr->data[REG_WDTCSR];
   b->watchdog.since = cycle;
   bool warned = (*control & WDE) && (b->raised & FLAG(VECTOR_WDT));
   if ((*control & WDIE) && !warned) {
+    b->watchdog.warned_at = NO_ADDRESS; /* not yet, this time */
     raise_flag(b, VECTOR_WDT);
   } else {
+    note_reset(b, cycle);
     want_reset(b, BOARD_RESET_WATCHDOG);
   }
   plan(b);
@@ -38,12 +60,16 @@ void watchdog_due(avr_board *b, uint64_t cycle) {
 /* Interrupt and reset mode: the interrupt was the warning. */
 void watchdog_acknowledged(avr_board *b) {
   uint8_t *control = &b->avr->data[REG_WDTCSR];
+  b->watchdog.warned_at = (uint32_t)b->avr->pc;
+  b->watchdog.warned_cycle = b->avr->cycle;
   if (!(*control & WDE)) return;
   *control &= (uint8_t)~WDIE;
   enable_interrupt(b, VECTOR_WDT, false);
 }
 
+/* With interrupts on it is not the warning's interrupt that kicks: the program has come to itself. */
 void watchdog_kick(avr_board *b) {
+  if (b->avr->sreg[S_I]) b->watchdog.warned_at = NO_ADDRESS;
   b->watchdog.since = b->avr->cycle + 1;
   if (b->due[DUE_WATCHDOG] != NEVER) plan(b);
 }
@@ -80,10 +106,12 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
 }
 
 void watchdog_reset(avr_board *b, uint64_t cycle) {
-  b->watchdog = (watchdog_state){.since = cycle};
+  b->watchdog = (watchdog_state){.since = cycle, .warned_at = NO_ADDRESS};
   b->avr->data[REG_WDTCSR] = b->avr->data[REG_MCUSR] & WDRF ? WDE : 0;
   plan(b);
 }
+
+void watchdog_free(avr_board *b) { free(b->watchdog_history.log.resets); }
 
 void watchdog_init(avr_board *b) {
   on_read(b, REG_WDTCSR, read_control, b);

@@ -1,7 +1,8 @@
 /* avr_image.c: puts the program of an ELF file into flash and EEPROM.
  *
  * Reads the little of ELF32 that an AVR image has: the header and its loadable segments, whose physical addresses say
- * where they go: flash from 0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed.
+ * where they go: flash from 0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed. They also say where
+ * the code ends, and where the variables do (their addresses are those of data memory and 0x800000).
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -17,6 +18,9 @@
 #define ARCHITECTURE_MASK 0x7Fu
 #define ARCHITECTURE_AVR5 5u /* that of the ATmega328P */
 #define SEGMENT_LOAD 1u
+#define SEGMENT_EXECUTABLE 1u
+#define DATA_BASE 0x800000u
+#define RAM_BEGIN 0x100u
 #define EEPROM_BASE 0x810000u
 
 static uint32_t half(const uint8_t *p) { return p[0] | (uint32_t)p[1] << 8; }
@@ -32,7 +36,6 @@ static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, u
   if (address < AVR_BOARD_FLASH_SIZE) {
     if (size > AVR_BOARD_FLASH_SIZE - address) return false;
     memcpy(b->avr->flash + address, bytes, size);
-    if (address + size > b->image_end) b->image_end = address + size;
   } else if (address >= EEPROM_BASE && address < EEPROM_BASE + BOARD_EEPROM_SIZE) {
     if (size > EEPROM_BASE + BOARD_EEPROM_SIZE - address) return false;
     memcpy(b->eeprom.cells + (address - EEPROM_BASE), bytes, size);
@@ -40,6 +43,19 @@ static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, u
     return false;
   }
   return true;
+}
+
+/* What a segment says of the program: where its code ends, or its variables, if they leave memory for a stack. */
+static void heed_segment(avr_board *b, const uint8_t *segment) {
+  uint32_t place = word(segment + 8), address = word(segment + 12), length = word(segment + 16);
+  uint32_t taken = word(segment + 20), flags = word(segment + 24);
+  if ((flags & SEGMENT_EXECUTABLE) && address < AVR_BOARD_FLASH_SIZE && address + length > b->code_end) {
+    b->code_end = address + length;
+  }
+  uint32_t begin = place - DATA_BASE;
+  if (begin < BOARD_DATA_SIZE && taken < BOARD_DATA_SIZE - begin && begin + taken > b->lowest_stack) {
+    b->lowest_stack = (uint16_t)(begin + taken);
+  }
 }
 
 bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size) {
@@ -53,6 +69,7 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
   }
   uint32_t table = word(elf + 28), entry_size = half(elf + 42), entries = half(elf + 44);
   bool loaded = false;
+  b->lowest_stack = RAM_BEGIN;
   for (uint32_t i = 0; i < entries; i++) {
     uint64_t at = table + (uint64_t)i * entry_size;
     if (entry_size < SEGMENT_HEADER_SIZE || at + SEGMENT_HEADER_SIZE > size) {
@@ -61,7 +78,9 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
     }
     const uint8_t *segment = elf + at;
     uint32_t offset = word(segment + 4), address = word(segment + 12), length = word(segment + 16);
-    if (word(segment) != SEGMENT_LOAD || length == 0) continue;
+    if (word(segment) != SEGMENT_LOAD) continue;
+    heed_segment(b, segment);
+    if (length == 0) continue;
     if ((uint64_t)offset + length > size) {
       snprintf(error, error_size, "it is cut short");
       return false;
@@ -73,6 +92,7 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
     }
     loaded = loaded || address < AVR_BOARD_FLASH_SIZE;
   }
+  loaded = loaded && b->code_end > 0;
   if (!loaded) snprintf(error, error_size, "it holds no program");
   return loaded;
 }

@@ -1,7 +1,8 @@
 /* avr_instructions.c: see avr_instructions.h. After the AVR instruction set manual; cycles are those of AVRe+ with a
  * 16-bit program counter. sim_bridge/tests/test_avr_common_instructions.py has all of them executed here and by simavr.
  *
- * Left to simavr is whatever reaches an I/O register or the interrupt system, or leaves flash or RAM.
+ * Left to simavr is whatever reaches an I/O register or the interrupt system, or leaves flash or RAM, or would take the
+ * stack into the variables: so the check of the stack costs the others nothing.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -67,9 +68,15 @@ static inline bool store_moving(uint8_t *data, unsigned opcode) {
   return true;
 }
 
-static inline bool push(uint8_t *data, unsigned opcode) {
+/* So many bytes, the first of them at `address`, the others below. */
+static inline bool may_push(unsigned address, unsigned bytes, unsigned lowest) {
+  return address - lowest - (bytes - 1u) < BOARD_DATA_SIZE - lowest - (bytes - 1u);
+}
+
+static inline bool push(uint8_t *data, unsigned opcode, unsigned lowest) {
   uint16_t stack = (uint16_t)word_at(data, SP);
-  if (!store(data, opcode, stack)) return false;
+  if (!may_push(stack, 1, lowest)) return false;
+  data[stack] = data[D];
   put_word(data, SP, stack - 1u);
   return true;
 }
@@ -81,9 +88,9 @@ static inline bool pop(uint8_t *data, unsigned opcode) {
   return true;
 }
 
-static inline bool push_address(uint8_t *data, uint32_t address) {
+static inline bool push_address(uint8_t *data, uint32_t address, unsigned lowest) {
   uint16_t stack = (uint16_t)word_at(data, SP);
-  if (!in_ram(stack) || !in_ram((uint16_t)(stack - 1u))) return false;
+  if (!may_push(stack, 2, lowest)) return false;
   data[stack] = (uint8_t)(address >> 1);
   data[stack - 1u] = (uint8_t)(address >> 9);
   put_word(data, SP, stack - 2u);
@@ -122,13 +129,24 @@ static inline bool skips(const uint8_t *data, unsigned opcode, unsigned kind) {
 
 static inline uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* False: the core is to stop behind it. `until` may come nearer by it. */
+/* A stack pointer that is not where it may be has gone wrong only behind an instruction that leaves it whole: a program
+ * writes it in two halves, the upper one first (avr-libc, gcc), and what is between them says nothing. */
+static void check_stack_behind(avr_board *b, uint32_t at) {
+  uint32_t pointer = word_at(b->avr->data, SP);
+  if (pointer + 1u >= b->lowest_stack && pointer < BOARD_DATA_SIZE) return;
+  unsigned opcode = at < AVR_BOARD_FLASH_SIZE ? word_at(b->avr->flash, at) : 0;
+  if (moves_whole_stack(opcode)) check_stack(b, at);
+}
+
+/* That at `pc`, which then is the next one's address. False: the core is to stop behind it. `until` may come nearer by it. */
 static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
   avr_t *avr = b->avr;
   avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
+  uint32_t at = *pc;
   *pc = (uint32_t)avr_run_one(avr);
+  check_stack_behind(b, at);
   *until = earlier(earlier(*until, b->next_due), next_of_simavr(avr));
-  return avr->run_cycle_count && avr->state == cpu_Running && !avr->interrupt_state;
+  return avr->run_cycle_count && avr->state == cpu_Running && !avr->interrupt_state && !b->crashed;
 }
 
 /* ---- many ---- */
@@ -138,12 +156,13 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
   avr_t *avr = b->avr;
   uint8_t *const data = avr->data, *const f = avr->sreg;
   const uint8_t *const flash = avr->flash;
+  const unsigned lowest = b->lowest_stack;
   uint64_t cycle = avr->cycle;
   uint32_t at, pc = (uint32_t)avr->pc;
   if (avr->interrupt_state || b->one_by_one) until = cycle + 1;
   do {
     unsigned opcode = 0, kind = UNCOMMON, takes = 1;
-    bool moves_stack = false, here = true; /* here: executed here */
+    bool moves_stack = false, jumps = false, here = true; /* here: executed here */
     at = pc;
     if (at < AVR_BOARD_FLASH_SIZE && !b->one_by_one) {
       opcode = word_at(flash, at);
@@ -237,7 +256,7 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         takes = 3;
         break;
       case PUSH:
-        here = push(data, opcode);
+        here = push(data, opcode, lowest);
         moves_stack = true;
         takes = 2;
         break;
@@ -304,37 +323,40 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
 
       case JMP:
         pc = word_at(flash, pc) << 1;
+        jumps = true;
         takes = 3;
         break;
       case RJMP:
         pc = relative(pc, opcode);
+        jumps = true;
         takes = 2;
         break;
       case IJMP:
         pc = word_at(data, Z) << 1;
+        jumps = true;
         takes = 2;
         break;
       case CALL:
-        here = push_address(data, pc + 2);
+        here = push_address(data, pc + 2, lowest);
         pc = word_at(flash, pc) << 1;
-        moves_stack = true;
+        moves_stack = jumps = true;
         takes = 4;
         break;
       case RCALL:
-        here = push_address(data, pc);
+        here = push_address(data, pc, lowest);
         pc = relative(pc, opcode);
-        moves_stack = true;
+        moves_stack = jumps = true;
         takes = 3;
         break;
       case ICALL:
-        here = push_address(data, pc);
+        here = push_address(data, pc, lowest);
         pc = word_at(data, Z) << 1;
-        moves_stack = true;
+        moves_stack = jumps = true;
         takes = 3;
         break;
       case RET:
         here = pop_address(data, &pc);
-        moves_stack = true;
+        moves_stack = jumps = true;
         takes = 4;
         break;
       case BRANCH_SET:
@@ -356,13 +378,14 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         here = false;
     }
     if (!here) {
-      avr->pc = at;
+      avr->pc = pc = at;
       avr->cycle = cycle;
       if (!uncommon(b, &pc, &until)) until = 0;
       cycle = avr->cycle;
-      moves_stack = true;
+      moves_stack = jumps = true;
       takes = 0;
     }
+    if (jumps && !is_code(b, pc)) until = 0;
     cycle += takes;
     if (stops) {
       if (moves_stack) {

@@ -305,7 +305,14 @@ typedef struct {
 typedef struct {
   uint64_t since;        /* when its counter was last reset */
   uint64_t change_until; /* WDCE is set before this cycle */
+  uint32_t warned_at;    /* where its interrupt found the program, or NO_ADDRESS */
+  uint64_t warned_cycle; /* when that was */
 } watchdog_state;
+
+typedef struct {
+  board_watchdog_log log;
+  size_t capacity;
+} watchdog_history;
 
 /* ---- EEPROM ---- */
 
@@ -346,7 +353,8 @@ typedef struct avr_board {
   bool crashed;
   char fault[160];
   uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
-  uint32_t image_end;            /* behind the last byte of flash that the image fills */
+  uint32_t code_end;             /* no instruction of the image stands from here on */
+  uint16_t lowest_stack;         /* lowest address in data memory that the stack may write: behind the variables */
   bool one_by_one;               /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
@@ -362,6 +370,7 @@ typedef struct avr_board {
   twi_state twi;
   converter_state converter;
   watchdog_state watchdog;
+  watchdog_history watchdog_history;
   eeprom_state eeprom;
 } avr_board;
 
@@ -379,12 +388,16 @@ void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled
 void want_reset(avr_board *b, board_reset_cause cause);
 /* The board stops; `address` is that of the instruction to blame, the rest says what it did, without place and time. */
 void crash_at(avr_board *b, uint32_t address, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* The board stops if the instruction at `address` has moved the stack pointer to where it may not be. */
+void check_stack(avr_board *b, uint32_t address);
 /* The program asks for a thing that is not built: the board stops, and says so. */
 void refuse(avr_board *b, const char *what);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
 uint64_t begin_access(avr_board *b);
+
+static inline bool is_code(const avr_board *b, uint32_t address) { return address - 1u < b->code_end - 1u; }
 
 /* avr_board.c */
 void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);
@@ -447,6 +460,7 @@ void watchdog_reset(avr_board *b, uint64_t cycle);
 void watchdog_due(avr_board *b, uint64_t cycle);
 void watchdog_kick(avr_board *b);
 void watchdog_acknowledged(avr_board *b);
+void watchdog_free(avr_board *b);
 
 /* avr_eeprom.c */
 void eeprom_init(avr_board *b);
@@ -454,12 +468,12 @@ void eeprom_reset(avr_board *b, bool power_failed);
 void eeprom_due(avr_board *b);
 
 /* avr_spans.c; all but spans_free only while there is a recorder */
-void run_recorded(avr_board *b, uint64_t until); /* instructions, while nothing wants the core to stop */
+uint32_t run_recorded(avr_board *b, uint64_t until); /* as execute_instructions; stops where something is recorded */
 void spans_accept(avr_board *b, uint8_t vector, uint64_t begin); /* an interrupt begins, its flag is still raised */
 void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle);
 void spans_request_gone(avr_board *b, uint8_t vector);
 void spans_woke(avr_board *b);
-void spans_restart(avr_board *b, bool by_watchdog);
+void spans_restart(avr_board *b);
 void spans_free(avr_board *b);
 
 /* avr_image.c */

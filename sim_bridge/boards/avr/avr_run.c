@@ -152,6 +152,7 @@ static bool enter_interrupt(avr_board *b) {
     if (b->recorder) spans_accept(b, vector, avr->cycle + (b->sleeping ? WAKE_UP_CYCLES : 0));
     acknowledge(b, vector);
     _avr_push_addr(avr, avr->pc);
+    check_stack(b, (uint32_t)avr->pc);
     avr_sreg_set(avr, S_I, 0);
     avr->pc = (avr_flashaddr_t)vector * avr->vector_size;
   } else { /* one of simavr's own modules; they are less urgent than all of ours */
@@ -196,6 +197,28 @@ void crash_at(avr_board *b, uint32_t address, const char *format, ...) {
   b->crashed = true;
 }
 
+void check_stack(avr_board *b, uint32_t address) {
+  uint32_t pointer = _avr_sp_get(b->avr), lowest = b->lowest_stack;
+  if (pointer + 1u < lowest) {
+    crash_at(b, address, "the stack overflows: it reaches 0x%04X, variables end below 0x%04X", (unsigned)pointer + 1u,
+             (unsigned)lowest);
+  } else if (pointer >= BOARD_DATA_SIZE) {
+    crash_at(b, address, "the stack pointer leaves the memory: 0x%04X", (unsigned)pointer);
+  }
+}
+
+/* The board stops if the instruction at `address` has led to where none is. */
+static void check_jump(avr_board *b, uint32_t address) {
+  uint32_t pc = (uint32_t)b->avr->pc;
+  if (b->crashed || is_code(b, pc)) return;
+  if (address >= b->code_end) address = b->code_end - 2u; /* it ran straight on, behind the last instruction */
+  if (pc == 0) {
+    crash_at(b, address, "the program jumps to its start without a reset");
+  } else {
+    crash_at(b, address, "the program goes to 0x%04X, but ends at 0x%04X", (unsigned)pc, (unsigned)b->code_end);
+  }
+}
+
 void refuse(avr_board *b, const char *what) {
   crash_at(b, (uint32_t)b->avr->pc, "the program uses %s, which is not built,", what);
   stop_core(b);
@@ -204,7 +227,12 @@ void refuse(avr_board *b, const char *what) {
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
   avr_board *b = param;
   (void)irq;
-  crash_at(b, (uint32_t)b->avr->pc, "the program reached the invalid instruction 0x%04X", (unsigned)opcode);
+  uint32_t address = (uint32_t)b->avr->pc;
+  if (is_code(b, address)) {
+    crash_at(b, address, "the program reached the invalid instruction 0x%04X", (unsigned)opcode);
+  } else {
+    check_jump(b, address);
+  }
   b->avr->state = cpu_Crashed;
 }
 
@@ -246,7 +274,7 @@ void restart(avr_board *b) {
   b->counters.resets++;
   b->crashed = false;
   b->sleeping = false;
-  if (b->recorder) spans_restart(b, causes & (1u << BOARD_RESET_WATCHDOG));
+  if (b->recorder) spans_restart(b);
   b->raised = 0;
   b->enabled = 0;
   b->timer_base[0] = b->timer_base[1] = cycle;
@@ -288,16 +316,15 @@ static void execute(avr_board *b, uint64_t until) {
     avr->interrupt_state = 0;
     until = start + 1;
   }
-  if (avr->pc >= b->image_end) {
-    crash_at(b, NO_ADDRESS, "the program ran off the end of its image: it is at 0x%04X, the image ends at 0x%04X",
-             (unsigned)avr->pc, (unsigned)b->image_end);
-  } else if (b->recorder) {
-    run_recorded(b, until);
+  uint32_t address;
+  if (b->recorder) {
+    address = run_recorded(b, until);
   } else {
-    execute_instructions(b, until, NULL);
+    address = execute_instructions(b, until, NULL);
     core_stopped(b);
     b->counters.executed_cycles += avr->cycle - start;
   }
+  check_jump(b, address);
 }
 
 board_state run_until(avr_board *b, uint64_t until) {

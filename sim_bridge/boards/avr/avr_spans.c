@@ -17,7 +17,6 @@
 #include "sim_core.h"
 
 #define OPEN_MAXIMUM 64u
-#define NOT_CODE 0xFFu
 #define OUT_MASK 0xFE0Fu /* OUT A, Rr: 1011 1AAr rrrr AAAA */
 #define OUT_SPH 0xBE0Eu
 #define HALF_WRITTEN_STEPS 3u /* out SPH; out SREG; out SPL */
@@ -29,8 +28,8 @@ typedef struct {
 } open_span;
 
 typedef struct avr_recorder {
-  instruction_stops stops; /* marked: 1 + index of the function that begins there, or NOT_CODE */
-  avr_watch watch;
+  instruction_stops stops; /* marked: 1 + index of the function that begins there */
+  uint64_t patience;
   avr_span *spans;
   size_t count, capacity;
   open_span open[OPEN_MAXIMUM];
@@ -40,9 +39,6 @@ typedef struct avr_recorder {
   uint16_t lowest_stack;
   uint8_t half_written; /* steps for which the stack pointer may be half of an old and half of a new one */
   uint64_t hangs_at;    /* unless it sleeps before */
-  bool was_reset;       /* by the watchdog */
-  uint32_t reset_address;
-  uint64_t reset_cycle;
 } avr_recorder;
 
 /* ---- spans ---- */
@@ -114,34 +110,13 @@ void spans_accept(avr_board *b, uint8_t vector, uint64_t begin) {
   open_one(b, vector, begin, request < begin ? (uint32_t)(begin - request) : 0, r->stack);
 }
 
-/* ---- what goes wrong ---- */
-
-static void check_stack(avr_board *b, uint32_t address) {
-  const avr_recorder *r = b->recorder;
-  if (r->stack + 1u < r->watch.lowest_stack) {
-    crash_at(b, address, "the stack overflows: it reaches 0x%04X, variables end below 0x%04X", r->stack + 1u,
-             (unsigned)r->watch.lowest_stack);
-  } else if (r->stack >= BOARD_DATA_SIZE) {
-    crash_at(b, address, "the stack pointer leaves the memory: 0x%04X", r->stack);
-  }
-}
-
-static void crash_by_jump(avr_board *b, uint32_t address) {
-  uint32_t pc = (uint32_t)b->avr->pc;
-  if (pc == 0) {
-    crash_at(b, address, "the program jumps to its start without a reset");
-  } else {
-    crash_at(b, address, "the program goes to 0x%04X, but ends at 0x%04X", (unsigned)pc,
-             (unsigned)b->recorder->watch.code_end);
-  }
-}
-
 /* ---- where the core stops ---- */
 
 /* Above the highest value of the stack pointer a span has ended; below the lowest one it is lower than ever, or it must
  * not be there. Between them its moves need not be seen. */
-static void choose_stops(avr_recorder *r) {
-  uint16_t allowed = (uint16_t)(r->watch.lowest_stack - 1u);
+static void choose_stops(const avr_board *b) {
+  avr_recorder *r = b->recorder;
+  uint16_t allowed = (uint16_t)(b->lowest_stack - 1u);
   uint16_t highest = r->open_count ? r->open[r->open_count - 1].stack : BOARD_DATA_SIZE - 1u;
   r->stops.lowest = r->lowest_stack > allowed ? r->lowest_stack : allowed;
   r->stops.highest = highest < BOARD_DATA_SIZE ? highest : BOARD_DATA_SIZE - 1u;
@@ -162,58 +137,47 @@ static void stack_moved(avr_board *b, uint32_t address) {
   r->stack = _avr_sp_get(b->avr);
   if (r->stack < r->lowest_stack) r->lowest_stack = r->stack;
   while (r->open_count && r->stack > r->open[r->open_count - 1].stack) close_one(b);
-  check_stack(b, address);
 }
 
-static void reached(avr_board *b, uint32_t address) {
+static void reached(avr_board *b, uint8_t mark) {
   avr_recorder *r = b->recorder;
-  uint32_t pc = (uint32_t)b->avr->pc;
-  uint8_t found = pc < AVR_BOARD_FLASH_SIZE ? r->stops.marked[pc / 2] : NOT_CODE;
-  if (found == NOT_CODE) {
-    crash_by_jump(b, address);
-    return;
-  }
-  uint16_t id = (uint16_t)(AVR_FUNCTION_IDS + found - 1u), stack = _avr_sp_get(b->avr);
+  uint16_t id = (uint16_t)(AVR_FUNCTION_IDS + mark - 1u), stack = _avr_sp_get(b->avr);
   const open_span *top = r->open_count ? &r->open[r->open_count - 1] : NULL;
   if (top && top->span.id == id && top->stack == stack) return; /* a loop that goes back to its first instruction */
   open_one(b, id, b->avr->cycle, 0, stack);
 }
 
-void run_recorded(avr_board *b, uint64_t until) {
+uint32_t run_recorded(avr_board *b, uint64_t until) {
   avr_t *avr = b->avr;
   avr_recorder *r = b->recorder;
   uint64_t start = avr->cycle;
   if (until > r->hangs_at) until = r->hangs_at;
   if (r->half_written) until = start + 1;
-  choose_stops(r);
+  choose_stops(b);
   uint32_t address = execute_instructions(b, until, &r->stops), next = (uint32_t)avr->pc;
   b->counters.executed_cycles += avr->cycle - start;
   if (avr->state != cpu_Running) core_stopped(b);
-  if (b->crashed) return;
+  if (b->crashed || !is_code(b, next)) return address;
   if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
-  if (next >= AVR_BOARD_FLASH_SIZE || r->stops.marked[next / 2]) reached(b, address);
+  if (r->stops.marked[next / 2]) reached(b, r->stops.marked[next / 2]);
   if (b->sleeping) {
     r->hangs_at = NEVER;
   } else if (avr->cycle >= r->hangs_at && !b->crashed) {
     crash_at(b, (uint32_t)avr->pc, "the program hangs: it has not slept for %llu cycles",
-             (unsigned long long)r->watch.patience);
+             (unsigned long long)r->patience);
   }
+  return address;
 }
 
 static void begin_patience(avr_board *b) {
   avr_recorder *r = b->recorder;
-  r->hangs_at = r->watch.patience && !b->sleeping ? b->avr->cycle + r->watch.patience : NEVER;
+  r->hangs_at = r->patience && !b->sleeping ? b->avr->cycle + r->patience : NEVER;
 }
 
 void spans_woke(avr_board *b) { begin_patience(b); }
 
-void spans_restart(avr_board *b, bool by_watchdog) {
+void spans_restart(avr_board *b) {
   avr_recorder *r = b->recorder;
-  if (by_watchdog && !r->was_reset) {
-    r->was_reset = true;
-    r->reset_address = (uint32_t)b->avr->pc;
-    r->reset_cycle = b->avr->cycle;
-  }
   r->open_count = 0; /* cut short: no spans */
   r->stack = (uint16_t)(BOARD_DATA_SIZE - 1u);
   r->half_written = 0;
@@ -241,16 +205,11 @@ bool avr_board_record(board *self, const avr_watch *watch) {
     }
     r->stops.marked[watch->entries[i] / 2] = (uint8_t)(i + 1);
   }
-  r->stops.marked[0] = NOT_CODE; /* nobody jumps to the reset vector */
-  for (uint32_t address = watch->code_end; address < AVR_BOARD_FLASH_SIZE; address += 2) {
-    r->stops.marked[address / 2] = NOT_CODE;
-  }
-  r->watch = *watch;
-  r->watch.entries = NULL; /* the caller's */
+  r->patience = watch->patience;
   r->lowest_stack = _avr_sp_get(b->avr);
   spans_free(b);
   b->recorder = r;
-  spans_restart(b, false);
+  spans_restart(b);
   r->stack = r->lowest_stack;
   for (uint8_t vector = 1; vector <= VECTOR_TWI; vector++) spans_requested(b, vector, b->avr->cycle);
   return true;
@@ -272,12 +231,4 @@ void avr_board_forget_spans(board *self) {
 uint16_t avr_board_lowest_stack(const board *self) {
   const avr_recorder *r = ((const avr_board *)self)->recorder;
   return r ? r->lowest_stack : 0;
-}
-
-bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle) {
-  const avr_recorder *r = ((const avr_board *)self)->recorder;
-  if (!r || !r->was_reset) return false;
-  *address = r->reset_address;
-  *cycle = r->reset_cycle;
-  return true;
 }

@@ -33,9 +33,7 @@ typedef struct {
 typedef struct {
   const uint32_t *entries; /* byte addresses of functions */
   size_t entry_count;
-  uint32_t code_end;     /* no instruction stands from here on; byte address */
-  uint32_t lowest_stack; /* lowest address in data memory that the stack may write */
-  uint64_t patience;     /* cycles without sleep after which the program hangs; 0: any number */
+  uint64_t patience; /* cycles without sleep after which the program hangs; 0: any number */
 } avr_watch;
 
 /* Begins to record, anew if it did already. False: no memory, or an entry that is no address of flash. */
@@ -48,8 +46,5 @@ void avr_board_forget_spans(board *self);
 
 /* Lowest value of the stack pointer while it records. */
 uint16_t avr_board_lowest_stack(const board *self);
-
-/* Where the watchdog first reset the board while it records: address of the next instruction and cycle; false: never. */
-bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle);
 
 #endif

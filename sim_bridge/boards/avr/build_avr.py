@@ -65,7 +65,6 @@ typedef struct { uint64_t begin, executed; uint32_t gross, net, latency; uint16_
 typedef struct {
   const uint32_t *entries;
   size_t entry_count;
-  uint32_t code_end, lowest_stack;
   uint64_t patience;
   ...;
 } avr_watch;
@@ -76,7 +75,6 @@ void avr_board_stop_recording(board *self);
 const avr_span *avr_board_spans(const board *self, size_t *count);
 void avr_board_forget_spans(board *self);
 uint16_t avr_board_lowest_stack(const board *self);
-bool avr_board_watchdog_reset(const board *self, uint32_t *address, uint64_t *cycle);
 """
 
 PREAMBLE = """

@@ -1,0 +1,40 @@
+"""What the resets of a board's watchdog are told as."""
+
+from __future__ import annotations
+
+import pytest
+
+from boebot import hangs
+from boebot.boards import WatchdogReset
+
+
+def reset(number: int, address: int, place: str = "") -> WatchdogReset:
+    return WatchdogReset(cycle=number * 1_600_000, time_s=number / 10, address=address, place=place)
+
+
+IN_A, IN_B = "in a (a.c:5)", "in b (b.c:7)"
+
+
+def test_nothing_is_told_of_no_reset() -> None:
+    assert hangs.sentences([]) == []
+    assert hangs.places([]) is None
+
+
+def test_each_place_is_told_once_by_its_first_reset() -> None:
+    """Two instructions of one line are one place; without lines each address is."""
+    resets = [reset(1, 0x1A2, IN_A), reset(2, 0x30, IN_B), reset(3, 0x1A4, IN_A), reset(4, 0x40)]
+    assert hangs.sentences(resets) == [
+        f"the watchdog reset the program, which it found at address 0x01A2 in cycle 1600000 {IN_A}; 2 times in all",
+        f"the watchdog reset the program, which it found at address 0x0030 in cycle 3200000 {IN_B}",
+        "the watchdog reset the program, which it found at address 0x0040 in cycle 6400000",
+    ]
+    assert hangs.places(resets) == f"0x01A2 {IN_A}, 2 times; 0x0030 {IN_B}; 0x0040"
+
+
+@pytest.mark.parametrize("count", [5, 50])
+def test_many_places_are_counted(count: int) -> None:
+    resets = [reset(number, 2 * number) for number in range(1, count + 1)]
+    told = hangs.sentences(resets)
+    assert len(told) == hangs.PLACES_AT_MOST + 1
+    assert told[-1] == f"the watchdog reset the program {count - 4} times more, at other places"
+    assert str(hangs.places(resets)).endswith(f"; elsewhere {count - 4} times")
