@@ -24,8 +24,8 @@ from boebot.timing import diagram, realisable
 from boebot.timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove
 from boebot.timing.graph import load_program
 from boebot.timing.loads import LOADS
-from boebot.timing.measured import Measurement, merged
-from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, measure
+from boebot.timing.measured import Measurement
+from sim_bridge.timing.measure import CLOCK_HZ, measure_image
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = ROOT / "tools" / "timing_page.md"
@@ -46,10 +46,9 @@ def elf(image: str) -> Path:
     return resources.folder("images") / f"{image}.elf"
 
 
-def measured(image: str, scenarios: Sequence[str] = SCENARIOS) -> Measurement:
-    """Of those scenarios, as `boebot timing` measures them."""
-    robot = load_robot(image)
-    return merged(measure(elf(image), robot, scenario, SECONDS, SEED) for scenario in scenarios)
+def measured(image: str) -> Measurement:
+    """As `boebot timing` measures it."""
+    return measure_image(elf(image), seconds=SECONDS, seed=SEED)
 
 
 def reports(image: str, what: Measurement | None = None) -> Reports:

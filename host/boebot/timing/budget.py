@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from boebot.timing.blocked import WAKE
-from boebot.timing.changes import CHANGE_BYTES, CHANGES_RING
+from boebot.timing.changes import CHANGES_RING
 from boebot.timing.changes import of_image as changes_of
 from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
@@ -40,7 +40,6 @@ RECEIVE_RING = "hal_receive_ring"  # the variable in which received bytes wait; 
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
 OF_ROWS = 0.4  # share of the work that tasks and interrupts are, where messages are bounded too
-IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
 STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
@@ -278,7 +277,9 @@ def prove(
         ring=ring,
         ring_holds=image.variables[RECEIVE_RING] - 1 if RECEIVE_RING in image.variables else None,
         changes=None if answers is None else changes_of(program, found, schedule, asked),
-        changes_held=image.variables[CHANGES_RING] // CHANGE_BYTES - 1 if CHANGES_RING in image.variables else None,
+        changes_held=image.variables[CHANGES_RING] // program.constants.change_bytes - 1
+        if CHANGES_RING in image.variables
+        else None,
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
@@ -345,7 +346,7 @@ def _of_link(
     def come(window: int) -> int:
         return sum(source.requests(window + 1) for source in bytes_)
 
-    return gap, max(come(gap), IDLE_LEAVES + come(idle)), taken
+    return gap, max(come(gap), program.constants.receive_due - 1 + come(idle)), taken
 
 
 def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:

@@ -28,7 +28,7 @@ from fractions import Fraction
 from math import ceil
 from typing import Any
 
-from boebot.timing.costs import CHANGES_DUE, Costs
+from boebot.timing.costs import Costs
 from boebot.timing.frames import FrameCost
 from boebot.timing.loads import RECEIVE, SEND, Load
 from boebot.timing.program import InterruptRow, Program
@@ -136,7 +136,7 @@ def _come(row: InterruptRow, load: Load) -> Callable[[int], int]:
 def begun(found: Costs) -> int:
     """What the main loop may be at when it has neither a slot nor a whole frame to do: it takes some bytes, and has
     left changes that were not due; or it works off those that were."""
-    changes = (CHANGES_DUE - 1) * found.change + found.other + found.storm
+    changes = (found.changes_due - 1) * found.change + found.other + found.storm
     return max(found.idle, found.loop + found.partial + changes)
 
 

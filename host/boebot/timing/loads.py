@@ -13,13 +13,11 @@ from dataclasses import dataclass, field, replace
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.timing.program import InterruptRow
+from boebot.timing.program import Constants, InterruptRow, Program
 from boebot.timing.response import Source
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s
-CHANGES_CLOSE, CHANGES_STORM = 256, 4  # so close, and so often in a row: the encoders' interrupt masks itself (hal.h)
-LIMIT = 80  # edges of a line in a tick above which it is masked (messages.toml, encoder_limit)
 # Vectors of the ATmega328P (data sheet, table 12-6), numbered as in __vector_N.
 ENCODERS, STAMP, WATCHDOG, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 6, 7, 10, 11, 12, 14
 RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
@@ -79,12 +77,12 @@ class Load:
         """The same, where the board says what it says by itself and no more; with a tone, which frames can bring."""
         return replace(self, streams={**self.streams, SEND: OWN_SENDING}, off=self.off - {BUZZER})
 
-    def is_calm(self, latency: int) -> bool:
+    def is_calm(self, latency: int, said: Constants) -> bool:
         """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of
         more changes than there are lines two are of one line, and a tick has no more of a line than the limit."""
         lines = self.streams.get(ENCODERS, ())
-        storm = CHANGES_STORM * CHANGES_CLOSE + latency
-        return 0 < len(lines) <= CHANGES_STORM and all(line.interval > max(storm, TICK // LIMIT) for line in lines)
+        closest = max(said.changes_storm * said.changes_close + latency, TICK // said.encoder_limit)
+        return 0 < len(lines) <= said.changes_storm and all(line.interval > closest for line in lines)
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
@@ -160,7 +158,6 @@ LOADS["everything"] = replace(
 
 # What can come at the worst, whatever the load, where the table's interval is not the least.
 _DENSEST: dict[int, Stream] = {
-    ENCODERS: Stream(close=CHANGES_STORM),  # with the first five, before it masks itself
     CARRIER: _SWEEP,
     CAPTURE: _ECHOES,
     EDGE: _SERVOS_AND_BURSTS,
@@ -175,8 +172,10 @@ _DENSEST: dict[int, Stream] = {
 APART = {EDGE: frozenset({CARRIER, SLOT})}
 
 
-def densest(row: InterruptRow) -> list[Source]:
+def densest(row: InterruptRow, program: Program) -> list[Source]:
     """The most requests of an interrupt in any time, one by one."""
+    if row.vector == ENCODERS:  # with the first of a storm and those that make it one, before it masks itself
+        return [Stream(close=program.constants.changes_storm).source(row, 1)]
     return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import struct
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from boebot.errors import TimingError
-from boebot.timing.program import FrameRow, InterruptRow, SensorRow, Table, TaskRow
+from boebot.timing.program import Constants, FrameRow, InterruptRow, SensorRow, Table, TaskRow
 
 SECTION = ".boebot.timing"
 MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
@@ -24,14 +25,26 @@ _DIGITS = 12  # of a number; longer ones are too large anyway
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
 _SECTION = struct.Struct("<10I")
 
-Row = TaskRow | InterruptRow | SensorRow | FrameRow
-_Kind = type[TaskRow] | type[InterruptRow] | type[SensorRow] | type[FrameRow]
+CONSTANTS = tuple(field.name for field in fields(Constants))
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantRow:
+    """One of the constants."""
+
+    name: str
+    value: int
+
+
+Row = TaskRow | InterruptRow | SensorRow | FrameRow | ConstantRow
+_Kind = type[TaskRow] | type[InterruptRow] | type[SensorRow] | type[FrameRow] | type[ConstantRow]
 
 ROWS: dict[str, tuple[_Kind, int]] = {
     "TASK": (TaskRow, 3),
     "INTERRUPT": (InterruptRow, 4),
     "SENSOR": (SensorRow, 3),
     "FRAME": (FrameRow, 2),
+    "CONSTANT": (ConstantRow, 1),
 }
 
 
@@ -74,7 +87,18 @@ def table_of(path: Path, data: bytes) -> Table:
         interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
         sensors=tuple(row for row in rows if isinstance(row, SensorRow)),
         frames=tuple(row for row in rows if isinstance(row, FrameRow)),
+        constants=_constants(path, {row.name: row.value for row in rows if isinstance(row, ConstantRow)}),
     )
+
+
+def _constants(path: Path, found: dict[str, int]) -> Constants | None:
+    """All of them, or none at all."""
+    if found and (wrong := sorted(found.keys() ^ set(CONSTANTS))):
+        what = "unknown" if wrong[0] in found else "missing"
+        raise TimingError(
+            f"{path}: of the constants of its timing table {wrong[0]!r} is {what}; expected {', '.join(CONSTANTS)}"
+        )
+    return Constants(**found) if found else None
 
 
 def _section(path: Path, data: bytes) -> bytes:
@@ -127,6 +151,8 @@ def _contradiction(row: _Kind, numbers: list[int]) -> str | None:
         if not 1 <= vector <= VECTORS:
             return f"vector {vector}; expected 1 to {VECTORS}, as the ATmega328P has"
         return None if budget and interval else "a budget or an interval of 0 cycles; expected at least 1"
+    if row is ConstantRow:
+        return None if numbers[0] else "a constant of 0; expected at least 1"
     if row is FrameRow:
         wrong = next((number for number in numbers if number > BYTE_MOST), None)
         return None if wrong is None else f"{wrong} as an id or a length; expected at most {BYTE_MOST}"

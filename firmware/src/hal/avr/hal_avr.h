@@ -55,6 +55,10 @@
   })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
+#if __GNUC__ > 7 /* would make functions of these two, after which it cannot be told whether interrupts are on */
+static inline uint8_t __iCliRetVal(void) __attribute__((always_inline));
+static inline void __iRestore(const uint8_t *) __attribute__((always_inline));
+#endif
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
 /* The timing table's columns, for this board's code and its assertions. */
@@ -239,8 +243,10 @@ static inline __attribute__((always_inline)) void hal_serial_look(void) {
       : "memory");
 }
 
+#define HAL_RECEIVE_DUE 64u /* bytes, a power of two: a quarter of the ring */
 static inline uint8_t hal_serial_due(void) {
-  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) | ((uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL) & 0xC0u));
+  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) |
+                   ((uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL) & (uint8_t) ~(HAL_RECEIVE_DUE - 1u)));
 }
 
 static inline void hal_serial_seen(void) { GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_ZERO_BIT)); }
