@@ -22,7 +22,8 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high) {
 int32_t motion_offset(int16_t gain, int16_t signal) {
   /* Two divisions would take a fifth of the time between two set-points on a full line, and shifts by anything but 8 or 16
    * bits a tenth: 6 + 36281 / 2^16 is 2^16 / 10000 to 1e-6. */
-  const int32_t part = signal * (int32_t)6 + (int16_t)high(signal * (int32_t)36281); /* signal in 1/65536 */
+  const int32_t rest = (signal * (int32_t)36281 + HALF) >> 16; /* never a half: 36281 is odd */
+  const int32_t part = signal * (int32_t)6 + (int16_t)rest;    /* signal in 1/65536 */
   return high(gain * part);
 }
 
