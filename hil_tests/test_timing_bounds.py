@@ -31,6 +31,16 @@ HEAD = """
 .long .Lloop\\@, \\passes, 0xFFFFFFFF
 .popsection
 .endm
+.macro told passes, line
+bounded \\passes
+entered \\line
+.endm
+.macro entered line
+.Lentry\\@: nop
+.pushsection .boebot.entries, "", @progbits
+.long .Lentry\\@, \\line
+.popsection
+.endm
 .global main
 main: sbi DDRB, 5
  ldi r26, lo8(0x700)
@@ -97,6 +107,25 @@ g: mul r20, r21
  lds r23, 256
  ret
 """
+# The test of a loop of the source, from r20 up to r21, stands twice, so that it is two; bits of r22 choose the ways.
+HALVES = """f: entered 7
+1: cp r20, r21
+ breq 9f
+2: told 5, 7
+ inc r20
+ lsr r22
+ brcc 4f
+ nop
+ nop
+ nop
+ nop
+ nop
+ cpse r20, r21
+ rjmp 2b
+9: ret
+4: lds r23, 256
+ rjmp 1b
+"""
 DIVIDE = "f: jmp __udivmodhi4\n"
 DIVIDE_LONG = "f: call __udivmodsi4\n clr r1\n ret\n"
 MULTIPLY = "f: call __mulsi3\n ret\n"
@@ -154,13 +183,14 @@ def bound(program: Program) -> int:
         # r24 = 1: what is shifted out comes back in, and ones give a carry every time: 0xFF, and zeros after it.
         (CRC, [1, 8, 0, 0, 0, 0, 0, 0, 0xFF, 0, 0, 0, 0, 0, 0, 0]),
         (SEARCH, [0, 0, 1, 0, 0, 0, 0, 0, *[0] * 31, 1]),
+        (HALVES, [0, 0, 0b01111, 0, 0, 0, 0, 5]),  # the longer way four times, then that which leaves later
         (DIVIDE, [0xFF, 0xFF, 1, 0]),  # 65,535 / 1: every bit of the quotient is one
         (DIVIDE_LONG, [0xFF, 0xFF, 0xFF, 0xFF, 1, 0, 0, 0]),
         (MULTIPLY, []),
         (SHIFT, [15, 0, 0, 0]),
         (EEPROM, []),
     ],
-    ids=["crc", "search", "16-bit division", "32-bit division", "multiplication", "shift", "EEPROM"],
+    ids=["crc", "search", "halves", "16-bit division", "32-bit division", "multiplication", "shift", "EEPROM"],
 )
 def test_bound_is_what_the_worst_input_takes(tmp_path: Path, source: str, worst: list[int]) -> None:
     image = build(tmp_path, source)

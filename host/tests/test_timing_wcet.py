@@ -63,6 +63,10 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: ldi r24, 7\n 1: dec r24\n brpl 1b\n ret", 1 + 7 * 3 + 2 + 4),  # 6 to 0, then 255
         ("main: ldi r24, 1\n ldi r25, 1\n 1: sbiw r24, 1\n brne 1b\n ret", 2 + 256 * 4 + 3 + 4),
         ("main: ldi r24, 0\n 1: dec r24\n brne 1b\n ret", 1 + 255 * 3 + 2 + 4),
+        ("main: ldi r18, 2\n ldi r25, 1\n ldi r20, 0\n 1: subi r18, 1\n sbci r25, 0\n sbci r20, 0\n brne 1b\n ret",
+         3 + 257 * 5 + 4 + 4),
+        ("main: ldi r30, 0\n ldi r31, 0\n 1: adiw r30, 1\n cpi r30, 0xE8\n ldi r18, 3\n cpc r31, r18\n brne 1b\n ret",
+         2 + 999 * 7 + 6 + 4),
         ("main: set\n bld r1, 3\n 1: lsr r24\n lsr r1\n brne 1b\n ret", 2 + 3 * (2 + 2) + (2 + 1) + 4),  # 8, 4, 2, 1
         ("main: ldi r24, 1\n rjmp 2f\n 1: ldi r24, 0\n 2: cpse r24, r1\n rjmp 1b\n ret", 3 + (1 + 2 + 1) + 2 + 4),
         ("main: ldi r24, 96\n ldi r25, 0\n bst r24, 5\n 1: bld r25, 7\n inc r25\n brmi 1b\n ret", 3 + 127 * 4 + 3 + 4),
@@ -71,8 +75,8 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
-         "nested", "counted", "counted below zero", "two bytes", "256 times", "shifted out", "flag", "bit of another",
-         "two entries", "two entries, farther", "waits"],
+         "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted out",
+         "flag", "bit of another", "two entries", "two entries, farther", "waits"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles

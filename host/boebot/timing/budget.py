@@ -39,6 +39,7 @@ FLASH_BYTES = 0x8000
 RECEIVE_RING = "hal_receive_ring"  # the variable in which received bytes wait; one of them stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
+OF_ROWS = 0.4  # share of the work that tasks and interrupts are, where messages are bounded too
 STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
@@ -245,7 +246,7 @@ def prove(
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
         program: the image's, if it has been read already.
-        progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
+        progress: called with the share of its tasks, interrupts and messages that are bounded, 0 to 1.
 
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
@@ -253,13 +254,15 @@ def prove(
     image = read_image(path)
     program = program or program_of(image)
     check_table(path, program)
-    found = costs(program, asked, progress)
+    of_rows = OF_ROWS if asked.is_full else 1.0
+    found = costs(program, asked, lambda share: progress(of_rows * share))
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
     between = (*sources, *found.between(program, asked))
     frames = found.of_frames(asked)
+    kinds = frame_costs(program, lambda share: progress(OF_ROWS + (1 - OF_ROWS) * share)) if asked.is_full else ()
     gap, ring, taken = _of_link(program, found, schedule, between, asked)
     return Report(
         path=str(path),
@@ -280,7 +283,7 @@ def prove(
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
-        lines=full_lines(program, found, schedule, asked, frame_costs(program) if asked.is_full else ()),
+        lines=full_lines(program, found, schedule, asked, kinds),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )

@@ -15,7 +15,7 @@ from boebot.timing.program import Block, Function, Instruction
 from boebot.timing.registers import KEEPS_FLAGS, before, written
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
-MOST_WORKED = 256  # passes that are worked through
+MOST_WORKED = 4096  # passes that are worked through
 SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
 CALLS = frozenset(("call", "rcall", "icall"))
 
@@ -84,30 +84,32 @@ def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State])
     counting = _counting(block.instructions[:-1])
     if counting is None:
         return None
-    register, width, step, instructions = counting
-    registers = frozenset(range(register, register + width))
+    registers, step, instructions = counting
     for start in loop.nodes:
         for instruction in known.function.blocks[start].instructions:
             if instruction in instructions:
                 continue
-            if written(instruction) & registers or instruction.mnemonic in CALLS:
+            if not written(instruction).isdisjoint(registers) or instruction.mnemonic in CALLS:
                 return None
     stays = branch.operands[-1] in loop.nodes
     counts: list[int] = []
     for state in entering:
         held = state.registers
-        if not registers <= held.keys():
+        if not held.keys() >= set(registers):
             return _shift(loop, known.function, instructions)
-        value = sum(held[register + i] << 8 * i for i in range(width))
-        count = _runs(value, step, 8 * width, branch.mnemonic, stays)
+        value = sum(held[register] << 8 * i for i, register in enumerate(registers))
+        count = _runs(value, step, 8 * len(registers), branch.mnemonic, stays)
         if count is None:
             return None
         counts.append(count)
     return max(counts, default=None)
 
 
-def _counting(instructions: tuple[Instruction, ...]) -> tuple[int, int, int, tuple[Instruction, ...]] | None:
-    """The counter whose flags the branch behind these instructions reads: register, bytes, step, its instructions."""
+def _counting(
+    instructions: tuple[Instruction, ...],
+) -> tuple[tuple[int, ...], int, tuple[Instruction, ...]] | None:
+    """The counter whose flags the branch behind these instructions reads: its registers, the lowest first, which need
+    not stand together; its step; its instructions."""
     rest = list(instructions)
     while rest and rest[-1].mnemonic in KEEPS_FLAGS:
         rest.pop()
@@ -115,21 +117,23 @@ def _counting(instructions: tuple[Instruction, ...]) -> tuple[int, int, int, tup
         return None
     last = rest[-1]
     if last.mnemonic == "dec":
-        return last.operands[0], 1, 1, (last,)
-    if last.mnemonic == "subi":
-        return last.operands[0], 1, last.operands[1], (last,)
+        return last.operands[:1], 1, (last,)
     if last.mnemonic == "sbiw":
-        return last.operands[0], 2, last.operands[1], (last,)
-    if last.mnemonic == "sbci" and len(rest) > 1 and rest[-2].mnemonic == "subi":
-        low = rest[-2]
-        if low.operands[0] + 1 == last.operands[0]:
-            return low.operands[0], 2, last.operands[1] << 8 | low.operands[1], (low, last)
-    return None
+        return (last.operands[0], last.operands[0] + 1), last.operands[1], (last,)
+    chain = [rest.pop()]
+    while rest and chain[0].mnemonic == "sbci":
+        chain.insert(0, rest.pop())
+    registers = tuple(each.operands[0] for each in chain if each.mnemonic in ("subi", "sbci"))
+    if chain[0].mnemonic != "subi" or len(set(registers)) < len(chain):
+        return None
+    return registers, sum(each.operands[1] << 8 * i for i, each in enumerate(chain)), tuple(chain)
 
 
 def _runs(value: int, step: int, bits: int, branch: str, stays: bool) -> int | None:
     """How often `value -= step` runs until the branch leaves the loop."""
     mask = (1 << bits) - 1
+    if branch == "brne" and stays and step == 1:
+        return value or mask + 1
     for count in range(1, MOST + 1):
         borrow = value < step
         value = value - step & mask
@@ -142,7 +146,7 @@ def _runs(value: int, step: int, bits: int, branch: str, stays: bool) -> int | N
 
 
 def _shift(loop: Loop[int], function: Function, counting: tuple[Instruction, ...]) -> int | None:
-    """Of a loop that does nothing but shift an operand: the test runs once more than the shift."""
+    """Of a loop that does nothing but shift an operand: a test before the shift runs once more than the shift."""
     shifts = 0
     for start in loop.nodes:
         for instruction in function.blocks[start].instructions:
@@ -151,8 +155,10 @@ def _shift(loop: Loop[int], function: Function, counting: tuple[Instruction, ...
                 if doubles and instruction.operands[0] != instruction.operands[1]:
                     return None
                 shifts += 1
-            elif instruction not in counting and instruction.mnemonic not in ("rjmp", "brne", "brpl"):
+            elif instruction not in counting and instruction.mnemonic not in ("rjmp", "brne", "brpl", "brmi"):
                 return None
     if counting[0].mnemonic != "dec" or shifts not in (1, 2, 3, 4):
         return None
-    return 32 if shifts > 2 else 16  # int is the least width that C shifts
+    header = function.blocks[loop.header].instructions
+    tests = 0 if any(instruction.mnemonic in SHIFTS for instruction in header) else 1
+    return (32 if shifts > 2 else 16) - 1 + tests  # int is the least width that C shifts

@@ -1,8 +1,8 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
-What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the three sections in
-which the firmware describes itself, `.boebot.timing`, `.boebot.loops` and `.boebot.ids`. The file need not have the
-last four.
+What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the sections in which the
+firmware describes itself, `.boebot.timing`, `.boebot.loops`, `.boebot.entries` and `.boebot.ids`. The file need not
+have the last five.
 """
 
 from __future__ import annotations
@@ -68,6 +68,7 @@ class Image:
     table: Table = field(default_factory=Table)
     bounds: tuple[LoopBound, ...] = ()
     ids: tuple[IdPlace, ...] = ()
+    entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
 
 
 def read_image(path: Path) -> Image:
@@ -99,6 +100,9 @@ def _image(path: Path, elf: ELFFile) -> Image:
     code, written = _flash(path, elf)
     ram = _ram(elf)
     symbols, stack_start = _symbols(elf)
+    entries = _entries(path, _section(path, elf, ".boebot.entries"), len(code))
+    bounds = _bounds(path, _section(path, elf, ".boebot.loops"), entries, len(code))
+    told = {bound.address for bound in bounds}
     return Image(
         path=str(path),
         code=code,
@@ -112,14 +116,15 @@ def _image(path: Path, elf: ELFFile) -> Image:
         stack_start=stack_start,
         lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
-        bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
+        bounds=bounds,
+        entries={address: line for address, line in entries.items() if address not in told},
         ids=_ids(path, _section(path, elf, ".boebot.ids"), len(code)),
     )
 
 
 def _lines(elf: ELFFile, end: int) -> dict[int, str]:
-    """The source lines; none where the debugging information is not one that pyelftools reads, as clang's for the AVR
-    with its addresses of two bytes. The program is all the same what it is."""
+    """The source lines; none where the debugging information is not one that pyelftools reads. The program is all the
+    same what it is."""
     try:
         return source_lines(elf, end)
     except DAMAGE:
@@ -206,16 +211,15 @@ def _section(path: Path, elf: ELFFile, name: str) -> bytes:
     return data
 
 
-def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
+def _bounds(path: Path, data: bytes, entries: dict[int, int], end: int) -> tuple[LoopBound, ...]:
     """The records of `.boebot.loops`: address in a loop's body, most passes, most cycles, of 32 bits each."""
     if len(data) % 12:
         raise TimingError(f"{path}: section .boebot.loops has {len(data)} bytes: records of 12 bytes are expected")
     bounds = []
     for address, passes, cycles in struct.iter_unpack("<III", data):
-        if address >= end or address % 2:
-            raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")
-        given = tuple(None if number == NOT_SAID else number for number in (passes, cycles))
-        bounds.append(LoopBound(address, *given))
+        _check_place(path, address, end)
+        most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
+        bounds.append(LoopBound(address, most, longest, entries.get(address, 0)))
     return tuple(bounds)
 
 
@@ -231,3 +235,18 @@ def _ids(path: Path, data: bytes, end: int) -> tuple[IdPlace, ...]:
                 f"one of {REGISTERS} registers and an instruction's address"
             )
     return tuple(places)
+
+
+def _entries(path: Path, data: bytes, end: int) -> dict[int, int]:
+    """The records of `.boebot.entries`, of 32 bits each: address of a loop's entry or bound, line of the loop."""
+    if len(data) % 8:
+        raise TimingError(f"{path}: section .boebot.entries has {len(data)} bytes: records of 8 bytes are expected")
+    entries = dict(struct.iter_unpack("<II", data))
+    for address in entries:
+        _check_place(path, address, end)
+    return entries
+
+
+def _check_place(path: Path, address: int, end: int) -> None:
+    if address >= end or address % 2:
+        raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")

@@ -12,6 +12,7 @@ The bytes that a message makes the board send are those of the longest way, coun
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from boebot.errors import TimingError
@@ -37,8 +38,12 @@ class FrameCost:
     answer: int  # bytes that it makes the board send, at most
 
 
-def frame_costs(program: Program) -> tuple[FrameCost, ...]:
+def frame_costs(program: Program, progress: Callable[[float], None] = lambda _: None) -> tuple[FrameCost, ...]:
     """Of all messages that the image names, in its order; none where it does not say enough.
+
+    Args:
+        program: the image's.
+        progress: called with the share of them that are done, 0 to 1.
 
     Raises:
         TimingError: a loop has no bound, or a message's answer no constant length.
@@ -63,6 +68,7 @@ def frame_costs(program: Program) -> tuple[FrameCost, ...]:
                 answer=_Sent(own, send).bound(poll).cycles,
             )
         )
+        progress(len(found) / len(rows))
     return tuple(found)
 
 

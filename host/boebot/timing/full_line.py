@@ -181,14 +181,18 @@ class Waiting:
                     break
         return most
 
+    def _slots(self, first: int, count: int) -> int:
+        """Cycles of so many slots one after another."""
+        works = [self.schedule.work(first + number) for number in range(len(self.schedule.slots))]
+        cycles, rest = divmod(count, len(works))
+        return cycles * sum(works) + sum(works[:rest])
+
     def _ended(self, first: int, work: int, time: int) -> int | None:
         """When such work is done at the latest that begins together with that slot, and is not done at that time; None:
         not within the horizon."""
-        schedule = self.schedule
         while time <= HORIZON:
-            slots = range(first, first + time // schedule.slot_cycles + 1)
             coming = sum(one.cycles * one.requests(time + 1) for one in self.sources)
-            after = work + sum(map(schedule.work, slots)) + coming
+            after = work + self._slots(first, time // self.schedule.slot_cycles + 1) + coming
             if after <= time:
                 return time
             time = after
@@ -210,7 +214,7 @@ def full_lines(
     rows = {row.vector: row for row in program.table.interrupts}
     if not asked.is_full or not kinds or RECEIVE not in rows or SEND not in rows:
         return FullLines()
-    alone = asked.unanswered()
+    alone = asked.without_answers()
     sources = (*found.sources(program, alone), *found.between(program, alone))
     left = background(schedule, sources)
     free = 1 - sum(float(one.load) for one in _bytes(rows[SEND], alone)) * asked.byte_interval

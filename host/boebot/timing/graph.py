@@ -9,7 +9,7 @@ instructions say, so nothing depends on the compiler:
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
 * What writes registers, the stack pointer or SREG by their data addresses is refused.
 * Where `ijmp` and `icall` lead is found by `jumps`, or refused.
-* Loops with several entries get one each, by copies of blocks (split.py).
+* Loops with several entries get one each, by copies of blocks (split.py); halves of a loop become one (joined.py).
 
 The vectors are functions too: that of interrupt N is at address 4·N, with the jump to `__vector_N` as its tail call, so
 that its time is that of the interrupt from the end of the entry's four cycles.
@@ -25,6 +25,7 @@ from pathlib import Path
 from boebot.errors import TimingError
 from boebot.timing.elf import Image, Symbol, read_image
 from boebot.timing.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
+from boebot.timing.joined import joined
 from boebot.timing.jumps import NotProvenError, Step, targets_of
 from boebot.timing.program import Block, Edge, Function, Instruction, Program
 from boebot.timing.registers import REGISTERS
@@ -43,11 +44,12 @@ def load_program(path: Path) -> Program:
 def program_of(image: Image) -> Program:
     """The program of an image. Raises TimingError where the code cannot be followed."""
     names = _Names(image)
-    program = Program(str(image.path), {}, {}, image.bounds, image.table, image.lines, image.ids)
+    program = Program(str(image.path), {}, {}, image.bounds, image.entries, image.table, image.lines, image.ids)
     explorer = _Explorer(image, names, program)
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
-        program.functions[entry] = Function(names.of(entry), entry, reducible(_blocks(draft), entry))
+        blocks = joined(reducible(_blocks(draft), entry), entry, program)
+        program.functions[entry] = Function(names.of(entry), entry, blocks)
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:

@@ -73,9 +73,9 @@ class Load:
         """Frames come back to back."""
         return not self.frame_bursts
 
-    def unanswered(self) -> Load:
-        """The same, where the board says what it says by itself and no more."""
-        return replace(self, streams={**self.streams, SEND: OWN_SENDING})
+    def without_answers(self) -> Load:
+        """The same, where the board says what it says by itself and no more; with a tone, which frames can bring."""
+        return replace(self, streams={**self.streams, SEND: OWN_SENDING}, off=self.off - {BUZZER})
 
     def is_calm(self, latency: int, said: Constants) -> bool:
         """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of

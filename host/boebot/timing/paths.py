@@ -5,13 +5,14 @@ longest way from the header out of each of its exits; around it, it is one node 
 says how often a marked node runs per entry of the loop. With n such runs, and every pass marked, a walk leaves
 - through an exit that it reaches without the mark (the test of `while`) after n passes,
 - through one that it reaches over the mark (`break`, the test of `do ... while`) after n - 1.
+Where copies of the mark stand in one pass, m of them on every way, the passes are n / m and (n - 1) / m.
 The sum is the optimum of the integer program of Y. Li, S. Malik, "Performance Analysis of Embedded Software Using
 Implicit Path Enumeration" (1995) with the same bounds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Generic
 
@@ -170,14 +171,15 @@ class _Search(Generic[N]):
     def _loop(self, loop: Loop[N]) -> dict[Way[N], Walk[N]]:
         deeper = frozenset(node for inner in loop.inner for node in inner.nodes)
         marks: dict[Hashable, Mark] = {}
-        marked: dict[Hashable, set[N]] = {}
+        marked: dict[Hashable, dict[N, int]] = {}  # nodes, and how many marks each has
         for node in sorted(loop.nodes - deeper, key=self.order.index):
             for mark in self.graph.marks.get(node, ()):
                 known = marks.get(mark.loop, mark)
                 passes = None if known.passes is None or mark.passes is None else max(known.passes, mark.passes)
                 cycles = None if known.cycles is None or mark.cycles is None else max(known.cycles, mark.cycles)
                 marks[mark.loop] = Mark(mark.loop, passes, cycles)
-                marked.setdefault(mark.loop, set()).add(node)
+                counts = marked.setdefault(mark.loop, {})
+                counts[node] = counts.get(node, 0) + 1
         nodes = [node for node in self.order if node in loop.nodes]
         where = self.graph.where(loop.header)
         if not marks:
@@ -196,19 +198,36 @@ class _Search(Generic[N]):
                     )
                 runs *= mark.passes + 1
             every = frozenset(node for nodes in marked.values() for node in nodes)
-            return _out(self.region(loop.header, nodes, list(loop.inner), every), Mark(None, runs - 1, None), where)
+            return _out(self.region(loop.header, nodes, list(loop.inner), every), Mark(None, runs - 1, None), where, 1)
         # One loop of the source, or others within it that have no edge back any more (unrolled): which of them it
         # is cannot be seen, so each may be.
         result: dict[Way[N], Walk[N]] = {}
         for name in whole if whole else marks:
-            for way, walk in _out(regions[name], marks[name], where).items():
+            least = self._least(loop, nodes, marked[name])
+            for way, walk in _out(regions[name], marks[name], where, least).items():
                 if way not in result or walk.cycles > result[way].cycles:
                     result[way] = walk
         return result
 
+    def _least(self, loop: Loop[N], nodes: list[N], marked: Mapping[N, int]) -> int:
+        """The fewest marks in one pass of a loop, all copies together; at least 1."""
+        by_header = {inner.header: inner for inner in loop.inner}
+        fewest = {loop.header: 0}
+        passes = []
+        for node in nodes:
+            if node not in fewest:
+                continue
+            count = fewest[node] + marked.get(node, 0)
+            for way in self.loop(by_header[node]) if node in by_header else self.graph.ways[node]:
+                if way.to == loop.header:
+                    passes.append(count)
+                elif way.to in loop.nodes:
+                    fewest[way.to] = min(count, fewest.get(way.to, count))
+        return max(1, min(passes, default=1))
 
-def _out(region: _Region[N], mark: Mark, where: str) -> dict[Way[N], Walk[N]]:
-    """The longest walk through each exit of a loop under one bound."""
+
+def _out(region: _Region[N], mark: Mark, where: str, least: int) -> dict[Way[N], Walk[N]]:
+    """The longest walk through each exit of a loop under one bound, with so many marks at least in each pass."""
     free_pass, full = region.back
     result: dict[Way[N], Walk[N]] = {}
     if mark.cycles is not None and (mark.passes is None or free_pass is not None):
@@ -227,7 +246,7 @@ def _out(region: _Region[N], mark: Mark, where: str) -> dict[Way[N], Walk[N]]:
         )
     passes = mark.passes or 0
     for way, (free, over) in region.out.items():
-        ends = [(free, passes), (over, passes - 1)]
+        ends = [(free, passes // least), (over, (passes - 1) // least)]
         for last, count in ends:
             if last is not None and count >= 0:
                 begin: Walk[N] = _start()

@@ -72,12 +72,14 @@ class LoopBound:
     """What the source says of a loop: `address` lies in its body.
 
     At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
-    `cycles` in all, to which one more pass may come. None: not said.
+    `cycles` in all, to which one more pass may come. None: not said. `line` is that of the loop where the image tells
+    all places at which it is entered (Program.entries), else 0; the instruction at `address` then runs once a pass.
     """
 
     address: int
     passes: int | None
     cycles: int | None
+    line: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +176,7 @@ class Program:
     functions: dict[int, Function]
     by_name: dict[str, int]  # entry of each named function
     bounds: tuple[LoopBound, ...] = ()
+    entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
     table: Table = field(default_factory=Table)
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
     ids: tuple[IdPlace, ...] = ()

@@ -1,11 +1,18 @@
 """Source lines of an image's instructions, from its debugging information (DWARF, section 6.2 of its standard).
 
 avr-gcc before version 8 writes DWARF with `-gdwarf-4`; its `-g` means stabs, whose addresses the linker's relaxation
-(`--relax`) leaves as they were. They are wrong then, and are not read.
+(`--relax`) leaves as they were. They are wrong then, and are not read. clang's addresses have two bytes, of which its
+DWARF 5 tells.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from elftools.construct import ULInt16
+from elftools.dwarf.dwarfinfo import DWARFInfo
+from elftools.dwarf.lineprogram import LineProgram
+from elftools.dwarf.structs import DWARFStructs
 from elftools.elf.elffile import ELFFile
 
 
@@ -14,11 +21,7 @@ def source_lines(elf: ELFFile, end: int) -> dict[int, str]:
     lines: dict[int, str] = {}
     if not elf.has_dwarf_info():
         return lines
-    dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
-    for unit in dwarf.iter_CUs():
-        program = dwarf.line_program_for_CU(unit)
-        if program is None:
-            continue
+    for program in _programs(elf.get_dwarf_info(relocate_dwarf_sections=False)):
         first = 0 if program["version"] >= 5 else 1  # DWARF 5 numbers its files from 0
         files = [entry.name.decode("utf-8", "replace").rsplit("/", 1)[-1] for entry in program["file_entry"]]
         before = None
@@ -32,3 +35,26 @@ def source_lines(elf: ELFFile, end: int) -> dict[int, str]:
                     lines[address] = text
             before = None if state.end_sequence else state
     return lines
+
+
+def _programs(dwarf: DWARFInfo) -> Iterator[LineProgram]:
+    """The line programs, one behind the other. (The units that name them are not read: pyelftools knows none with
+    addresses of two bytes.)"""
+    offset = 0
+    while dwarf.debug_line_sec is not None and offset < dwarf.debug_line_sec.size:
+        program = dwarf._parse_line_program_at_offset(offset, dwarf.structs)
+        if program["version"] >= 5 and program["address_size"] == 2:
+            program.structs = _Narrow()
+        yield program
+        offset += dwarf.structs.initial_length_field_size() + program["unit_length"]
+
+
+class _Narrow(DWARFStructs):
+    """Little-endian, with addresses of two bytes."""
+
+    def __new__(cls) -> _Narrow:
+        self = object.__new__(cls)
+        self.little_endian, self.dwarf_format, self.address_size, self.dwarf_version = True, 32, 4, 5
+        self._create_structs()
+        self.the_Dwarf_target_addr = ULInt16("")
+        return self

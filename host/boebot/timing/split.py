@@ -24,7 +24,7 @@ def reducible(blocks: Blocks, entry: int) -> Blocks:
     most = MOST * len(blocks)
     found = blocks
     while len(found) <= most:
-        following = partial(_successors, found)
+        following = partial(successors, found)
         found = {start: found[start] for start in reverse_postorder(entry, following)}
         try:
             natural_loops(list(found), following)
@@ -35,22 +35,29 @@ def reducible(blocks: Blocks, entry: int) -> Blocks:
     return blocks
 
 
-def _successors(blocks: Blocks, start: int) -> list[int]:
+def successors(blocks: Blocks, start: int) -> list[int]:
+    """Where the ways out of a block lead."""
     return [edge.to for edge in blocks[start].edges]
 
 
 def _split(blocks: Blocks, entry: int) -> Blocks:
     """With one loop less that has several entries."""
     component, entries = next(_tangles(blocks, entry, set(blocks)))
-    ways = {header: _without(blocks, component, entries - {header}, header) for header in entries}
 
     def copied(header: int) -> tuple[int, int]:
-        return sum(len(blocks[start].instructions) for start in ways[header]), -header
+        ways = _without(blocks, component, entries - {header}, header)
+        return sum(len(blocks[start].instructions) for start in ways), -header
 
     header = entry if entry in entries else min(entries, key=copied)
-    names = {start: _name(blocks, start) for start in ways[header]}
+    return entered_only_at(header, blocks, component, entries)
+
+
+def entered_only_at(header: int, blocks: Blocks, component: set[int], entries: set[int]) -> Blocks:
+    """The same function with copies of what runs from the entries of a part of it until `header`, which all of its
+    cycles pass."""
+    names = {start: _name(blocks, start) for start in _without(blocks, component, entries - {header}, header)}
     result = {start: block if start in component else _led(block, names) for start, block in blocks.items()}
-    return result | {names[start]: replace(_led(blocks[start], names), start=names[start]) for start in ways[header]}
+    return result | {names[start]: replace(_led(blocks[start], names), start=names[start]) for start in names}
 
 
 def _led(block: Block, names: dict[int, int]) -> Block:
@@ -70,12 +77,12 @@ def _tangles(blocks: Blocks, entry: int, nodes: set[int]) -> Iterator[tuple[set[
     left = set(nodes)
     while left:
         start = min(left)
-        ahead = _reached(blocks, start, nodes)
-        component = {node for node in ahead if start in _reached(blocks, node, nodes)}
+        ahead = reached(blocks, start, nodes)
+        component = {node for node in ahead if start in reached(blocks, node, nodes)}
         left -= component | {start}
         if not component:
             continue
-        entered = {to for node, block in blocks.items() if node not in component for to in _successors(blocks, node)}
+        entered = {to for node, block in blocks.items() if node not in component for to in successors(blocks, node)}
         entries = {node for node in component if node in entered or node == entry}
         if len(entries) > 1:
             yield component, entries
@@ -83,12 +90,12 @@ def _tangles(blocks: Blocks, entry: int, nodes: set[int]) -> Iterator[tuple[set[
             yield from _tangles(blocks, entry, component - entries)
 
 
-def _reached(blocks: Blocks, start: int, nodes: Collection[int]) -> set[int]:
+def reached(blocks: Blocks, start: int, nodes: Collection[int]) -> set[int]:
     """Of some blocks, those to which ways lead from there through no others."""
     seen: set[int] = set()
     work = [start]
     while work:
-        for to in _successors(blocks, work.pop()):
+        for to in successors(blocks, work.pop()):
             if to in nodes and to not in seen:
                 seen.add(to)
                 work.append(to)
@@ -98,4 +105,4 @@ def _reached(blocks: Blocks, start: int, nodes: Collection[int]) -> set[int]:
 def _without(blocks: Blocks, component: set[int], starts: set[int], header: int) -> set[int]:
     """Those that run from there until the header."""
     nodes = component - {header}
-    return starts.union(*(_reached(blocks, start, nodes) for start in starts))
+    return starts.union(*(reached(blocks, start, nodes) for start in starts))

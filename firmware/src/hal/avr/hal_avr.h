@@ -55,6 +55,10 @@
   })
 #define HAL_ZERO(variable) ((void)0) /* the start-up code has done it */
 
+#if __GNUC__ > 7 /* would make functions of these two, after which it cannot be told whether interrupts are on */
+static inline uint8_t __iCliRetVal(void) __attribute__((always_inline));
+static inline void __iRestore(const uint8_t *) __attribute__((always_inline));
+#endif
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 
 /* The timing table's columns, for this board's code and its assertions. */
