@@ -85,7 +85,7 @@ def test_sums_follow_from_the_bounds(report: budget.Report) -> None:
         ({"first_nops": 147}, "task first may take 151 cycles, 1 above its budget of 150"),
         ({"interrupt_budget": 30}, "interrupt slot may take 31 cycles, 1 above its budget of 30"),
         ({"reserve": 2041}, "the stack may need 8 bytes; 7 of 2048 are left for it"),
-        ({"first_nops": 9990, "first_budget": 60_000}, None),
+        ({"first_nops": 9990, "first_budget": 39_000}, None),
     ],
 )
 def test_planted_faults_are_found(tmp_path: Path, options: dict[str, int], sentence: str | None) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from boebot import robots
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.robots import RobotDescription
-from boebot.timing.elf import Image, read_image
+from boebot.timing.elf import read_image
 from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
@@ -100,7 +99,7 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     least = SILENCE / CLOCK_HZ if scenario == "everything" else 0.0
     if not least < seconds <= 3600:
         raise BoardError(f"scenario {scenario} for {seconds:g} s; expected more than {least:g} s and at most 3600 s")
-    said = _said(image)
+    said = read_image(image)
     what = watched(said)
     board = avr.create(image)
     board.record(what.watch)
@@ -141,7 +140,7 @@ def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
     Raises:
         BoardError: its watchdog does not reset it; and see `run`.
     """
-    said = _said(image)
+    said = read_image(image)
     what = watched(said)
     if not what.entries or WATCHDOG not in what.vectors:
         raise BoardError(f"{image.name} has no {'watchdog interrupt' if what.entries else 'task'}; expected one")
@@ -171,20 +170,6 @@ def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
             sent=after["bytes_in"] - before["bytes_in"],
             received=after["bytes_out"] - before["bytes_out"],
         )
-
-
-def _said(image: Path) -> Image:
-    """What an image says, read once for all runs as long as its file stays the same."""
-    try:
-        state = image.stat()
-    except OSError:
-        return read_image(image)  # which says what is wrong
-    return _read(image, state.st_mtime_ns, state.st_size)
-
-
-@lru_cache(maxsize=4)
-def _read(image: Path, _changed: int, _size: int) -> Image:
-    return read_image(image)
 
 
 def _lost(line: Line, wheels: list[list[PulseTrain]], scenario: str, after: dict[str, int]) -> dict[str, int]:
@@ -289,7 +274,7 @@ def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | 
         found.append(measure(elf, robot, scenario, max(seconds, least), seed))
         if progress:
             progress((number + 1) / len(SCENARIOS))
-    what = watched(_said(elf))
+    what = watched(read_image(elf))
     if what.entries and WATCHDOG in what.vectors:
         found.append(hang(elf, robot, seed).measurement())
     return merged(found)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
+from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 
 from elftools.common.exceptions import DWARFError, ELFError
@@ -72,10 +74,17 @@ class Image:
 def read_image(path: Path) -> Image:
     """Reads an ELF file. Raises TimingError when it is not a linked program for an AVR, or is damaged."""
     try:
-        with path.open("rb") as stream:
-            return _image(path, ELFFile(stream))
+        data = path.read_bytes()
     except OSError as error:
         raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
+    return _read(path, data)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, data: bytes) -> Image:
+    """Once, whoever asks again for the same bytes."""
+    try:
+        return _image(path, ELFFile(BytesIO(data)))
     except DAMAGE as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise TimingError(f"{path} is not an ELF file, or is damaged: {reason}") from error
