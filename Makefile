@@ -30,7 +30,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; longest tasks, SEARCH_SECONDS; the firmware by other options of the compiler; all experiments"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; longest tasks, SEARCH_SECONDS; a line full of each message; the firmware by other options of the compiler; all experiments"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -75,6 +75,7 @@ soak: experiments
 	@$(PYTHON_VENV) -m tools.bench.saturation 60
 	@$(PYTHON_VENV) -m tools.bench.jitter --seconds $(JITTER_SECONDS)
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
+	@$(PYTHON_VENV) -m tools.full_lines
 	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
@@ -83,7 +84,7 @@ FUZZ_SECONDS ?= 60
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
 	@$(PYTHON_VENV) -m tools.fuzz --seconds $(FUZZ_SECONDS)
-	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis
+	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800
 
 pictures:
 	@$(SIDE_BY_SIDE) ready-run

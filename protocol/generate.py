@@ -93,6 +93,9 @@ def messages_header(spec: schema.Schema) -> str:
         for message in spec.of_direction(direction):
             lines += [f"    case MSG_{message.name.upper()}_ID:", f"      return MSG_{message.name.upper()}_LENGTH;"]
         lines += ["    default:", "      return -1;", "  }", "}"]
+    lines += ["", "/* X(name, id, bytes of payload) for each message to the board, in plain decimals. */"]
+    rows = [f"  X({m.name}, {m.id}, {m.length})" for m in spec.of_direction("to_board")]
+    lines += continued("#define MESSAGES_TO_BOARD(X)", rows)
     lines += [
         "",
         "/* Whether the message belongs to the handshake, whose checksums start from the constant seed. */",

@@ -24,8 +24,8 @@ from boebot.timing import diagram, realisable
 from boebot.timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove
 from boebot.timing.graph import load_program
 from boebot.timing.loads import LOADS
-from boebot.timing.measured import Measurement, merged
-from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, measure
+from boebot.timing.measured import Measurement
+from sim_bridge.timing.measure import CLOCK_HZ, measure_image
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = ROOT / "tools" / "timing_page.md"
@@ -34,6 +34,7 @@ DRAWN = "shieldbot"  # the image whose tick is drawn
 SECONDS, SEED = 1.0, 1  # of each scenario, as `boebot timing` does by itself
 UNMEASURED = "?"
 NOTHING = "–"
+SET_POINT = "setpoint_"  # how the names of all their messages begin
 Reports = Mapping[str, Report]  # by load
 
 
@@ -45,10 +46,9 @@ def elf(image: str) -> Path:
     return resources.folder("images") / f"{image}.elf"
 
 
-def measured(image: str, scenarios: Sequence[str] = SCENARIOS) -> Measurement:
-    """Of those scenarios, as `boebot timing` measures them."""
-    robot = load_robot(image)
-    return merged(measure(elf(image), robot, scenario, SECONDS, SEED) for scenario in scenarios)
+def measured(image: str) -> Measurement:
+    """As `boebot timing` measures it."""
+    return measure_image(elf(image), seconds=SECONDS, seed=SEED)
 
 
 def reports(image: str, what: Measurement | None = None) -> Reports:
@@ -167,9 +167,35 @@ def _sums(report: Report) -> dict[str, str]:
         "between two polls of the link, emulator (cycles)": _number(own.between_polls if own else None, unknown),
         "in the receive ring, bound (bytes)": _number(report.ring, "overload"),
         "frames that come": f"{report.frames_coming:.1f}",
-        "frames that can be worked off, bound": f"{report.frames_proven:.1f}",
+        "frames that can be worked off, the costliest, bound": f"{report.frames_proven:.1f}",
         "lost, emulator: bytes, frames, edges, ticks": lost(report),
     }
+
+
+def lines(of: Reports) -> str:
+    """Of each message what a line full of it takes, under the load whose line is full."""
+    titles = ["a line full of", "frame (bytes)", "each (cycles)", "answer (bytes)"]
+    titles += ["come in a tick", "worked off, bound", "can be answered", "margin", "in the receive ring, bound (bytes)"]
+    rows = [
+        [
+            line.cost.name,
+            str(line.cost.bytes),
+            _number(line.cycles),
+            _number(line.cost.answer or None),
+            f"{line.carried:.1f}",
+            f"{line.worked_off:.1f}",
+            NOTHING if line.answered is None else f"{line.answered:.1f}",
+            f"{100 * line.margin:.0f} %",
+            _number(line.ring),
+        ]
+        for report in of.values()
+        for line in report.lines.lines
+    ]
+    found = next((report.lines for report in of.values() if report.lines.lines), None)
+    if found is None:
+        return ""
+    mixed = f"In any mix of {', '.join(found.mixed)}: {found.ring} bytes.\n" if found.mixed else ""
+    return f"{table(titles, rows)}\n{mixed}"
 
 
 def lost(report: Report) -> str:
@@ -188,7 +214,7 @@ def memory(report: Report) -> str:
 
 def _image(name: str, of: Reports) -> str:
     first = next(iter(of.values()))
-    return "\n".join([f"## {name}.elf\n", tasks(of), interrupts(of), sums(of), memory(first)])
+    return "\n".join([f"## {name}.elf\n", tasks(of), interrupts(of), sums(of), lines(of), memory(first)])
 
 
 # ---- all images ----------------------------------------------------------------------------------------------------
@@ -214,7 +240,11 @@ def goals(of: Mapping[str, Reports], limits: Any) -> str:
     cells = [[what, goal, *(_goal(find(one["figures"])) for one in of.values())] for what, goal, find in rows]
     cells += [
         ["response of the tick, bound, `saturated`", "≤ 100 %", *(_response(one["saturated"]) for one in of.values())],
-        ["frames worked off in a tick, bound, `saturated`", "all", *(_frames(one["saturated"]) for one in of.values())],
+        [
+            "a line full of set-points loses nothing, bound, `saturated`",
+            "all of each kind",
+            *(_set_points(one["saturated"]) for one in of.values()),
+        ],
         ["lost, emulator, `saturated`", "0", *(lost(one["saturated"]) for one in of.values())],
     ]
     return table(["figure", "goal", *of], cells, 2)
@@ -230,8 +260,10 @@ def _goal(figure: float | None) -> str:
     return f"{figure:,}" if isinstance(figure, int) else f"{figure:.1f} %"
 
 
-def _frames(report: Report) -> str:
-    return f"{report.frames_proven:.1f} of {report.frames_coming:.1f}"
+def _set_points(report: Report) -> str:
+    found = [line for line in report.lines.lines if line.cost.name.startswith(SET_POINT)]
+    proven = [line.cost.name.removeprefix(SET_POINT) for line in found if line.is_proven(report.ring_holds)]
+    return "all" if found and len(proven) == len(found) else ", ".join(proven) or "none"
 
 
 def _response(report: Report) -> str:

@@ -31,14 +31,13 @@ typedef struct {
   size_t count; /* more than fit are only counted */
 } piece;
 
-static void check_accepted(const frame_decoder *decoder, const piece *came) {
+static void check_accepted(const frame_decoder *decoder, uint32_t seed, const piece *came) {
   const uint8_t id = frame_id(decoder);
   const int16_t length = frame_accepted_length(id);
   assert(length >= 0);
   assert(came->count == (size_t)length + FRAME_OVERHEAD - 2u);
   uint8_t again[FRAME_SIZE_MAX];
-  const uint8_t size =
-      frame_encode(again, id, frame_sequence(decoder), frame_payload(decoder), (uint8_t)length, decoder->seed);
+  const uint8_t size = frame_encode(again, id, frame_sequence(decoder), frame_payload(decoder), (uint8_t)length, seed);
   assert(size == came->count + 2u);
   assert(again[0] == 0 && again[size - 1u] == 0);
   assert(memcmp(again + 1, came->bytes, came->count) == 0);
@@ -54,9 +53,9 @@ static uint8_t good_frame(uint8_t *wire, uint32_t seed) {
   return frame_encode(wire, id, 1, ZEROS, (uint8_t)frame_accepted_length(id), seed);
 }
 
-static void check_good_frame_is_accepted(frame_decoder *decoder) {
+static void check_good_frame_is_accepted(frame_decoder *decoder, uint32_t seed) {
   uint8_t wire[FRAME_SIZE_MAX];
-  const uint8_t size = good_frame(wire, decoder->seed);
+  const uint8_t size = good_frame(wire, seed);
   size_t accepted = 0;
   frame_decode(decoder, 0);
   for (uint8_t i = 0; i < size; i++) {
@@ -71,7 +70,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   }
   frame_decoder *decoder = malloc(sizeof *decoder); /* so that a byte beyond its end is seen */
   assert(decoder != NULL);
-  frame_decoder_start(decoder, seed_of_input(data));
+  const uint32_t seed = seed_of_input(data);
+  frame_decoder_start(decoder, seed);
   frame_decode(decoder, 0);
   piece came = {.count = 0};
   uint16_t pieces = 0;
@@ -87,13 +87,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
       continue;
     }
     if (accepted) {
-      check_accepted(decoder, &came);
+      check_accepted(decoder, seed, &came);
     }
     pieces = (uint16_t)(pieces + (came.count > 0));
     assert((uint16_t)(decoder->good + decoder->bad) == pieces);
     came.count = 0;
   }
-  check_good_frame_is_accepted(decoder);
+  check_good_frame_is_accepted(decoder, seed);
   free(decoder);
   return 0;
 }

@@ -64,9 +64,9 @@ static inline __attribute__((always_inline)) uint8_t lines_of(uint8_t side, uint
 /* Main loop only. Stamps are hal_time(), and become schedule_now() in encoder_update(). */
 typedef struct {
   uint16_t stamp, stamp_before; /* of the last two edges */
-  uint8_t stamped;              /* edges since encoder_update() */
+  uint8_t stamped;              /* edges since encoder_update(), at most a line's limit; of two lines a bit for each */
 #if ENCODER_LINES == 2
-  int8_t steps; /* and by how much they change the count */
+  int16_t steps; /* and by how much they change the count, at most by both lines' limits */
 #endif
   uint8_t edges;                /* in this tick, at most 2 */
   uint8_t silence;              /* ticks since the last edge, at most SILENT_TICKS */
@@ -158,9 +158,9 @@ static __attribute__((noinline)) void keep_limit(void) {
 static __attribute__((noinline)) void see_wheel(wheel *w, uint8_t changed, uint8_t bits, uint16_t time) {
   w->stamp_before = w->stamp;
   w->stamp = time;
-  w->stamped++;
   uint8_t *left = &w->left[0];
 #if ENCODER_LINES == 2
+  w->stamped = (uint8_t)(2u * w->stamped | 1u);
   if (changed == (A | B)) {
     if (*left > 1u) {
       --*left;
@@ -174,6 +174,7 @@ static __attribute__((noinline)) void see_wheel(wheel *w, uint8_t changed, uint8
     left++;
   }
 #else
+  w->stamped++;
   (void)changed, (void)bits;
 #endif
   if (--*left == 0) {

@@ -11,6 +11,7 @@
 #include "link/identity.h"
 #include "link/link.h"
 #include "link/parameters.h"
+#include "motion.h"
 #include "ping.h"
 #include "reset.h"
 #include "safety.h"
@@ -25,6 +26,7 @@ void firmware_start(void) {
   identity_start();
   storage_start();
   parameters_start();
+  motion_use_parameters();
   servo_start();
   encoder_start();
   whisker_start();

@@ -6,6 +6,8 @@
 #include "buzzer.h"
 #include "compass.h"
 #include "encoder.h"
+#include "generated/messages.h"
+#include "generated/parameters.h"
 #include "infrared.h"
 #include "light.h"
 #include "link/counters.h"
@@ -27,7 +29,8 @@
 
 #define SLOTS_PER_FRAME 8u
 #define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
-#define OVERLOAD_TICKS 10u /* ticks in a row that overran: the watchdog ends it */
+#define SLOTS_KEPT (2u * SCHEDULE_SLOTS_PER_TICK) /* that may wait; of more, whole ticks are dropped */
+#define OVERLOAD_TICKS 10u                        /* ticks in a row that overran: the watchdog ends it */
 
 #define TASK(name, period, phase, budget) \
   _Static_assert(256 % (period) == 0 && (phase) < (period), "task " #name ": period and phase");
@@ -36,13 +39,35 @@ _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go t
 
 #ifdef __AVR__
 /* The timing table as part of the image, so that an image can be judged without its sources: a text for each row, ended by
- * a zero byte, in a section that is not loaded. */
+ * a zero byte, in a section that is not loaded. Behind the rows of tasks.def there is one for each message to the board, and one
+ * for each constant on which the bounds depend. */
 #define ROW(text) __asm__(".pushsection .boebot.timing, \"\", @progbits \n .asciz \"" text "\" \n .popsection");
 #define TASK(name, period, phase, budget) ROW("TASK " #name " " #period " " #phase " " #budget)
 #define INTERRUPT(name, vector, budget, latency, interval) \
   ROW("INTERRUPT " #name " " #vector " " #budget " " #latency " " #interval)
 #define SENSOR(name, conversion, period, age) ROW("SENSOR " #name " " #conversion " " #period " " #age)
 #include "tasks.def"
+#define FRAME(name, id, length) ROW("FRAME " #name " " #id " " #length)
+MESSAGES_TO_BOARD(FRAME)
+
+/* A constant's value may be an expression, and so is an operand: these stand in a function of which there is one. */
+#define CONSTANT(name, value)                                                        \
+  __asm__(".pushsection .boebot.timing, \"\", @progbits \n .asciz \"CONSTANT " #name \
+          " %0\" \n .popsection" ::"n"((uint32_t)(value)))
+#define LIMIT_OF(name, type, least, most, first) +(PARAMETER_##name == PARAMETER_ENCODER_LIMIT ? (int32_t)(first) : 0)
+#define TELL_CONSTANTS()                                       \
+  CONSTANT(slot_cycles, HAL_SLOT_CYCLES);                      \
+  CONSTANT(slots_per_tick, SCHEDULE_SLOTS_PER_TICK);           \
+  CONSTANT(slots_kept, SLOTS_KEPT);                            \
+  CONSTANT(receive_due, HAL_RECEIVE_DUE);                      \
+  CONSTANT(encoder_limit, PARAMETER_LIST(LIMIT_OF));           \
+  CONSTANT(changes_due, ENCODER_DUE_BYTES / HAL_CHANGE_BYTES); \
+  CONSTANT(change_bytes, HAL_CHANGE_BYTES);                    \
+  CONSTANT(changes_close, HAL_CHANGES_CLOSE);                  \
+  CONSTANT(changes_storm, HAL_CHANGES_STORM)
+#else
+#define LIMIT_OF(name, type, least, most, first) +(PARAMETER_##name == PARAMETER_ENCODER_LIMIT ? (int32_t)(first) : 0)
+#define TELL_CONSTANTS() ((void)0)
 #endif
 
 HAL_NAMED volatile uint8_t schedule_slot;
@@ -61,6 +86,7 @@ static bool overran;        /* so it was in the previous tick, or ticks were dro
 static uint8_t overrun_row; /* ticks in a row that overran, at most OVERLOAD_TICKS */
 
 void schedule_start(uint32_t first_tick) {
+  TELL_CONSTANTS();
   schedule_slot = 0xFF;
   HAL_ZERO(schedule_slot_start);
   HAL_ZERO(slot_cycles);
@@ -168,8 +194,8 @@ static void begin_tick(void) {
   late = false;
   /* Hopelessly behind: drop whole ticks, keep the time right. The waiting slots are a byte, and none begins in the short
    * time that this takes, or one that makes the byte 0. */
-  BOUNDED((UINT8_MAX - 2u * SCHEDULE_SLOTS_PER_TICK + SCHEDULE_SLOTS_PER_TICK - 1u) / SCHEDULE_SLOTS_PER_TICK,
-          while (schedule_waiting() > 2u * SCHEDULE_SLOTS_PER_TICK)) {
+  BOUNDED((UINT8_MAX - SLOTS_KEPT + SCHEDULE_SLOTS_PER_TICK - 1u) / SCHEDULE_SLOTS_PER_TICK,
+          while (schedule_waiting() > SLOTS_KEPT)) {
     schedule_next_slot = (uint8_t)(schedule_next_slot + SCHEDULE_SLOTS_PER_TICK);
     next_tick();
     overruns++;

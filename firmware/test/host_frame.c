@@ -3,6 +3,7 @@
 #define frame_checksum host_frame_checksum
 #define frame_encode host_frame_encode
 #define frame_decoder_start host_frame_decoder_start
+#define frame_decoder_seed host_frame_decoder_seed
 #define frame_decode_end host_frame_decode_end
 #include "link/frame.c"
 
@@ -16,7 +17,7 @@ static inline const frame_decoder *of_const(const host_decoder *decoder) {
 }
 
 void host_decoder_start(host_decoder *decoder, uint32_t seed) { frame_decoder_start(of(decoder), seed); }
-void host_decoder_seed(host_decoder *decoder, uint32_t seed) { of(decoder)->seed = seed; }
+void host_decoder_seed(host_decoder *decoder, uint32_t seed) { frame_decoder_seed(of(decoder), seed); }
 bool host_decode(host_decoder *decoder, uint8_t byte) { return frame_decode(of(decoder), byte); }
 uint8_t host_message_id(const host_decoder *decoder) { return frame_id(of_const(decoder)); }
 uint8_t host_message_sequence(const host_decoder *decoder) { return frame_sequence(of_const(decoder)); }

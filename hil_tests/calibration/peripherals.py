@@ -117,6 +117,107 @@ UART = [
     ),
 ]
 
+# ---- UART: bits at the TX pin, which is pin 1; read at PIND, and by its pin-change interrupt ----
+
+SAMPLE = 2  # cycles of SBIC or SBIS with an INC that it may skip
+
+
+def uart_mode(divider: int, ubrr: int) -> str:
+    """The transmitter's mode, with nothing under way and TXC0 cleared; `divider`: 8 at double speed, else 16."""
+    return f"""
+      store UBRR0L, {ubrr}
+      store UCSR0A, 1 << TXC0 | {int(divider == 8)} << U2X0
+    """
+
+
+# The listener may take slower bits for a byte that ends later: it gets the time of two.
+UART_MODE_ENDS = f"""
+    7: lds r18, UCSR0A
+      sbrs r18, TXC0
+      rjmp 7b
+      {uart_mode(8, 3)}
+      ldi r18, {2 * BYTE // 3}
+    8: dec r18
+      brne 8b
+"""
+
+
+def bit_at_pin(what: str, byte: int, frames: int, high: bool, window: tuple[float, float], divider: int) -> Row:
+    """One bit, in samples of two cycles: each that sees its level counts, in a window that has no other bit of it.
+
+    `window`: in bits from the writing of UDR0.
+    """
+    bit = divider * (3 + 1)
+    begin, end = (round(bit * edge) for edge in window)
+    wait = begin // 3  # cycles of DEC and BRNE, at most 255 times
+    return Row(
+        group=TX_BITS,
+        what=f"{what}, {divider} (UBRR0 + 1), UBRR0 = 3",
+        expected=bit,
+        source="table 20-1",
+        code=f"""
+          {uart_mode(divider, 3)}
+          clr r21
+          ldi r19, 0x{byte:02X}
+          ldi r20, {max(wait, 1)}
+          {"sts UDR0, r19" * (frames > 1)}
+          sts UDR0, r19
+          {"8: dec r20" * (wait > 0)}
+          {"brne 8b" * (wait > 0)}
+          .rept {(end - begin) // SAMPLE}
+          {"sbic" if high else "sbis"} PIND, 1
+          inc r21
+          .endr
+          {UART_MODE_ENDS}
+          clr r25
+          mov r24, r21
+          lsl r24
+        """,
+        told=True,
+    )
+
+
+def seven_bits(divider: int, ubrr: int) -> Row:
+    """From the second edge of 0x0E, the first that comes in sleep, to the fourth: all data bits but the first."""
+    return Row(
+        group=TX_BITS,
+        what=f"seven data bits, {divider} (UBRR0 + 1), UBRR0 = {ubrr}: from edge to edge",
+        expected=7 * divider * (ubrr + 1),
+        source="table 20-1, figure 20-4",
+        code=f"""
+          {uart_mode(divider, ubrr)}
+          store PCMSK2, 1 << PCINT17
+          sbi PCIFR, PCIF2
+          store PCICR, 1 << PCIE2
+          clr r8
+          ldi r19, 0x0E
+          sts UDR0, r19
+          sleep_until 2
+          movw r2, r4
+          sleep_until 4
+          sts PCICR, r1
+          sts PCMSK2, r1
+          {UART_MODE_ENDS}
+        """,
+        edges=(-3, -1),
+    )
+
+
+TX_BITS = "UART, bits at the TX pin"
+UART_BITS = [
+    *(
+        row
+        for divider in (8, 16)
+        for row in (
+            bit_at_pin("start bit", 0xFF, 1, False, (0, 2.5), divider),
+            bit_at_pin("data bit, the fifth", 0x10, 1, True, (3, 7.5), divider),
+            bit_at_pin("stop bit, before the next start bit", 0x00, 2, True, (6, 13), divider),
+            seven_bits(divider, 3),
+        )
+    ),
+    seven_bits(8, 16),
+]
+
 # ---- ADC, clk/128 ----
 
 ADC_CLOCK = 128
@@ -340,4 +441,4 @@ def watchdog(step: int) -> Row:
 
 WATCHDOG = [watchdog(step) for step in (0, 1, 2, 3)]
 
-ROWS = [*UART, *ADC, *EEPROM, *TWO_WIRE, *WATCHDOG]
+ROWS = [*UART, *ADC, *EEPROM, *TWO_WIRE, *WATCHDOG, *UART_BITS]

@@ -90,6 +90,7 @@ __vector_\vector:
 
 handler 1  /* INT0 */
 handler 4  /* pin change of port C */
+handler 5  /* of port D */
 handler 6  /* watchdog */
 handler 7  /* Timer 2, compare A */
 handler 10 /* Timer 1, capture */

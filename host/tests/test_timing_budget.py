@@ -178,7 +178,8 @@ def test_frames_beyond_the_proven_ones_are_noted(
     coming = replace(report, frames=frames, frames_proven=9.88, measured=measured, ring=129, ring_holds=255)
     (note,) = coming.notes
     assert (
-        note == f"frames: the bound proves 9.9 of the 25 that come per tick; {says}; the receive ring holds 255 bytes"
+        note == "frames: the bound proves 9.9 of the 25 that come per tick, if all are of the costliest; "
+        f"{says}; the receive ring holds 255 bytes"
     )
     assert replace(coming, frames_proven=25.0).notes == []
 

@@ -16,7 +16,7 @@ from boebot import resources
 from boebot.cli import timing_tables
 from boebot.timing import budget
 from boebot.timing.changes import CHANGES_RING, most_waiting
-from boebot.timing.costs import CHANGES_DUE, Costs
+from boebot.timing.costs import Costs
 from boebot.timing.loads import LOADS
 from boebot.timing.response import Piece, Schedule, Source, load
 from tools.bench import avr_program
@@ -36,6 +36,7 @@ COSTS = Costs(
     change=CHANGE,
     other=0,
     storm=0,
+    changes_due=8,
 )
 LINE = Source("line", 0, 1000)
 
@@ -46,9 +47,9 @@ def slots(*cycles: int, every: int = 40_000) -> Schedule:
 
 def test_frame_comes_upon_changes_that_were_not_due() -> None:
     """By hand: 7 stay, and 20 + 2000 + 100 + 10 cycles pass until the first is worked off: 3 come in 2130."""
-    assert most_waiting(COSTS, slots(ROUND), [], [LINE], 0) == CHANGES_DUE - 1 + 3
-    assert most_waiting(COSTS, slots(ROUND), [], [LINE], 870) == CHANGES_DUE - 1 + 4  # at 3000 a fourth
-    assert most_waiting(COSTS, slots(ROUND), [], [LINE, LINE], 0) == CHANGES_DUE - 1 + 6
+    assert most_waiting(COSTS, slots(ROUND), [], [LINE], 0) == COSTS.changes_due - 1 + 3
+    assert most_waiting(COSTS, slots(ROUND), [], [LINE], 870) == COSTS.changes_due - 1 + 4  # at 3000 a fourth
+    assert most_waiting(COSTS, slots(ROUND), [], [LINE, LINE], 0) == COSTS.changes_due - 1 + 6
 
 
 @pytest.mark.parametrize(
@@ -78,7 +79,7 @@ def test_four_lines_change_while_the_ring_is_worked_off(slot: int, most: int) ->
 
 def test_interrupts_lengthen_what_lies_between() -> None:
     """By hand: 2130 cycles under 50 in each 100 take 4280, for 43 * 50 = 2150: 5 changes."""
-    assert most_waiting(COSTS, slots(ROUND), [Source("i", 50, 100)], [LINE], 0) == CHANGES_DUE - 1 + 5
+    assert most_waiting(COSTS, slots(ROUND), [Source("i", 50, 100)], [LINE], 0) == COSTS.changes_due - 1 + 5
 
 
 class Loop:
@@ -102,7 +103,7 @@ class Loop:
                 yield from [None] * (self.works[self.slot % len(self.works)] - before)
                 self.slots_waiting -= 1
                 self.slot += 1
-            elif self.ring >= CHANGES_DUE:
+            elif self.ring >= COSTS.changes_due:
                 yield from [None] * self.found.loop
                 yield from self.poll()
             else:
@@ -205,3 +206,34 @@ def test_ring_is_the_images_own(capsys: pytest.CaptureFixture[str]) -> None:
 def test_image_without_encoders_has_no_changes(tmp_path: Path) -> None:
     report = budget.prove(timing_program.build(tmp_path), LOADS["figures"])
     assert report.changes is None and report.changes_held is None and sentences(report) == report.notes == []
+
+
+def test_image_built_with_another_constant_has_another_bound(tmp_path: Path) -> None:
+    """The main loop leaves twice as many changes before it works them off: the code is the same but for a number."""
+    sources = tmp_path / "src"
+    shutil.copytree(avr_program.SOURCES, sources)
+    header = sources / "encoder.h"
+    text = header.read_text(encoding="utf-8")
+    assert text.count("#define ENCODER_DUE_BYTES 0x20u") == 1
+    header.write_text(text.replace("ENCODER_DUE_BYTES 0x20u", "ENCODER_DUE_BYTES 0x40u"), encoding="utf-8")
+    later = avr_program.build(tmp_path / "later.elf", environment="env:uno_quad", folder=sources)
+    sound, other = (budget.prove(image, LOADS["saturated"]) for image in (shipped("shieldbot-quad"), later))
+    assert (sound.costs.changes_due, other.costs.changes_due) == (8, 16)
+    assert other.costs.change == sound.costs.change
+    assert other.costs.idle - sound.costs.idle == 8 * sound.costs.change
+    assert sound.changes is not None and other.changes is not None and other.changes > sound.changes
+
+
+def test_lines_that_come_back_are_counted_with_the_lights_edge(tmp_path: Path) -> None:
+    """Where it waits the task leaves them to the next poll, whatever the load: 50 cycles more there are 50 more."""
+    sources = tmp_path / "src"
+    shutil.copytree(avr_program.SOURCES, sources)
+    encoder = sources / "encoder.c"
+    text, begins = encoder.read_text(encoding="utf-8"), "take_back(void) {\n"
+    assert text.count(begins) == 1
+    nops = '  __asm__ volatile(".rept 50\\n nop\\n .endr");\n'
+    encoder.write_text(text.replace(begins, begins + nops), encoding="utf-8")
+    slow = avr_program.build(tmp_path / "slow.elf", folder=sources)
+    sound, slower = (budget.prove(image, LOADS["everything"]).costs for image in (shipped("shieldbot"), slow))
+    assert slower.other - sound.other == 50
+    assert slower.idle - sound.idle == 50

@@ -9,6 +9,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+import timing_program
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from boebot.errors import TimingError
 from boebot.timing import loads
 from boebot.timing.blocked import ENTRY, WAKE, Blocked
 from boebot.timing.latency import HORIZON, Latencies
-from boebot.timing.program import Instruction, InterruptRow, Program
+from boebot.timing.program import Constants, Instruction, InterruptRow, Program, Table
 from boebot.timing.response import Source
 from boebot.timing.steps import KEPT, Steps
 
@@ -103,9 +104,10 @@ def test_how_often_one_of_higher_priority_comes_must_be_said(tmp_path: Path) -> 
 
 def test_requests_come_closer_than_in_the_long_run() -> None:
     """38 periods of 42.1 kHz in a burst, 190 cycles from edge to edge; five changes of the encoders at once."""
-    carrier = loads.densest(InterruptRow("carrier", loads.CARRIER, 0, 0, 952))[0]
+    program = Program("x.elf", {}, {}, table=Table(constants=Constants(**timing_program.CONSTANTS)))
+    carrier = loads.densest(InterruptRow("carrier", loads.CARRIER, 0, 0, 952), program)[0]
     assert [carrier.requests(w) for w in (1, 190, 191, 1900, 160_000)] == [1, 1, 2, 10, 170]
-    changes = loads.densest(InterruptRow("changes", loads.ENCODERS, 0, 0, 1000))[0]
+    changes = loads.densest(InterruptRow("changes", loads.ENCODERS, 0, 0, 1000), program)[0]
     assert [changes.requests(w) for w in (1, 1000, 1001)] == [5, 5, 6]
 
 

@@ -76,11 +76,12 @@ work = st.integers(0, 12)
 
 
 def times(source: Source, until: int, late: list[int]) -> list[int]:
-    """Requests as early as can be after the first, which came late by all its jitter; each then `late` by so much."""
-    found = [0]
+    """Requests as early as can be after the first, which came late by all its jitter; before each, a rest of `late`."""
+    found, rest = [0], 0
     for number in range(1, until // source.interval + 3):
-        found.append(max(0, number * source.interval - source.jitter) + late[number % len(late)] * (number > 0))
-    return sorted(found)
+        rest += late[number % len(late)]
+        found.append(max(0, number * source.interval + rest - source.jitter))
+    return found
 
 
 def simulate(schedule: Schedule, first: int, requested: list[tuple[Source, list[int]]], end: int) -> list[int]:

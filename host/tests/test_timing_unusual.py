@@ -102,8 +102,71 @@ def test_pass_of_the_main_loop_counts_all_that_is_in_it(tmp_path: Path) -> None:
 
 def test_slots_of_another_length_are_refused(tmp_path: Path) -> None:
     source = timing_program.text().replace("1000 40000", "1000 20000")
-    with pytest.raises(TimingError, match="a slot has 20000 cycles; expected 40000, 4 of them in a tick of 10 ms"):
+    with pytest.raises(TimingError, match="a slot has 20000 cycles; expected 40000, as its constants say"):
         budget.prove(timing_program.compiled(tmp_path, source), FIGURES)
+
+
+def constants(old: str, new: str) -> str:
+    """The small program with other CONSTANT rows."""
+    text = timing_program.text()
+    assert old in text
+    return text.replace(old, new)
+
+
+def test_slots_are_those_that_the_image_says(tmp_path: Path) -> None:
+    """Twice as many of half the length; the second task, each fourth slot, then runs twice in a tick."""
+    text = constants("CONSTANT slot_cycles 40000", "CONSTANT slot_cycles 20000").replace("1000 40000", "1000 20000")
+    twice = timing_program.compiled(tmp_path, text.replace("slots_per_tick 4", "slots_per_tick 8"))
+    found = budget.prove(twice, FIGURES)
+    assert (found.schedule.slot_cycles, found.schedule.slots_per_tick, len(found.schedule.slots)) == (20_000, 8, 8)
+    once = budget.prove(timing_program.build(tmp_path), FIGURES)
+    assert found.tick_work - once.tick_work >= once.costs.tasks["second"] + 4 * once.costs.tasks["first"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "CONSTANT slot_cycles 40000",
+            "CONSTANT slot_cycles 30000",
+            "a tick is 4 slots of 30000 cycles; expected 160000",
+        ),
+        (
+            'ROW("CONSTANT receive_due 64");',
+            "",
+            "constants of its timing table 'receive_due' is missing; expected slot_cycles",
+        ),
+        ("CONSTANT receive_due 64", "CONSTANT patience 64", "constants of its timing table 'patience' is unknown"),
+    ],
+)
+def test_constants_that_are_not_all_there_or_contradict_are_refused(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    with pytest.raises(TimingError, match=words):
+        budget.prove(timing_program.compiled(tmp_path, constants(old, new)), FIGURES)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("slot 12 40 1000 40000", "slot 12 40001 1000 40000", "row 'slot' .* budget of 40001 cycles .* due each 40000"),
+        ("first 1 0 150", "first 1 0 40001", "row 'first' .* budget of 40001 cycles .* due each 40000"),
+        ("second 4 1 300", "second 4 1 160001", "row 'second' .* budget of 160001 cycles .* due each 160000"),
+        ("first 1 0 150", "first 1 0 39900", "each as often as it is due, are 100.0% of all cycles"),
+        ("ping 18500 5 20000", "ping 18500 5 18499", "row 'ping' .* reading of 18500 us is at most 18499 us old"),
+    ],
+)
+def test_table_that_promises_the_impossible_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    """Of the fourth: 39,900 of 40,000 cycles, 300 of 160,000 and 40 of 40,000 are 40 in 160,000 too many."""
+    with pytest.raises(TimingError, match=words):
+        budget.prove(timing_program.compiled(tmp_path, constants(old, new)), FIGURES)
+
+
+def test_image_without_constants_is_refused(tmp_path: Path) -> None:
+    lines = [line for line in timing_program.text().splitlines() if "CONSTANT" not in line]
+    image = timing_program.compiled(tmp_path, "\n".join(lines))
+    with pytest.raises(TimingError, match=r"program\.elf carries no constants; expected CONSTANT rows in its section"):
+        budget.prove(image, FIGURES)
 
 
 @pytest.mark.parametrize("size", [64, 300])

@@ -18,6 +18,7 @@ ROW("TASK first 1 0 FIRST_BUDGET");
 ROW("TASK second 4 1 300");
 ROW("INTERRUPT slot 12 INTERRUPT_BUDGET 1000 40000");
 ROW("SENSOR ping 18500 5 20000");
+CONSTANTS
 
 __attribute__((noinline)) void first_task(void) { NOPS(FIRST_NOPS); }
 __attribute__((noinline)) void second_task(void) { NOPS(200); }
@@ -41,12 +42,28 @@ int main(void) {
 """
 
 
+CONSTANTS = {
+    "slot_cycles": 40_000,
+    "slots_per_tick": 4,
+    "slots_kept": 8,
+    "receive_due": 64,
+    "encoder_limit": 80,
+    "changes_due": 8,
+    "change_bytes": 4,
+    "changes_close": 256,
+    "changes_storm": 4,
+}
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware" / "src"
 
 
 def text(first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10) -> str:
     """Its source."""
-    source = SOURCE.replace("FIRST_BUDGET", str(first_budget)).replace("FIRST_NOPS", str(first_nops))
+    constants = "\n".join(f'ROW("CONSTANT {name} {value}");' for name, value in CONSTANTS.items())
+    source = (
+        SOURCE.replace("CONSTANTS", constants)
+        .replace("FIRST_BUDGET", str(first_budget))
+        .replace("FIRST_NOPS", str(first_nops))
+    )
     return source.replace("INTERRUPT_BUDGET", str(interrupt_budget)).replace("RESERVE", str(reserve))
 
 

@@ -56,6 +56,47 @@ def test_bytes_leave_at_the_end_of_their_stop_bits() -> None:
     assert machine.board.counters()["bytes_out"] == 3
 
 
+def watching(from_start: bool) -> str:
+    """Sends 0x0E; PCINT17 is unmasked before it, or in its start bit."""
+    watch = "ldi r24, 1 << PCINT17\nsts PCMSK2, r24"
+    send = "ldi r24, 0x0E\nsts UDR0, r24"
+    return f"""
+    main:
+      {SETUP}
+      ldi r24, 1 << TXEN0
+      sts UCSR0B, r24
+      {watch if from_start else send}
+      {send if from_start else watch}
+    1: lds r24, UCSR0A
+      sbrs r24, TXC0
+      rjmp 1b
+      in r16, PCIFR
+    2: rjmp 2b
+    """
+
+
+def test_bits_at_the_pin_of_a_program_that_looks_there() -> None:
+    """Start bit and first bit of 0, three of 1, four of 0, stop bit."""
+    machine = Machine(watching(from_start=True))
+    machine.board.run(2000)
+    (sent,) = machine.board.receive()
+    start = sent.cycle - BYTE_CYCLES
+    levels = [(edge.cycle - start, edge.level) for edge in machine.board.log() if edge.pin == 1 and edge.cycle >= start]
+    assert levels == [(0, Level.LOW), (64, Level.HIGH), (160, Level.LOW), (288, Level.HIGH)]
+    assert machine.board.read_memory(16, 1)[0] == 1 << 2  # PCIF2
+
+
+def test_looking_in_the_middle_of_a_bit_is_no_edge() -> None:
+    """The flag that is there then is of the edges that follow: they are as long after the start bit as ever."""
+    machine = Machine(watching(from_start=False).replace("1: lds", "nop\n" * 6 + "in r17, PCIFR\n1: lds"))
+    machine.board.run(2000)
+    (sent,) = machine.board.receive()
+    start = sent.cycle - BYTE_CYCLES
+    edges = [edge.cycle - start for edge in machine.board.log() if edge.pin == 1 and edge.cycle > start]
+    assert 0 < edges[0] < 10 and edges[1:] == [64, 160, 288]
+    assert (machine.board.read_memory(17, 1)[0], machine.board.read_memory(16, 1)[0]) == (0, 1 << 2)
+
+
 @pytest.mark.parametrize(("divisor", "double_speed", "bit"), [(16, 1, 136), (8, 0, 144), (103, 0, 1664), (0, 1, 8)])
 def test_ten_bit_times_a_byte(divisor: int, double_speed: int, bit: int) -> None:
     setup = f"""

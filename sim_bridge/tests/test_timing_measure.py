@@ -15,9 +15,9 @@ from boebot.timing.measured import as_json, merged, statistics
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.timing.loads import TICK_CYCLES, Bench
+from sim_bridge.timing.loads import SLOT_CYCLES, TICK_CYCLES, Bench
 from sim_bridge.timing.losses import COUNTERS_TICKS, MASKED
-from sim_bridge.timing.measure import Run, measure, robot_of, run, search, span_at
+from sim_bridge.timing.measure import CLOCK_HZ, HANG, WATCHDOG, Run, hang, measure, robot_of, run, search, span_at
 from sim_bridge.timing.scenarios import RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
 
 IMAGE = avr_image("shieldbot")
@@ -79,6 +79,26 @@ def test_a_maximum_is_seen_again(figures: Run) -> None:
         again = span_at(IMAGE, robot_of(IMAGE), name, spans.worst, SECONDS)
         assert again["begin"] == spans.worst.cycle
         assert again["net"] == spans.largest
+
+
+def test_a_hang_shows_the_watchdogs_interrupt() -> None:
+    """16,384 cycles of 128 kHz after the last kick, which was in the slot before; and nothing else of that time."""
+    found = hang(IMAGE, robot_of(IMAGE), seed=1)
+    (span,) = found.spans[found.spans["id"] == WATCHDOG]
+    hung_at = found.loaded_from + found.cycles
+    assert abs(int(span["begin"]) - hung_at - 16_384 * CLOCK_HZ // 128_000) < SLOT_CYCLES
+    assert found.spans[-1] == span and found.spans["begin"][-2] < hung_at
+    worst = found.measurement().row("watchdog").worst
+    assert worst.scenario == HANG
+    assert span_at(IMAGE, robot_of(IMAGE), "watchdog", worst, SECONDS)["net"] == span["net"]
+
+
+def test_what_has_no_task_cannot_hang_in_one(tmp_path: Path) -> None:
+    source, image = tmp_path / "empty.c", tmp_path / "empty.elf"
+    source.write_text("int main(void) {}", encoding="ascii")
+    subprocess.run(["avr-gcc", "-mmcu=atmega328p", "-o", str(image), str(source)], check=True)
+    with pytest.raises(BoardError, match=r"empty.elf has no task; expected one"):
+        hang(image, robot_of(IMAGE), seed=1)
 
 
 def test_nothing_is_lost_in_the_figures(figures: Run) -> None:

@@ -32,6 +32,10 @@ from sim_bridge.timing.watched import Circumstances, Watched, measurement, watch
 from sim_bridge.timing.world_access import WorldAccess
 
 SCENARIOS = ("figures", "saturated", "noise", "faults", "everything")
+HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never returns; what comes then is the watchdog's
+HANGS_AFTER = 5 * TICK_CYCLES
+WATCHDOG = 6  # vector (data sheet, table 12-6)
+RESETS_WITHIN = 20 * TICK_CYCLES  # of the hang: the watchdog's 125 ms and the 16 ms after its interrupt
 CLOCK_HZ = 16_000_000
 DRAIN_TICKS = 3  # after a run, for what is under way
 RESTART = 0.3  # share of the search's runs that begin anew
@@ -132,6 +136,47 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
         )
 
 
+def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
+    """A run in which a task hangs, so that the watchdog's interrupt comes, and its reset: the spans up to the hang, and
+    of what came then only the watchdog's.
+
+    The image is as it is until then; the hang is an instruction of the first task that turns into a jump to itself.
+
+    Raises:
+        BoardError: its watchdog does not reset it; and see `run`.
+    """
+    said = _said(image)
+    what = watched(said)
+    if not what.entries or WATCHDOG not in what.vectors:
+        raise BoardError(f"{image.name} has no {'watchdog interrupt' if what.entries else 'task'}; expected one")
+    board = avr.create(image)
+    board.record(what.watch)
+    with Bench(image, board.access()) as bench:
+        line = prepare(bench, robot, "figures")
+        loaded_from, before = bench.now, bench.access.counters()
+        load(bench, line, robot, "figures", numbers_of(seed), HANGS_AFTER)
+        bench.run(HANGS_AFTER)
+        hung_at, lowest_stack, after = bench.now, board.lowest_stack, bench.access.counters()
+        board.hang_at(what.entries[0])
+        while bench.access.counters()["resets"] == after["resets"]:
+            if bench.now > hung_at + RESETS_WITHIN:
+                raise BoardError(f"{image.name} hangs in {what.names[0]}, and its watchdog does not reset it")
+            bench.run(TICK_CYCLES)
+        spans = board.spans()
+        return Run(
+            what=what,
+            under=Circumstances(HANG, seed),
+            spans=spans[(spans["begin"] < hung_at) | (spans["id"] == WATCHDOG)],
+            cycles=hung_at - loaded_from,
+            executed=after["executed_cycles"] - before["executed_cycles"],
+            lowest_stack=lowest_stack,
+            loaded_from=loaded_from,
+            lost={"bytes": after["overruns"]},
+            sent=after["bytes_in"] - before["bytes_in"],
+            received=after["bytes_out"] - before["bytes_out"],
+        )
+
+
 def _said(image: Path) -> Image:
     """What an image says, read once for all runs as long as its file stays the same."""
     try:
@@ -170,7 +215,11 @@ def span_at(image: Path, robot: RobotDescription, name: str, worst: Worst, secon
     Raises:
         BoardError: there is none; and see `run`.
     """
-    again = run(image, robot, worst.scenario, seconds, worst.seed, losses=False)
+    again = (
+        hang(image, robot, worst.seed)
+        if worst.scenario == HANG
+        else run(image, robot, worst.scenario, seconds, worst.seed, losses=False)
+    )
     ids = {name: FUNCTION_IDS + i for i, name in enumerate(again.what.names)}
     ids.update({name: vector for vector, name in again.what.vectors.items()})
     found = again.spans[(again.spans["id"] == ids.get(name, -1)) & (again.spans["begin"] == worst.cycle)]
@@ -228,14 +277,14 @@ def _next_seed(draw: random.Random, best: dict[str, tuple[int, int]]) -> int:
 
 
 def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | None = None) -> Measurement:
-    """All scenarios of the robot that an image was built for, `seconds` of the board's time each (entry point
-    `emulated` of the group boebot.timing).
+    """All scenarios of the robot that an image was built for, `seconds` of the board's time each, and, where it has a
+    watchdog that warns by an interrupt, a hang (entry point `emulated` of the group boebot.timing).
 
     Args:
         progress: called with the share that is done, 0 to 1.
 
     Raises:
-        BoardError, TimingError, RobotError: see `run` and `robot_of`.
+        BoardError, TimingError, RobotError: see `run`, `hang` and `robot_of`.
     """
     robot = robot_of(elf)
     found = []
@@ -244,4 +293,7 @@ def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | 
         found.append(measure(elf, robot, scenario, max(seconds, least), seed))
         if progress:
             progress((number + 1) / len(SCENARIOS))
+    what = watched(_said(elf))
+    if what.entries and WATCHDOG in what.vectors:
+        found.append(hang(elf, robot, seed).measurement())
     return merged(found)

@@ -27,7 +27,7 @@ c_decoder *c_decoder_new(uint32_t seed) {
 
 void c_decoder_free(c_decoder *self) { free(self); }
 
-void c_decoder_seed(c_decoder *self, uint32_t seed) { self->decoder.seed = seed; }
+void c_decoder_seed(c_decoder *self, uint32_t seed) { frame_decoder_seed(&self->decoder, seed); }
 
 size_t c_decoder_feed(c_decoder *self, const uint8_t *bytes, size_t count, c_decoder_message *found, size_t room) {
   size_t messages = 0;

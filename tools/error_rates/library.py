@@ -43,21 +43,14 @@ ABLATIONS = {
     "checksum": Ablation(
         (("check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2]", "check != expected"),)
     ),
-    "exact length": Ablation(
-        (
-            (
-                "(uint8_t)frame_accepted_length(id) != (uint8_t)(count - INSIDE_MIN)",
-                "frame_accepted_length(id) < 0",
-            ),
-        )
-    ),
+    "exact length": Ablation((("off != 0", "off != 0 && frame_accepted_length(id) < 0"),)),
     "stuffing": Ablation(
         (("unstuff(bytes, size, ACCEPTED_MAX - 2u)", "(unstuff(bytes, size, ACCEPTED_MAX - 2u), true)"),)
     ),
     "session seed": Ablation(
         (
-            ("seed = decoder->seed;", "seed = decoder != 0 ? FRAME_SEED : 0;"),
-            ("FRAME_SEED : session", "FRAME_SEED : FRAME_SEED + 0u * session"),
+            ("FRAME_SEED : seed", "FRAME_SEED : FRAME_SEED + 0u * seed"),
+            (": decoder->aligned;", ": FRAME_SEED << 3 | (decoder->aligned & 0u);"),
         )
     ),
     "delimiter": Ablation((("  decoder->count = 0;\n", ""),)),

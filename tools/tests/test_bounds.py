@@ -76,7 +76,7 @@ def test_rows_are_not_loaded(pin_map: str) -> None:
     with (IMAGES / f"{pin_map}.elf").open("rb") as file:
         elf = ELFFile(file)
         sections = {section.name: section for section in elf.iter_sections()}
-        for name in (".boebot.loops", ".boebot.timing"):
+        for name in (".boebot.loops", ".boebot.timing", ".boebot.ids"):
             assert sections[name]["sh_size"] > 0
             assert sections[name]["sh_flags"] == 0
         loaded = sections[".text"]["sh_size"] + sections[".data"]["sh_size"]

@@ -8,11 +8,13 @@ import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
+from boebot.link import messages
 from boebot.timing.program import Table
 from tools import timing_table
 
 IMAGES = timing_table.ROOT / "build" / "images"
 TABLE = timing_table.read_table()
+FIRST_TO_HOST = 0x80  # of the ids; those below are of messages to the board
 
 
 def lines_of(table: Table) -> list[str]:
@@ -37,8 +39,13 @@ def test_an_image_carries_the_table(pin_map: str) -> None:
             for symbol in symbols.iter_symbols()
             if (name := symbol.name).removeprefix("__vector_").isdigit() and symbol["st_info"]["bind"] == "STB_GLOBAL"
         }
-    assert text.endswith(b"\0")
-    assert text[:-1].decode("ascii").split("\0") == lines_of(TABLE)
+    kinds = [kind for kind in messages.MESSAGES.values() if kind.ID < FIRST_TO_HOST]
+    frames = sorted((kind.ID, kind.LENGTH) for kind in kinds)
+    *rows_, rest = text.decode("ascii").split("\0")
+    assert rest == ""
+    assert [row for row in rows_ if not row.startswith(("FRAME ", "CONSTANT "))] == lines_of(TABLE)
+    said = [row.split()[2:] for row in rows_ if row.startswith("FRAME ")]
+    assert [(int(number), int(length)) for number, length in said] == frames, "the messages that the host knows"
     assert vectors == {row.vector for row in TABLE.interrupts}, "every interrupt in use has a row, and no other"
 
 

@@ -526,6 +526,26 @@ static inline int16_t message_length_to_host(uint8_t id) {
   }
 }
 
+/* X(name, id, bytes of payload) for each message to the board, in plain decimals. */
+#define MESSAGES_TO_BOARD(X) \
+  X(open, 1, 9)              \
+  X(identify, 2, 0)          \
+  X(describe, 3, 5)          \
+  X(stop, 8, 1)              \
+  X(close, 9, 4)             \
+  X(setpoint_signal, 16, 8)  \
+  X(setpoint_speed, 17, 8)   \
+  X(setpoint_coast, 18, 4)   \
+  X(turret, 24, 3)           \
+  X(buzzer, 25, 4)           \
+  X(get_parameter, 32, 3)    \
+  X(set_parameter, 33, 7)    \
+  X(save_parameters, 34, 2)  \
+  X(reset_parameters, 35, 2) \
+  X(arm, 36, 3)              \
+  X(acknowledge, 40, 2)      \
+  X(clock_probe, 48, 2)
+
 /* Whether the message belongs to the handshake, whose checksums start from the constant seed. */
 static inline bool message_is_handshake(uint8_t id) {
   switch (id) {

@@ -16,11 +16,6 @@ static inline crc21 crc_from(uint32_t aligned) {
 }
 
 static inline crc21 crc_start(uint32_t seed) { return crc_from(crc21_align(seed)); }
-
-/* The seed of a message, aligned; above 24 bits: none, for there is no session. */
-static inline __attribute__((always_inline)) uint32_t aligned_seed(uint8_t id, uint32_t session) {
-  return crc21_align(message_is_handshake(id) ? FRAME_SEED : session);
-}
 _Static_assert(FRAME_NO_SESSION > 0xFFFFFFul && FRAME_SEED_MAX << 3 <= 0xFFFFFFul, "seeds and none");
 
 uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
@@ -40,7 +35,7 @@ uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *pa
   cobs_put(&stuffing, sequence);
   cobs_put(&stuffing, id);
   hal_serial_put_before(&stuffing.to, stuffing.distance);
-  crc21 crc = crc_from(aligned_seed(id, seed));
+  crc21 crc = crc_start(message_is_handshake(id) ? FRAME_SEED : seed);
   crc21_take_sent(&crc, &stuffing.to, (uint8_t)(length + HEAD_BYTES), FRAME_PAYLOAD_MAX + HEAD_BYTES);
   crc21_spread(&crc);
   hal_serial_put(&stuffing.to, crc.high);
@@ -60,9 +55,8 @@ static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t 
   if (off != 0) {
     return false;
   }
-  const uint32_t seed = decoder->seed;
-  const uint32_t aligned = aligned_seed(id, seed);
-  if ((uint8_t)(aligned >> 24) != 0) {
+  const uint32_t aligned = message_is_handshake(id) ? FRAME_SEED << 3 : decoder->aligned;
+  if ((uint8_t)(aligned >> 24) != 0) { /* no session */
     return false;
   }
   crc21 crc = crc_from(aligned);
@@ -79,7 +73,12 @@ static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t 
   return false;
 }
 
-void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
+void frame_decoder_start(frame_decoder *decoder, uint32_t seed) {
+  *decoder = (frame_decoder){0};
+  frame_decoder_seed(decoder, seed);
+}
+
+void frame_decoder_seed(frame_decoder *decoder, uint32_t seed) { decoder->aligned = crc21_align(seed); }
 
 bool frame_decode_end(frame_decoder *decoder) {
   const uint8_t count = decoder->count;

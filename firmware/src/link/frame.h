@@ -16,6 +16,7 @@
 #include <stdint.h>
 
 #include "generated/messages.h"
+#include "holds_id.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -51,7 +52,7 @@ uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count);
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed);
 
 typedef struct {
-  uint32_t seed;           /* the session's, or FRAME_NO_SESSION; may be changed between frames */
+  uint32_t aligned;        /* the session's seed as the checksum's register has it; above 24 bits: there is none */
   uint16_t good;           /* frames accepted, modulo 65536 */
   uint16_t bad;            /* frames refused, modulo 65536 */
   uint16_t resynchronised; /* times that a good frame followed bad ones, modulo 65536 */
@@ -62,6 +63,9 @@ typedef struct {
 } frame_decoder;
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed);
+
+/* Another session's seed, or FRAME_NO_SESSION; between frames. */
+void frame_decoder_seed(frame_decoder *decoder, uint32_t seed);
 
 /* A delimiter came: whether what was collected is a message. */
 bool frame_decode_end(frame_decoder *decoder) __attribute__((noinline));
@@ -79,7 +83,11 @@ static inline bool frame_decode(frame_decoder *decoder, uint8_t byte) {
   return false;
 }
 
-static inline uint8_t frame_id(const frame_decoder *decoder) { return decoder->bytes[1]; }
+static inline uint8_t frame_id(const frame_decoder *decoder) {
+  uint8_t id = decoder->bytes[1];
+  HOLDS_ID(id);
+  return id;
+}
 static inline uint8_t frame_sequence(const frame_decoder *decoder) { return decoder->bytes[2]; }
 static inline const uint8_t *frame_payload(const frame_decoder *decoder) { return &decoder->bytes[3]; }
 

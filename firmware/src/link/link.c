@@ -26,7 +26,7 @@ void link_start(uint16_t baud) {
 }
 
 void link_use_seed(uint32_t seed) {
-  decoder.seed = seed;
+  frame_decoder_seed(&decoder, seed);
   link_room = 0; /* a request of the session before is not carried out any more */
 }
 

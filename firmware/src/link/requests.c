@@ -8,6 +8,7 @@
 #include "link/counters.h"
 #include "link/parameters.h"
 #include "link/send.h"
+#include "motion.h"
 #include "safety.h"
 #include "storage.h"
 
@@ -57,6 +58,7 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *val
       msg_set_parameter message;
       memcpy(&message, payload, sizeof message);
       status = parameters_set(message.parameter, message.value);
+      motion_use_parameters();
       *value = parameters_get(message.parameter);
       break;
     }
@@ -68,6 +70,7 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *val
       break;
     case MSG_RESET_PARAMETERS_ID:
       parameters_reset();
+      motion_use_parameters();
       break;
     default: /* MSG_ARM_ID */
       status = safety_arm(payload[offsetof(msg_arm, latches)]);

@@ -10,7 +10,7 @@
 
 namespace {
 constexpr int32_t CENTRE = 24000; /* 1500 us */
-constexpr int32_t GAIN = 3200;    /* 200 us */
+constexpr int16_t GAIN = 3200;    /* 200 us */
 }  // namespace
 
 TEST_CASE("signals give the pulses of the data sheet") {
@@ -23,7 +23,7 @@ TEST_CASE("signals give the pulses of the data sheet") {
 TEST_CASE("a mirrored servo turns the other way by as much") {
   for (int signal = -10000; signal <= 10000; signal += 7) {
     const auto s = static_cast<int16_t>(signal);
-    CHECK(motion_pulse(CENTRE, GAIN, s) - CENTRE == CENTRE - motion_pulse(CENTRE, -GAIN, s));
+    CHECK(motion_pulse(CENTRE, GAIN, s) - CENTRE == CENTRE - motion_pulse(CENTRE, static_cast<int16_t>(-GAIN), s));
   }
 }
 
@@ -34,9 +34,9 @@ TEST_CASE("trim moves the centre") {
 
 TEST_CASE("pulses stay within 1300 to 1700 us whatever the calibration") {
   for (int32_t centre : {22400, 24000, 25600}) {
-    for (int32_t gain : {-3200, -1, 0, 1, 3200}) {
+    for (int gain : {-3200, -1, 0, 1, 3200}) {
       for (int32_t signal : {-10000, -1, 0, 1, 10000}) {
-        const uint16_t pulse = motion_pulse(centre, gain, static_cast<int16_t>(signal));
+        const uint16_t pulse = motion_pulse(centre, static_cast<int16_t>(gain), static_cast<int16_t>(signal));
         CHECK(pulse >= MOTION_PULSE_MIN);
         CHECK(pulse <= MOTION_PULSE_MAX);
       }

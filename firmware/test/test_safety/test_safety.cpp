@@ -485,6 +485,21 @@ TEST_CASE("set-points in m/s are scaled by the full speed") {
   CHECK(bench.telemetry().pulse_right == 24000 + 3200);
 }
 
+TEST_CASE("another full speed counts from the next set-point on, also when it is reset") {
+  native_bench bench;
+  bench.start();
+  bench.set(PARAMETER_WHEEL_SPEED_MAXIMUM, 3400);
+  bench.say(MSG_SETPOINT_SPEED_ID, msg_setpoint_speed{850, -1700, 1000, now_of(bench)});
+  bench.run(10 * TICK);
+  CHECK(bench.telemetry().pulse_left == 24000 + 800);
+  CHECK(bench.telemetry().pulse_right == 24000 + 1600);
+  bench.say(MSG_RESET_PARAMETERS_ID, msg_reset_parameters{bench.next_number++});
+  bench.say(MSG_SETPOINT_SPEED_ID, msg_setpoint_speed{850, -1700, 1000, now_of(bench)});
+  bench.run(10 * TICK);
+  CHECK(bench.telemetry().pulse_left == 24000 + 1600);
+  CHECK(bench.telemetry().pulse_right == 24000 + 3200);
+}
+
 TEST_CASE("switching the servos off stops them and refuses set-points") {
   native_bench bench;
   bench.start();

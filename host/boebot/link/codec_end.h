@@ -3,6 +3,7 @@
 #define frame_checksum END(frame_checksum)
 #define frame_encode END(frame_encode)
 #define frame_decoder_start END(frame_decoder_start)
+#define frame_decoder_seed END(frame_decoder_seed)
 #define frame_decode_end END(frame_decode_end)
 #define BOUNDS_UNCHECKED
 #include "link/frame.c"
@@ -31,7 +32,7 @@ codec_decoder *END(new)(uint32_t seed) {
 }
 
 void END(seed)(codec_decoder *self, uint32_t seed) {
-  self->frames.seed = seed;
+  frame_decoder_seed(&self->frames, seed);
   self->next = ANY_SEQUENCE;
 }
 

@@ -6,7 +6,9 @@ is wrong, and counts like any broken budget. What a task or an interrupt takes b
 scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
 
 What must end in time is the tick: tasks, interrupts, edges. Frames are worked off in what they leave, and never keep a
-slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget.
+slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget: for each
+kind of message whether a line full of it is worked off, and how many bytes wait meanwhile (full_line.py). The bytes of
+`ring` are those that come between two polls alone; they are all that wait where the link was not behind before.
 """
 
 from __future__ import annotations
@@ -17,10 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from boebot.timing.blocked import WAKE
-from boebot.timing.changes import CHANGE_BYTES, CHANGES_RING
+from boebot.timing.changes import CHANGES_RING
 from boebot.timing.changes import of_image as changes_of
 from boebot.timing.costs import SLOT_BEGINS, Costs, costs
 from boebot.timing.elf import read_image
+from boebot.timing.frames import frame_costs
+from boebot.timing.full_line import FullLines, full_lines
 from boebot.timing.graph import program_of
 from boebot.timing.loads import RECEIVE, Load
 from boebot.timing.measured import Measurement, Spans, as_json
@@ -35,7 +39,7 @@ FLASH_BYTES = 0x8000
 RECEIVE_RING = "hal_receive_ring"  # the variable in which received bytes wait; one of them stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
 RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
-IDLE_LEAVES = 63  # bytes of a frame that has not ended, which an idle main loop leaves in the ring
+OF_ROWS = 0.4  # share of the work that tasks and interrupts are, where messages are bounded too
 STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
@@ -98,7 +102,8 @@ class Report:
     changes_held: int | None  # for which it has room; None: the image has no such ring
     taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
-    frames_proven: float  # of these in a tick, so many are worked off whatever happens, in the long run
+    frames_proven: float  # of these in a tick, so many are worked off whatever they are, in the long run
+    lines: FullLines  # a line full of each message
     memory: Memory
     measured: Measurement | None = None
 
@@ -212,6 +217,7 @@ class Report:
             "edge_age_bound_cycles": self.edge_age,
             "frames_coming_per_tick": round(self.frames_coming, 2),
             "frames_proven_per_tick": round(self.frames_proven, 2),
+            "full_lines": self.lines.as_dict(self.ring_holds),
             "losses_in_emulator": None if own is None else own.losses,
             "ram_static_bytes": memory.static,
             "stack_bound_bytes": memory.stack,
@@ -240,7 +246,7 @@ def prove(
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
         program: the image's, if it has been read already.
-        progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
+        progress: called with the share of its tasks, interrupts and messages that are bounded, 0 to 1.
 
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
@@ -248,13 +254,15 @@ def prove(
     image = read_image(path)
     program = program or program_of(image)
     check_table(path, program)
-    found = costs(program, asked, progress)
+    of_rows = OF_ROWS if asked.is_full else 1.0
+    found = costs(program, asked, lambda share: progress(of_rows * share))
     schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
     deepest = Stack(program).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     answers = responses(schedule, sources)
     between = (*sources, *found.between(program, asked))
     frames = found.of_frames(asked)
+    kinds = frame_costs(program, lambda share: progress(OF_ROWS + (1 - OF_ROWS) * share)) if asked.is_full else ()
     gap, ring, taken = _of_link(program, found, schedule, between, asked)
     return Report(
         path=str(path),
@@ -269,10 +277,13 @@ def prove(
         ring=ring,
         ring_holds=image.variables[RECEIVE_RING] - 1 if RECEIVE_RING in image.variables else None,
         changes=None if answers is None else changes_of(program, found, schedule, asked),
-        changes_held=image.variables[CHANGES_RING] // CHANGE_BYTES - 1 if CHANGES_RING in image.variables else None,
+        changes_held=image.variables[CHANGES_RING] // program.constants.change_bytes - 1
+        if CHANGES_RING in image.variables
+        else None,
         taken=taken,
         frames=frames,
         frames_proven=_proven(schedule, between, frames),
+        lines=full_lines(program, found, schedule, asked, kinds),
         memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
         measured=measured,
     )
@@ -335,7 +346,7 @@ def _of_link(
     def come(window: int) -> int:
         return sum(source.requests(window + 1) for source in bytes_)
 
-    return gap, max(come(gap), IDLE_LEAVES + come(idle)), taken
+    return gap, max(come(gap), program.constants.receive_due - 1 + come(idle)), taken
 
 
 def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:
@@ -412,14 +423,15 @@ def _frames_unproven(report: Report) -> list[str]:
     proven, coming = round(report.frames_proven, 1), round(report.frames_coming, 1)
     if proven >= coming:
         return []
-    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick; "
+    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick, if all are of the costliest; "
     if report.own is None:
         says += "that none of the others is lost is not proven, and nothing was measured"
     elif any(lost := [report.own.losses.get(kind, 0) for kind in ("frames", "bytes")]):
         says += f"the emulator lost {lost[0]} frames and {lost[1]} bytes"
     else:
         says += "that none of the others is lost is measured, not proven"
-    return [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
+    found = [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
+    return [*found, f"frames: {report.lines.says(report.ring_holds)}"] if report.lines.lines else found
 
 
 def _memory_broken(memory: Memory) -> list[str]:

@@ -15,13 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from boebot.timing.costs import CHANGES_DUE, Costs
+from boebot.timing.costs import Costs
 from boebot.timing.loads import ENCODERS, TICK, Load
 from boebot.timing.program import Program
 from boebot.timing.response import Schedule, Source, response
 
 CHANGES_RING = "hal_changes"  # the variable in which they wait; one place stays free
-CHANGE_BYTES = 4  # of one (HAL_CHANGE_BYTES of hal.h)
 
 
 def of_image(program: Program, found: Costs, schedule: Schedule, asked: Load) -> int | None:
@@ -65,7 +64,7 @@ def most_waiting(
                 return most
             most, freed = max(most, waiting), freed + 1
 
-    needed = peak(found.loop + found.frame + found.round, CHANGES_DUE - 1)
+    needed = peak(found.loop + found.frame + found.round, found.changes_due - 1)
     while needed is not None:
         more = peak(slots + rare + needed * found.change + found.round, 0)
         if more is not None and more <= needed:

@@ -30,17 +30,13 @@ from boebot.timing.response import Piece, Schedule, Source
 from boebot.timing.taken import Taken
 from boebot.timing.wcet import Bound, WorstCase
 
-SLOT_CYCLES = 40_000
-SLOTS_PER_TICK = 4
-DROPS_FROM = 2 * SLOTS_PER_TICK * SLOT_CYCLES  # so late, the scheduler drops ticks (begin_tick of schedule.c)
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
 AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task that runs
 ENCODER_POLL, LINK_POLL = "encoder_poll", "link_poll"
 TAKE, DECODE, ROOM = "link_take_frame", "frame_decode_end", "hal_serial_room"  # parts of a poll of the link
-RARE, WHEEL, OTHER = "keep_limit", "see_wheel", "see_other"  # parts of a poll of the encoders
+RARE, WHEEL, OTHER, BACK = "keep_limit", "see_wheel", "see_other", "take_back"  # parts of a poll of the encoders
 SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the scheduler does
 PIECES = 2  # passes of loops of TAKE that are not over bytes
-CHANGES_DUE = 8  # so many changes the main loop works off between slots; fewer wait (ENCODER_DUE_BYTES of encoder.h)
 
 
 class Given(WorstCase):
@@ -70,8 +66,9 @@ class Costs:
     partial: int  # to take bytes and find no whole frame
     edges: int  # to look for edges
     change: int  # more, to work off one
-    other: int  # more, when it is the light sensor's
+    other: int  # more, when it is the light sensor's, and lines come back
     storm: int  # more, to stop a line that comes too often; 0: under this load none does
+    changes_due: int  # so many changes the main loop works off between slots; fewer wait
 
     def requested(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load."""
@@ -87,10 +84,10 @@ class Costs:
         return found
 
     def between(self, program: Program, load: Load) -> list[Source]:
-        """What the main loop does besides when no slot waits: it looks for edges when there are CHANGES_DUE."""
+        """What the main loop does besides when no slot waits: it looks for edges when so many are due."""
         return [
             replace(one, name="looks for edges")
-            for one in self._changes(program, load, -(-(self.loop + self.edges) // CHANGES_DUE))
+            for one in self._changes(program, load, -(-(self.loop + self.edges) // self.changes_due))
         ]
 
     @staticmethod
@@ -106,22 +103,24 @@ class Costs:
     @property
     def idle(self) -> int:
         """What a slot may find when there is no frame: the main loop works off edges that have just become due."""
-        return self.loop + self.edges + CHANGES_DUE * self.change + self.other + self.storm
+        return self.loop + self.edges + self.changes_due * self.change + self.other + self.storm
 
     @property
     def blocking(self) -> int:
         """The most that a slot may find: or the main loop is at a frame, and has left edges that were not due."""
-        return max(self.idle, self.loop + self.frame + (CHANGES_DUE - 1) * self.change + self.other + self.storm)
+        return max(self.idle, self.loop + self.frame + (self.changes_due - 1) * self.change + self.other + self.storm)
 
     def schedule(self, program: Program) -> Schedule:
         """The slots of a whole cycle."""
-        rows = program.table.tasks
+        rows, said = program.table.tasks, program.constants
         slots = []
         for slot in range(_slots(program)):
             pieces = [Piece(SLOT_BEGINS, self.round)]
             pieces += [Piece(row.name, self.tasks[row.name] + self.around) for row in rows if _is_due(row, slot)]
             slots.append(tuple(pieces))
-        return Schedule(tuple(slots), SLOT_CYCLES, SLOTS_PER_TICK, self.blocking, DROPS_FROM)
+        return Schedule(
+            tuple(slots), said.slot_cycles, said.slots_per_tick, self.blocking, said.slots_kept * said.slot_cycles
+        )
 
 
 def _is_due(row: TaskRow, slot: int) -> bool:
@@ -150,7 +149,8 @@ def costs(program: Program, load: Load, progress: Callable[[float], None] = lamb
         interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
         waits[row.name] = latencies.of(row.vector)
         progress(done / rows)
-    storm = not load.is_calm(next((waits[row.name] for row in table.interrupts if row.vector == ENCODERS), 0))
+    waited = next((waits[row.name] for row in table.interrupts if row.vector == ENCODERS), 0)
+    storm = not load.is_calm(waited, program.constants)
     edges = _edges(program, storm)
     loop, scheduler = _rounds(program, edges.nothing)
     return Costs(
@@ -160,13 +160,14 @@ def costs(program: Program, load: Load, progress: Callable[[float], None] = lamb
         latencies=waits,
         loop=loop,
         round=loop + scheduler,
-        around=sum(worst.bound(entry).cycles for entry in _entries(program, AROUND_TASK)),
-        frame=sum(worst.bound(entry).cycles for entry in _entries(program, (LINK_POLL,))),
+        around=sum(worst.bound(entry).cycles for entry in entries_of(program, AROUND_TASK)),
+        frame=sum(worst.bound(entry).cycles for entry in entries_of(program, (LINK_POLL,))),
         partial=_partial(program),
         edges=edges.nothing,
         change=edges.each,
         other=edges.other,
         storm=edges.storm,
+        changes_due=program.constants.changes_due,
     )
 
 
@@ -192,21 +193,25 @@ class _Edges:
 def _edges(program: Program, storm: bool) -> _Edges:
     """Lines are stopped in functions of its own, outside its loop or RARE; where none ever is, they are not called.
 
+    BACK is one of these: lines come back that were stopped or switched off. The task that switches them on calls it
+    itself, and leaves it to the next poll only where a change waits. A line that was off brings none: it is the light
+    sensor's edge, with which it is counted.
+
     A change that is one edge calls WHEEL once. In one that is several, each of them has been charged a whole change.
     """
-    entry = _entry(program, ENCODER_POLL)
+    entry = entry_of(program, ENCODER_POLL)
     if entry is None:
         return _Edges()
     blocks, inside = program.functions[entry].blocks, _in_loops(program.functions[entry])
     outside = {callee for start, block in blocks.items() if start not in inside for callee in block.calls}
-    rare, wheel, other = (_entries(program, (name,)) for name in (RARE, WHEEL, OTHER))
+    rare, wheel, other, back = (entries_of(program, (name,)) for name in (RARE, WHEEL, OTHER, BACK))
     calm = dict.fromkeys((*outside, *rare, *wheel, *other), 0)
-    none, one, two = (Given(_passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
+    none, one, two = (Given(passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
     each = Given(program, dict.fromkeys(rare, 0))
     return _Edges(
         nothing=none,
         each=max(one - none, two - one) + sum(each.bound(callee).cycles for callee in wheel),
-        other=sum(WorstCase(program).bound(callee).cycles for callee in other),
+        other=sum(WorstCase(program).bound(callee).cycles for callee in (*other, *(back if other else ()))),
         storm=sum(WorstCase(program).bound(callee).cycles for callee in (*outside, *rare)) if storm else 0,
     )
 
@@ -216,14 +221,14 @@ def _partial(program: Program) -> int:
 
     The time for each of those bytes is counted with its frame.
     """
-    entry, take = _entry(program, LINK_POLL), _entry(program, TAKE)
+    entry, take = entry_of(program, LINK_POLL), entry_of(program, TAKE)
     if entry is None:
         return 0
     if take is None:  # in line: what finds no frame cannot be told from what finds one
         return WorstCase(program).bound(entry).cycles
-    decode = dict.fromkeys(_entries(program, (DECODE,)), 0)
-    room = {callee: WorstCase(program).bound(callee).cycles for callee in _entries(program, (ROOM,))}
-    taken = Given(_passed(program, take, 1, above=PIECES), decode).bound(take).cycles
+    decode = dict.fromkeys(entries_of(program, (DECODE,)), 0)
+    room = {callee: WorstCase(program).bound(callee).cycles for callee in entries_of(program, (ROOM,))}
+    taken = Given(passed(program, take, 1, above=PIECES), decode).bound(take).cycles
     return _nothing(program, entry, room | {take: taken})
 
 
@@ -249,20 +254,20 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
     """One pass of the main loop at most, and the scheduler in it around a slot's tasks, with so many cycles to look for
     edges: of the scheduler its longest way, of the loop around it every block once.
 
-    The scheduler's only loop drops ticks when it has fallen behind. Where it has not (DROPS_FROM), it is not passed.
+    The scheduler's only loop drops ticks when it has fallen behind. Where it has not, it is not passed.
     """
-    scheduler = _entry(program, SCHEDULER)
+    scheduler = entry_of(program, SCHEDULER)
     if scheduler is None:
         raise TimingError(
             f"{program.path} has no function {SCHEDULER}; expected the scheduler as a function of its own, not in line"
         )
     names = (*(f"{row.name}_task" for row in program.table.tasks), *AROUND_TASK)
-    elsewhere = dict.fromkeys(_entries(program, names), 0)
-    polls = dict.fromkeys(_entries(program, (ENCODER_POLL, LINK_POLL)), edges)
+    elsewhere = dict.fromkeys(entries_of(program, names), 0)
+    polls = dict.fromkeys(entries_of(program, (ENCODER_POLL, LINK_POLL)), edges)
     alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
-    cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
+    cycles = Given(passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
-    loop = _entry(program, LOOP)
+    loop = entry_of(program, LOOP)
     if loop is None:
         return _main_loop(program, done, scheduler), cycles
     return Given(program, done).bound(loop).cycles + _main_loop(program, {loop: 0}, loop), cycles
@@ -270,7 +275,7 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
 
 def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> int:
     """All blocks once of the loops of `main` from which that is called."""
-    main = _entry(program, "main")
+    main = entry_of(program, "main")
     if main is None:
         return 0
     given = Given(program, elsewhere)
@@ -322,7 +327,7 @@ def _in_loops(function: Function) -> set[int]:
     return {node for loop in _loops(function) for node in loop.nodes}
 
 
-def _passed(program: Program, entry: int, passes: int, above: int = 0) -> Program:
+def passed(program: Program, entry: int, passes: int, above: int = 0) -> Program:
     """The program with each loop of a function passed so often at most, if it is bounded by more than `above`."""
     blocks = program.functions[entry].blocks.values()
     own = {instruction.address for block in blocks for instruction in block.instructions}
@@ -337,10 +342,10 @@ def _passed(program: Program, entry: int, passes: int, above: int = 0) -> Progra
 
 def _slots(program: Program) -> int:
     """Slots of a whole cycle of the schedule."""
-    return math.lcm(SLOTS_PER_TICK, *(row.period for row in program.table.tasks))
+    return math.lcm(program.constants.slots_per_tick, *(row.period for row in program.table.tasks))
 
 
-def _entry(program: Program, name: str) -> int | None:
+def entry_of(program: Program, name: str) -> int | None:
     """Of a function of the source; the compiler may have added to its name. None: there is none, or not one only."""
     if name in program.by_name:
         return program.by_name[name]
@@ -354,11 +359,11 @@ def task_entry(program: Program, name: str) -> int:
     Raises:
         TimingError: it is no function.
     """
-    entry = _entry(program, f"{name}_task")
+    entry = entry_of(program, f"{name}_task")
     if entry is None:
         raise TimingError(f"{program.path} has no function {name}_task")
     return entry
 
 
-def _entries(program: Program, names: Collection[str]) -> list[int]:
-    return [entry for entry in (_entry(program, name) for name in names) if entry is not None]
+def entries_of(program: Program, names: Collection[str]) -> list[int]:
+    return [entry for entry in (entry_of(program, name) for name in names) if entry is not None]

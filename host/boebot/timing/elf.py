@@ -1,8 +1,8 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
 What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the sections in which the
-firmware describes itself, `.boebot.timing`, `.boebot.loops` and `.boebot.entries`. The file need not have the last
-four.
+firmware describes itself, `.boebot.timing`, `.boebot.loops`, `.boebot.entries` and `.boebot.ids`. The file need not
+have the last five.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import TimingError
-from boebot.timing.program import LoopBound, Table
+from boebot.timing.program import IdPlace, LoopBound, Table
 from boebot.timing.source_lines import source_lines
 from boebot.timing.table import SECTION, table_of
 
@@ -28,6 +28,7 @@ DATA_SPACE = 0x800000
 EM_AVR = "EM_AVR"
 PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
 NOT_SAID = 0xFFFFFFFF
+REGISTERS = 32
 # What pyelftools raises on a damaged file.
 DAMAGE: tuple[type[Exception], ...] = (
     *(ELFError, DWARFError, ConstructError, struct.error, ValueError, LookupError),
@@ -64,6 +65,7 @@ class Image:
     lines: dict[int, str] = field(default_factory=dict)
     table: Table = field(default_factory=Table)
     bounds: tuple[LoopBound, ...] = ()
+    ids: tuple[IdPlace, ...] = ()
     entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
 
 
@@ -107,6 +109,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         table=table_of(path, _section(path, elf, SECTION)),
         bounds=bounds,
         entries={address: line for address, line in entries.items() if address not in told},
+        ids=_ids(path, _section(path, elf, ".boebot.ids"), len(code)),
     )
 
 
@@ -209,6 +212,20 @@ def _bounds(path: Path, data: bytes, entries: dict[int, int], end: int) -> tuple
         most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
         bounds.append(LoopBound(address, most, longest, entries.get(address, 0)))
     return tuple(bounds)
+
+
+def _ids(path: Path, data: bytes, end: int) -> tuple[IdPlace, ...]:
+    """The records of `.boebot.ids`: address behind an instruction, register that holds a message's id; 32 bits each."""
+    if len(data) % 8:
+        raise TimingError(f"{path}: section .boebot.ids has {len(data)} bytes: records of 8 bytes are expected")
+    places = [IdPlace(address, register) for address, register in struct.iter_unpack("<II", data)]
+    for place in places:
+        if place.address >= end or place.address % 2 or place.register >= REGISTERS:
+            raise TimingError(
+                f"{path}: a message's id is said to be in register {place.register} at 0x{place.address:X}; expected "
+                f"one of {REGISTERS} registers and an instruction's address"
+            )
+    return tuple(places)
 
 
 def _entries(path: Path, data: bytes, end: int) -> dict[int, int]:

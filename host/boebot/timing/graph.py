@@ -44,7 +44,7 @@ def load_program(path: Path) -> Program:
 def program_of(image: Image) -> Program:
     """The program of an image. Raises TimingError where the code cannot be followed."""
     names = _Names(image)
-    program = Program(str(image.path), {}, {}, image.bounds, image.entries, image.table, image.lines)
+    program = Program(str(image.path), {}, {}, image.bounds, image.entries, image.table, image.lines, image.ids)
     explorer = _Explorer(image, names, program)
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):

@@ -51,7 +51,7 @@ class Latencies:
         self.steps = Steps(blocked)
         self.spans = {vector: blocked.interrupt(vector) for vector in blocked.vectors()}
         rows = blocked.program.table.interrupts
-        self.requests = {row.vector: densest(row) for row in rows} if requests is None else requests
+        self.requests = {row.vector: densest(row, blocked.program) for row in rows} if requests is None else requests
 
     def of(self, vector: int) -> int:
         """Most cycles from the request of an interrupt to its acceptance. HORIZON: those of higher priority can take

@@ -13,13 +13,11 @@ from dataclasses import dataclass, field, replace
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.timing.program import InterruptRow
+from boebot.timing.program import Constants, InterruptRow, Program
 from boebot.timing.response import Source
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s
-CHANGES_CLOSE, CHANGES_STORM = 256, 4  # so close, and so often in a row: the encoders' interrupt masks itself (hal.h)
-LIMIT = 80  # edges of a line in a tick above which it is masked (messages.toml, encoder_limit)
 # Vectors of the ATmega328P (data sheet, table 12-6), numbered as in __vector_N.
 ENCODERS, STAMP, WATCHDOG, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 6, 7, 10, 11, 12, 14
 RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
@@ -70,12 +68,21 @@ class Load:
             return []
         return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]
 
-    def is_calm(self, latency: int) -> bool:
+    @property
+    def is_full(self) -> bool:
+        """Frames come back to back."""
+        return not self.frame_bursts
+
+    def without_answers(self) -> Load:
+        """The same, where the board says what it says by itself and no more; with a tone, which frames can bring."""
+        return replace(self, streams={**self.streams, SEND: OWN_SENDING}, off=self.off - {BUZZER})
+
+    def is_calm(self, latency: int, said: Constants) -> bool:
         """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of
         more changes than there are lines two are of one line, and a tick has no more of a line than the limit."""
         lines = self.streams.get(ENCODERS, ())
-        storm = CHANGES_STORM * CHANGES_CLOSE + latency
-        return 0 < len(lines) <= CHANGES_STORM and all(line.interval > max(storm, TICK // LIMIT) for line in lines)
+        closest = max(said.changes_storm * said.changes_close + latency, TICK // said.encoder_limit)
+        return 0 < len(lines) <= said.changes_storm and all(line.interval > closest for line in lines)
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
@@ -91,6 +98,13 @@ _COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK),))
 _SERVOS_AND_BURSTS = Stream(_EDGE_TO_EDGE, ((2, _THREE_EDGES), (3, _FOUR_EDGES), (10, 2 * TICK)))
 _SWEEP = Stream(_HALF_PERIOD, ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)))
 _ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
+# What a board says by itself, at its fastest.
+OWN_SENDING = (
+    Stream(BYTE, ((_TELEMETRY, TICK),)),
+    Stream(BYTE, ((_DEVICES, 2 * TICK),)),
+    Stream(BYTE, ((_OWN, 4 * TICK),)),
+    Stream(BYTE, ((_HELLO, 20 * TICK),)),
+)
 _DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
@@ -100,12 +114,7 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
-            SEND: (
-                Stream(BYTE, ((_TELEMETRY, TICK),)),
-                Stream(BYTE, ((_DEVICES, 2 * TICK),)),
-                Stream(BYTE, ((_OWN, 4 * TICK),)),
-                Stream(BYTE, ((_HELLO, 20 * TICK),)),
-            ),
+            SEND: OWN_SENDING,
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
             EDGE: (_SERVOS_AND_BURSTS,),
             CARRIER: (_SWEEP,),
@@ -149,7 +158,6 @@ LOADS["everything"] = replace(
 
 # What can come at the worst, whatever the load, where the table's interval is not the least.
 _DENSEST: dict[int, Stream] = {
-    ENCODERS: Stream(close=CHANGES_STORM),  # with the first five, before it masks itself
     CARRIER: _SWEEP,
     CAPTURE: _ECHOES,
     EDGE: _SERVOS_AND_BURSTS,
@@ -164,8 +172,10 @@ _DENSEST: dict[int, Stream] = {
 APART = {EDGE: frozenset({CARRIER, SLOT})}
 
 
-def densest(row: InterruptRow) -> list[Source]:
+def densest(row: InterruptRow, program: Program) -> list[Source]:
     """The most requests of an interrupt in any time, one by one."""
+    if row.vector == ENCODERS:  # with the first of a storm and those that make it one, before it masks itself
+        return [Stream(close=program.constants.changes_storm).source(row, 1)]
     return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from boebot.errors import TimingError
+
 COPY = 0x10000  # behind all addresses: what a copy of a block has above its own (split.py)
 
 
@@ -117,12 +119,53 @@ class SensorRow:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameRow:
+    """A message that the program takes: its name, its id, and the bytes of its payload."""
+
+    name: str
+    id: int
+    length: int
+
+
+@dataclass(frozen=True, slots=True)
+class IdPlace:
+    """What the source says of a message's id: it is in `register` behind the instruction that ends at `address`."""
+
+    address: int
+    register: int
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What the program is built with and its bounds depend on.
+
+    A control tick is `slots_per_tick` slots of `slot_cycles` cycles; when more than `slots_kept` wait, ticks are
+    dropped. Between slots the main loop is at the link when a frame has ended or `receive_due` bytes wait, and before
+    that at the encoders when `changes_due` changes do, of `change_bytes` bytes each. Their interrupt stops itself when
+    `changes_storm` in a row have come at most `changes_close` cycles after the one before; a line is stopped above
+    `encoder_limit` edges in a tick, if the parameter of that name is as it is at first.
+    """
+
+    slot_cycles: int
+    slots_per_tick: int
+    slots_kept: int
+    receive_due: int
+    encoder_limit: int
+    changes_due: int
+    change_bytes: int
+    changes_close: int
+    changes_storm: int
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """The timing table of an image, in its order."""
 
     tasks: tuple[TaskRow, ...] = ()
     interrupts: tuple[InterruptRow, ...] = ()
     sensors: tuple[SensorRow, ...] = ()
+    frames: tuple[FrameRow, ...] = ()
+    constants: Constants | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +179,14 @@ class Program:
     entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
     table: Table = field(default_factory=Table)
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
+    ids: tuple[IdPlace, ...] = ()
+
+    @property
+    def constants(self) -> Constants:
+        """What the image says of itself. Raises TimingError where it does not."""
+        if self.table.constants is None:
+            raise TimingError(f"{self.path} carries no constants; expected CONSTANT rows in its section .boebot.timing")
+        return self.table.constants
 
     def where(self, address: int) -> str:
         """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""

@@ -18,6 +18,8 @@ from boebot.errors import BoardError
 from sim_bridge.boards.board import BoardAccess
 
 ERROR_SIZE = 200
+FLASH_SIZE = 0x8000  # bytes
+JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 FUNCTION_IDS = 64  # id of the first watched function; below are vectors
 
 SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
@@ -101,6 +103,12 @@ class AvrBoard:
             raise ValueError(f"no data at 0x{address:X}..0x{address + size - 1:X}; the data space ends at 0x8FF")
         board = self._ffi.cast("board *", self.pointer)
         return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
+
+    def hang_at(self, address: int) -> None:
+        """From now on the instruction at that byte address of the program jumps to itself."""
+        if not 0 <= address < FLASH_SIZE or address % 2:
+            raise ValueError(f"no instruction at 0x{address:X}; expected an even address below 0x{FLASH_SIZE:X}")
+        self._lib.avr_board_flash(self._running)[address : address + 2] = JUMP_TO_ITSELF
 
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""

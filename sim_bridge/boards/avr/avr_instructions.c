@@ -16,7 +16,7 @@
 #define REG_SPMCSR 0x57u
 #define SP 0x5Du
 
-enum { X = 26, Y = 28, Z = 30 };
+enum { Y = 28, Z = 30 };
 
 /* Operands, by the letters of the manual. */
 #define D (opcode >> 4 & 0x1Fu)
@@ -41,12 +41,17 @@ static inline bool store(uint8_t *data, unsigned opcode, uint16_t address) {
 }
 
 /* Y or Z, and q. */
-static inline uint16_t displaced(const uint8_t *data, unsigned opcode, unsigned pointer) {
-  return (uint16_t)(word_at(data, pointer) + ((opcode & 0x2000u) >> 8 | (opcode & 0x0C00u) >> 7 | (opcode & 7u)));
+static inline uint16_t displaced(const uint8_t *data, unsigned opcode) {
+  unsigned q = (opcode & 0x2000u) >> 8 | (opcode & 0x0C00u) >> 7 | (opcode & 7u);
+  return (uint16_t)(word_at(data, opcode & 8u ? Y : Z) + q);
 }
 
-/* X, Y or Z, one less before or one more behind. */
-static inline bool load_moving(uint8_t *data, unsigned opcode, unsigned pointer) {
+/* X, Y or Z: 26, 28 or 30 for 0b11, 0b10 or 0b00 in front of the mode. */
+static inline unsigned pointer_of(unsigned opcode) { return Z - (opcode >> 2 & 2u) - (opcode >> 1 & 2u); }
+
+/* X, Y or Z, as it is, one less before or one more behind. */
+static inline bool load_moving(uint8_t *data, unsigned opcode) {
+  unsigned pointer = pointer_of(opcode);
   uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
   if (!in_ram(address)) return false;
   put_word(data, pointer, address + (opcode & 1u));
@@ -54,7 +59,8 @@ static inline bool load_moving(uint8_t *data, unsigned opcode, unsigned pointer)
   return true;
 }
 
-static inline bool store_moving(uint8_t *data, unsigned opcode, unsigned pointer) {
+static inline bool store_moving(uint8_t *data, unsigned opcode) {
+  unsigned pointer = pointer_of(opcode);
   uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
   if (!store(data, opcode, address)) return false;
   put_word(data, pointer, address + (opcode & 1u));
@@ -199,46 +205,20 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         data[H] = K;
         break;
 
-      case LDD_Y:
-      case LDD_Z:
-        here = load(data, opcode, displaced(data, opcode, kind == LDD_Y ? Y : Z));
+      case LDD:
+        here = load(data, opcode, displaced(data, opcode));
         takes = 2;
         break;
-      case STD_Y:
-      case STD_Z:
-        here = store(data, opcode, displaced(data, opcode, kind == STD_Y ? Y : Z));
+      case STD:
+        here = store(data, opcode, displaced(data, opcode));
         takes = 2;
         break;
-      case LD_X:
-      case LD_X_UP:
-      case LD_X_DOWN:
-        here = load_moving(data, opcode, X);
+      case LD:
+        here = load_moving(data, opcode);
         takes = 2;
         break;
-      case LD_Y_UP:
-      case LD_Y_DOWN:
-        here = load_moving(data, opcode, Y);
-        takes = 2;
-        break;
-      case LD_Z_UP:
-      case LD_Z_DOWN:
-        here = load_moving(data, opcode, Z);
-        takes = 2;
-        break;
-      case ST_X:
-      case ST_X_UP:
-      case ST_X_DOWN:
-        here = store_moving(data, opcode, X);
-        takes = 2;
-        break;
-      case ST_Y_UP:
-      case ST_Y_DOWN:
-        here = store_moving(data, opcode, Y);
-        takes = 2;
-        break;
-      case ST_Z_UP:
-      case ST_Z_DOWN:
-        here = store_moving(data, opcode, Z);
+      case ST:
+        here = store_moving(data, opcode);
         takes = 2;
         break;
       case LDS:

@@ -12,8 +12,9 @@
 enum {
   UNCOMMON, /* any other: simavr's */
   NOP, MOVW, CPC, SBC, ADD, CPSE, CP, SUB, ADC, AND, EOR, OR, MOV, CPI, SBCI, SUBI, ORI, ANDI, LDI,
-  LDD_Y, LDD_Z, STD_Y, STD_Z, LD_X, LD_X_UP, LD_X_DOWN, LD_Y_UP, LD_Y_DOWN, LD_Z_UP, LD_Z_DOWN,
-  ST_X, ST_X_UP, ST_X_DOWN, ST_Y_UP, ST_Y_DOWN, ST_Z_UP, ST_Z_DOWN, LDS, STS, LPM, LPM_UP, PUSH, POP,
+  LDD, STD, /* by Y or Z, also without displacement */
+  LD, ST,   /* by X, and by what moves before or behind */
+  LDS, STS, LPM, LPM_UP, PUSH, POP,
   COM, NEG, SWAP, INC, DEC, ASR, LSR, ROR, ADIW, SBIW, MUL, BLD, BST,
   IN_SREG, IN_STACK, /* SPL or SPH */
   JMP, RJMP, IJMP, CALL, RCALL, ICALL, RET, BRANCH_SET, BRANCH_CLEAR, SKIP_CLEAR, SKIP_SET

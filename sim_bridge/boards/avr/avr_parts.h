@@ -70,6 +70,7 @@ typedef enum {
   DUE_TIMER1,
   DUE_TIMER2,
   DUE_TRANSMITTER,
+  DUE_BIT,     /* of the transmitter, at its pin */
   DUE_OUTSIDE, /* has read a byte */
   DUE_RECEIVER,
   DUE_CONVERTER,
@@ -421,7 +422,10 @@ void usart_reset(avr_board *b);
 void usart_free(avr_board *b);
 void usart_due_transmitter(avr_board *b, uint64_t cycle);
 void usart_due_receiver(avr_board *b, uint64_t cycle);
+void usart_due_bit(avr_board *b, uint64_t cycle);
 void usart_due_outside(avr_board *b, uint64_t cycle);
+void usart_watched(avr_board *b, uint8_t mask, uint64_t cycle);
+uint8_t usart_at_pins(const avr_board *b, uint8_t level, uint64_t cycle); /* PIND at an access: level with the line's */
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count);
 size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 void usart_line_rate(avr_board *b, uint32_t baud);

@@ -133,8 +133,10 @@ static uint8_t read_pins(avr_t *avr, avr_io_addr_t address, void *param) {
   avr_board *b = param;
   (void)avr;
   uint64_t cycle = begin_access(b);
-  const port_state *p = &b->port[port_of(address)];
-  return p->changed >= cycle ? p->level_before : p->level;
+  const uint8_t port = port_of(address);
+  const port_state *p = &b->port[port];
+  uint8_t level = p->changed >= cycle ? p->level_before : p->level;
+  return port == PORT_D ? usart_at_pins(b, level, cycle) : level;
 }
 
 static void write_port(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
@@ -238,6 +240,12 @@ static void write_pin_change_enables(avr_t *avr, avr_io_addr_t address, uint8_t 
   }
 }
 
+static void write_pin_change_mask_d(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  usart_watched(b, value, begin_access(b) + 1);
+  avr->data[address] = value;
+}
+
 static void write_external_enables(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   avr_board *b = param;
   begin_access(b);
@@ -311,6 +319,7 @@ void pins_init(avr_board *b) {
   on_write(b, REG_MCUCR, write_control, b);
   add_flag_register(b, REG_PCIFR, pin_change_flags);
   on_write(b, REG_PCICR, write_pin_change_enables, b);
+  on_write(b, REG_PCMSK0 + PORT_D, write_pin_change_mask_d, b);
   add_flag_register(b, REG_EIFR, external_flags);
   on_write(b, REG_EIMSK, write_external_enables, b);
   on_write(b, REG_EICRA, write_external_modes, b);

@@ -60,6 +60,9 @@ static void happen(avr_board *b, due_source source, uint64_t cycle) {
     case DUE_TRANSMITTER:
       usart_due_transmitter(b, cycle);
       break;
+    case DUE_BIT:
+      usart_due_bit(b, cycle);
+      break;
     case DUE_OUTSIDE:
       usart_due_outside(b, cycle);
       break;

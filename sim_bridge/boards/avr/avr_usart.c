@@ -6,8 +6,9 @@
  * bit comes while all three are full, the third is lost and the next byte read bears DOR0 (20.8.1). RXC is set when the
  * stop bit has been sampled, a little before its end.
  *
- * A byte is complete for the outside at the end of its stop bit, whatever level that has. Bits do not show at pins 0 and 1, which
- * rest high. Synchronous and SPI modes, the ninth bit's value and parity checks are not built.
+ * A byte is complete for the outside at the end of its stop bit, whatever level that has. The board's bits show at pin 1
+ * to whom the program lets look there: its reads of PIND, and while PCINT17 is unmasked every edge. Else the pin rests high,
+ * as pin 0 does, and bits cost nothing. Synchronous and SPI modes, the ninth bit's value and parity checks are not built.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -214,12 +215,40 @@ void usart_due_outside(avr_board *b, uint64_t cycle) {
   plan_outside(b);
 }
 
+/* Each bit of the frame under way moves the pin; behind the last one the line rests. */
+void usart_due_bit(avr_board *b, uint64_t cycle) {
+  const usart_state *u = &b->usart;
+  port_state *p = &b->port[PORT_D];
+  bool high = line_level(&u->from_board, cycle << FRACTION);
+  p->forced_level = (uint8_t)(high ? p->forced_level | TX_MASK : p->forced_level & ~TX_MASK);
+  pins_update(b, PORT_D, cycle);
+  uint64_t next = NEVER;
+  if (u->sending) {
+    const line_frame *f = &u->from_board.frames[u->from_board.end - 1];
+    uint64_t bit_time = f->bit_time >> FRACTION;
+    next = cycle + bit_time - (cycle - (f->start >> FRACTION)) % bit_time;
+  }
+  set_due(b, DUE_BIT, next);
+}
+
+/* Before the mask of port D's pin changes becomes this. What the pin does already is no edge. */
+void usart_watched(avr_board *b, uint8_t mask, uint64_t cycle) {
+  if ((mask & TX_MASK) && b->usart.sending && b->due[DUE_BIT] == NEVER) usart_due_bit(b, cycle);
+}
+
+uint8_t usart_at_pins(const avr_board *b, uint8_t level, uint64_t cycle) {
+  if (!b->usart.sending || !(b->port[PORT_D].forced & TX_MASK)) return level;
+  bool high = line_level(&b->usart.from_board, (cycle << FRACTION) - 1);
+  return (uint8_t)(high ? level | TX_MASK : level & ~TX_MASK);
+}
+
 static void begin_frame(avr_board *b, uint8_t byte, uint64_t cycle) {
   usart_state *u = &b->usart;
   u->sending = true;
   put_on_line(&u->from_board, (line_frame){cycle << FRACTION, (uint64_t)u->bit_time << FRACTION, u->frame_bits, byte});
   if (u->outside_start == NEVER) plan_outside(b);
   set_due(b, DUE_TRANSMITTER, cycle + (uint64_t)u->frame_bits * u->bit_time);
+  if (b->avr->data[REG_PCMSK0 + PORT_D] & TX_MASK) set_due(b, DUE_BIT, cycle);
 }
 
 static void drive_transmit_pin(avr_board *b, uint64_t cycle) {
@@ -373,6 +402,7 @@ void usart_reset(avr_board *b) {
   u->from_board.first = u->from_board.end = 0;
   u->outside_start = NEVER;
   set_due(b, DUE_TRANSMITTER, NEVER);
+  set_due(b, DUE_BIT, NEVER);
   set_due(b, DUE_OUTSIDE, NEVER);
   raise_flag(b, VECTOR_USART_UDRE);
   update_settings(b);

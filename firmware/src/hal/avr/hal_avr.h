@@ -243,8 +243,10 @@ static inline __attribute__((always_inline)) void hal_serial_look(void) {
       : "memory");
 }
 
+#define HAL_RECEIVE_DUE 64u /* bytes, a power of two: a quarter of the ring */
 static inline uint8_t hal_serial_due(void) {
-  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) | ((uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL) & 0xC0u));
+  return (uint8_t)((GPIOR0 & _BV(HAL_ZERO_BIT)) |
+                   ((uint8_t)(HAL_RECEIVE_HEAD - HAL_RECEIVE_TAIL) & (uint8_t) ~(HAL_RECEIVE_DUE - 1u)));
 }
 
 static inline void hal_serial_seen(void) { GPIOR0 = (uint8_t)(GPIOR0 & (uint8_t)~_BV(HAL_ZERO_BIT)); }
