@@ -62,6 +62,15 @@ def test_loop_without_a_bound_counts_only_where_interrupts_are_off(tmp_path: Pat
         Blocked(assembled(tmp_path, f"main: cli\n {loop} sei\n nop\n ret")).of("main")
 
 
+def test_stretch_begins_in_the_midst_of_a_loop(tmp_path: Path) -> None:
+    """Interrupts go off in one of two ways through a loop, and stay off: the rest of that pass, 5 more, and the end."""
+    row = '3: .pushsection .boebot.loops, "", @progbits\n .long 3b, 5, 0xFFFFFFFF\n .popsection\n'
+    ways = " sbrs r24, 0\n rjmp 1b\n cli\n nop\n rjmp 1b\n"
+    source = f"main: 1: dec r25\n breq 9f\n {row}{ways} 9: sei\n nop\n ret"
+    rest, whole, end = 1 + 1 + 2, 1 + 1 + 2 + 1 + 1 + 2, 1 + 2 + 1 + 1
+    assert Blocked(assembled(tmp_path, source)).of("main").cycles == rest + 5 * whole + end
+
+
 def test_interrupts(tmp_path: Path) -> None:
     source = VECTORS + (
         "main: cli\n nop\n nop\n sei\n nop\n ret\n __vector_1: nop\n reti\n"

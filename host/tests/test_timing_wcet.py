@@ -75,7 +75,7 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
-         "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted out",
+         "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted",
          "flag", "bit of another", "two entries", "two entries, farther", "waits"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:

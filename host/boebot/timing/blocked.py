@@ -13,12 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
 from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
+from boebot.timing.loops import IrreducibleError, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Block, Function, Instruction, Program
 from boebot.timing.registers import CALL_CLOBBERED, written
+from boebot.timing.split import successors
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -58,6 +61,7 @@ class Effect:
 
 
 Node = tuple[int, int, State]  # block, number of the instruction in it, state before it
+_Ahead = tuple[Node, frozenset[int]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,21 +213,45 @@ class Blocked:
         return tuple(None if each is None else begin.before + each for each in (ended, returned))  # type: ignore[return-value]
 
     def _longest(self, flow: Flow, start: Node, ends: Callable[[Flow, Node], Iterable[int]]) -> int | None:
-        """The longest way from a node, with interrupts off all the way, to one kind of end."""
+        """The longest way from a node, with interrupts off all the way, to one kind of end.
+
+        In the midst of a loop it begins with the rest of a pass, which is none of the passes behind the loop's header.
+        So nodes go by the headers, of the loops around the first one, that have not come yet.
+        """
         marks = self.worst_case.marks(flow.entry[0])
-        ways: dict[Node, list[Way[Node]]] = {}
-        work = [start]
+        around = self._around(flow.entry[0], start)
+        first = (start, frozenset(around))
+        ways: dict[_Ahead, list[Way[_Ahead]]] = {}
+        work = [first]
         while work:
-            node = work.pop()
-            if node in ways:
+            place = work.pop()
+            if place in ways:
                 continue
-            ways[node] = [Way(node, None, cycles) for cycles in ends(flow, node)]
+            node, ahead = place
+            ways[place] = [Way(place, None, cycles) for cycles in ends(flow, node)]
             for to, cycles in flow.goes.get(node, ()):
-                ways[node].append(Way(node, to, cycles))
-                work.append(to)
-        counted = {node: marks[node[0]] for node in ways if node[1] == 0 and node[0] in marks}
-        walk = longest(Graph(start, ways, lambda node: self.program.where(node[0]), counted))
+                left = frozenset(header for header in ahead if to[0] in around[header] and to[:2] != (header, 0))
+                ways[place].append(Way(place, (to, left), cycles))
+                work.append((to, left))
+        counted = {place: marks[place[0][0]] for place in ways if place[0][1] == 0 and place[0][0] in marks}
+        walk = longest(Graph(first, ways, lambda place: self.program.where(place[0][0]), counted))
         return None if walk is None else walk.cycles
+
+    def _around(self, entry: int, start: Node) -> dict[int, frozenset[int]]:
+        """The loops that a node is in the midst of: headers and blocks."""
+        blocks = self.worst_case.inside(entry).function.blocks
+        following = partial(successors, blocks)
+        try:
+            loops = natural_loops(reverse_postorder(entry, following), following)
+        except IrreducibleError:  # refused by whoever looks for paths
+            return {}
+        found = {}
+        while loops:
+            loop = loops.pop()
+            loops += loop.inner
+            if start[0] in loop.nodes and start[:2] != (loop.header, 0):
+                found[loop.header] = loop.nodes
+        return found
 
     def flow(self, entry: int, on: bool) -> Flow:
         """All ways through a function that is called with interrupts on or off."""

@@ -38,15 +38,19 @@ def source_lines(elf: ELFFile, end: int) -> dict[int, str]:
 
 
 def _programs(dwarf: DWARFInfo) -> Iterator[LineProgram]:
-    """The line programs, one behind the other. (The units that name them are not read: pyelftools knows none with
-    addresses of two bytes.)"""
+    """The line programs that are not empty. Before DWARF 5 only the units say how long addresses are; pyelftools raises
+    AssertionError where that is neither 4 nor 8 bytes."""
     offset = 0
     while dwarf.debug_line_sec is not None and offset < dwarf.debug_line_sec.size:
         program = dwarf._parse_line_program_at_offset(offset, dwarf.structs)
-        if program["version"] >= 5 and program["address_size"] == 2:
+        offset = program.program_end_offset
+        if program.program_start_offset == offset:
+            continue
+        if program["version"] < 5:
+            list(dwarf.iter_CUs())
+        elif program["address_size"] == 2:
             program.structs = _Narrow()
         yield program
-        offset += dwarf.structs.initial_length_field_size() + program["unit_length"]
 
 
 class _Narrow(DWARFStructs):
