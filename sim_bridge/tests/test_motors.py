@@ -278,7 +278,7 @@ def test_position_servo_is_exact_at_any_step(pulse: float, dt: float, parts: int
     def rate(t: float, angle: Any) -> Any:
         return np.clip(20.0 * (target - angle), -5.0, 5.0)
 
-    truth = solve_ivp(rate, (0, dt), [0.0], rtol=1e-8, atol=1e-10, max_step=dt / 20).y[0, -1]
+    truth = solve_ivp(rate, (0, dt), [0.0], rtol=1e-10, atol=1e-12, max_step=dt / 100).y[0, -1]
     assert state.angle == pytest.approx(truth, abs=1e-5)
 
 
