@@ -35,17 +35,15 @@ PLACE = r"in motion_signals \(motion\.c:\d+\)"
 FUNCTIONS = """
 #include <avr/interrupt.h>
 #include <avr/io.h>
-uint8_t planted(void);
-volatile uint8_t planted_number __attribute__((used)) = 99;
-uint8_t planted(void) { return planted_number; }
+volatile uint8_t planted __attribute__((used)) = 99;
 static __attribute__((noinline)) void deeper(uint8_t n) { volatile uint8_t more = n; deeper(n + 1); GPIOR2 = more; }
 static void (*volatile nobody)(void) = 0;
 """
 DEEPER = next(i for i, line in enumerate(FUNCTIONS.splitlines(), 1) if "deeper" in line)
 LINK, DEAF, STACK, INVALID, WILD, NULL, INTERRUPT = range(1, 8)
 IN_MOTION = {
-    LINK: "while (planted() != 0) { }",
-    DEAF: "cli(); while (planted() != 0) { }",
+    LINK: "while (planted != 0) { }",
+    DEAF: "cli(); while (planted != 0) { }",
     STACK: "deeper(0);",
     INVALID: 'GPIOR2 = 1; __asm__ volatile(".word 1");',
     WILD: "((void (*)(void))0x3800)();",
@@ -71,7 +69,7 @@ class Variants:
         folder.mkdir(exist_ok=True)
         content = bytearray(self.image.read_bytes())
         elf = ELFFile(io.BytesIO(bytes(content)))
-        data, variable = elf.get_section_by_name(".data"), find_symbol(self.image, "planted_number")
+        data, variable = elf.get_section_by_name(".data"), find_symbol(self.image, "planted")
         assert data is not None
         at = data["sh_offset"] + variable.address + DATA_SPACE - data["sh_addr"]
         assert content[at] == 99
@@ -100,13 +98,13 @@ def variants(tmp_path_factory: pytest.TempPathFactory) -> Variants:
     """Compiled as the image is."""
     folder = tmp_path_factory.mktemp("planted")
     shutil.copytree(avr_program.SOURCES, folder / "src")
-    lines = [f"if (planted() == {number}) {{ {code} }}" for number, code in IN_MOTION.items()]
+    lines = [f"if (planted == {number}) {{ {code} }}" for number, code in IN_MOTION.items()]
     behind = "void motion_signals(int16_t left, int16_t right) {"
     numbers = _plant(folder / "src" / "motion.c", FUNCTIONS, behind, lines)
     places = {number: ("motion.c", line) for number, line in zip(IN_MOTION, numbers, strict=True)}
-    counted = f"static uint16_t slots; if (planted() == {INTERRUPT} && ++slots == 200)"  # a session is open by then
-    hang = f"{{ {counted} {{ while (planted() != 0) {{ }} }} }}"
-    head = "#include <avr/io.h>\nuint8_t planted(void);"
+    counted = f"static uint16_t slots; if (planted == {INTERRUPT} && ++slots == 200)"  # a session is open by then
+    hang = f"{{ {counted} {{ while (planted != 0) {{ }} }} }}"
+    head = "#include <avr/io.h>\nextern volatile uint8_t planted;"
     (line,) = _plant(folder / "src" / "schedule.c", head, "HAL_INTERRUPT_SLOT {", [hang])
     places[INTERRUPT] = ("schedule.c", line)
     extra = ("-Wno-error", "-Wno-infinite-recursion")

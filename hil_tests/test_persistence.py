@@ -203,7 +203,8 @@ def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
         (ResetCause.POWER, messages.ResetCause.POWER),
     ):
         board.reset(cause)
-        assert host.hello().reset_cause == told
+        # the watchdog's may have come while a task was running, which is then told, too
+        assert messages.ResetCause(host.hello().reset_cause).name.partition("_IN_")[0] == told.name
 
 
 def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:
