@@ -91,7 +91,7 @@ def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> No
 
 
 def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
-    beside = {"counters": {}, "watchdog_resets": []}
+    beside: dict[str, object] = {"counters": {}, "watchdog_resets": []}
     assert json.loads((folder / "summary.json").read_text()) == {"format": 2} | result.table() | beside
 
 
