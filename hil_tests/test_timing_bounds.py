@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from avr_image import MARKS
 from boebot.timing.blocked import Blocked
 from boebot.timing.graph import load_program
 from boebot.timing.program import Program
@@ -22,25 +23,13 @@ INPUT = 0x700  # of the programs in data memory, far from variables and stack
 CYCLES = 400_000
 CALL, CLEAR = 4, 2  # `call`, and the `cbi` that ends the measured span
 
-HEAD = """
+HEAD = (
+    """
 #define __SFR_OFFSET 0
 #include <avr/io.h>
-.macro bounded passes
-.Lloop\\@:
-.pushsection .boebot.loops, "", @progbits
-.long .Lloop\\@, \\passes, 0xFFFFFFFF
-.popsection
-.endm
-.macro told passes, line
-bounded \\passes
-entered \\line
-.endm
-.macro entered line
-.Lentry\\@: nop
-.pushsection .boebot.entries, "", @progbits
-.long .Lentry\\@, \\line
-.popsection
-.endm
+"""
+    + MARKS
+    + """
 .global main
 main: sbi DDRB, 5
  ldi r26, lo8(0x700)
@@ -59,6 +48,7 @@ main: sbi DDRB, 5
 1: rjmp 1b
 .type f, @function
 """
+)
 # CRC-8 of 8 bytes at X: the longer way in each bit is that with a carry.
 CRC = """f: ldi r18, 0
 1: ld r19, X+

@@ -18,6 +18,25 @@ ASSEMBLER = """
 #include <avr/io.h>
 .global main
 """
+# What firmware/src/bounds.h writes, in short: a loop's bound; its entry; both, told in one place.
+MARKS = """
+.macro bounded passes
+.Lloop\\@:
+.pushsection .boebot.loops, "", @progbits
+.long .Lloop\\@, \\passes, 0xFFFFFFFF
+.popsection
+.endm
+.macro told passes, line
+bounded \\passes
+entered \\line
+.endm
+.macro entered line
+.Lentry\\@: nop
+.pushsection .boebot.entries, "", @progbits
+.long .Lentry\\@, \\line
+.popsection
+.endm
+"""
 LINE = re.compile(r"^ *([0-9a-f]+):\t(?:[0-9a-f]{2} )+ *\t(.*)$")
 
 

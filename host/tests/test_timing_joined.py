@@ -7,33 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from avr_image import assembled, build
+from avr_image import MARKS, assembled, build
 from boebot.errors import TimingError
 from boebot.timing.elf import read_image
 from boebot.timing.program import LoopBound
 from boebot.timing.wcet import WorstCase
 
-# What firmware/src/bounds.h writes, in short.
-MARKS = """
-.macro entered line
-.Lentry\\@: nop
-.pushsection .boebot.entries, "", @progbits
-.long .Lentry\\@, \\line
-.popsection
-.endm
-.macro bounded passes, line
-.Lrow\\@:
-.pushsection .boebot.loops, "", @progbits
-.long .Lrow\\@, \\passes, 0xFFFFFFFF
-.popsection
-entered \\line
-.endm
-"""
 # The test of a `while` stands twice, so that the loop is two, one within the other.
 HALVES = """main: entered 7
 1: cp r18, r19
  breq 9f
-2: bounded 5, 7
+2: told 5, 7
  inc r18
  sbrs r24, 0
  rjmp 4f
@@ -50,9 +34,9 @@ SHORT = 1 + 1 + 2 + 3 + 1 + 2  # cycles of a pass that goes back to the row
 LONG = 1 + 1 + 1 + 2 + 2 + 2 + 1 + 1  # and of one over the first test
 # Two passes at a time, as the compiler unrolls.
 TWICE = """main: entered 7
-1: bounded 6, 7
+1: told 6, 7
  sts 256, r18
- bounded 6, 7
+ told 6, 7
  sts 257, r18
  cp r18, r19
  brne 1b
@@ -60,9 +44,9 @@ TWICE = """main: entered 7
 """
 # A loop within another one, each with its row, and of the inner one no more than one pass is left.
 WITHIN = """main: entered 7
-1: bounded 4, 7
+1: told 4, 7
  entered 9
- bounded 3, 9
+ told 3, 9
  sts 256, r18
  cp r18, r19
  brne 1b
@@ -95,7 +79,7 @@ def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     [
         (HALVES, "main: entered 7\n1:", "main: nop\n1: entered 7\n"),  # the outer half is a loop around
         (HALVES, "4: lds", "4: entered 7\n lds"),  # entered again in a pass
-        (WITHIN, "bounded 4, 7", "nop"),  # the outer one's bound removed: what is left of the inner one bounds nothing
+        (WITHIN, "told 4, 7", "nop"),  # the outer one's bound removed: what is left of the inner one bounds nothing
         (TWICE, "main: entered 7\n1:", "main: nop\n1: entered 7\n"),
     ],
 )
