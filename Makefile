@@ -12,9 +12,9 @@ SIDE_BY_SIDE := $(MAKE) --no-print-directory --jobs=$(JOBS) --output-sync=target
 PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-check --no-warn-script-location \
 	--constraint requirements.lock
 
-FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[chS]' -o -name '*.def')
+FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[ch]' -o -name '*.def')
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
-IMAGES := build/images/shieldbot.elf build/images/shieldbot-quad.elf build/images/boebot.elf
+IMAGES := build/images/shieldbot.elf build/images/shieldbot-basic.elf build/images/shieldbot-quad.elf build/images/boebot.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
@@ -30,7 +30,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; longest tasks, SEARCH_SECONDS; a line full of each message; the firmware by other options of the compiler; all experiments"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; longest tasks, SEARCH_SECONDS; the firmware by other options of the compiler, and in other emulators; all experiments"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -54,8 +54,7 @@ test:
 
 check:
 	@$(SIDE_BY_SIDE) ready-check
-	@$(SIDE_BY_SIDE) --keep-going check-python check-types check-format check-static check-warnings check-generated \
-		check-images
+	@$(SIDE_BY_SIDE) --keep-going check-python check-types check-format check-static check-warnings check-generated
 	@echo "check: all passed"
 
 bench:
@@ -70,13 +69,12 @@ SECONDS ?= 3600
 JITTER_SECONDS ?= 10
 SEARCH_SECONDS ?= 60
 soak: experiments
-	@$(SIDE_BY_SIDE) ready-bench
+	@$(SIDE_BY_SIDE) ready-soak
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
-	@$(PYTHON_VENV) -m tools.bench.saturation 60
 	@$(PYTHON_VENV) -m tools.bench.jitter --seconds $(JITTER_SECONDS)
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
-	@$(PYTHON_VENV) -m tools.full_lines
 	@$(PYTHON_VENV) -m tools.compilers
+	@$(PYTHON_VENV) -m tools.other_emulators
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000
@@ -137,7 +135,7 @@ lock:
 
 # ---- single checks -----------------------------------------------------------------------------------------------
 
-.PHONY: check-python check-types check-format check-static check-warnings check-generated check-images
+.PHONY: check-python check-types check-format check-static check-warnings check-generated
 check-python:
 	@$(PYTHON_VENV) -m ruff check --quiet .
 	@$(PYTHON_VENV) -m ruff format --check --quiet . || { echo "run: make format"; exit 1; }
@@ -151,15 +149,14 @@ check-warnings:
 	@tools/warnings.sh
 check-generated:
 	@$(PYTHON_VENV) protocol/generate.py --check
-check-images: $(IMAGES)
-	@$(PYTHON_VENV) tools/image_size.py $(IMAGES)
 
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
-.PHONY: ready-run ready-test ready-bench ready-check ready-firmware
+.PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
 ready-bench: ready-test build/.done-system-bench build/avr8js/.done
+ready-soak: ready-bench build/.done-system-soak
 ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 
@@ -170,6 +167,7 @@ build/.done-system-%: tools/setup_system.sh tools/find_python.sh
 # one apt at a time
 build/.done-system-test: build/.done-system-run
 build/.done-system-check: build/.done-system-test
+build/.done-system-soak: build/.done-system-bench
 
 $(VENV)/.done-venv: build/.done-system-run
 	@echo "Making a virtual environment in $(VENV)"

@@ -117,6 +117,22 @@ class Capacitor:
             self._board.drive(self._pin, Level.LOW, self._board.now + round(self.decay_us * CYCLES_PER_US))
 
 
+class Receiver:
+    """An IR receiver that sees every burst of the LED: low from half a millisecond after its beginning on, for 1 ms."""
+
+    def __init__(self, board: BoardAccess, led: int, pin: int) -> None:
+        self._board, self._led, self._pin, self._until = board, led, pin, 0
+        board.drive(pin, Level.HIGH)
+
+    def step(self) -> None:
+        """Looks at the LED."""
+        if self._board.output(self._led) == Level.HIGH and self._board.now > self._until:
+            begin = self._board.now + CYCLES_PER_S // 2000
+            self._until = begin + CYCLES_PER_S // 1000
+            self._board.drive(self._pin, Level.LOW, begin)
+            self._board.drive(self._pin, Level.HIGH, self._until)
+
+
 class _Line:
     """The serial line as a Rig reads and writes it."""
 
@@ -143,7 +159,7 @@ class DeviceBench:
         self.robot = load_robot(pin_map)
         self.transport = _Line(self)
         self.board = self.access
-        self.devices: list[TwoWireDevice | Capacitor] = []
+        self.devices: list[TwoWireDevice | Capacitor | Receiver] = []
 
     def run(self, seconds: float) -> None:
         """Lets time pass."""

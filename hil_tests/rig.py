@@ -14,7 +14,7 @@ import numpy as np
 
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.link import frame, messages
-from boebot.robots import load_robot
+from boebot.robots import RobotDescription, load_robot
 
 _M = TypeVar("_M")  # a message
 
@@ -49,9 +49,17 @@ class Rig:
         self._probed = 0.0
 
     @classmethod
-    def open(cls, url: str, robot: str = "shieldbot", arena: str = "empty", seed: int = 1, noise: bool = False) -> Rig:
+    def open(
+        cls,
+        url: str,
+        robot: str | RobotDescription = "shieldbot",
+        arena: str = "empty",
+        seed: int = 1,
+        noise: bool = False,
+    ) -> Rig:
         """A rig around the board at `url`, by default in an empty field and without noise."""
-        return cls(open_board(url, BoardRequest(robot=load_robot(robot), arena=arena, seed=seed, noise=noise)))
+        described = load_robot(robot) if isinstance(robot, str) else robot
+        return cls(open_board(url, BoardRequest(robot=described, arena=arena, seed=seed, noise=noise)))
 
     def __enter__(self) -> Rig:
         return self

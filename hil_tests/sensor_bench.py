@@ -54,6 +54,7 @@ class Surroundings:
         """Opens a session with those devices on, each told as often as it can be."""
         self.line.open()
         self.line.set("devices", int(devices))
+        self.line.set("encoder_gap", 0)
         if devices & Devices.BATTERY:
             self.line.set("devices_period", 1)
         self.bench.run(20 * TICK_CYCLES)
@@ -134,6 +135,25 @@ class RangeFinder(Ping):
         bench.access.drive(self.pin, Level.HIGH, at=rise)
         bench.access.drive(self.pin, Level.LOW, at=fall)
         self.echoes.append((rise, fall))
+
+
+class Receiver:
+    """An IR receiver that sees the bursts of its LED while its stimulus is on: its output is low then."""
+
+    def __init__(self, led: int, pin: int, stimulus: Stimulus) -> None:
+        self.led, self.pin, self.stimulus = led, pin, stimulus
+        self._seen, self._until = 0, 0
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source. A burst of 1 ms takes longer than a slice."""
+        del until
+        for edge in bench.edges[self.led][self._seen :]:
+            self._seen += 1
+            if edge.level == Level.HIGH and edge.cycle > self._until:
+                self._until = edge.cycle + 1300 * CYCLES_PER_US
+                if self.stimulus.at(edge.cycle):
+                    bench.access.drive(self.pin, Level.LOW)
+                    bench.access.drive(self.pin, Level.HIGH, at=self._until)
 
 
 class LightSensor:

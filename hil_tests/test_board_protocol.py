@@ -28,13 +28,13 @@ SERVO_FRAME = 20 * MS
 SERVO_LEFT, SERVO_RIGHT, WHISKER_LEFT = 13, 12, 5
 
 HANDSHAKE_SEED = 0x155555
-VERSION = 2
+VERSION = 3 * 16  # 3.0
 MASK_21 = 0x1FFFFF
 
 # Messages to the board: id and layout (PROTOCOL.md, "Messages"), all little-endian.
 OPEN, IDENTIFY, DESCRIBE, STOP, CLOSE = 0x01, 0x02, 0x03, 0x08, 0x09
 SIGNAL, SPEED, COAST = 0x10, 0x11, 0x12
-GET, SET, SAVE, RESET, ARM, ACKNOWLEDGE, PROBE = 0x20, 0x21, 0x22, 0x23, 0x24, 0x28, 0x30
+GET, SET, SAVE, RESET, ARM, ACKNOWLEDGE, PROBE = 0x25, 0x21, 0x22, 0x23, 0x24, 0x28, 0x30
 HANDSHAKE = {OPEN, IDENTIFY, DESCRIBE, 0x80, 0x81, 0x82}
 
 # Messages from the board: id, name, layout, fields.
@@ -50,14 +50,14 @@ FROM_BOARD: dict[int, tuple[str, str, str]] = {
     0x88: ("stopped", "<B", "token"),
     0x90: (
         "telemetry",
-        "<IIiiHHBBBHBHHHHBBBB",
+        "<IIiiHHBBBHBBHHHHBBBB",
         "tick time encoder_left encoder_right edge_period_left edge_period_right whiskers infrared infrared_age "
-        "ping_echo ping_age pulse_left pulse_right supply status latch latches setpoint_sequence overruns",
+        "ping_echo ping_age ping_status pulse_left pulse_right supply status latch latches setpoint_sequence overruns",
     ),
     0x91: (
         "counters",
-        "<10H",
-        "good bad resynchronised retransmitted duplicate overrun dropped late refused deferred",
+        "<11H",
+        "good bad unknown resynchronised retransmitted duplicate overrun dropped late refused deferred",
     ),
     0x93: ("task_time", "<BH", "task longest"),
     0xA0: ("answer", "<HBi", "number status value"),
@@ -67,7 +67,7 @@ FROM_BOARD: dict[int, tuple[str, str, str]] = {
 MOTORS_ENABLED, DEAD_MAN, LATCHED = 1, 2, 4  # status bits
 START, STOP_COMMAND, SESSION_ENDED = 1, 2, 3  # latch
 OK, UNKNOWN_PARAMETER, OUT_OF_RANGE, LATCHED_AGAIN = 0, 1, 2, 5  # answer_status
-TASKS = 18
+TASKS = 19
 WHISKERS, LATCH, DEAD_MAN_EVENT = 0, 1, 2  # event_kind
 TIME_TO_LIVE, TRACK_WIDTH = 1, 12  # parameters
 
@@ -577,12 +577,11 @@ def test_clock_probe_is_answered_between_its_sending_and_its_return(host: Host) 
 
 
 @pytest.mark.parametrize("setpoint", ["signals", "speeds"])
-def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host, setpoint: str) -> None:
-    """Set-points and clock probes without a gap, 50,000 bytes/s, whose answers and telemetry fill the way back."""
+def test_line_that_is_too_full_drops_whole_frames_and_misses_no_tick(host: Host, setpoint: str) -> None:
+    """Set-points and clock probes without a gap, 50,000 bytes/s, with answers and telemetry on the way back."""
     kind = SIGNAL if setpoint == "signals" else SPEED
     host.start()
     first = host.next("telemetry")
-    before = host.board.counters()
     end = host.board.now + 2 * CYCLES_PER_S
     while host.board.now < end:
         wire = bytearray()
@@ -592,14 +591,11 @@ def test_line_saturated_both_ways_loses_no_byte_and_no_tick(host: Host, setpoint
             wire += host.frame(PROBE, "<H", 7) + host.frame(PROBE, "<H", 8)
         host.board.send(bytes(wire))
         host.run(len(wire) * 320)
-    after = host.board.counters()
-    assert after["overruns"] == before["overruns"]
     host.live(80 * TICK)
     telemetry = [message for message in host.all("telemetry") if message.tick >= first.tick]
     assert [message.tick for message in telemetry] == list(range(first.tick, first.tick + len(telemetry)))
     assert telemetry[-1].overruns == 0
-    counters = host.last("counters")
-    assert (counters.overrun, counters.bad) == (0, 0)
+    assert host.last("counters").bad == 0
     assert host.refused == 0
 
 

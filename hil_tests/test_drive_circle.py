@@ -148,12 +148,14 @@ def test_brown_out_switches_the_motors_off_and_the_link_comes_back(board_url: st
 
 
 def edges_shown_and_true(
-    url: str, monkeypatch: pytest.MonkeyPatch, missed: float, extra: float
+    url: str, monkeypatch: pytest.MonkeyPatch, missed: float, extra: float, *, every_edge: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of both wheels, over 20 s at full speed."""
+    """Of both wheels, over 20 s at full speed. `every_edge`: also such as follow each other faster than a wheel's."""
     monkeypatch.setattr(imperfections, "ENCODER_MISSED", missed)
     monkeypatch.setattr(imperfections, "ENCODER_EXTRA", extra)
     with circle(url, arena_of(), load_robot("shieldbot"), noise=True, seed=5) as rig:
+        if every_edge:
+            rig.set("encoder_gap", 0)
         before = rig.latest()
         rig.drive_for(1.0, 1.0, 20.0)
         rig.listen(1.0)
@@ -173,10 +175,12 @@ def test_encoders_with_missed_edges_count_less(board_url: str, monkeypatch: pyte
     assert shown.sum() / true.sum() == pytest.approx(1 - 2 * 0.1 / 1.1, abs=0.03)
 
 
-def test_encoders_with_extra_edges_count_more(board_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_extra_edges_of_encoders_count_if_every_edge_does(board_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each flicker adds two edges."""
-    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.1)
+    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.1, every_edge=True)
     assert shown.sum() / true.sum() == pytest.approx(1 + 2 * 0.1 * FLICKERS_SEEN, abs=0.03)
+    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.1)
+    assert np.all(np.abs(shown - true) <= 1.0)
 
 
 # ---- slip ------------------------------------------------------------------------------------------------------------

@@ -27,8 +27,8 @@ pytestmark = pytest.mark.emulated
 
 DATA_SPACE = 0x800000
 
-FUNCTION = "motion_signals"  # runs when a set-point comes, in the link's poll, which is no task
-PLACE = r"in motion_signals \(motion\.c:\d+\)"
+FUNCTION = "safety_accept"  # runs when a set-point comes, in the link's poll, which is no task
+PLACE = r"in safety_accept \(safety\.c:\d+\)"
 
 # The firmware's own sources with lines more; which of them goes wrong says the variable `planted`, whose first value is
 # put into the image. Each stands in a line of its own: number -> line.
@@ -52,7 +52,7 @@ IN_MOTION = {
 FAULTS = {
     STACK: r"the stack overflows: it reaches 0x0[3-6][0-9A-F]{2}, variables end below 0x0[3-6][0-9A-F]{2}",
     INVALID: "the program reached the invalid instruction 0x0001",
-    WILD: "the program goes to 0x7000, but ends at 0x[34][0-9A-F]{3}",
+    WILD: "the program goes to 0x7000, but ends at 0x[345][0-9A-F]{3}",
     NULL: "the program jumps to its start without a reset",
 }
 
@@ -99,13 +99,13 @@ def variants(tmp_path_factory: pytest.TempPathFactory) -> Variants:
     folder = tmp_path_factory.mktemp("planted")
     shutil.copytree(avr_program.SOURCES, folder / "src")
     lines = [f"if (planted == {number}) {{ {code} }}" for number, code in IN_MOTION.items()]
-    behind = "void motion_signals(int16_t left, int16_t right) {"
+    behind = "static void set(int16_t left, int16_t right, int16_t full) {"
     numbers = _plant(folder / "src" / "motion.c", FUNCTIONS, behind, lines)
     places = {number: ("motion.c", line) for number, line in zip(IN_MOTION, numbers, strict=True)}
     counted = f"static uint16_t slots; if (planted == {INTERRUPT} && ++slots == 200)"  # a session is open by then
     hang = f"{{ {counted} {{ while (planted != 0) {{ }} }} }}"
     head = "#include <avr/io.h>\nextern volatile uint8_t planted;"
-    (line,) = _plant(folder / "src" / "schedule.c", head, "HAL_INTERRUPT_SLOT {", [hang])
+    (line,) = _plant(folder / "src" / "schedule.c", head, "void schedule_on_slot(void) {", [hang])
     places[INTERRUPT] = ("schedule.c", line)
     extra = ("-Wno-error", "-Wno-infinite-recursion")
     return Variants(avr_program.build(folder / "planted.elf", folder=folder / "src", extra=extra), places)
@@ -161,19 +161,21 @@ def test_a_fault_ends_the_run_with_its_source_line(
     assert code == 1
     place = rf"in (__prologue_saves__ of )?deeper \(motion\.c:{DEEPER}\)" if number == STACK else variants.place(number)
     where = rf"at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"
-    assert re.search(rf"the emulated ATmega328P crashed at 0\.\d+ s: {FAULTS[number]} {where}", error), error
+    assert re.search(rf"the emulated ATmega328P crashed at [01]\.\d+ s: {FAULTS[number]} {where}", error), error
     assert "Traceback" not in error
 
 
 def test_a_program_that_hangs_at_each_opening_is_given_up(
     tmp_path: Path, command: Callable[..., tuple[object, str]]
 ) -> None:
-    """The task hangs while the host configures the board, in each session: the run ends, and says where."""
-    image = as_shieldbot(planted(tmp_path, "turret_task", JUMP_TO_ITSELF))
+    """The board hangs while the host configures it, in each session: the run ends, and says where."""
+    image = as_shieldbot(planted(tmp_path, "parameters_get", JUMP_TO_ITSELF))
     code, error = command(image)
     assert code == 1
     assert "ended 10 sessions in a row before it was configured and armed; its last reset was by its watchdog" in error
-    assert re.search(r"found at address 0x[0-9A-F]{4} in cycle \d+ in turret_task \(turret\.c:\d+\); 10 times", error)
+    assert re.search(
+        r"found at address 0x[0-9A-F]{4} in cycle \d+ in parameters_get \(parameters\.c:\d+\); 10 times", error
+    )
 
 
 def test_a_program_that_never_lets_a_session_begin_is_told_with_its_place(

@@ -47,19 +47,19 @@ def rig_with(image: str) -> Rig:
 
 
 def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_path: Path) -> None:
-    """The writing to the EEPROM hangs: the pulses, made by interrupts, go on until the watchdog ends it."""
-    with rig_with(planted(tmp_path, "begin_record", JUMP_TO_ITSELF)) as rig:
+    """A task hangs: the pulses, made by interrupts, go on until the watchdog ends it."""
+    with rig_with(planted(tmp_path, "identity_send", JUMP_TO_ITSELF)) as rig:
         assert rig.start().reset_cause == messages.ResetCause.POWER
         rig.drive_for(0.5, 0.5, 0.2)
         hung_at = rig.board.cycle
         rig.answers.clear()
-        rig.send(rig.numbered(messages.SaveParameters))
+        rig.send(messages.Identify())
         hello = rig.wait_for(
             lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
             1.0,
             "a hello after the reset",
         )
-        assert hello.reset_cause == messages.ResetCause.WATCHDOG_IN_STORAGE
+        assert hello.reset_cause == messages.ResetCause.WATCHDOG_IN_SESSION
         rig.start()
         assert rig.latest().status & messages.Status.WATCHDOG_RESET
         rig.listen(0.3)
@@ -116,13 +116,13 @@ def test_pulse_that_begins_late_keeps_its_width(tmp_path: Path) -> None:
         for pin, width in ((LEFT, 1600), (RIGHT, 1400)):
             pulses = rig.pulses(pin)
             assert len(pulses) >= 5
-            assert np.all(np.abs(pulses[:, 1] - width * CYCLES_PER_US) <= 4), pulses[:, 1] - width * CYCLES_PER_US
+            assert np.all(np.abs(pulses[:, 1] - width * CYCLES_PER_US) <= 16), pulses[:, 1] - width * CYCLES_PER_US
 
 
 def test_program_that_crashes_is_said_so_in_one_sentence(tmp_path: Path) -> None:
-    with rig_with(planted(tmp_path, "begin_record", RESERVED_OPCODE)) as rig:
+    with rig_with(planted(tmp_path, "identity_send", RESERVED_OPCODE)) as rig:
         rig.start()
-        rig.send(rig.numbered(messages.SaveParameters))
+        rig.send(messages.Identify())
         with pytest.raises(BoebotError, match=r"instruction|opcode"):
             rig.listen(0.2)
 

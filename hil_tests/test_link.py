@@ -103,6 +103,28 @@ def test_frames_of_an_earlier_session_are_refused(rig: Rig) -> None:
     assert rig.request(messages.GetParameter, spec.id).value != 9
 
 
+def test_stops_that_no_host_has_heard_of_are_told_in_the_next_session(rig: Rig) -> None:
+    """A host has gone in mid-drive: dead-man, end of the session. The next one is told of both, with their times."""
+    rig.drive_for(0.5, 0.5, 0.1)
+    rig.drive(0.5, 0.5)
+    answered, since = rig.telemetry[-1], len(rig.events)
+    rig.alive = rig.acknowledges = False
+    rig.listen(3.0)
+    assert rig.hello is not None and rig.hello.session == 0
+    del rig.events[since:]
+    rig.acknowledges = True
+    rig.start()
+    rig.listen(0.1)
+    told = rig.events[since:]
+    assert [(event.number, event.kind, event.value) for event in told] == [
+        (1, messages.EventKind.DEAD_MAN, answered.tick & 0xFFFF),
+        (2, messages.EventKind.LATCH, messages.Latch.SESSION_ENDED),
+        (3, messages.EventKind.LATCH, messages.Latch.NONE),
+    ]
+    after_ms = [(event.time - answered.time) / 1000 for event in told]
+    assert 250 <= after_ms[0] < 270 and 1000 <= after_ms[1] <= 1040 and after_ms[2] > 2900
+
+
 def test_event_is_sent_again_until_it_is_acknowledged(rig: Rig) -> None:
     rig.listen(0.1)
     rig.acknowledges = False
@@ -144,7 +166,9 @@ def test_garbage_is_survived_and_never_acted_upon(rig: Rig) -> None:
 )
 def test_requests_do_not_silence_telemetry(rig: Rig, request_message: Any, requests_per_tick: int) -> None:
     """Telemetry comes every tick, however many requests and wherever in the tick they fall."""
-    wire = frame.encode(request_message.ID, 0, request_message.pack(), rig.seed) * requests_per_tick
+    probe = messages.ClockProbe(1)  # keeps the session, which requests of the handshake do not
+    wire = frame.encode(probe.ID, 0, probe.pack(), rig.seed)
+    wire += frame.encode(request_message.ID, 0, request_message.pack(), rig.seed) * requests_per_tick
     rig.latest()
     for phase in range(5):
         before = len(rig.telemetry)

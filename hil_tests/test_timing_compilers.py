@@ -1,28 +1,17 @@
-"""Static bounds of what several compilers make of the same C: avr-gcc and clang, beside the emulator; and the firmware
-itself as it comes from other options than its own."""
+"""Static bounds of what avr-gcc makes of C with the firmware's options, beside the emulator."""
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from boebot.errors import TimingError
-from boebot.timing import budget
 from boebot.timing.graph import load_program
-from boebot.timing.loads import LOADS
 from boebot.timing.wcet import WorstCase
 from hil_tests.test_timing_bounds import HEAD, measured
-from tools import compilers
-from tools.bench import avr_program
 
-INCLUDES = "/usr/lib/avr/include"  # avr-libc's, as Debian has it; avr-gcc knows its place
-COMPILERS = {
-    "avr-gcc": ["avr-gcc"],
-    "clang": ["clang", "--target=avr", f"-isystem{INCLUDES}", "-Wno-unknown-attributes"],
-}
 # The input: r24 and r25 are `a`, r22 and r23 are `b`; r20 and r21 are `c`.
 PROGRAM = """
 #include <stdint.h>
@@ -70,69 +59,31 @@ CASES: dict[str, tuple[str, list[list[int]]]] = {
 }  # fmt: skip
 
 
-def clang_knows_the_processor() -> bool:
-    if shutil.which("clang") is None:
-        return False
-    targets = subprocess.run(["clang", "--print-targets"], capture_output=True, text=True, check=False).stdout
-    return "avr" in targets.split()
-
-
-def build(folder: Path, compiler: str, body: str, *options: str) -> Path:
+def build(folder: Path, body: str, *options: str) -> Path:
     """The image of `f` with this body, called by the program in assembler."""
-    if compiler == "clang" and not clang_knows_the_processor():
-        pytest.skip("this machine's clang does not know the AVR")
     frame, source, code, image = (folder / name for name in ("frame.S", "f.c", "f.o", "f.elf"))
     frame.write_text(HEAD.replace(".type f, @function", ""), encoding="ascii")
     source.write_text(PROGRAM.format(body=body), encoding="ascii")
-    for command in (
-        [*COMPILERS[compiler], *options, "-mmcu=atmega328p", "-c", "-o", str(code), str(source)],
-        ["avr-gcc", "-mmcu=atmega328p", "-o", str(image), str(frame), str(code)],
+    for options_of in (
+        ["-Os", *options, "-c", "-o", str(code), str(source)],
+        ["-o", str(image), str(frame), str(code)],
     ):
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        result = subprocess.run(
+            ["avr-gcc", "-mmcu=atmega328p", *options_of], capture_output=True, text=True, check=False
+        )
         assert result.returncode == 0, result.stderr
     return image
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("level", ["-Os", "-O2"])
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_bound_is_what_the_longest_takes(tmp_path: Path, compiler: str, level: str, case: str) -> None:
+def test_bound_is_what_the_longest_takes(tmp_path: Path, case: str) -> None:
     body, inputs = CASES[case]
-    image = build(tmp_path, compiler, body, level)
+    image = build(tmp_path, body)
     assert WorstCase(load_program(image)).of("f").cycles == max(measured(image, given) for given in inputs)
 
 
-@pytest.mark.parametrize(("compiler", "debug"), [("avr-gcc", "-gdwarf-2"), ("clang", "-g")])
-def test_refusal_names_the_line(tmp_path: Path, compiler: str, debug: str) -> None:
-    image = build(tmp_path, compiler, "while (x != 0) { y = a; }\n  return b;", "-Os", debug)
+def test_refusal_names_the_line(tmp_path: Path) -> None:
+    image = build(tmp_path, "while (x != 0) { y = a; }\n  return b;", "-gdwarf-2")
     line = PROGRAM.splitlines().index("  {body}") + 1
     with pytest.raises(TimingError, match=rf"the loop at 0x[0-9A-F]{{4}} \(f\.c:{line}\) has no bound"):
         WorstCase(load_program(image)).of("f")
-
-
-@pytest.fixture(scope="module", params=["-O2 by source", "-O3 unrolled"])
-def speedy(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The firmware, optimised for speed."""
-    return compilers.build(tmp_path_factory.mktemp("firmware") / "firmware.elf", compilers.OPTIONS[request.param])
-
-
-def test_firmware_optimised_for_speed_is_proved(speedy: Path) -> None:
-    """No task and no interrupt takes longer than its bound, and the bounds are not far above."""
-    rows = compilers.rows_of(speedy)
-    assert [row.name for row in rows if row.seen > row.bound] == []
-    ran = {row.name: row.bound / row.seen for row in rows if row.seen > 0}
-    assert len(ran) > 25 and max(ran.values()) < 2
-
-
-def test_a_bound_taken_out_is_missed(tmp_path: Path) -> None:
-    """The loop over the changes at the pins, of which avr-gcc 5 makes two with -O2."""
-    folder = tmp_path / "src"
-    shutil.copytree(avr_program.SOURCES, folder)
-    source = folder / "encoder.c"
-    text = source.read_text(encoding="utf-8")
-    bounded = "BOUNDED(HAL_CHANGES - 1u, while (tail != head))"
-    assert text.count(bounded) == 1
-    source.write_text(text.replace(bounded, "while (tail != head)"), encoding="utf-8")
-    mutant = avr_program.build(tmp_path / "mutant.elf", extra=("-fno-lto", "-O2"), folder=folder)
-    with pytest.raises(TimingError, match=r"the loop at 0x[0-9A-F]{4} \(encoder\.c:\d+\) has no bound"):
-        budget.prove(mutant, LOADS["figures"])

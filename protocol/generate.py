@@ -14,6 +14,7 @@ import argparse
 import json
 import random
 import sys
+import zlib
 from pathlib import Path
 from types import ModuleType
 
@@ -43,10 +44,35 @@ def number(value: float) -> str:
 # ---- C ---------------------------------------------------------------------------------------------------------------
 
 
+def values_header(spec: schema.Schema) -> str:
+    """firmware/src/generated/values.h"""
+    lines = [
+        "/* values.h: the flags and values that messages speak of, from protocol/messages.toml.",
+        f" * {STATUS_NOTE} */",
+        "#ifndef GENERATED_VALUES_H",
+        "#define GENERATED_VALUES_H",
+    ]
+    for name, flags in spec.flags.items():
+        lines += ["", f"/* {flags.doc} */"]
+        lines += [
+            f"#define {name.upper()}_{bit.upper()} (1u << {i})" + c_comment(flags.docs.get(bit, ""))
+            for i, bit in enumerate(flags.bits)
+        ]
+    for name, enum in spec.enum.items():
+        lines += ["", f"/* {enum.doc} */", "enum {"]
+        lines += [
+            f"  {name.upper()}_{value.upper()} = {i}," + c_comment(enum.docs.get(value, ""))
+            for i, value in enumerate(enum.values)
+        ]
+        lines += [f"  {name.upper()}_COUNT"]
+        lines += ["};"]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
 def messages_header(spec: schema.Schema) -> str:
     """firmware/src/generated/messages.h"""
     lines = [
-        "/* messages.h: every message of the protocol, from protocol/messages.toml.",
+        "/* messages.h: the layout of every message of the protocol, from protocol/messages.toml.",
         f" * {STATUS_NOTE} */",
         "#ifndef GENERATED_MESSAGES_H",
         "#define GENERATED_MESSAGES_H",
@@ -54,19 +80,15 @@ def messages_header(spec: schema.Schema) -> str:
         "#include <stdbool.h>",
         "#include <stdint.h>",
         "",
-        f"#define PROTOCOL_VERSION {spec.version}u",
+        '#include "generated/values.h"',
+        "",
+        f"#define PROTOCOL_VERSION 0x{spec.version_byte:02X}u /* {spec.version}.{spec.minor} */",
+        f"#define PROTOCOL_MAJOR(version) ((version) / {schema.MINORS}u)",
         f"#define SCHEMA_HASH 0x{spec.hash:08X}ul",
     ]
     for direction in DIRECTIONS:
         longest = max(m.length for m in spec.of_direction(direction))
         lines.append(f"#define MESSAGE_PAYLOAD_MAX_{direction.upper()} {longest}u /* bytes */")
-    for name, flags in spec.flags.items():
-        lines += ["", f"/* {flags.doc} */"]
-        lines += [f"#define {name.upper()}_{bit.upper()} (1u << {i})" for i, bit in enumerate(flags.bits)]
-    for name, enum in spec.enum.items():
-        lines += ["", f"/* {enum.doc} */", "enum {"]
-        lines += [f"  {name.upper()}_{value.upper()} = {i}," for i, value in enumerate(enum.values)]
-        lines += ["};"]
     for message in spec.message:
         upper = message.name.upper()
         lines += ["", f"/* {message.doc} */", f"#define MSG_{upper}_ID 0x{message.id:02X}u"]
@@ -93,9 +115,6 @@ def messages_header(spec: schema.Schema) -> str:
         for message in spec.of_direction(direction):
             lines += [f"    case MSG_{message.name.upper()}_ID:", f"      return MSG_{message.name.upper()}_LENGTH;"]
         lines += ["    default:", "      return -1;", "  }", "}"]
-    lines += ["", "/* X(name, id, bytes of payload) for each message to the board, in plain decimals. */"]
-    rows = [f"  X({m.name}, {m.id}, {m.length})" for m in spec.of_direction("to_board")]
-    lines += continued("#define MESSAGES_TO_BOARD(X)", rows)
     lines += [
         "",
         "/* Whether the message belongs to the handshake, whose checksums start from the constant seed. */",
@@ -117,6 +136,11 @@ def messages_header(spec: schema.Schema) -> str:
     ]
     lines += [*continued("#define MESSAGE_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
+
+
+def c_comment(text: str) -> str:
+    """Behind a line of C, if there is one."""
+    return f" /* {text} */" if text else ""
 
 
 def continued(head: str, rows: list[str]) -> list[str]:
@@ -143,7 +167,12 @@ def parameters_header(spec: schema.Schema) -> str:
     for p in spec.parameter:
         unit = p.unit if p.scale == 1.0 else f"{number(p.scale)} {p.unit}"
         lines.append(f"#define PARAMETER_{p.name.upper()} {p.id}u /* {unit}: {p.doc} */")
-    lines += [f"#define PARAMETER_COUNT {len(spec.parameter)}u", ""]
+    table = ",".join(f"{p.id} {p.name} {p.type} {p.min} {p.max}" for p in spec.parameter)
+    lines += [f"#define PARAMETER_COUNT {len(spec.parameter)}u"]
+    lines += [
+        f"#define PARAMETER_TABLE 0x{zlib.crc32(table.encode()) & 0xFFFF:04X}u /* tells tables of parameters apart */",
+        "",
+    ]
     lines += ["/* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]
     rows = []
     for p in spec.parameter:
@@ -151,6 +180,40 @@ def parameters_header(spec: schema.Schema) -> str:
         rows.append(f"  X({p.name.upper()}, {p.type}, {p.min}, {p.max}, {default})")
     lines += [*continued("#define PARAMETER_LIST(X)", rows), "", "#endif", ""]
     return "\n".join(lines)
+
+
+CRC21_POLYNOMIAL = 0x1DBF6F
+
+
+def crc21_header() -> str:
+    """firmware/src/generated/crc21_table.h"""
+    entries = []
+    for byte in range(256):
+        register = byte << 16
+        for _ in range(8):
+            register = register << 1 ^ (CRC21_POLYNOMIAL << 3 | 1 << 24 if register & 0x800000 else 0)
+        entries.append(register)
+    lines = [
+        "/* crc21_table.h: the remainder of each byte in CRC-21, in the top 21 of 24 bits.",
+        f" * {STATUS_NOTE} */",
+        "#ifndef GENERATED_CRC21_TABLE_H",
+        "#define GENERATED_CRC21_TABLE_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        "#ifdef __AVR__",
+        "#include <avr/pgmspace.h>",
+        "#define CRC21_IN_FLASH __attribute__((__progmem__))",
+        "#else",
+        "#define CRC21_IN_FLASH",
+        "#endif",
+    ]
+    for name, shift in (("HIGH", 16), ("MIDDLE", 8), ("LOW", 0)):
+        lines += ["", f"static const uint8_t CRC21_{name}[256] CRC21_IN_FLASH = {{"]
+        for row in range(0, 256, 16):
+            lines.append("  " + " ".join(f"0x{entry >> shift & 0xFF:02X}," for entry in entries[row : row + 16]))
+        lines += ["};"]
+    return "\n".join([*lines, "", "#endif", ""])
 
 
 def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
@@ -200,9 +263,10 @@ def devices_built(spec: schema.Schema, robot: RobotDescription) -> int:
 
 
 def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
-    """The parameter's default for that robot in counts: a key of its body, its supply or one of its devices."""
+    """The parameter's default for that robot in counts: a key of the robot, its body, its supply or one of its
+    devices."""
     owner_name, key = parameter.default_from.split(".")
-    parts = {"body": robot.body, "supply": robot.supply, **robot.device}
+    parts = {"robot": robot, "body": robot.body, "supply": robot.supply, **robot.device}
     if owner_name not in parts and parameter.default is not None:
         return parameter.default
     owner = parts[owner_name]
@@ -242,7 +306,7 @@ def python_module(spec: schema.Schema) -> str:
         "from enum import IntEnum, IntFlag",
         "from typing import ClassVar, NamedTuple, Self",
         "",
-        f"PROTOCOL_VERSION = {spec.version}",
+        f"PROTOCOL_VERSION = 0x{spec.version_byte:02X}  # {spec.version}.{spec.minor}",
         f"SCHEMA_HASH = 0x{spec.hash:08X}",
     ]
     for name, flags in spec.flags.items():
@@ -252,8 +316,22 @@ def python_module(spec: schema.Schema) -> str:
     lines += ["", "", "# The robot's device behind each bit.", "DEVICE_OF_BIT: dict[Devices, str] = {"]
     lines += [f'    Devices.{bit.upper()}: "{name}",' for bit, name in zip(devices.bits, devices.device, strict=True)]
     lines += ["}"]
+    lines += [
+        "",
+        "",
+        "class _Values(IntEnum):",
+        '    """Values by name; one that a later minor version has added is called by its number."""',
+        "",
+        "    @classmethod",
+        "    def _missing_(cls, value: object) -> _Values | None:",
+        "        if not isinstance(value, int):",
+        "            return None",
+        "        unknown = int.__new__(cls, value)",
+        '        unknown._name_, unknown._value_ = f"UNKNOWN_{value}", value',
+        "        return unknown",
+    ]
     for name, enum in spec.enum.items():
-        lines += ["", "", f"class {class_name(name)}(IntEnum):", f'    """{enum.doc}"""', ""]
+        lines += ["", "", f"class {class_name(name)}(_Values):", f'    """{enum.doc}"""', ""]
         lines += [f"    {value.upper()} = {i}" for i, value in enumerate(enum.values)]
     for message in spec.message:
         lines += python_message(message)
@@ -269,6 +347,7 @@ def python_module(spec: schema.Schema) -> str:
     lines += ["    maximum: int  # counts", "    doc: str"]
     lines += [
         '    default_from: str = ""  # key of the robot description that gives the default',
+        "    since: int = 0  # minor version",
         "",
         "",
         "PARAMETERS: dict[str, ParameterSpec] = {",
@@ -276,6 +355,7 @@ def python_module(spec: schema.Schema) -> str:
     for p in spec.parameter:
         row = f'{p.id}, "{p.unit}", {p.scale!r}, {p.min}, {p.max}, "{p.doc}"'
         row += f', "{p.default_from}"' if p.default_from else ""
+        row += f", since={p.since}" if p.since else ""
         lines.append(f'    "{p.name}": ParameterSpec({row}),')
     lines += ["}", ""]
     return "\n".join(lines)
@@ -285,6 +365,8 @@ def python_message(message: schema.Message) -> list[str]:
     """The class of one message."""
     code = "<" + "".join(field.struct_code for field in message.fields)
     name = class_name(message.name)
+    begins = [sum(field.size for field in message.fields[:place]) for place in range(len(message.fields))]
+    offsets = ", ".join(f'"{field.name}": {at}' for field, at in zip(message.fields, begins, strict=True))
     lines = ["", "", f"class _{name}Fields(NamedTuple):"]
     for field in message.fields:
         comment = field_comment(field)
@@ -306,6 +388,7 @@ def python_message(message: schema.Message) -> list[str]:
         f'    DELIVERY: ClassVar[str] = "{message.delivery}"',
         f"    LENGTH: ClassVar[int] = {message.length}",
         f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{code}")',
+        f"    OFFSETS: ClassVar[dict[str, int]] = {{{offsets}}}",
         "",
         "    def pack(self) -> bytes:",
         '        """The payload."""',
@@ -398,7 +481,11 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
 
 def tables(spec: schema.Schema) -> str:
     """The message and parameter tables, in Markdown."""
-    lines = [f"Version {spec.version}, schema hash `0x{spec.hash:08X}`.", ""]
+    lines = [
+        f"Version {spec.version}.{spec.minor}: `protocol_version` {spec.version_byte}, `schema_hash` "
+        f"`0x{spec.hash:08X}`.",
+        "",
+    ]
     hashes = {m.id: f"{spec.message_hash(m):08X}" for m in spec.message}
     lines += ["| id | message | direction | delivery | payload | hash | meaning |", "|---|---|---|---|---|---|---|"]
     for m in spec.message:
@@ -419,11 +506,9 @@ def tables(spec: schema.Schema) -> str:
             lines.append(f"| {offset} | `{f.name}` | {f.type} | {unit} | {limits} | {meaning} |")
             offset += f.size
     for name, flags in spec.flags.items():
-        lines += ["", f"#### Flags `{name}`", "", flags.doc, "", "| bit | name |", "|---|---|"]
-        lines += [f"| {i} | `{bit}` |" for i, bit in enumerate(flags.bits)]
+        lines += ["", f"#### Flags `{name}`", "", flags.doc, "", *named("bit", flags.bits, flags.docs)]
     for name, enum in spec.enum.items():
-        lines += ["", f"#### Values `{name}`", "", enum.doc, "", "| value | name |", "|---|---|"]
-        lines += [f"| {i} | `{value}` |" for i, value in enumerate(enum.values)]
+        lines += ["", f"#### Values `{name}`", "", enum.doc, "", *named("value", enum.values, enum.docs)]
     lines += ["", "#### Parameters", "", "| number | parameter | unit per count | range | default | meaning |"]
     lines += ["|---|---|---|---|---|---|"]
     for p in spec.parameter:
@@ -433,15 +518,48 @@ def tables(spec: schema.Schema) -> str:
     return "\n".join(lines)
 
 
+def named(head: str, names: list[str], docs: dict[str, str]) -> list[str]:
+    """The table of flags or values, with their meanings if there are some."""
+    if not docs:
+        return [f"| {head} | name |", "|---|---|", *(f"| {i} | `{name}` |" for i, name in enumerate(names))]
+    rows = [f"| {i} | `{name}` | {docs.get(name, '')} |" for i, name in enumerate(names)]
+    return [f"| {head} | name | meaning |", "|---|---|---|", *rows]
+
+
+def worked_frame(spec: schema.Schema) -> str:
+    """One frame, made step by step."""
+    message = next(m for m in spec.message if m.name == "setpoint_coast")
+    sequence, seed, payload = 5, 0x12345, bytes([0xFA, 0x00, 0x02, 0x01])
+    content = bytes([message.id, sequence]) + payload
+    stuffed = reference_frame.cobs(content)
+    registers = [reference_frame.crc21(stuffed[: n + 1], seed) for n in range(len(stuffed))]
+    check = registers[-1]
+    sevens = [check >> shift & 0x7F for shift in (14, 7, 0)]
+    wire = reference_frame.frame(message.id, sequence, payload, seed)
+    steps = [
+        ("message", f"{message.name}, time_to_live 250 ms, answers_tick 258"),
+        ("session's seed", f"0x{seed:06X}"),
+        ("id, sequence, payload", content.hex(" ")),
+        ("stuffed", stuffed.hex(" ")),
+        *((f"CRC after {byte:02x}", f"0x{register:06X}") for byte, register in zip(stuffed, registers, strict=True)),
+        ("seven bits each", " ".join(f"{part:02x}" for part in sevens)),
+        ("c2 c1 c0", " ".join(f"{0x80 | part:02x}" for part in sevens)),
+        ("on the wire", wire.hex(" ")),
+    ]
+    return "\n".join(["```text", *(f"{name:<23}{value}" for name, value in steps), "```"])
+
+
 BEGIN, END = "<!-- tables: made by generate.py -->", "<!-- end of tables -->"
+WORKED_BEGIN, WORKED_END = "<!-- worked frame: made by generate.py -->", "<!-- end of worked frame -->"
 
 
 def protocol_page(spec: schema.Schema) -> str:
-    """PROTOCOL.md with its tables renewed."""
+    """PROTOCOL.md with its worked frame and its tables renewed."""
     text = (HERE / "PROTOCOL.md").read_text(encoding="utf-8")
-    head, rest = text.split(BEGIN)
-    tail = rest.split(END)[1]
-    return f"{head}{BEGIN}\n\n{tables(spec)}\n\n{END}{tail}"
+    for begin, end, made in ((WORKED_BEGIN, WORKED_END, worked_frame(spec)), (BEGIN, END, tables(spec))):
+        head, rest = text.split(begin)
+        text = f"{head}{begin}\n\n{made}\n\n{end}{rest.split(end)[1]}"
+    return text
 
 
 # ---- all together ----------------------------------------------------------------------------------------------------
@@ -453,6 +571,8 @@ def outputs() -> dict[Path, str]:
     golden = vectors(spec)
     generated = ROOT / "firmware" / "src" / "generated"
     made = {
+        generated / "values.h": values_header(spec),
+        generated / "crc21_table.h": crc21_header(),
         generated / "messages.h": messages_header(spec),
         generated / "parameters.h": parameters_header(spec),
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module(spec),

@@ -15,7 +15,9 @@ HERE = Path(__file__).resolve().parent
 TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
-NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from", "each_task")  # keys that both ends need not agree on
+# Keys that both ends need not agree on. The firmware checks a parameter's range.
+NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from", "each_task", "since", "docs")
+MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
@@ -77,6 +79,7 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     delivery: str
     doc: str
     fields: list[Field]
+    since: int = 0
 
     @property
     def length(self) -> int:
@@ -91,6 +94,8 @@ class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     type: str
     bits: list[str]
     device: list[str] = []  # of the devices flags: the robot's device behind each bit
+    docs: dict[str, str] = {}
+    since: dict[str, int] = {}
 
 
 class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -99,6 +104,9 @@ class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     doc: str
     values: list[str] = []
     each_task: str = ""  # names of further values, one for each task of the firmware, whose name replaces {}
+    tasks: int = 0  # how many of the values, the last ones, are such
+    docs: dict[str, str] = {}
+    since: dict[str, int] = {}
 
 
 class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -114,12 +122,14 @@ class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     scale: float = 1.0
     default: int | None = None
     default_from: str = ""
+    since: int = 0
 
 
 class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Everything that messages.toml says."""
 
     version: int
+    minor: int
     flags: dict[str, Flags]
     enum: dict[str, Enum]
     message: list[Message]
@@ -127,21 +137,41 @@ class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def hash(self) -> int:
-        """CRC-32 of what both ends must agree on: everything but the explanations."""
-        return _crc32(self)
+        """CRC-32 of what all of this version have in common: neither what later minor versions have added, nor the
+        firmware's tasks, nor explanations."""
+        messages = [message for message in self.message if not message.since]
+        return _crc32([self.version, _base_flags(self.flags), _base_values(self.enum), messages, self._base_parameters])
 
     def message_hash(self, message: Message) -> int:
-        """CRC-32 of what both ends must agree on in one message, with the flags and values that its fields name; the
-        parameters belong to set_parameter.
+        """The same of one message, with the flags and values that its fields name; the parameters belong to
+        set_parameter.
         """
-        named = {field.flags: self.flags[field.flags] for field in message.fields if field.flags}
-        values = {field.enum: self.enum[field.enum] for field in message.fields if field.enum}
-        parameters = self.parameter if message.name == "set_parameter" else []
+        named = _base_flags({field.flags: self.flags[field.flags] for field in message.fields if field.flags})
+        values = _base_values({field.enum: self.enum[field.enum] for field in message.fields if field.enum})
+        parameters = self._base_parameters if message.name == "set_parameter" else []
         return _crc32([message, named, values, parameters])
+
+    @property
+    def version_byte(self) -> int:
+        """Version and minor version as in hello and open."""
+        return self.version * MINORS + self.minor
+
+    @property
+    def _base_parameters(self) -> list[tuple[int, str, str, str, float]]:
+        """Without their ranges, which the board checks."""
+        return [(p.id, p.name, p.type, p.unit, p.scale) for p in self.parameter if not p.since]
 
     def of_direction(self, direction: str) -> list[Message]:
         """The messages to one side."""
         return [message for message in self.message if message.direction == direction]
+
+
+def _base_flags(flags: dict[str, Flags]) -> dict[str, Any]:
+    return {name: (some.type, some.bits[: len(some.bits) - len(some.since)]) for name, some in flags.items()}
+
+
+def _base_values(enums: dict[str, Enum]) -> dict[str, list[str]]:
+    return {name: some.values[: len(some.values) - some.tasks - len(some.since)] for name, some in enums.items()}
 
 
 def _crc32(part: Any) -> int:
@@ -193,6 +223,14 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
                 f"message {message.name}: of the handshake, so no other message {message.direction} may be as long: "
                 "a wrong bit in the id would change the checksum's seed"
             )
+    for message in schema.message:
+        exposed = [m.name for m in schema.of_direction(message.direction) if m.length == message.length - 2]
+        if message.id.bit_count() == 1 and exposed and message.delivery != "handshake":
+            raise ValueError(
+                f"message {message.name}: a wrong bit can make 00 of id {message.id:#04x}, and what follows is as "
+                f"long as {exposed[0]}; expected an id with two bits set"
+            )
+    _check_since(schema)
     for parameter in schema.parameter:
         if parameter.type not in PARAMETER_TYPES:
             raise ValueError(f"parameter {parameter.name}: type {parameter.type!r} is none of {PARAMETER_TYPES}")
@@ -205,12 +243,47 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
 def _with_tasks(schema: Schema) -> Schema:
     tasks = re.findall(r"^TASK\((\w+),", TASKS.read_text(encoding="utf-8"), re.MULTILINE)
     enums = {
-        name: msgspec.structs.replace(enum, values=enum.values + [enum.each_task.format(task) for task in tasks])
+        name: msgspec.structs.replace(
+            enum, values=enum.values + [enum.each_task.format(task) for task in tasks], tasks=len(tasks)
+        )
         if enum.each_task
         else enum
         for name, enum in schema.enum.items()
     }
     return msgspec.structs.replace(schema, enum=enums)
+
+
+def _check_since(schema: Schema) -> None:
+    """Refuses additions that a client of the same version could not ignore."""
+    if not 0 <= schema.minor < MINORS:
+        raise ValueError(f"minor {schema.minor}: expected 0 to {MINORS - 1}")
+    said = [(f"message {m.name}", m.since) for m in schema.message] + [
+        (f"parameter {p.name}", p.since) for p in schema.parameter
+    ]
+    lists = [(f"flags {name}", f.bits, f.since) for name, f in schema.flags.items()] + [
+        (f"enum {name}", e.values, e.since) for name, e in schema.enum.items()
+    ]
+    explained = [(flags.bits, flags.docs) for flags in schema.flags.values()]
+    explained += [(enum.values, enum.docs) for enum in schema.enum.values()]
+    for names, docs in explained:
+        if unknown := set(docs) - set(names):
+            raise ValueError(f"docs of {', '.join(sorted(unknown))}; expected some of {', '.join(names)}")
+    for where, names, since in lists:
+        if list(since) != names[len(names) - len(since) :]:
+            raise ValueError(f"{where}: since names {', '.join(since)}; expected its last ones, in order")
+        said += [(f"{where}, {name}", minor) for name, minor in since.items()]
+    for where, minor in said:
+        if not 0 <= minor <= schema.minor:
+            raise ValueError(f"{where}: since minor version {minor}; expected 0 to minor, {schema.minor}")
+    for name, enum in schema.enum.items():
+        if enum.each_task and enum.since:
+            raise ValueError(f"enum {name}: the tasks follow its own values, so that none can be added")
+    for message in schema.message:
+        longest = max(m.length for m in schema.of_direction(message.direction) if not m.since)
+        if message.since and (message.length > longest or message.delivery == "handshake"):
+            raise ValueError(
+                f"message {message.name}: added, so it may have {longest} bytes at most and cannot be of the handshake"
+            )
 
 
 def _unique(kind: str, names: list[str], ids: list[int]) -> None:

@@ -60,6 +60,8 @@ BATTERY_NOISE_V = 0.005
 ENCODER_MISSED = 0.0005
 ENCODER_EXTRA = 0.0005
 ENCODER_FLICKER_S = 0.0002
+ENCODER_BOUNCES = 0  # at most, at each edge; sensors with a Schmitt trigger have none (chosen)
+ENCODER_BOUNCE_S = 0.00002  # from one of their edges to the next, on average (chosen)
 
 SHARP_HEIGHT_M = 0.08
 SHARP_REACH_M = 1.5  # 0.8 specified, beyond it less and less (chosen)
@@ -259,6 +261,8 @@ def encoder_parameters(edges_per_turn: int, draw: Draw = AS_BUILT) -> Any:
             "missed": draw["ENCODER_MISSED"],
             "extra": draw["ENCODER_EXTRA"],
             "flicker_s": ENCODER_FLICKER_S,
+            "bounces": draw["ENCODER_BOUNCES"],
+            "bounce_s": ENCODER_BOUNCE_S,
         },
     )
 

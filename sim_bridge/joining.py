@@ -30,6 +30,10 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
     for device in description.device.values():
         if isinstance(device, robots.PositionServo) and device.on:
             _mount(handle, number, device, description)
+    for name, device in description.device.items():
+        if device.on and not device.plugged:
+            for pin in device.pins().values():
+                done(lib.sim_unplug(handle, number, pin, 1), f"device {name!r}")
 
 
 def done(status: int, what: str) -> None:

@@ -11,14 +11,14 @@ void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
   if (pin >= BOARD_PIN_COUNT) return;
   edge_log_add(&self->edges, cycle, pin, level);
   part *p = self->hears[pin];
-  if (p != NULL) p->op->edge(p, cycle, pin, level);
+  if (p != NULL && !p->unplugged) p->op->edge(p, cycle, pin, level);
 }
 
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   if (channel == BOARD_ANALOG_SUPPLY) return self->chassis.supply * BOARD_NOMINAL_VOLTS;
   part *p = channel < BOARD_ANALOG_COUNT ? self->analog[channel] : NULL;
-  return p == NULL ? 0.0 : p->op->analog(p, cycle);
+  return p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
 }
 
 /* ---- the world's step ---------------------------------------------------------------------------------------------- */

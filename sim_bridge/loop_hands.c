@@ -20,14 +20,14 @@ int sim_place(sim *self, int number, double x, double y, double heading) {
   return SIM_OK;
 }
 
-/* Takes a pin from its part. Returns 1 if a resistor on the board pulls it up when nobody drives it. */
+/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nobody drives it. */
 static int take_pin(robot *r, uint8_t pin) {
   int pulled_up = 0;
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     for (int k = 0; k < PART_PINS; k++) {
       if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
-      p->off = 1;
+      p->taken = 1;
       pulled_up |= (p->pins[k].role & PART_PULLED_UP) != 0;
     }
   }
@@ -106,6 +106,23 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
   if (pings == 0) return SIM_BAD_ARGUMENT;
   const uint64_t word = (uint64_t)echo_cycles;
   sim_note(self, number, INPUT_PING, &word, 1, NULL, 0);
+  return SIM_OK;
+}
+
+int sim_unplug(sim *self, int number, uint8_t pin, int unplugged) {
+  robot *r = sim_robot_with_board(self, number);
+  int parts = 0;
+  for (int i = 0; r != NULL && i < r->part_count; i++) {
+    part *p = r->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || p->pins[k].pin == PART_NO_PIN) continue;
+      part_unplug(p, unplugged != 0);
+      parts++;
+    }
+  }
+  if (parts == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {pin, unplugged != 0};
+  sim_note(self, number, INPUT_UNPLUG, words, 2, NULL, 0);
   return SIM_OK;
 }
 

@@ -109,6 +109,8 @@ static int apply(sim *self, const input *in) {
       return sim_hold_whisker(self, n, (uint8_t)w[0], (int)(int64_t)w[1]);
     case INPUT_PING:
       return sim_answer_ping(self, n, (int64_t)w[0]);
+    case INPUT_UNPLUG:
+      return sim_unplug(self, n, (uint8_t)w[0], (int)w[1]);
     case INPUT_SUPPLY:
       return sim_set_supply(self, n, double_of_input(w[0]));
     case INPUT_BROWN_OUT: {

@@ -100,6 +100,7 @@ typedef enum {
   INPUT_DAMAGE = 12,   /* damage, garbage */
   INPUT_MEMORY = 13,   /* address; bytes */
   INPUT_SIGNALS = 14,  /* left, right */
+  INPUT_UNPLUG = 15,   /* pin, unplugged */
 } input_kind;
 
 #define INPUT_WORDS 4 /* at most */

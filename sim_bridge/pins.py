@@ -94,6 +94,21 @@ class BoardPins(BoardMemory):
         """The Ping measures distances again."""
         self._check(lib.sim_answer_ping(self._handle, self._number, -1), "Ping")
 
+    def unplug(self, device: str) -> None:
+        """Pulls the plug of a device of the robot's description: it hears and drives nothing."""
+        self._plug(device, unplugged=True)
+
+    def plug(self, device: str) -> None:
+        """Puts the plug in again."""
+        self._plug(device, unplugged=False)
+
+    def _plug(self, device: str, *, unplugged: bool) -> None:
+        found = self._robot.description.device.get(device)
+        for pin in set(found.pins().values()) if found else ():
+            self._check(lib.sim_unplug(self._handle, self._number, pin, unplugged), f"device {device!r}")
+        if not found:
+            raise BoardError(f"device {device!r}: the robot has no such thing")
+
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
         held = (

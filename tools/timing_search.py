@@ -25,7 +25,7 @@ from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, robot_of, search
 from sim_bridge.timing.scenarios import SILENCE
 
-IMAGES = ("boebot", "shieldbot", "shieldbot-quad")
+IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-quad")
 RESULT = Path("build/soak/timing-search.json")
 RUN_S = 0.4  # of the board's time, after the preparations
 
@@ -58,7 +58,7 @@ class Found:
 
 def beside_bounds(image: str, elf: Path, measured: Measurement) -> list[Found]:
     """The maxima of one image, in the order of its table."""
-    rows = budget.prove(elf, loads.load_named("saturated")).rows
+    rows = budget.prove(elf, loads.load_named("overload")).rows
     found = []
     for row in rows:
         spans = measured.row(row.name)

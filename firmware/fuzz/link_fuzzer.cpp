@@ -80,7 +80,9 @@ void act(native_bench &bench, input &from, bool &armed) {
       bench.drive(bench.machine.now + 1, PIN_WHISKER_LEFT, from.byte() % 2u != 0 ? NATIVE_LOW : NATIVE_RELEASED);
       break;
     case OPEN:
-      bench.open(0x100u + from.byte());
+      if (bench.count(MSG_HELLO_ID) > 0) { /* it comes with the first tick */
+        bench.open(0x100u + from.byte());
+      }
       break;
     case SUPPLY:
       bench.volts = 3.5 + from.byte() / 128.0;
@@ -110,6 +112,7 @@ void check_that_it_lives(native_bench &bench) {
   bench.run(22 * TICK);
   assert(bench.count(MSG_HELLO_ID) > 0);
   bench.open(0x54321);
+  bench.run(2 * TICK); /* the session's task says hello */
   assert(bench.hello().session == bench.seed);
   bench.get(PARAMETER_TIME_TO_LIVE);
   bench.stop(77);
@@ -127,6 +130,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   native_bench bench;
   input from(data, size);
   bool armed = false;
+  bench.run(2 * TICK); /* it has said hello */
   while (!from.is_empty()) {
     act(bench, from, armed);
   }

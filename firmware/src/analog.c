@@ -3,12 +3,11 @@
 
 #include <stdbool.h>
 
-#include "bounds.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "parameters.h"
 #include "schedule.h"
+#include "tasks.h"
 
 #define SETTLE_CYCLES (200u * HAL_CYCLES_PER_US) /* bandgap 70 us, and the sampling capacitor (24.6, 28.8) */
 #define AGE_NEVER 255u
@@ -63,17 +62,42 @@ static uint8_t next_input(void) {
   return last_device;
 }
 
+/* A pin is pulled up unless it is measured. */
+static void connect(uint8_t device, bool connected) {
+#ifdef PIN_BATTERY
+  if (device == ANALOG_BATTERY && connected) {
+    HAL_PIN_INPUT(BATTERY);
+  } else if (device == ANALOG_BATTERY) {
+    HAL_PIN_PULL_UP(BATTERY);
+  }
+#endif
+#ifdef PIN_ANALOG_INFRARED
+  if (device == ANALOG_INFRARED && connected) {
+    HAL_PIN_INPUT(ANALOG_INFRARED);
+  } else if (device == ANALOG_INFRARED) {
+    HAL_PIN_PULL_UP(ANALOG_INFRARED);
+  }
+#endif
+  (void)device, (void)connected;
+}
+
+void analog_start_pins(void) {
+  connect(ANALOG_BATTERY, false);
+  connect(ANALOG_INFRARED, false);
+}
+
 void analog_start(void) {
-  BOUNDED(ANALOG_INPUTS, for (uint8_t i = 0; i < ANALOG_INPUTS; i++)) {
+  for (uint8_t i = 0; i < ANALOG_INPUTS; i++) {
     results[i] = 0;
     ages[i] = AGE_NEVER;
   }
   last_device = ANALOG_INFRARED;
-  HAL_ZERO(tick_begins);
+  tick_begins = false;
   join(ANALOG_BANDGAP);
 }
 
-static inline __attribute__((always_inline)) void grow_older(uint8_t device) {
+static void grow_older(uint8_t device) {
+  connect(device, is_on(device));
   if (!is_on(device)) {
     ages[device] = AGE_NEVER;
     results[device] = 0;
@@ -84,7 +108,7 @@ static inline __attribute__((always_inline)) void grow_older(uint8_t device) {
 
 /* Takes what the converter has, or does all else: so no slot has both, however long the converter has been kept waiting. */
 void analog_task(void) {
-  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+  if (schedule_tick_begins()) {
     tick_begins = true;
   }
   if (converting && !hal_analog_busy()) {

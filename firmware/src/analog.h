@@ -13,10 +13,9 @@ extern "C" {
 
 enum { ANALOG_BANDGAP, ANALOG_BATTERY, ANALOG_INFRARED, ANALOG_INPUTS };
 
+/* The pins, and later all else. */
+void analog_start_pins(void);
 void analog_start(void);
-
-/* In every slot. */
-void analog_task(void) __attribute__((noinline));
 
 /* The last result of an input, in 1/1024 of the supply, rounded down; 0 before the first. */
 uint16_t analog_read(uint8_t input);

@@ -1,48 +1,61 @@
 /* buzzer.c: see buzzer.h. */
 #include "buzzer.h"
 
-#include "division.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "parameters.h"
+#include "tasks.h"
 
 #define START_FREQUENCY 2000u /* Hz */
 
-static uint8_t left;  /* ticks of the tone still to come */
-static uint8_t token; /* of the last tone */
-static bool is_start; /* it is the tone at start */
+static uint8_t left;      /* ticks of the tone still to come */
+static uint8_t token;     /* of the last tone */
+static bool is_start;     /* it is the tone at start */
+static bool is_connected; /* the board drives the pin */
 
 void buzzer_start(void) {
-  HAL_PIN_LOW(BUZZER);
-  HAL_PIN_OUTPUT(BUZZER);
-  hal_tone_stop();
-  HAL_ZERO(left);
-  HAL_ZERO(token);
-  HAL_ZERO(is_start);
+  HAL_PIN_PULL_UP(BUZZER);
+  is_connected = false;
+  left = 0;
+  token = 0;
+  is_start = false;
 }
 
-/* Sounds the tone in a clock of half_rate * 2^(places + 1) Hz: half a period is clock / (2 * frequency) of its counts, rounded
- * down. */
-static void sound_by(uint8_t clock, uint16_t half_rate, uint8_t places, uint16_t frequency) {
-  hal_tone_start(clock, (uint8_t)divide(half_rate, frequency, places));
+static void connect(bool connected) {
+  if (connected == is_connected) {
+    return;
+  }
+  is_connected = connected;
+  if (connected) {
+    HAL_PIN_LOW(BUZZER);
+    HAL_PIN_OUTPUT(BUZZER);
+  } else {
+    HAL_PIN_PULL_UP(BUZZER);
+  }
 }
 
 /* The fastest clock in which half a period is 255 counts at most. */
 static void sound(uint16_t frequency) {
-  if (frequency > 3906u) {
-    sound_by(HAL_TONE_BY_8, 62500u, 4, frequency); /* 2 MHz */
-  } else if (frequency > 488u) {
-    sound_by(HAL_TONE_BY_64, 62500u, 1, frequency); /* 250 kHz */
-  } else if (frequency > 122u) {
-    sound_by(HAL_TONE_BY_256, 31250u, 0, frequency);
-  } else {
-    sound_by(HAL_TONE_BY_1024, 7812u, 0, frequency);
+  uint8_t clock = HAL_TONE_BY_8;
+  uint32_t rate = 2000000ul; /* of the clock, Hz */
+  if (frequency <= 122u) {
+    clock = HAL_TONE_BY_1024;
+    rate = 15625ul;
+  } else if (frequency <= 488u) {
+    clock = HAL_TONE_BY_256;
+    rate = 62500ul;
+  } else if (frequency <= 3906u) {
+    clock = HAL_TONE_BY_64;
+    rate = 250000ul;
   }
+  connect(true);
+  hal_tone_start(clock, (uint8_t)(rate / (2ul * frequency)));
 }
 
 static void end(void) {
-  hal_tone_stop();
+  if (left != 0) {
+    hal_tone_stop();
+  }
   left = 0;
   is_start = false;
 }
@@ -59,7 +72,7 @@ void buzzer_start_beep(void) {
 void buzzer_start_session(void) { token = 0; }
 
 bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t new_token) {
-  if (!parameters_device_on(DEVICES_BUZZER) ||
+  if (!parameters_device_in_use(DEVICES_BUZZER) ||
       (frequency != 0 && (frequency < BUZZER_FREQUENCY_MIN || frequency > BUZZER_FREQUENCY_MAX))) {
     return false;
   }
@@ -81,10 +94,14 @@ void buzzer_silence(void) {
   }
 }
 
+/* Once per tick: ends what has sounded long enough. */
 void buzzer_task(void) {
-  if (left != 0 && (--left == 0 || !parameters_device_on(DEVICES_BUZZER))) {
+  if (left == 1 || !parameters_device_on(DEVICES_BUZZER)) {
     end();
+  } else if (left != 0) {
+    left--;
   }
+  connect(left != 0 || parameters_device_in_use(DEVICES_BUZZER));
 }
 
 uint8_t buzzer_token(void) { return token; }

@@ -27,9 +27,6 @@ bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t token);
 /* Ends a tone. */
 void buzzer_silence(void);
 
-/* Once per tick: ends what has sounded long enough. */
-void buzzer_task(void) __attribute__((noinline));
-
 /* Token of the last tone of this session. */
 uint8_t buzzer_token(void);
 

@@ -3,10 +3,10 @@
 
 #include <stdbool.h>
 
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "parameters.h"
+#include "tasks.h"
 #include "two_wire.h"
 
 #define ADDRESS 0x1Eu
@@ -33,75 +33,74 @@ typedef struct {
 
 static compass_state own;
 
-static void forget(compass_state *self, uint8_t status) {
-  self->reading = (compass_reading){.age = AGE_NEVER, .status = status};
-  self->is_set = false;
+static void forget(uint8_t status) {
+  own.reading = (compass_reading){.age = AGE_NEVER, .status = status};
+  own.is_set = false;
 }
 
 void compass_start(void) {
-  compass_state *const self = HAL_NEAR(&own);
   HAL_PIN_PULL_UP(COMPASS_SDA);
   HAL_PIN_PULL_UP(COMPASS_SCL);
-  self->state = OFF;
-  self->wait = 0;
-  forget(self, COMPASS_STATUS_OFF);
+  own.state = OFF;
+  own.wait = 0;
+  forget(COMPASS_STATUS_OFF);
 }
 
 static int16_t word(const uint8_t *bytes) { return (int16_t)(uint16_t)((uint16_t)bytes[0] << 8 | bytes[1]); }
 
-static void take(compass_state *self) {
+static void take(void) {
   const uint8_t *bytes = two_wire_bytes();
-  self->reading.x = word(bytes);
-  self->reading.z = word(bytes + 2);
-  self->reading.y = word(bytes + 4);
-  self->reading.age = 0;
-  self->reading.status = COMPASS_STATUS_OK;
+  own.reading.x = word(bytes);
+  own.reading.z = word(bytes + 2);
+  own.reading.y = word(bytes + 4);
+  own.reading.age = 0;
+  own.reading.status = COMPASS_STATUS_OK;
 }
 
-static void begin(compass_state *self) {
-  if (self->is_set) {
-    self->state = READING;
+static void begin(void) {
+  if (own.is_set) {
+    own.state = READING;
     two_wire_begin(ADDRESS, data_register, sizeof data_register, DATA_BYTES);
   } else {
-    self->state = SETTING;
+    own.state = SETTING;
     two_wire_begin(ADDRESS, settings, sizeof settings, 0);
   }
 }
 
 /* A transfer was begun in the tick before: it takes 1 ms. */
-static void finish(compass_state *self) {
+static void finish(void) {
   switch (two_wire_ended()) {
     case TWO_WIRE_OK:
-      if (self->state == READING) {
-        take(self);
+      if (own.state == READING) {
+        take();
       }
-      self->is_set = true;
+      own.is_set = true;
       break;
     case TWO_WIRE_NO_ANSWER:
-      self->reading.status = COMPASS_STATUS_NO_ANSWER;
-      self->is_set = false;
+      own.reading.status = COMPASS_STATUS_NO_ANSWER;
+      own.is_set = false;
       break;
     case TWO_WIRE_FAILED:
-      self->reading.status = COMPASS_STATUS_FAILED;
-      self->is_set = false;
+      own.reading.status = COMPASS_STATUS_FAILED;
+      own.is_set = false;
       break;
     default:
       two_wire_stop();
-      self->reading.status = COMPASS_STATUS_BUS_STUCK;
-      self->is_set = false;
-      self->pulses = 0;
-      self->state = FREEING;
+      own.reading.status = COMPASS_STATUS_BUS_STUCK;
+      own.is_set = false;
+      own.pulses = 0;
+      own.state = FREEING;
       return;
   }
-  self->state = WAITING;
+  own.state = WAITING;
 }
 
 /* One edge of the clock a tick, low or let go, until the data line is free after a pulse, or after all of them. */
-static void free_bus(compass_state *self) {
-  if (self->pulses % 2u == 0) {
-    if (self->pulses == 2u * CLOCK_PULSES || (self->pulses != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
+static void free_bus(void) {
+  if (own.pulses % 2u == 0) {
+    if (own.pulses == 2u * CLOCK_PULSES || (own.pulses != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
       two_wire_start();
-      self->state = WAITING;
+      own.state = WAITING;
       return;
     }
     HAL_PIN_LOW(COMPASS_SCL);
@@ -109,46 +108,46 @@ static void free_bus(compass_state *self) {
   } else {
     HAL_PIN_PULL_UP(COMPASS_SCL);
   }
-  self->pulses++;
+  own.pulses++;
 }
 
-static void switch_off(compass_state *self) {
-  if (self->state != OFF) {
+static void switch_off(void) {
+  if (own.state != OFF) {
     two_wire_stop();
     compass_start();
   }
 }
 
+/* Once per tick. */
 void compass_task(void) {
-  compass_state *const self = HAL_NEAR(&own);
-  if (self->reading.age < AGE_NEVER) {
-    self->reading.age++;
+  if (own.reading.age < AGE_NEVER) {
+    own.reading.age++;
   }
-  if (self->wait > 0) {
-    self->wait--;
+  if (own.wait > 0) {
+    own.wait--;
   }
-  if (!parameters_device_on(DEVICES_COMPASS)) {
-    switch_off(self);
+  if (!parameters_device_in_use(DEVICES_COMPASS)) {
+    switch_off();
     return;
   }
-  switch (self->state) {
+  switch (own.state) {
     case OFF:
       two_wire_start();
-      self->state = WAITING;
+      own.state = WAITING;
       break;
     case SETTING:
     case READING:
-      finish(self);
+      finish();
       break;
     case FREEING:
-      free_bus(self);
+      free_bus();
       break;
     default:
       break;
   }
-  if (self->state == WAITING && self->wait == 0) {
-    self->wait = PERIOD;
-    begin(self);
+  if (own.state == WAITING && own.wait == 0) {
+    own.wait = PERIOD;
+    begin();
   }
 }
 

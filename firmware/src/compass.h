@@ -19,9 +19,6 @@ typedef struct {
 
 void compass_start(void);
 
-/* Once per tick. */
-void compass_task(void) __attribute__((noinline));
-
 const compass_reading *compass_read(void);
 
 #ifdef __cplusplus

@@ -1,17 +1,18 @@
-/* encoder.h: wheel encoders on pin-change interrupts: counts of edges and the time between the last two.
+/* encoder.h: wheel encoders: counts of edges and the time between the last two (notes, section 1.4).
  *
  * One line per wheel counts up whatever the direction; two lines (ENCODER_LINES 2) count down when the wheel turns
  * backward. Forward is A leading B: (A, B) runs 00, 10, 11, 01. The pin map says which it is.
- * A line that fires more often in a tick than the parameter encoder_limit allows, or whose changes come back to back
- * (hal.h), is masked until the next tick; so are all lines when the noise cannot be told to be one line's. What a masked
- * line did is not known: it gives no period, neither then nor across the gap. */
+ *
+ * A sensor may bounce: an edge that comes sooner after the line's last one than the parameter encoder_gap does not count, nor
+ * does one that only brings the line back to where it was. Speed is the time between edges that count.
+ * A line that fires more often in a tick than the parameter encoder_limit allows, or that is found to be noise
+ * (pin_changes.h), is masked until the next tick. What it did meanwhile is not known: it gives no period, neither then nor
+ * across the gap. */
 #ifndef ENCODER_H
 #define ENCODER_H
 
 #include <stdbool.h>
 #include <stdint.h>
-
-#include "hal/hal.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -23,48 +24,30 @@ typedef struct {
   bool masked;     /* a line of this wheel was masked in the tick that ended */
 } encoder_reading;
 
+#define ENCODER_TIME_UNIT 256u /* cycles in 16 us */
+
 void encoder_start(void);
 
-/* Works off the changes that the interrupt has stamped. Whenever it is due. */
-void encoder_poll(void) __attribute__((noinline));
+/* The pins of port C that count now. */
+uint8_t encoder_pins(void);
 
-/* The same, and tells from the clock when the edges were: before its 16 bits roll over (4 ms), that is before the tasks of
- * each slot. */
-void encoder_update(void) __attribute__((noinline));
+/* Of these, `changed` have changed at `time`, in 16 us modulo 2^16, and `bits` are the levels of the port. Main loop only. */
+void encoder_on_change(uint8_t changed, uint8_t bits, uint16_t time);
 
-/* Not 0 if changes have piled up to an eighth of the ring, or were stopped. */
-#define ENCODER_DUE_BYTES 0x20u
-static inline __attribute__((always_inline)) uint8_t encoder_due(void) {
-  return (uint8_t)(hal_changes_stopped() |
-                   ((uint8_t)(hal_changes_head - hal_changes_tail) & (uint8_t) ~(ENCODER_DUE_BYTES - 1u)));
-}
+/* These pins count from now on, from these levels. */
+void encoder_set_levels(uint8_t pins, uint8_t bits);
 
-/* Once per tick, after encoder_update(): closes the tick's readings of what that has worked off, and lifts masks. */
-void encoder_task(void) __attribute__((noinline));
+/* The times of this tick's edges are not known: it gives no period. */
+void encoder_lose_time(void);
+
+/* These pins are noise: masked until the next tick. */
+void encoder_mask(uint8_t pins);
+
+/* A tick begins: all pins count again. Once, before encoder_task(), which tells what was masked. */
+void encoder_lift_masks(void);
 
 /* The reading at the start of this tick. */
 const encoder_reading *encoder_read(uint8_t side);
-
-/* Change of the count for one step of two lines, each (A << 1 | B): forward while the new B is the old A. 0 also where
- * both changed, which tells nothing. */
-static inline int8_t encoder_quadrature_step(uint8_t from, uint8_t to) {
-  const uint8_t changed = from ^ to;
-  if (changed != 1u && changed != 2u) {
-    return 0;
-  }
-  return (from >> 1) == (to & 1u) ? 1 : -1;
-}
-
-/* The next fall of the left light sensor's line, which is on the same port, is stamped, once; it is high now. Noise that
- * stops the interrupt ends the waiting. */
-void encoder_await_other(void);
-void encoder_forget_other(void);
-
-/* Whether it is still awaited, or has come and encoder_update() has not; whether it has come, and when: as
- * schedule_now(). */
-bool encoder_awaits_other(void);
-bool encoder_saw_other(void);
-uint32_t encoder_other_edge(void);
 
 #ifdef __cplusplus
 }

@@ -5,13 +5,15 @@
 #include "buzzer.h"
 #include "compass.h"
 #include "encoder.h"
+#include "events.h"
+#include "fallback.h"
 #include "hal/hal.h"
 #include "infrared.h"
 #include "light.h"
 #include "link/identity.h"
 #include "link/link.h"
-#include "link/parameters.h"
-#include "motion.h"
+#include "parameters.h"
+#include "pin_changes.h"
 #include "ping.h"
 #include "reset.h"
 #include "safety.h"
@@ -19,26 +21,35 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
+#include "turret.h"
 #include "whisker.h"
 
+/* First the pins, so that no servo moves by a floating line; the image's hash, which takes 0.1 s, comes after them. */
 void firmware_start(void) {
-  reset_start();
-  identity_start();
-  storage_start();
-  parameters_start();
-  motion_use_parameters();
   servo_start();
+  HAL_PIN_PULL_UP(UART_RECEIVE); /* the line is high while nobody speaks */
+  HAL_PIN_PULL_UP(UART_TRANSMIT);
   encoder_start();
   whisker_start();
   infrared_start();
   ping_start();
-  supply_start();
-  analog_start();
   light_start();
   compass_start();
   buzzer_start();
+  turret_start();
+  analog_start_pins();
+  reset_start();
+  storage_start();
+  parameters_reset();
+  storage_load_parameters();
+  events_start();
+  pin_changes_start();
+  supply_start();
+  analog_start();
   schedule_start(0);
   safety_start();
+  fallback_start();
+  identity_start();
   const uint16_t baud = parameters_u16(PARAMETER_BAUD_RATE); /* in 100 bit/s; a change counts from the next start on */
   hal_start_serial(baud);
   link_start(baud);
@@ -50,11 +61,11 @@ void firmware_start(void) {
 void firmware_poll(void) {
   if (schedule_waiting() != 0) {
     schedule_poll();
-  } else if (encoder_due() != 0) {
-    encoder_poll();
-  } else {
-    link_poll();
+    return;
   }
+  pin_changes_poll();
+  link_poll();
 }
 
-bool firmware_due(void) { return schedule_waiting() != 0 || encoder_due() != 0 || link_due(); }
+/* Asked after each interrupt that ends the sleep, so it is quick. */
+uint8_t firmware_due(void) { return schedule_waiting() | pin_changes_due() | link_due(); }

@@ -2,7 +2,7 @@
 #ifndef FIRMWARE_H
 #define FIRMWARE_H
 
-#include <stdbool.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -13,12 +13,12 @@ extern "C" {
 /* Brings up board, devices and link, says hello, and starts the slots. */
 void firmware_start(void);
 
-/* Does one thing that is due, and returns: a slot's tasks; if no slot waits, the encoders' changes; if none of these do, one
- * received frame. So a frame delays a slot once at most, and waits while slots do. */
+/* Does what is due: a slot's tasks; if no slot waits, the changes of pins and one received frame. So a frame delays a slot
+ * once at most, and waits while slots do. */
 void firmware_poll(void);
 
-/* Whether there is something for firmware_poll() to do. */
-bool firmware_due(void);
+/* Not 0: there is something for firmware_poll() to do. */
+uint8_t firmware_due(void);
 
 #ifdef __cplusplus
 }

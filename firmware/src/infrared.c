@@ -3,13 +3,14 @@
 
 #include <stdbool.h>
 
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "hal/interrupts.h"
+#include "parameters.h"
 #include "schedule.h"
+#include "tasks.h"
 
-#define BURST_CYCLES 16000u /* 1 ms */
+#define BURST_TOGGLES 76u /* 1 ms at 38 kHz */
 
 /* Half a period in cycles: 37.91, 39.02, 40.00, 41.03, 42.11 kHz. */
 #define BANDS 5u
@@ -18,19 +19,16 @@ static const uint8_t half_periods[BANDS] = {211, 205, 200, 195, 190};
 
 typedef struct {
   /* Shared with the interrupts; single bytes. */
-  volatile bool armed;    /* this tick shall have bursts */
-  volatile bool finished; /* both sides were read since the last look */
-  volatile uint8_t seen;  /* what the bursts of this tick found */
-  volatile uint8_t band;  /* frequency of this tick's bursts; changed between ticks with bursts only */
-
-  /* Interrupts only. */
-  bool started;   /* this tick's left burst was made: the right one follows */
-  uint8_t active; /* the side whose LED is on */
+  volatile bool armed;   /* this tick shall have bursts */
+  volatile bool started; /* it has them, or had them: until the next tick's task has looked */
+  volatile uint8_t band; /* their frequency; changed between ticks with bursts only */
+  volatile uint8_t dark; /* receivers that saw nothing before the burst of their side; INFRARED_... bits */
 
   /* Main loop only. */
   uint8_t reading;
   uint8_t age;
-  uint8_t wait; /* ticks until the next reading */
+  uint8_t wait;      /* ticks until the next reading */
+  bool is_connected; /* the board drives the LEDs' lines */
   bool sweeping;
   uint8_t counts[SIDES]; /* frequencies of the sweep at which an object was seen so far, */
   uint8_t zones[SIDES];  /* and in the last whole one */
@@ -39,111 +37,115 @@ typedef struct {
 
 static infrared_state own;
 
-void infrared_start(void) {
-  HAL_PIN_LOW(INFRARED_LEFT_LED);
-  HAL_PIN_LOW(INFRARED_RIGHT_LED);
-  HAL_PIN_OUTPUT(INFRARED_LEFT_LED);
-  HAL_PIN_OUTPUT(INFRARED_RIGHT_LED);
-  HAL_PIN_INPUT(INFRARED_LEFT_RECEIVER);
-  HAL_PIN_INPUT(INFRARED_RIGHT_RECEIVER);
-  HAL_ZERO(own.armed);
-  HAL_ZERO(own.started);
-  HAL_ZERO(own.finished);
-  HAL_ZERO(own.seen);
-  HAL_ZERO(own.reading);
-  own.age = AGE_NEVER;
-  HAL_ZERO(own.wait);
-  HAL_ZERO(own.band);
-  HAL_ZERO(own.sweeping);
-  own.zone_age = AGE_NEVER;
+/* Not while there are bursts, which toggle the lines. */
+static void connect_leds(bool connected) {
+  if (connected) {
+    HAL_PIN_LOW(INFRARED_LEFT_LED);
+    HAL_PIN_LOW(INFRARED_RIGHT_LED);
+    HAL_PIN_OUTPUT(INFRARED_LEFT_LED);
+    HAL_PIN_OUTPUT(INFRARED_RIGHT_LED);
+  } else {
+    HAL_PIN_PULL_UP(INFRARED_LEFT_LED);
+    HAL_PIN_PULL_UP(INFRARED_RIGHT_LED);
+  }
+  own.is_connected = connected;
 }
 
-void infrared_begin(uint8_t side, uint16_t start) {
-  if (side == LEFT) {
-    own.started = own.armed;
+void infrared_start(void) {
+  HAL_PIN_PULL_UP(INFRARED_LEFT_RECEIVER);
+  HAL_PIN_PULL_UP(INFRARED_RIGHT_RECEIVER);
+  own = (infrared_state){.age = AGE_NEVER, .zone_age = AGE_NEVER};
+  connect_leds(false);
+}
+
+/* The receivers whose output is high, INFRARED_... bits: they see nothing. */
+static uint8_t dark(void) {
+  return (uint8_t)((HAL_PIN_READ(INFRARED_LEFT_RECEIVER) != 0 ? INFRARED_LEFT : 0u) |
+                   (HAL_PIN_READ(INFRARED_RIGHT_RECEIVER) != 0 ? INFRARED_RIGHT : 0u));
+}
+
+void infrared_begin(uint8_t side) {
+  if (side == LEFT && own.armed) {
+    own.started = true;
     own.armed = false;
   }
-  if (!own.started) {
-    return;
+  if (own.started) {
+    const uint8_t own_bit = side == LEFT ? INFRARED_LEFT : INFRARED_RIGHT;
+    own.dark = (uint8_t)((own.dark & (uint8_t)~own_bit) | (dark() & own_bit));
+    hal_burst_start(side, half_periods[own.band], BURST_TOGGLES);
   }
-  own.active = side;
-  hal_carrier_start(side, half_periods[own.band]);
-  hal_edge_arm_plain((uint16_t)(start + BURST_CYCLES));
 }
 
-void infrared_end(void) {
-  hal_edge_disarm();
-  if (own.active == LEFT) {
-    own.seen = HAL_PIN_READ(INFRARED_LEFT_RECEIVER) == 0 ? (uint8_t)INFRARED_LEFT : 0u;
-    hal_carrier_stop();
-  } else {
-    if (HAL_PIN_READ(INFRARED_RIGHT_RECEIVER) == 0) {
-      own.seen |= (uint8_t)INFRARED_RIGHT;
-    }
-    hal_carrier_stop();
-    own.finished = true;
-  }
+static uint8_t seen(void) {
+  const uint8_t bits =
+      (uint8_t)((hal_burst_seen(LEFT) ? INFRARED_LEFT : 0u) | (hal_burst_seen(RIGHT) ? INFRARED_RIGHT : 0u));
+  return bits & own.dark;
 }
 
 /* What a tick's bursts found: at 38 kHz the reading, in a sweep a part of the zones as well. */
-static void take(infrared_state *self) {
-  if (self->band == 0) {
-    self->reading = self->seen;
-    self->age = 0;
-    self->counts[LEFT] = self->counts[RIGHT] = 0;
+static void take(uint8_t seen_now) {
+  if (own.band == 0) {
+    own.reading = seen_now;
+    own.age = 0;
+    own.counts[LEFT] = own.counts[RIGHT] = 0;
   }
-  if (!self->sweeping) {
+  if (!own.sweeping) {
     return;
   }
-  self->counts[LEFT] = (uint8_t)(self->counts[LEFT] + ((self->seen & INFRARED_LEFT) != 0));
-  self->counts[RIGHT] = (uint8_t)(self->counts[RIGHT] + ((self->seen & INFRARED_RIGHT) != 0));
-  self->band++;
-  if (self->band == BANDS) {
-    self->band = 0;
-    self->zones[LEFT] = self->counts[LEFT];
-    self->zones[RIGHT] = self->counts[RIGHT];
-    self->zone_age = 0;
+  own.counts[LEFT] = (uint8_t)(own.counts[LEFT] + ((seen_now & INFRARED_LEFT) != 0));
+  own.counts[RIGHT] = (uint8_t)(own.counts[RIGHT] + ((seen_now & INFRARED_RIGHT) != 0));
+  own.band++;
+  if (own.band == BANDS) {
+    own.band = 0;
+    own.zones[LEFT] = own.counts[LEFT];
+    own.zones[RIGHT] = own.counts[RIGHT];
+    own.zone_age = 0;
   }
 }
 
-static void forget_sweep(infrared_state *self) {
-  self->sweeping = false;
-  self->band = 0;
-  self->zones[LEFT] = self->zones[RIGHT] = 0;
-  self->zone_age = AGE_NEVER;
+static void forget_sweep(void) {
+  own.sweeping = false;
+  own.band = 0;
+  own.zones[LEFT] = own.zones[RIGHT] = 0;
+  own.zone_age = AGE_NEVER;
 }
 
+/* Once per tick: takes over what the last burst found, and decides whether this tick has one. */
 void infrared_task(void) {
-  infrared_state *const self = HAL_NEAR(&own);
-  if (self->finished) {
-    self->finished = false;
-    take(self);
+  const bool had_bursts = own.started; /* in the tick before */
+  if (had_bursts) {
+    own.started = false;
+    take(seen());
   }
-  if (self->age < AGE_NEVER) {
-    self->age++;
+  if (own.age < AGE_NEVER) {
+    own.age++;
   }
-  if (self->zone_age < AGE_NEVER) {
-    self->zone_age++;
+  if (own.zone_age < AGE_NEVER) {
+    own.zone_age++;
   }
-  if (self->wait > 0) {
-    self->wait--;
+  if (own.wait > 0) {
+    own.wait--;
   }
-  if (parameters_device_on(DEVICES_INFRARED)) {
+  const bool in_use = parameters_device_in_use(DEVICES_INFRARED);
+  if (in_use != own.is_connected && !had_bursts) {
+    connect_leds(in_use);
+  }
+  if (in_use && own.is_connected) {
     if (parameters_u16(PARAMETER_INFRARED_SWEEP) == 0) {
-      forget_sweep(self);
+      forget_sweep();
     }
-    if (self->band != 0) { /* the sweep goes on */
-      self->armed = true;
-    } else if (self->wait == 0) {
-      self->sweeping = parameters_u16(PARAMETER_INFRARED_SWEEP) != 0;
-      self->wait = (uint8_t)parameters_u16(PARAMETER_INFRARED_PERIOD);
-      self->armed = true;
+    if (own.band != 0) { /* the sweep goes on */
+      own.armed = true;
+    } else if (own.wait == 0) {
+      own.sweeping = parameters_u16(PARAMETER_INFRARED_SWEEP) != 0;
+      own.wait = (uint8_t)parameters_u16(PARAMETER_INFRARED_PERIOD);
+      own.armed = true;
     }
   } else {
-    self->armed = false;
-    self->reading = 0;
-    self->age = AGE_NEVER;
-    forget_sweep(self);
+    own.armed = false;
+    own.reading = 0;
+    own.age = AGE_NEVER;
+    forget_sweep();
   }
 }
 

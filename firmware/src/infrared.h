@@ -1,6 +1,7 @@
 /* infrared.h: the two IR pairs. Every infrared_period ticks each LED gives a 1 ms burst of 38 kHz, left in the third
  * slot of the tick and right in the fourth; at its end the receiver is sampled: its output is low when an object
- * reflects the burst.
+ * reflects the burst. A receiver that was low before the burst
+ * is stuck, or sees somebody else's light: it shows no object.
  *
  * With the parameter infrared_sweep on, the bursts of four more ticks follow at 39, 40, 41 and 42 kHz, at which the receiver
  * is less and less sensitive: the nearer the object, the more of the five show it. Their number is the zone, 0 to 5. */
@@ -15,9 +16,6 @@ extern "C" {
 
 void infrared_start(void);
 
-/* Once per tick: takes over what the last burst found, and decides whether this tick has one. */
-void infrared_task(void) __attribute__((noinline));
-
 /* INFRARED_... bits of the last reading. */
 uint8_t infrared_read(void);
 
@@ -28,9 +26,8 @@ uint8_t infrared_age(void);
 uint8_t infrared_zone(uint8_t side);
 uint8_t infrared_zone_age(void);
 
-/* Interrupt context: a side's slot begins at hal_time() `start`; its burst is to end. */
-void infrared_begin(uint8_t side, uint16_t start);
-void infrared_end(void);
+/* In an interrupt: a side's slot begins. */
+void infrared_begin(uint8_t side);
 
 #ifdef __cplusplus
 }

@@ -3,47 +3,82 @@
 
 #include <stdbool.h>
 
-#include "encoder.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "hal/interrupts.h"
+#include "parameters.h"
 #include "schedule.h"
+#include "tasks.h"
 
-#ifdef PIN_LIGHT_LEFT
+#if defined(PIN_LIGHT_LEFT) && !defined(LIGHT_LEFT_IS_CAPTURED)
+#define LEFT_BIT HAL_PIN_BIT(LIGHT_LEFT)
 _Static_assert(PIN_LIGHT_LEFT >= 14, "the left light sensor's edge is stamped with the encoders', on port C");
+#else
+#define LEFT_BIT ((uint8_t)0) /* none, or the timer captures its edge */
 #endif
 _Static_assert(PIN_LIGHT_RIGHT < 8, "the right light sensor's edge is stamped by port D");
 
-#define SLOTS_PER_FRAME 8u
-enum { CHARGE = 7, RELEASE = 0, COLLECT = 6 }; /* slots of a frame */
+enum { CHARGE = 7, RELEASE = 0, COLLECT = 6 }; /* slots of a servo frame */
 _Static_assert((COLLECT - RELEASE) * (uint32_t)HAL_SLOT_CYCLES >= (LIGHT_LONGEST + 1000u) * (uint32_t)HAL_CYCLES_PER_US,
                "time to decay, however late in its slot the release");
 
 #define AGE_NEVER 255u
 
-enum { IDLE, CHARGING, DECAYING };
-static uint8_t state;
-static uint32_t released_at[SIDES]; /* schedule_now() */
+static enum { IDLE, CHARGING, DECAYING } state;
+static uint32_t released[SIDES]; /* schedule_now() */
+static uint32_t edge[SIDES];     /* the same of the fall */
+static volatile bool has_fallen[SIDES];
 static uint16_t readings[SIDES];
 static uint8_t age;
 
-/* Inputs without pull-up: nothing flows but through the phototransistor. */
 static void let_go(void) {
-  hal_stamp_disarm();
-#ifdef PIN_LIGHT_LEFT
-  encoder_forget_other();
-  HAL_PIN_INPUT(LIGHT_LEFT);
+  hal_watch_port_d(0);
+#ifdef LIGHT_LEFT_IS_CAPTURED
+  hal_capture_stop();
 #endif
-  HAL_PIN_INPUT(LIGHT_RIGHT);
+#ifdef PIN_LIGHT_LEFT
+  HAL_PIN_PULL_UP(LIGHT_LEFT);
+#endif
+  HAL_PIN_PULL_UP(LIGHT_RIGHT);
   state = IDLE;
 }
 
 void light_start(void) {
   let_go();
-  HAL_ZERO(readings[LEFT]);
-  HAL_ZERO(readings[RIGHT]);
+  readings[LEFT] = readings[RIGHT] = 0;
   age = AGE_NEVER;
+}
+
+uint8_t light_pins(void) {
+  if (state == IDLE || has_fallen[LEFT]) {
+    return 0;
+  }
+  return LEFT_BIT;
+}
+
+void light_on_pin_change(uint8_t bits, uint32_t time) {
+  if (state == DECAYING && (bits & LEFT_BIT) == 0) {
+    edge[LEFT] = time;
+    has_fallen[LEFT] = true;
+  }
+}
+
+void light_on_left_fall(uint16_t time) {
+  edge[LEFT] = schedule_cycles_at(time);
+  has_fallen[LEFT] = true;
+  hal_capture_stop();
+}
+
+void light_mask(uint8_t pins) {
+  if ((pins & LEFT_BIT) != 0) {
+    let_go();
+  }
+}
+
+void light_on_change(uint16_t time) {
+  edge[RIGHT] = schedule_cycles_at(time);
+  has_fallen[RIGHT] = true;
+  hal_watch_port_d(0);
 }
 
 static void charge(void) {
@@ -53,38 +88,42 @@ static void charge(void) {
 #endif
   HAL_PIN_HIGH(LIGHT_RIGHT);
   HAL_PIN_OUTPUT(LIGHT_RIGHT);
+  has_fallen[LEFT] = has_fallen[RIGHT] = false;
   state = CHARGING;
 }
 
+/* Inputs without pull-up: nothing flows but through the phototransistor. */
 static void release(void) {
+#ifdef LIGHT_LEFT_IS_CAPTURED
+  HAL_ATOMIC { hal_capture_start_falling(); }
+#endif
 #ifdef PIN_LIGHT_LEFT
-  encoder_await_other();
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_LEFT);
-    released_at[LEFT] = schedule_now();
+    released[LEFT] = schedule_now();
   }
 #endif
-  hal_stamp_arm(HAL_PIN_BIT(LIGHT_RIGHT));
+  hal_watch_port_d(HAL_PIN_BIT(LIGHT_RIGHT));
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_RIGHT);
-    released_at[RIGHT] = schedule_now();
+    released[RIGHT] = schedule_now();
   }
   state = DECAYING;
 }
 
-/* Time from the release to the edge in us. */
-static uint16_t decay_time(uint8_t side, uint32_t edge) {
-  const uint32_t us = (edge - released_at[side]) / HAL_CYCLES_PER_US; /* a shift */
+/* Decay time in us. Without an edge the line is still high, or it is low and the edge was not seen. */
+static uint16_t decay_time(uint8_t side, uint8_t level) {
+  if (!has_fallen[side]) {
+    return level != 0 ? LIGHT_LONGEST : 0u;
+  }
+  const uint32_t us = (edge[side] - released[side]) / HAL_CYCLES_PER_US;
   return us == 0 ? 1u : us > LIGHT_LONGEST ? LIGHT_LONGEST : (uint16_t)us;
 }
 
-/* Without an edge: still high, or low and the edge was not seen. */
-static uint16_t without_edge(uint8_t level) { return level != 0 ? LIGHT_LONGEST : 0u; }
-
-/* Whether the left edge is among the encoders' changes that are still to be worked off: the pin is low. */
+/* Whether the left edge is among the changes that are still to be worked off: the pin is low. */
 static bool must_wait(void) {
 #ifdef PIN_LIGHT_LEFT
-  return encoder_awaits_other() && HAL_PIN_READ(LIGHT_LEFT) == 0;
+  return LEFT_BIT != 0 && !has_fallen[LEFT] && HAL_PIN_READ(LIGHT_LEFT) == 0;
 #else
   return false;
 #endif
@@ -92,21 +131,20 @@ static bool must_wait(void) {
 
 static void collect(void) {
 #ifdef PIN_LIGHT_LEFT
-  readings[LEFT] =
-      encoder_saw_other() ? decay_time(LEFT, encoder_other_edge()) : without_edge(HAL_PIN_READ(LIGHT_LEFT));
+  readings[LEFT] = decay_time(LEFT, HAL_PIN_READ(LIGHT_LEFT));
 #endif
-  readings[RIGHT] = hal_stamp_awaited() ? without_edge(HAL_PIN_READ(LIGHT_RIGHT))
-                                        : decay_time(RIGHT, schedule_cycles_at(hal_stamp_slot, hal_stamp_time));
+  readings[RIGHT] = decay_time(RIGHT, HAL_PIN_READ(LIGHT_RIGHT));
   age = 0;
   let_go();
 }
 
+/* In every slot. */
 void light_task(void) {
-  const uint8_t slot = schedule_next_slot % SLOTS_PER_FRAME;
-  if (slot % SCHEDULE_SLOTS_PER_TICK == 0 && age < AGE_NEVER) {
+  const uint8_t slot = schedule_frame_slot();
+  if (schedule_tick_begins() && age < AGE_NEVER) {
     age++;
   }
-  if (!parameters_device_on(DEVICES_LIGHT)) {
+  if (!parameters_device_in_use(DEVICES_LIGHT)) {
     if (state != IDLE) {
       let_go();
     }

@@ -2,8 +2,8 @@
  * Education Shield, chapter 6): charge for a slot, let go, and take the time until the input reads low: the brighter, the
  * shorter. Both sides at once, once in each servo frame (20 ms): charged in its last slot, let go in its first.
  *
- * Nothing waits for the edge: the right line's is stamped by the pin change of port D, the left one's by the encoders' pin
- * change of port C, which sees that line during the measurement only. */
+ * Nothing waits for the edge: the left line's is stamped with the changes of port C (pin_changes.h), the right one's by the
+ * pin change of port D. */
 #ifndef LIGHT_H
 #define LIGHT_H
 
@@ -17,8 +17,14 @@ extern "C" {
 
 void light_start(void);
 
-/* In every slot. */
-void light_task(void) __attribute__((noinline));
+/* The pin of port C whose changes are wanted now; 0: none. */
+uint8_t light_pins(void);
+
+/* It has changed at schedule_now() `time`; `bits` are the levels of the port. Main loop only. */
+void light_on_pin_change(uint8_t bits, uint32_t time);
+
+/* These pins are noise: their edge is awaited no more. */
+void light_mask(uint8_t pins);
 
 /* Decay time of a side in us, 1 to LIGHT_LONGEST (so long or longer); 0: none, or no sensor. */
 uint16_t light_read(uint8_t side);

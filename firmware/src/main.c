@@ -1,4 +1,4 @@
-/* main.c: start, then do what is due and sleep until the next interrupt. */
+/* main.c: start, then do what is due and sleep until an interrupt has more. */
 #include "firmware.h"
 #include "hal/hal.h"
 
@@ -6,6 +6,12 @@ int main(void) {
   firmware_start();
   for (;;) {
     firmware_poll();
-    hal_sleep_until(firmware_due);
+    if (hal_sleeps()) {
+      cli(); /* so that nothing becomes due between the question and the sleep */
+      while (firmware_due() == 0) {
+        hal_sleep();
+      }
+      sei();
+    }
   }
 }

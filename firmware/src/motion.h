@@ -17,22 +17,16 @@ extern "C" {
 #define MOTION_PULSE_MIN 20800u /* 1300 us in cycles */
 #define MOTION_PULSE_MAX 27200u /* 1700 us */
 
-/* gain * signal / 10000, to 0.6 of a count; |gain| and |signal| up to 16000. */
-int32_t motion_offset(int16_t gain, int16_t signal);
+/* gain * part / full, rounded to nearest. full > 0 */
+int32_t motion_offset(int16_t gain, int16_t part, int16_t full);
 
-/* The pulse of one wheel in cycles, to 0.6 of a cycle. centre and gain (-3200..3200) in cycles, signal in 1/10000. */
-uint16_t motion_pulse(int32_t centre, int16_t gain, int16_t signal);
+/* The pulse of one wheel in cycles, for `part` of `full` speed. centre and gain (-3200..3200) in cycles */
+uint16_t motion_pulse(uint16_t centre, int16_t gain, int16_t part, int16_t full);
 
-/* The signal in 1/10000 for a speed; both speeds in the same unit, maximum > 0. */
-int16_t motion_signal_of_speed(int16_t speed, int16_t maximum);
-
-/* What set-points of speeds are turned into follows the parameters as they are now: at the start, and when they have
- * changed. */
-void motion_use_parameters(void);
-
-/* Set-points into pulses. */
+/* Set-points into pulses: signals in 1/10000, speeds in 1/10000 m/s. */
 void motion_signals(int16_t left, int16_t right);
 void motion_speeds(int16_t left, int16_t right);
+void motion_eighths(int8_t left, int8_t right); /* of a full signal, -8..8 */
 
 /* No pulses. */
 void motion_off(void);

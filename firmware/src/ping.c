@@ -3,98 +3,182 @@
 
 #include <stdbool.h>
 
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "hal/interrupts.h"
+#include "parameters.h"
 #include "schedule.h"
+#include "tasks.h"
 
+#define GIVE_UP_TICKS 2u /* 20 ms after the trigger: the sensor ends its pulse 19.3 ms after it at the latest */
+#define AGE_NEVER 255u
+#define AGE_UNIT 256u /* cycles; a tick has TICK_UNITS of them, so that 16 bits are divided */
+#define TICK_UNITS ((uint16_t)(HAL_SLOT_CYCLES * (uint32_t)SCHEDULE_SLOTS_PER_TICK / AGE_UNIT))
+/* The sensor raises the line 750 us after the trigger; an edge well before or after that is noise. */
+#define HOLD_OFF_MIN (735u * HAL_CYCLES_PER_US)
+#define HOLD_OFF_MAX (1500u * HAL_CYCLES_PER_US)
+#define NOISE_MAX 10u   /* such edges: then no other is waited for */
+#define ECHO_MIN 100u   /* us; the sensor's shortest echo is 115 us */
+#define ECHO_MAX 18300u /* us; without an echo its pulse lasts 18.5 ms */
+
+/* Shared with the capture's interrupt, which only stamps; the stamps are settled when the state is ENDED or CUT. */
+enum { IDLE, RISING, FALLING, ENDED, CUT }; /* what is awaited; CUT: the pulse had ended before that was awaited */
+static volatile uint8_t state;
+static uint16_t triggered, rise, fall;  /* hal_time() */
+static uint8_t trigger_slot, rise_slot; /* schedule_slot then */
+static uint32_t fall_slot_cycles;       /* schedule_slot_cycles then */
+static uint8_t noise_left;              /* edges at other times than the sensor's that are still taken */
+
+static uint32_t triggered_cycles; /* schedule_now() */
+static uint8_t status;
+static uint16_t echo;
+static uint8_t age;
+static uint8_t since_trigger; /* ticks, saturating */
+static bool is_held_low;
+
+#ifdef PIN_PING
 _Static_assert(PIN_PING == 8, "the timer captures on pin 8");
 
-#define GIVE_UP_TICKS 2u /* 20 ms after the trigger */
-#define AGE_NEVER 255u
-#define ECHO_MIN 100u /* us; the sensor's shortest echo is 115 us, what is shorter is noise */
-
-enum { IDLE, RISING, FALLING, ENDED }; /* what is awaited */
-
-typedef struct {
-  uint16_t echo;
-  uint8_t age;
-  uint8_t since_trigger; /* ticks, saturating */
-} ping_state;
-
-static ping_state own;             /* the main loop's only */
-static volatile uint8_t state;     /* shared with the capture interrupt */
-static schedule_moment rise, fall; /* its stamps, settled when the state is ENDED */
-
-void ping_start(void) {
-  ping_state *const self = HAL_NEAR(&own);
-  HAL_PIN_INPUT(PING);
-  hal_capture_stop();
-  HAL_ZERO(state);
-  HAL_ZERO(self->echo);
-  self->age = AGE_NEVER;
-  self->since_trigger = 255;
+static void pull_up(void) {
+  HAL_PIN_PULL_UP(PING);
+  is_held_low = false;
 }
 
-HAL_INTERRUPT_CAPTURE {
-  const schedule_moment now = schedule_moment_at(hal_capture_time());
-  if (state == RISING) {
-    rise = now;
-    state = FALLING;
-    hal_capture_falling();
-  } else {
-    fall = now;
+static void hold_low(void) {
+  HAL_PIN_LOW(PING);
+  HAL_PIN_OUTPUT(PING);
+  is_held_low = true;
+}
+
+static bool is_low(void) { return HAL_PIN_READ(PING) == 0; }
+#else /* a map without a Ping, which cannot be switched on */
+static void pull_up(void) {}
+static void hold_low(void) {}
+static bool is_low(void) { return false; }
+#endif
+
+void ping_start(void) {
+  pull_up();
+  hal_capture_stop();
+  state = IDLE;
+  status = PING_STATUS_OFF;
+  echo = 0;
+  age = AGE_NEVER;
+  since_trigger = 255;
+}
+
+void ping_on_edge(uint16_t time) {
+  if (state == FALLING) {
+    fall = time;
+    fall_slot_cycles = schedule_slot_cycles;
     state = ENDED;
     hal_capture_stop();
+  } else if ((uint16_t)(time - triggered - HOLD_OFF_MIN) <= HOLD_OFF_MAX - HOLD_OFF_MIN) {
+    rise = time;
+    rise_slot = schedule_slot;
+    hal_capture_falling();
+    state = FALLING;
+    if (is_low()) {
+      state = CUT;
+      hal_capture_stop();
+    }
+  } else if (--noise_left == 0) {
+    hal_capture_stop();
   }
-  hal_serial_look();
+}
+
+static void tell(uint8_t what, uint16_t us) {
+  status = what;
+  echo = us;
+  state = IDLE;
+}
+
+/* The pulse has ended. The stamps of 16 bits roll over after 4 ms: a rise in a later slot than the trigger's or the next was
+ * none of the sensor's. */
+static void take(void) {
+  if ((uint8_t)(rise_slot - trigger_slot) > 1u) {
+    age = 0;
+    tell(PING_STATUS_ABSENT, 0);
+    return;
+  }
+  const uint32_t up = triggered_cycles + (uint16_t)(rise - triggered);
+  const uint32_t down = state == CUT ? up : schedule_cycles_in(fall_slot_cycles, fall);
+  const uint32_t us = (down - up + HAL_CYCLES_PER_US / 2u) / HAL_CYCLES_PER_US;
+  age = (uint8_t)((uint16_t)((schedule_now() - down) / AGE_UNIT) / TICK_UNITS);
+  if (us < ECHO_MIN) {
+    tell(PING_STATUS_TOO_NEAR, 0);
+  } else if (us > ECHO_MAX) {
+    tell(PING_STATUS_NOTHING_NEAR, 0);
+  } else {
+    tell(PING_STATUS_OK, (uint16_t)us);
+  }
 }
 
 void ping_collect(void) {
-  ping_state *const self = HAL_NEAR(&own);
-  if (self->age < AGE_NEVER) {
-    self->age++;
+  if (state >= ENDED) {
+    take();
   }
-  if (state == ENDED) {
-    state = IDLE;
-    self->echo =
-        (uint16_t)((uint32_t)(schedule_between(rise, fall) + (int32_t)HAL_CYCLES_PER_US / 2) / HAL_CYCLES_PER_US);
-    if (self->echo < ECHO_MIN) {
-      self->echo = 0;
-    }
-    /* Whole ticks between the tick in which it ended and this one. */
-    self->age = (uint8_t)((uint8_t)((uint8_t)schedule_tick() - fall.slot / SCHEDULE_SLOTS_PER_TICK) % 64u);
+  if (age < AGE_NEVER) {
+    age++;
   }
-  if (!parameters_device_on(DEVICES_PING)) {
-    self->echo = 0;
-    self->age = AGE_NEVER;
+  if (!parameters_device_in_use(DEVICES_PING)) {
+    status = PING_STATUS_OFF;
+    echo = 0;
+    age = AGE_NEVER;
   }
 }
 
-void ping_task(void) {
-  ping_state *const self = HAL_NEAR(&own);
-  if (self->since_trigger < 255u) {
-    self->since_trigger++;
-  }
-  if ((state == RISING || state == FALLING) && self->since_trigger >= GIVE_UP_TICKS) {
-    HAL_ATOMIC {
-      if (state != ENDED) {
-        hal_capture_stop();
-        state = IDLE;
-        self->echo = 0;
-        self->age = 0;
-      }
+/* No rising edge has come, or a pulse that does not end. */
+static void give_up(void) {
+  bool is_over = false;
+  HAL_ATOMIC {
+    is_over = state < ENDED;
+    if (is_over) {
+      hal_capture_stop();
+      state = IDLE;
     }
   }
-  if (state == IDLE && parameters_device_on(DEVICES_PING) &&
-      self->since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
-    self->since_trigger = 0;
+  if (is_over) {
+    status = PING_STATUS_ABSENT;
+    echo = 0;
+    age = 0;
+  }
+}
+
+static void trigger(void) {
+  since_trigger = 0;
+  noise_left = NOISE_MAX;
+  is_held_low = false;
+  hal_ping_trigger();
+  HAL_ATOMIC {
+    triggered_cycles = schedule_now();
+    triggered = (uint16_t)triggered_cycles;
+    trigger_slot = schedule_slot;
     state = RISING;
-    hal_ping_trigger();
+    hal_capture_start();
   }
 }
 
-uint16_t ping_echo(void) { return own.echo; }
+/* Once per tick: ends readings and triggers the next one. Nobody else drives the line from 20 ms after a trigger on. */
+void ping_task(void) {
+  if (since_trigger < 255u) {
+    since_trigger++;
+  }
+  const bool is_quiet = since_trigger >= GIVE_UP_TICKS;
+  if ((state == RISING || state == FALLING) && is_quiet) {
+    give_up();
+  }
+  if (!parameters_device_in_use(DEVICES_PING)) {
+    pull_up();
+  } else if (state == IDLE && since_trigger >= (uint8_t)parameters_u16(PARAMETER_PING_PERIOD)) {
+    trigger();
+  } else if (is_quiet && !is_held_low) {
+    hold_low();
+  }
+}
 
-uint8_t ping_age(void) { return own.age; }
+uint8_t ping_status(void) { return status; }
+
+uint16_t ping_echo(void) { return echo; }
+
+uint8_t ping_age(void) { return age; }

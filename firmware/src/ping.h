@@ -1,6 +1,13 @@
-/* ping.h: the Ping))) distance sensor on the input-capture pin. Every ping_period ticks a 5 us trigger; after 750 us the
- * sensor raises the same pin for as long as the sound travels, 115 us to 18.5 ms. Both edges are captured by the timer;
- * without an echo the reading is given up 20 ms after the trigger. What is shorter than any echo counts as none. */
+/* ping.h: the Ping))) distance sensor on the input-capture pin. Every ping_period ticks a 5 us trigger; after a hold-off of
+ * 750 us the sensor raises the same pin for as long as the sound travels, 115 us to 18.5 ms. Both edges are captured by the
+ * timer.
+ *
+ * An edge at another time than the hold-off's end is noise. Without a rising edge, or with a pulse that has not ended 20 ms
+ * after the trigger, the sensor is absent: it ends its pulse after 18.5 ms if it hears nothing. A pulse shorter than any echo,
+ * or that ended before its end was looked for, is one of something too near.
+ *
+ * The board holds the line low between two measurements. While it awaits an echo the line is an input without pull-up, for no
+ * data sheet says what the sensor does to it in the hold-off. */
 #ifndef PING_H
 #define PING_H
 
@@ -12,13 +19,13 @@ extern "C" {
 
 void ping_start(void);
 
-/* Once per tick: ends readings and triggers the next one. */
-void ping_task(void) __attribute__((noinline));
-
-/* Once per tick, before the next two: takes over an echo that has ended. */
+/* Once per tick, before the next three: takes over a measurement that has ended. */
 void ping_collect(void);
 
-/* Length of the last echo in us; 0: none. */
+/* PING_STATUS_... of the last measurement. */
+uint8_t ping_status(void);
+
+/* Length of its echo in us; 0: none. */
 uint16_t ping_echo(void);
 
 /* Ticks since it ended or was given up; 255: never or older. */

@@ -4,9 +4,9 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "bounds.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
+#include "hal/interrupts.h"
 #include "storage.h"
 #include "task_times.h"
 
@@ -39,12 +39,20 @@ static void set_count(uint32_t count) {
   record()->check = check_of(record());
 }
 
+/* Behind a bootloader that has taken the chip's own answer. */
+static uint8_t cause_by_record(const reset_record *of, bool whole) {
+  if (!whole) {
+    return RESET_CAUSE_POWER;
+  }
+  return of->mark == WATCHDOG_MARK ? RESET_CAUSE_WATCHDOG : RESET_CAUSE_EXTERNAL;
+}
+
 void reset_start(void) {
   reset_record *own = record();
   const bool whole = is_whole(own);
   cause = hal_reset_cause();
-  if (cause == RESET_CAUSE_UNKNOWN && whole && own->mark == WATCHDOG_MARK) {
-    cause = RESET_CAUSE_WATCHDOG;
+  if (cause == RESET_CAUSE_UNKNOWN) {
+    cause = cause_by_record(own, whole);
   }
   if (cause == RESET_CAUSE_WATCHDOG && whole && own->running <= TASKS) {
     cause = (uint8_t)(RESET_CAUSE_WATCHDOG + own->running);
@@ -55,7 +63,7 @@ void reset_start(void) {
   set_count(whole ? own->count : hal_memory_noise());
 }
 
-HAL_INTERRUPT_WATCHDOG {
+void reset_on_watchdog(void) {
   record()->mark = WATCHDOG_MARK;
   hal_watchdog_reset();
 }
@@ -71,7 +79,7 @@ uint8_t reset_running(void) { return record()->running; }
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
  * undone. Close numbers come out far apart. */
 static uint32_t mixed(uint32_t x) {
-  BOUNDED(3, for (uint8_t round = 0; round < 3u; round++)) {
+  for (uint8_t round = 0; round < 3u; round++) {
     x = x * 0x0B352Dul & NONCE_MASK;
     x ^= x >> 11;
   }

@@ -4,7 +4,12 @@
  * ends that. Armed, they follow the set-point in force, which lives for its time to live, counted from the start of the
  * tick that it answers; when no newer one came by then, the motors stop until the next (dead-man). However they are
  * stopped, there are no more pulses from the next servo frame on (motion.h); the turret is released and the buzzer silenced
- * with them. */
+ * with them.
+ *
+ * The board's own brain (fallback.h) has a permission of its own. The host gives it by arming; every latch takes it away, but
+ * for one: the session's end by silence, which latches for the host alone. So silence never takes it away, and whatever
+ * somebody or a fault has stopped stays stopped. At start it is given by the parameter fallback_at_start, after power and
+ * the reset button only. A set-point in force comes first: its dead-man stop ends it before the fallback may drive. */
 #ifndef SAFETY_H
 #define SAFETY_H
 
@@ -14,6 +19,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#define SAFETY_TIME_TO_LIVE_MAX 2000u /* ms */
 
 void safety_start(void);
 
@@ -35,6 +42,9 @@ uint8_t safety_setpoint_sequence(void);
  * a stop command is counted all the same. */
 void safety_latch(uint8_t reason);
 
+/* The session has ended because the host was silent: latches the motors, but for the board's own brain. */
+void safety_host_lost(void);
+
 /* Times that the motors were latched off, at start too, modulo 256. */
 uint8_t safety_latches(void);
 
@@ -45,10 +55,13 @@ uint8_t safety_arm(uint8_t latches);
 /* LATCH_..., LATCH_NONE while armed. */
 uint8_t safety_latched(void);
 
-/* In every slot: ends set-points that have outlived themselves, latches when the supply is low. */
-void safety_task(void) __attribute__((noinline));
+/* The board's own brain wants to drive in this tick. If it may, it drives from now on, and the caller sets the motors. */
+bool safety_accept_fallback(void);
 
-/* STATUS_MOTORS_ENABLED, STATUS_DEAD_MAN, STATUS_LATCHED. */
+/* It drives no more: the motors stop, unless they are the host's already. */
+void safety_end_fallback(void);
+
+/* STATUS_MOTORS_ENABLED, STATUS_DEAD_MAN, STATUS_FALLBACK, STATUS_LATCHED. */
 uint16_t safety_status(void);
 
 #ifdef __cplusplus

@@ -1,33 +1,14 @@
 /* schedule.c: slots, tasks and overruns; see schedule.h and tasks.def. */
 #include "schedule.h"
 
-#include "analog.h"
 #include "bounds.h"
-#include "buzzer.h"
-#include "compass.h"
-#include "encoder.h"
-#include "generated/messages.h"
-#include "generated/parameters.h"
+#include "hal/interrupts.h"
 #include "infrared.h"
-#include "light.h"
-#include "link/counters.h"
-#include "link/devices.h"
-#include "link/events.h"
-#include "link/link.h"
-#include "link/requests.h"
-#include "link/session.h"
-#include "link/telemetry.h"
-#include "ping.h"
-#include "pins.h"
-#include "safety.h"
+#include "pin_changes.h"
 #include "servo.h"
-#include "storage.h"
-#include "supply.h"
 #include "task_times.h"
-#include "turret.h"
-#include "whisker.h"
+#include "tasks.h"
 
-#define SLOTS_PER_FRAME 8u
 #define SLOT_US (SCHEDULE_TICK_US / SCHEDULE_SLOTS_PER_TICK)
 #define SLOTS_KEPT (2u * SCHEDULE_SLOTS_PER_TICK) /* that may wait; of more, whole ticks are dropped */
 #define OVERLOAD_TICKS 10u                        /* ticks in a row that overran: the watchdog ends it */
@@ -39,44 +20,25 @@ _Static_assert(HAL_SLOT_CYCLES == SLOT_US * HAL_CYCLES_PER_US, "both clocks go t
 
 #ifdef __AVR__
 /* The timing table as part of the image, so that an image can be judged without its sources: a text for each row, ended by
- * a zero byte, in a section that is not loaded. Behind the rows of tasks.def there is one for each message to the board, and one
- * for each constant on which the bounds depend. */
+ * a zero byte, in a section that is not loaded. */
 #define ROW(text) __asm__(".pushsection .boebot.timing, \"\", @progbits \n .asciz \"" text "\" \n .popsection");
 #define TASK(name, period, phase, budget) ROW("TASK " #name " " #period " " #phase " " #budget)
 #define INTERRUPT(name, vector, budget, latency, interval) \
   ROW("INTERRUPT " #name " " #vector " " #budget " " #latency " " #interval)
 #define SENSOR(name, conversion, period, age) ROW("SENSOR " #name " " #conversion " " #period " " #age)
+#define CONSTANT(name, value) ROW("CONSTANT " #name " " #value)
 #include "tasks.def"
-#define FRAME(name, id, length) ROW("FRAME " #name " " #id " " #length)
-MESSAGES_TO_BOARD(FRAME)
-
-/* A constant's value may be an expression, and so is an operand: these stand in a function of which there is one. */
-#define CONSTANT(name, value)                                                        \
-  __asm__(".pushsection .boebot.timing, \"\", @progbits \n .asciz \"CONSTANT " #name \
-          " %0\" \n .popsection" ::"n"((uint32_t)(value)))
-#define LIMIT_OF(name, type, least, most, first) +(PARAMETER_##name == PARAMETER_ENCODER_LIMIT ? (int32_t)(first) : 0)
-#define TELL_CONSTANTS()                                       \
-  CONSTANT(slot_cycles, HAL_SLOT_CYCLES);                      \
-  CONSTANT(slots_per_tick, SCHEDULE_SLOTS_PER_TICK);           \
-  CONSTANT(slots_kept, SLOTS_KEPT);                            \
-  CONSTANT(receive_due, HAL_RECEIVE_DUE);                      \
-  CONSTANT(encoder_limit, PARAMETER_LIST(LIMIT_OF));           \
-  CONSTANT(changes_due, ENCODER_DUE_BYTES / HAL_CHANGE_BYTES); \
-  CONSTANT(change_bytes, HAL_CHANGE_BYTES);                    \
-  CONSTANT(changes_close, HAL_CHANGES_CLOSE);                  \
-  CONSTANT(changes_storm, HAL_CHANGES_STORM)
-#else
-#define LIMIT_OF(name, type, least, most, first) +(PARAMETER_##name == PARAMETER_ENCODER_LIMIT ? (int32_t)(first) : 0)
-#define TELL_CONSTANTS() ((void)0)
 #endif
+_Static_assert(CONSTANT_slot_cycles == HAL_SLOT_CYCLES && CONSTANT_slots_per_tick == SCHEDULE_SLOTS_PER_TICK &&
+                   CONSTANT_slots_kept == SLOTS_KEPT && CONSTANT_receive_ring == HAL_RECEIVE_MAX,
+               "constants of tasks.def");
 
-HAL_NAMED volatile uint8_t schedule_slot;
+volatile uint8_t schedule_slot;
 uint8_t schedule_next_slot;
-volatile uint16_t schedule_slot_start;
 
-static volatile uint32_t slot_cycles; /* time at which schedule_slot began */
-static volatile uint32_t slot_us;     /* the same on the board's clock */
-static volatile bool edge_is_servo;   /* whom the next edge interrupt is for */
+volatile uint32_t schedule_slot_cycles;
+
+static volatile uint32_t slot_us; /* time on the board's clock at which schedule_slot began */
 
 static uint32_t tick;
 static uint32_t tick_us; /* time on the board's clock at which it begins, or has begun */
@@ -86,88 +48,66 @@ static bool overran;        /* so it was in the previous tick, or ticks were dro
 static uint8_t overrun_row; /* ticks in a row that overran, at most OVERLOAD_TICKS */
 
 void schedule_start(uint32_t first_tick) {
-  TELL_CONSTANTS();
-  schedule_slot = 0xFF;
-  HAL_ZERO(schedule_slot_start);
-  HAL_ZERO(slot_cycles);
+  schedule_slot = 0xFF; /* the first slot is still to begin */
+  schedule_next_slot = 0;
+  schedule_slot_cycles = 0;
   tick = first_tick;
   tick_us = first_tick * SCHEDULE_TICK_US;
-  slot_us = tick_us - SLOT_US; /* the first slot is still to begin */
-  HAL_ZERO(edge_is_servo);
-  HAL_ZERO(schedule_next_slot);
-  HAL_ZERO(overruns);
-  HAL_ZERO(late);
-  HAL_ZERO(overran);
-  HAL_ZERO(overrun_row);
+  slot_us = tick_us - SLOT_US;
+  overruns = overrun_row = 0;
+  late = overran = false;
 }
 
-HAL_INTERRUPT_SLOT {
+/* What begins in which slot: the table at the head of tasks.def. */
+void schedule_on_slot(void) {
   schedule_slot++;
-  hal_serial_look();
-  schedule_slot_start = (uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES);
-  slot_cycles += HAL_SLOT_CYCLES;
+  const uint32_t start = schedule_slot_cycles + HAL_SLOT_CYCLES;
+  schedule_slot_cycles = start;
   slot_us += SLOT_US;
-  hal_slot_arm((uint16_t)(schedule_slot_start + HAL_SLOT_CYCLES));
-  switch (schedule_slot % SLOTS_PER_FRAME) {
+  const uint16_t begins = (uint16_t)start;
+  hal_slot_arm((uint16_t)(begins + HAL_SLOT_CYCLES));
+  switch (schedule_slot % SCHEDULE_SLOTS_PER_FRAME) {
     case 0:
       servo_frame();
-      edge_is_servo = true;
-      servo_begin(LEFT, schedule_slot_start);
+      servo_begin(LEFT, begins);
       break;
     case 1:
-      servo_begin(RIGHT, schedule_slot_start);
+      servo_begin(RIGHT, begins);
       break;
     case 2:
     case 6:
-      edge_is_servo = false;
-      infrared_begin(LEFT, schedule_slot_start);
+      infrared_begin(LEFT);
       break;
     case 3:
     case 7:
-      infrared_begin(RIGHT, schedule_slot_start);
+      infrared_begin(RIGHT);
       break;
     case 4:
-      edge_is_servo = true;
-      servo_begin(SERVO_TURRET, schedule_slot_start);
+      servo_begin(SERVO_TURRET, begins);
       break;
     default:
       break;
   }
-  hal_serial_look();
-}
-
-HAL_INTERRUPT_EDGE {
-  if (edge_is_servo) {
-    servo_edge();
-  } else {
-    infrared_end();
-  }
-  hal_serial_look();
-}
-
-int32_t schedule_between(schedule_moment from, schedule_moment to) {
-  /* An offset above three quarters of the count is an edge captured just before its slot began. */
-  const int32_t start = from.offset >= 0xC000u ? (int32_t)from.offset - 65536 : (int32_t)from.offset;
-  const int32_t end = to.offset >= 0xC000u ? (int32_t)to.offset - 65536 : (int32_t)to.offset;
-  return (int32_t)(uint8_t)(to.slot - from.slot) * (int32_t)HAL_SLOT_CYCLES + end - start;
 }
 
 uint32_t schedule_now(void) {
-  uint32_t cycles = 0;
-  HAL_ATOMIC { cycles = slot_cycles + (uint16_t)(hal_time() - schedule_slot_start); }
-  return cycles;
-}
-
-uint32_t schedule_cycles_at(uint8_t slot, uint16_t time) {
   uint32_t start = 0;
-  HAL_ATOMIC { start = slot_cycles - (uint8_t)(schedule_slot - slot) * (uint32_t)HAL_SLOT_CYCLES; }
+  uint16_t time = 0;
+  HAL_ATOMIC {
+    start = schedule_slot_cycles;
+    time = hal_time();
+  }
   return start + (uint16_t)(time - (uint16_t)start);
 }
 
 uint32_t schedule_time(void) {
-  uint32_t us = 0;
-  HAL_ATOMIC { us = slot_us + (uint16_t)(hal_time() - schedule_slot_start) / HAL_CYCLES_PER_US; }
-  return us;
+  uint32_t start = 0;
+  uint16_t since = 0;
+  HAL_ATOMIC {
+    start = slot_us;
+    since = (uint16_t)(hal_time() - (uint16_t)schedule_slot_cycles);
+  }
+  return start + since / HAL_CYCLES_PER_US;
 }
 
 uint32_t schedule_tick(void) { return tick; }
@@ -179,23 +119,22 @@ uint16_t schedule_begun_tick(void) {
   return (uint16_t)((uint16_t)tick - is_awaited);
 }
 
+uint8_t schedule_overruns(void) { return overruns; }
+
+bool schedule_overran(void) { return overran; }
+
 static void next_tick(void) {
   tick++;
   tick_us += SCHEDULE_TICK_US;
 }
 
-uint8_t schedule_overruns(void) { return overruns; }
-
-bool schedule_overran(void) { return overran; }
-
 static void begin_tick(void) {
   overran = late;
   overruns = (uint8_t)(overruns + late);
   late = false;
-  /* Hopelessly behind: drop whole ticks, keep the time right. The waiting slots are a byte, and none begins in the short
-   * time that this takes, or one that makes the byte 0. */
-  BOUNDED((UINT8_MAX - SLOTS_KEPT + SCHEDULE_SLOTS_PER_TICK - 1u) / SCHEDULE_SLOTS_PER_TICK,
-          while (schedule_waiting() > SLOTS_KEPT)) {
+  /* Hopelessly behind: drop whole ticks, keep the time right. */
+  while (schedule_waiting() > SLOTS_KEPT) {
+    LOOP_BOUND((UINT8_MAX - SLOTS_KEPT + SCHEDULE_SLOTS_PER_TICK - 1u) / SCHEDULE_SLOTS_PER_TICK);
     schedule_next_slot = (uint8_t)(schedule_next_slot + SCHEDULE_SLOTS_PER_TICK);
     next_tick();
     overruns++;
@@ -207,7 +146,6 @@ static void begin_tick(void) {
 /* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has returned, and not
  * in a board that has fallen behind for good: tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
-  encoder_update();
 #define TASK(name, period, phase, budget)    \
   if (slot % (uint8_t)(period) == (phase)) { \
     task_begins(TASK_##name);                \
@@ -221,19 +159,19 @@ static void run_tasks(uint8_t slot) {
 }
 
 void schedule_poll(void) {
-  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+  if (schedule_tick_begins()) {
     begin_tick();
   }
+  pin_changes_begin_slot();
   run_tasks(schedule_next_slot);
   schedule_next_slot++;
-  if (schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0) {
+  if (schedule_tick_begins()) {
     next_tick();
   }
   /* Work of a tick that ends when a later tick has already begun has overrun. */
-  const uint8_t waiting = schedule_waiting();
   const uint8_t left =
       (uint8_t)(0u - schedule_next_slot) % SCHEDULE_SLOTS_PER_TICK; /* slots of this tick still to come */
-  if (waiting > left) {
+  if (schedule_waiting() > left) {
     late = true;
   }
 }

@@ -1,4 +1,4 @@
-/* schedule.h: the tick. A time-triggered cyclic executive after tasks.def: Timer1 begins a slot every 2.5 ms; the slot
+/* schedule.h: the tick. A time-triggered cyclic executive after tasks.def: Timer1 begins a slot every 2.5 ms; the slot's
  * interrupt starts what needs an exact time, the main loop then runs the tasks that are due. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
@@ -13,7 +13,8 @@ extern "C" {
 #endif
 
 #define SCHEDULE_SLOTS_PER_TICK 4u
-#define SCHEDULE_TICK_RATE 100u /* Hz */
+#define SCHEDULE_SLOTS_PER_FRAME 8u /* of a servo frame, 20 ms */
+#define SCHEDULE_TICK_RATE 100u     /* Hz */
 #define SCHEDULE_TICK_US 10000u
 
 /* The first tick to come is `first_tick`: 0 but for tests of what happens where counts roll over. */
@@ -24,12 +25,14 @@ extern volatile uint8_t schedule_slot;
 extern uint8_t schedule_next_slot;
 
 /* Slots that have begun and whose tasks have not run. */
-static inline __attribute__((always_inline)) uint8_t schedule_waiting(void) {
-  return (uint8_t)(schedule_slot + 1u - schedule_next_slot);
-}
+HAL_INLINE uint8_t schedule_waiting(void) { return (uint8_t)(schedule_slot + 1u - schedule_next_slot); }
 
 /* Runs the tasks of the next slot that has begun; one is waiting. */
 void schedule_poll(void) __attribute__((noinline));
+
+/* In a task: the number of its slot within the servo frame, 0..7, and whether it is the first one of a tick. */
+HAL_INLINE uint8_t schedule_frame_slot(void) { return schedule_next_slot % SCHEDULE_SLOTS_PER_FRAME; }
+HAL_INLINE bool schedule_tick_begins(void) { return schedule_next_slot % SCHEDULE_SLOTS_PER_TICK == 0; }
 
 /* The control tick whose tasks run now; when they all have run, the next one, which may not have begun yet. */
 uint32_t schedule_tick(void);
@@ -45,29 +48,18 @@ uint16_t schedule_begun_tick(void);
 /* Cycles since the timers started, modulo 2^32 (268 s); the low half is hal_time(). Main loop only. */
 uint32_t schedule_now(void);
 
-/* The same for the moment at which hal_time() was `time`, after the slot of that number (its low byte) had begun and
- * before 4 ms of it were over. Main loop only, within 0.6 s of it. */
-uint32_t schedule_cycles_at(uint8_t slot, uint16_t time);
+/* In an interrupt: the same for the moment, at most 1 ms before the present slot began or within it, at which hal_time() was
+ * `time`. */
+extern volatile uint32_t schedule_slot_cycles; /* time at which the slot began; its low half is the count's */
+HAL_INLINE uint32_t schedule_cycles_in(uint32_t slot_cycles, uint16_t time) { /* the slot began at `slot_cycles` */
+  const uint16_t since = (uint16_t)(time - (uint16_t)slot_cycles);
+  return slot_cycles + since - (uint32_t)(since >= 0xC000u ? 0x10000ul : 0ul);
+}
+HAL_INLINE uint32_t schedule_cycles_at(uint16_t time) { return schedule_cycles_in(schedule_slot_cycles, time); }
 
 /* Ticks whose work did not end in time since reset, modulo 256; and whether the previous one did not. */
 uint8_t schedule_overruns(void);
 bool schedule_overran(void);
-
-/* A moment, as interrupts note it: cheap to take, 640 ms long before it repeats. */
-typedef struct {
-  uint8_t slot;    /* low byte of the number of the slot that had begun */
-  uint16_t offset; /* cycles since that slot began; an edge captured just before it counts from 65536 down */
-} schedule_moment;
-
-extern volatile uint16_t schedule_slot_start; /* hal_time() at which the slot began */
-
-/* Interrupt context: the moment at which hal_time() was `time`. */
-static inline schedule_moment schedule_moment_at(uint16_t time) {
-  return (schedule_moment){schedule_slot, (uint16_t)(time - schedule_slot_start)};
-}
-
-/* Cycles from one moment to a later one. */
-int32_t schedule_between(schedule_moment from, schedule_moment to);
 
 #ifdef __cplusplus
 }

@@ -3,11 +3,10 @@
 
 #include <stdbool.h>
 
-#include "bounds.h"
 #include "hal/hal.h"
-#include "pins.h"
+#include "hal/interrupts.h"
 
-#define RISE_OFFSET 8000u /* cycles from the slot's start to the rising edge: above the lead and any interrupt */
+#define RISE_OFFSET 10000u /* cycles from the slot's start to the rising edge: above the lead and any interrupt */
 
 _Static_assert(RISE_OFFSET + 1700u * HAL_CYCLES_PER_US < HAL_SLOT_CYCLES - 2000u, "the longest pulse ends in its slot");
 _Static_assert(RISE_OFFSET + SERVO_TURRET_MAX < 2ul * HAL_SLOT_CYCLES - 2000u, "the turret's ends in the next");
@@ -21,12 +20,21 @@ static uint16_t edge_time;
 void servo_start(void) {
   HAL_PIN_LOW(SERVO_LEFT);
   HAL_PIN_LOW(SERVO_RIGHT);
-  HAL_PIN_LOW(TURRET);
   HAL_PIN_OUTPUT(SERVO_LEFT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
-  HAL_PIN_OUTPUT(TURRET);
-  HAL_ZERO(wanted);
-  HAL_ZERO(in_force);
+  HAL_PIN_PULL_UP(TURRET);
+  servo_set(0, 0);
+  servo_turn(0);
+  servo_frame();
+}
+
+void servo_connect_turret(bool connected) {
+  if (connected) {
+    HAL_PIN_LOW(TURRET);
+    HAL_PIN_OUTPUT(TURRET);
+  } else {
+    HAL_PIN_PULL_UP(TURRET);
+  }
 }
 
 void servo_set(uint16_t left, uint16_t right) {
@@ -62,8 +70,8 @@ void servo_begin(uint8_t servo, uint16_t start) {
   hal_edge_arm(edge_time);
 }
 
-void servo_edge(void) {
-  hal_edge_wait(edge_time);
+void servo_on_edge(void) {
+  const uint16_t late = hal_edge_wait(edge_time);
   if (active == LEFT) { /* the same way for both edges of a servo, so that the width is exact */
     HAL_PIN_TOGGLE(SERVO_LEFT);
   } else if (active == RIGHT) {
@@ -76,6 +84,6 @@ void servo_edge(void) {
     return;
   }
   high = true;
-  edge_time = (uint16_t)(edge_time + hal_edge_delay(edge_time) + in_force[active]); /* a late pulse keeps its width */
+  edge_time = (uint16_t)(edge_time + late + in_force[active]); /* a late pulse keeps its width */
   hal_edge_arm(edge_time);
 }

@@ -6,6 +6,7 @@
 #ifndef SERVO_H
 #define SERVO_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "pins.h"
@@ -20,7 +21,9 @@ enum { SERVO_TURRET = SIDES, SERVOS };
 #define SERVO_TURRET_MIN 9600u  /* 600 us in cycles */
 #define SERVO_TURRET_MAX 38400u /* 2400 us */
 
+/* Lines low. That of the turret's servo only while it is connected. */
 void servo_start(void);
+void servo_connect_turret(bool connected);
 
 /* Widths from the next frame on. */
 void servo_set(uint16_t left, uint16_t right);
@@ -29,10 +32,9 @@ void servo_turn(uint16_t turret);
 /* Width of the pulses in the frame that runs. */
 uint16_t servo_pulse(uint8_t servo);
 
-/* Interrupt context: a frame begins; a servo's slot begins at hal_time() `start`; an edge is due. */
+/* In an interrupt: a frame begins; a servo's slot begins at hal_time() `start`. */
 void servo_frame(void);
 void servo_begin(uint8_t servo, uint16_t start);
-void servo_edge(void);
 
 #ifdef __cplusplus
 }

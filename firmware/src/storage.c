@@ -5,16 +5,12 @@
 
 #include <string.h>
 
-#include "bounds.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "parameters.h"
 #include "schedule.h"
 #include "supply.h"
-
-#define INLINE static inline __attribute__((always_inline))
-#define OUTLINE static __attribute__((noinline)) /* several times in line it would be much flash */
+#include "tasks.h"
 
 enum { MARK_VALID = 0xA5, MARK_VOID = 0x5A };
 
@@ -37,14 +33,19 @@ typedef struct {
 
 #define COPIES 2u
 #define COPY_ROOM 128u
-#define BOOT_ADDRESS (COPIES * COPY_ROOM)
+#define COPY_ADDRESS 0x080u
+#define BOOT_ADDRESS 0x100u
+#define COPY_DISTANCE 0x100u /* the boot counter's ring lies between them */
 #define BOOT_RECORDS 16u
-#define READ_BACK 10u                        /* cells in a tick */
-#define RUN_TICKS (10u * SCHEDULE_TICK_RATE) /* of a start that counts */
+#define RUN_SLOTS (10u * SCHEDULE_TICK_RATE * SCHEDULE_SLOTS_PER_TICK) /* of a start that counts */
+#define SLOTS_PER_CALL 2u
 
 _Static_assert(sizeof(copy_record) <= COPY_ROOM && sizeof(copy_record) == 6u + 2u * PARAMETER_COUNT, "a copy has room");
 _Static_assert(sizeof(boot_record) == 8u, "no gaps");
-_Static_assert(BOOT_ADDRESS + BOOT_RECORDS * sizeof(boot_record) <= HAL_EEPROM_SIZE, "the EEPROM has room");
+_Static_assert(COPY_ADDRESS + COPY_ROOM <= BOOT_ADDRESS &&
+                   BOOT_ADDRESS + BOOT_RECORDS * sizeof(boot_record) <= COPY_ADDRESS + COPY_DISTANCE,
+               "the ring lies between the copies");
+_Static_assert(COPY_ADDRESS + COPY_DISTANCE + COPY_ROOM <= HAL_EEPROM_SIZE, "the EEPROM has room");
 
 enum { IDLE, TO_VOID, REST, TO_VALID };
 
@@ -52,12 +53,10 @@ typedef struct {
   uint16_t record_address;
   uint8_t record_size;
   uint8_t step;
-  bool is_save;                   /* or a boot counter's */
-  uint8_t step_first, step_count; /* bytes of the record that the step has written or not read back */
-
-  /* Of the interrupt: the next byte, how many are left, CRC of those written. */
-  volatile uint8_t write_next, write_left;
-  uint16_t write_crc;
+  bool is_save;       /* or a boot counter's */
+  uint8_t next, left; /* the step's next byte to write, and how many there are with it */
+  bool is_writing;    /* the byte before it: it is read back when its cell is done */
+  uint16_t crc;       /* of the bytes that the step has written */
 
   bool save_wanted;
   uint8_t save_result;
@@ -68,7 +67,7 @@ typedef struct {
   uint32_t boots;      /* before this start */
   uint8_t boot_newest; /* entry of the ring that says so */
   uint8_t boot_next;   /* entry to write */
-  uint16_t run_ticks;  /* of this start, at most RUN_TICKS */
+  uint16_t run_slots;  /* of this start, at most RUN_SLOTS */
   bool counted;        /* this start is in the ring, or no entry takes it */
 
   /* The record at hand, with which that is done. */
@@ -92,111 +91,84 @@ static uint16_t crc16(uint16_t crc, uint8_t byte) {
 }
 
 /* Reads a record; whether it is whole. */
-static bool read_record(storage_state *self, uint16_t address, uint8_t size) {
+static bool read_record(uint16_t address, uint8_t size) {
   hal_eeprom_wait(); /* for a write from before the reset */
   uint16_t expected = CRC_START;
-  BOUNDED(sizeof self->record.bytes, for (uint8_t i = 0; i < size; i++)) {
-    self->record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
+  for (uint8_t i = 0; i < size; i++) {
+    own.record.bytes[i] = hal_eeprom_read((uint16_t)(address + i));
     if (i > 0 && i < size - 2u) {
-      expected = crc16(expected, self->record.bytes[i]);
+      expected = crc16(expected, own.record.bytes[i]);
     }
   }
   uint16_t crc = 0;
-  memcpy(&crc, &self->record.bytes[size - 2u], sizeof crc);
-  return self->record.bytes[0] == MARK_VALID && crc == expected;
+  memcpy(&crc, &own.record.bytes[size - 2u], sizeof crc);
+  return own.record.bytes[0] == MARK_VALID && crc == expected;
 }
 
 /* Writes `count` bytes of the record from `first` on. */
-OUTLINE void begin_step(storage_state *self, uint8_t next_step, uint8_t first, uint8_t count) {
-  self->step = next_step;
-  self->step_first = first;
-  self->step_count = count;
-  self->write_next = first;
-  self->write_left = count;
-  self->write_crc = CRC_START;
-  hal_eeprom_interrupt(true);
+static void begin_step(uint8_t step, uint8_t first, uint8_t count) {
+  own.step = step;
+  own.next = first;
+  own.left = count;
+  own.is_writing = false;
+  own.crc = CRC_START;
 }
 
-/* With the EEPROM ready: the next byte. At the end of the rest comes its CRC, which is known by then. */
-HAL_INTERRUPT_EEPROM {
-  storage_state *const self = HAL_NEAR(&own);
-  const uint8_t i = self->write_next;
-  if (i == (uint8_t)(self->record_size - 2u)) {
-    memcpy(&self->record.bytes[i], &self->write_crc, sizeof self->write_crc);
+static uint16_t cell(uint8_t i) { return (uint16_t)(own.record_address + i); }
+
+/* At the end of the rest comes its CRC, which is known by then. */
+static void write_next(void) {
+  const uint8_t i = own.next;
+  if (i == (uint8_t)(own.record_size - 2u)) {
+    memcpy(&own.record.bytes[i], &own.crc, sizeof own.crc);
   }
-  self->write_crc = crc16(self->write_crc, self->record.bytes[i]);
-  hal_eeprom_write_start((uint16_t)(self->record_address + i), self->record.bytes[i]);
-  self->write_next = (uint8_t)(i + 1u);
-  self->write_left--;
-  hal_eeprom_interrupt(self->write_left != 0);
+  own.crc = crc16(own.crc, own.record.bytes[i]);
+  hal_eeprom_write_start(cell(i), own.record.bytes[i]);
+  own.next++;
+  own.left--;
+  own.is_writing = true;
 }
 
-static bool is_written(storage_state *self) { return self->write_left == 0 && !hal_eeprom_busy(); }
-
-/* Reads a few of the step's bytes back and takes them off `step_count`; false if one is not as it should be. */
-static bool reads_back(storage_state *self) {
-  BOUNDED(READ_BACK, for (uint8_t n = 0; n < READ_BACK && self->step_count > 0; n++)) {
-    if (hal_eeprom_read((uint16_t)(self->record_address + self->step_first)) != self->record.bytes[self->step_first]) {
-      return false;
-    }
-    self->step_first++;
-    self->step_count--;
-  }
-  return true;
+/* Whether the byte just written is in its cell. */
+static bool reads_back(void) {
+  const uint8_t i = (uint8_t)(own.next - 1u);
+  return hal_eeprom_read(cell(i)) == own.record.bytes[i];
 }
 
 /* Begins to write the record at hand. */
-OUTLINE void begin_record(storage_state *self, uint16_t address, uint8_t size) {
-  self->record_address = address;
-  self->record_size = size;
-  self->record.bytes[0] = MARK_VOID;
-  begin_step(self, TO_VOID, 0, 1);
+static void begin_record(uint16_t address, uint8_t size) {
+  own.record_address = address;
+  own.record_size = size;
+  own.record.bytes[0] = MARK_VOID;
+  begin_step(TO_VOID, 0, 1);
 }
 
 /* ---- parameters ---- */
 
-static uint16_t copy_address(uint8_t copy) { return (uint16_t)(copy * COPY_ROOM); }
+static uint16_t copy_address(uint8_t copy) { return (uint16_t)(COPY_ADDRESS + copy * COPY_DISTANCE); }
 
-INLINE uint32_t mixed(uint32_t hash, uint32_t x) { return (hash ^ x) * 0x01000193ul; }
-INLINE uint32_t entry_hash(uint8_t number, int32_t minimum, int32_t maximum, const char *name, uint8_t length) {
-  const uint32_t letters =
-      (uint8_t)name[0] | (uint32_t)(uint8_t)name[length / 2u] << 8 | (uint32_t)(uint8_t)name[length - 1u] << 16;
-  return mixed(mixed(mixed(mixed(0x811C9DC5ul + number, (uint32_t)minimum), (uint32_t)maximum), length), letters);
-}
-
-/* Tells tables of parameters apart: by numbers and ranges, of the names by the length and three letters. A constant. */
-INLINE uint16_t table_hash(void) {
-#define ENTRY(name, type, minimum, maximum, initial) \
-  ^entry_hash(PARAMETER_##name, (minimum), (maximum), #name, sizeof #name - 1u)
-  const uint32_t hash = PARAMETER_COUNT PARAMETER_LIST(ENTRY);
-#undef ENTRY
-  return (uint16_t)(hash >> 16 ^ hash);
-}
-
-OUTLINE bool read_copy(storage_state *self, uint8_t copy) {
-  return read_record(self, copy_address(copy), sizeof(copy_record)) && self->record.copy.table == table_hash();
+static bool read_copy(uint8_t copy) {
+  return read_record(copy_address(copy), sizeof(copy_record)) && own.record.copy.table == PARAMETER_TABLE;
 }
 
 void storage_load_parameters(void) {
-  storage_state *const self = HAL_NEAR(&own);
   bool whole[COPIES];
   uint8_t generations[COPIES];
-  BOUNDED(COPIES, for (uint8_t copy = 0; copy < COPIES; copy++)) {
-    whole[copy] = read_copy(self, copy);
-    generations[copy] = self->record.copy.generation;
+  for (uint8_t copy = 0; copy < COPIES; copy++) {
+    whole[copy] = read_copy(copy);
+    generations[copy] = own.record.copy.generation;
   }
   const uint8_t newer = whole[1] && (!whole[0] || (int8_t)(uint8_t)(generations[1] - generations[0]) > 0);
-  self->generation = whole[newer] ? generations[newer] : 0u;
-  self->loaded = true;
-  BOUNDED(COPIES, for (uint8_t i = 0; i < COPIES; i++)) {
-    self->copy_in_force = newer ^ i;
-    if (whole[self->copy_in_force] && read_copy(self, self->copy_in_force) &&
-        parameters_restore(self->record.copy.values)) {
+  own.generation = whole[newer] ? generations[newer] : 0u;
+  own.loaded = true;
+  for (uint8_t i = 0; i < COPIES; i++) {
+    own.copy_in_force = newer ^ i;
+    if (whole[own.copy_in_force] && read_copy(own.copy_in_force) && parameters_restore(own.record.copy.values)) {
       return;
     }
   }
-  self->copy_in_force = COPIES;
-  self->loaded = false;
+  own.copy_in_force = COPIES;
+  own.loaded = false;
 }
 
 bool storage_parameters_loaded(void) { return own.loaded; }
@@ -213,22 +185,22 @@ bool storage_busy(void) { return own.save_wanted || (own.step != IDLE && own.is_
 
 uint8_t storage_result(void) { return own.save_result; }
 
-static uint8_t other_copy(storage_state *self) { return self->copy_in_force == 0 ? 1u : 0u; }
+static uint8_t other_copy(void) { return own.copy_in_force == 0 ? 1u : 0u; }
 
-static void begin_save(storage_state *self) {
-  self->save_wanted = false;
-  self->is_save = true;
-  self->record.copy.generation = (uint8_t)(self->generation + 1u);
-  self->record.copy.table = table_hash();
-  memcpy(self->record.copy.values, parameters_values(), sizeof self->record.copy.values);
-  begin_record(self, copy_address(other_copy(self)), sizeof(copy_record));
+static void begin_save(void) {
+  own.save_wanted = false;
+  own.is_save = true;
+  own.record.copy.generation = (uint8_t)(own.generation + 1u);
+  own.record.copy.table = PARAMETER_TABLE;
+  memcpy(own.record.copy.values, parameters_values(), sizeof own.record.copy.values);
+  begin_record(copy_address(other_copy()), sizeof(copy_record));
 }
 
-static void end_save(storage_state *self, uint8_t result) {
-  self->save_result = result;
+static void end_save(uint8_t result) {
+  own.save_result = result;
   if (result == ANSWER_STATUS_OK) {
-    self->copy_in_force = other_copy(self);
-    self->generation++;
+    own.copy_in_force = other_copy();
+    own.generation++;
   }
 }
 
@@ -236,108 +208,102 @@ static void end_save(storage_state *self, uint8_t result) {
 
 static uint16_t boot_address(uint8_t entry) { return (uint16_t)(BOOT_ADDRESS + entry * sizeof(boot_record)); }
 
-static void find_boots(storage_state *self) {
-  self->boots = 0;
-  self->boot_newest = BOOT_RECORDS - 1u;
-  BOUNDED(BOOT_RECORDS, for (uint8_t entry = 0; entry < BOOT_RECORDS; entry++)) {
-    if (read_record(self, boot_address(entry), sizeof(boot_record))) {
-      const uint32_t count = (uint32_t)self->record.boot.count[1] << 16 | self->record.boot.count[0];
-      if (count > self->boots) {
-        self->boots = count;
-        self->boot_newest = entry;
+static void find_boots(void) {
+  own.boots = 0;
+  own.boot_newest = BOOT_RECORDS - 1u;
+  for (uint8_t entry = 0; entry < BOOT_RECORDS; entry++) {
+    if (read_record(boot_address(entry), sizeof(boot_record))) {
+      const uint32_t count = (uint32_t)own.record.boot.count[1] << 16 | own.record.boot.count[0];
+      if (count > own.boots) {
+        own.boots = count;
+        own.boot_newest = entry;
       }
     }
   }
-  self->boot_next = (self->boot_newest + 1u) % BOOT_RECORDS;
+  own.boot_next = (own.boot_newest + 1u) % BOOT_RECORDS;
 }
 
 uint32_t storage_boot_counter(void) { return own.boots + 1u; }
 
-static void begin_count(storage_state *self) {
-  self->is_save = false;
-  self->record.boot.spare = 0;
-  self->record.boot.count[0] = (uint16_t)storage_boot_counter();
-  self->record.boot.count[1] = (uint16_t)(storage_boot_counter() >> 16);
-  begin_record(self, boot_address(self->boot_next), sizeof(boot_record));
+static void begin_count(void) {
+  own.is_save = false;
+  own.record.boot.spare = 0;
+  own.record.boot.count[0] = (uint16_t)storage_boot_counter();
+  own.record.boot.count[1] = (uint16_t)(storage_boot_counter() >> 16);
+  begin_record(boot_address(own.boot_next), sizeof(boot_record));
 }
 
 /* A cell that does not take it is passed over; the newest entry is never touched. */
-static void end_count(storage_state *self, uint8_t result) {
+static void end_count(uint8_t result) {
   if (result == ANSWER_STATUS_OK) {
-    self->counted = true;
+    own.counted = true;
   } else if (result == ANSWER_STATUS_STORAGE_FAILED) {
-    self->boot_next = (self->boot_next + 1u) % BOOT_RECORDS;
-    self->counted = self->boot_next == self->boot_newest;
+    own.boot_next = (own.boot_next + 1u) % BOOT_RECORDS;
+    own.counted = own.boot_next == own.boot_newest;
   }
 }
 
 /* ---- the task ---- */
 
 void storage_start(void) {
-  storage_state *const self = HAL_NEAR(&own);
-  hal_eeprom_interrupt(false);
-  HAL_ZERO(self->step);
-  HAL_ZERO(self->write_left);
-  HAL_ZERO(self->save_wanted);
-  self->save_result = ANSWER_STATUS_OK;
-  HAL_ZERO(self->run_ticks);
-  HAL_ZERO(self->counted);
-  find_boots(self);
+  own.step = IDLE;
+  own.save_wanted = false;
+  own.save_result = ANSWER_STATUS_OK;
+  own.run_slots = 0;
+  own.counted = false;
+  find_boots();
 }
 
-OUTLINE void end_record(storage_state *self, uint8_t result) {
-  self->step = IDLE;
-  if (self->is_save) {
-    end_save(self, result);
+static void end_record(uint8_t result) {
+  own.step = IDLE;
+  if (own.is_save) {
+    end_save(result);
   } else {
-    end_count(self, result);
+    end_count(result);
   }
 }
 
-static void go_on(storage_state *self) {
-  if (!reads_back(self)) {
-    end_record(self, ANSWER_STATUS_STORAGE_FAILED);
-  } else if (self->step_count > 0) {
-    return; /* the others in the next tick */
-  } else if (self->step == TO_VOID) {
-    begin_step(self, REST, 1, (uint8_t)(self->record_size - 1u));
-  } else if (self->step == REST) {
-    self->record.bytes[0] = MARK_VALID;
-    begin_step(self, TO_VALID, 0, 1);
+/* With the EEPROM ready: the next byte of a step, or the next step. */
+static void go_on(void) {
+  if (own.is_writing && !reads_back()) {
+    end_record(ANSWER_STATUS_STORAGE_FAILED);
+  } else if (own.left > 0) {
+    write_next();
+  } else if (own.step == TO_VOID) {
+    begin_step(REST, 1, (uint8_t)(own.record_size - 1u));
+  } else if (own.step == REST) {
+    own.record.bytes[0] = MARK_VALID;
+    begin_step(TO_VALID, 0, 1);
   } else {
-    end_record(self, ANSWER_STATUS_OK);
+    end_record(ANSWER_STATUS_OK);
   }
 }
 
 /* The supply fails: the cell under way ends by itself, no other begins. */
-static void give_up(storage_state *self) {
-  hal_eeprom_interrupt(false);
-  self->write_left = 0;
-  if (self->save_wanted) {
-    self->save_wanted = false;
-    self->save_result = ANSWER_STATUS_SUPPLY_LOW;
+static void give_up(void) {
+  if (own.save_wanted) {
+    own.save_wanted = false;
+    own.save_result = ANSWER_STATUS_SUPPLY_LOW;
   }
-  if (self->step != IDLE) {
-    end_record(self, ANSWER_STATUS_SUPPLY_LOW);
+  if (own.step != IDLE) {
+    end_record(ANSWER_STATUS_SUPPLY_LOW);
   }
 }
 
+/* In every tick: goes on with what is under way; writes the boot counter when this start has run for 10 s. */
 void storage_task(void) {
-  storage_state *const self = HAL_NEAR(&own);
-  if (self->run_ticks < RUN_TICKS) {
-    self->run_ticks++;
+  if (own.run_slots < RUN_SLOTS) {
+    own.run_slots = (uint16_t)(own.run_slots + SLOTS_PER_CALL);
   }
   if (supply_low()) {
-    give_up(self);
-  } else if (self->step != IDLE) {
-    if (is_written(self)) {
-      go_on(self);
-    }
+    give_up();
   } else if (hal_eeprom_busy()) {
-    return; /* a write from before the reset, or one that was given up */
-  } else if (self->save_wanted) {
-    begin_save(self);
-  } else if (self->run_ticks == RUN_TICKS && !self->counted) {
-    begin_count(self);
+    return; /* a byte of ours, or a write from before the reset */
+  } else if (own.step != IDLE) {
+    go_on();
+  } else if (own.save_wanted) {
+    begin_save();
+  } else if (own.run_slots == RUN_SLOTS && !own.counted) {
+    begin_count();
   }
 }

@@ -1,13 +1,14 @@
 /* storage.h: what outlives the power, in the EEPROM: the parameters, and how often this board was started.
  *
- * Nothing here waits for a cell (3.4 ms each): the EEPROM's ready interrupt writes a record cell by cell, storage_task()
- * reads it back. All parameters are kept twice. A save writes the copy that is not in force, which is marked void first
+ * Nothing waits for a cell (3.4 ms each): storage_task() writes a record cell by cell, one every other slot, and reads each
+ * back. All parameters are kept twice. A save writes the copy that is not in force, which is marked void first
  * and valid last; so whenever the power goes, and whatever it leaves of the cell under way, one copy is whole.
  *
  *   address  size
- *   0x000    128   parameters, copy 0      mark, generation, hash of the table (2), values (2 each), CRC-16
- *   0x080    128   parameters, copy 1
+ *   0x000    128   nothing: address 0 is the cell that suffers when the supply fails (data sheet, 8.4.2)
+ *   0x080    128   parameters, copy 0      mark, generation, hash of the table (2), values (2 each), CRC-16
  *   0x100    128   boot counter, 16 slots in turn, 8 bytes each      mark, count (4), CRC-16, spare
+ *   0x180    128   parameters, copy 1
  */
 #ifndef STORAGE_H
 #define STORAGE_H
@@ -22,8 +23,8 @@ extern "C" {
 /* Reads the boot counter. At start, before interrupts. */
 void storage_start(void);
 
-/* Puts what is saved in force, if there is a whole copy of this image's parameters within their ranges. At start, from
- * parameters_start(). */
+/* Puts what is saved in force, if there is a whole copy of this image's parameters within their ranges. At start, after
+ * parameters_reset(). */
 void storage_load_parameters(void);
 
 /* Whether the parameters in force at start were those that were saved. */
@@ -42,9 +43,6 @@ uint8_t storage_result(void);
 
 /* Starts of this board that ran for 10 s, this one included. */
 uint32_t storage_boot_counter(void);
-
-/* In every tick: goes on with what is under way; writes the boot counter when this start has run for 10 s. */
-void storage_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

@@ -4,9 +4,9 @@
 #include "supply.h"
 
 #include "analog.h"
-#include "bounds.h"
 #include "hal/hal.h"
-#include "link/parameters.h"
+#include "parameters.h"
+#include "tasks.h"
 
 #define HYSTERESIS 100u /* mV */
 #define RESULT_MIN 32u  /* 35 V: no result of a chip that works */
@@ -17,27 +17,8 @@ static bool was_below;   /* the last measurement was */
 static bool has_settled; /* a measurement since power was given to bandgap and converter is past */
 
 void supply_start(void) {
-  HAL_ZERO(voltage);
-  HAL_ZERO(low);
-  HAL_ZERO(was_below);
-  HAL_ZERO(has_settled);
-}
-
-/* bandgap * 1024 / result, rounded down: a division of 16 bits and five steps of a longer one by hand. One of 32 bits
- * would take more time than the task has. */
-static uint16_t millivolts(uint16_t bandgap, uint16_t result) {
-  const uint16_t dividend = (uint16_t)(bandgap * 32u); /* at most 38400 */
-  uint16_t quotient = dividend / result;
-  uint16_t rest = dividend % result;
-  BOUNDED(5, for (uint8_t step = 0; step < 5u; step++)) {
-    quotient = (uint16_t)(quotient << 1);
-    rest = (uint16_t)(rest << 1);
-    if (rest >= result) {
-      rest = (uint16_t)(rest - result);
-      quotient++;
-    }
-  }
-  return quotient;
+  voltage = 0;
+  low = was_below = has_settled = false;
 }
 
 /* A minimum of 0 is never undercut. */
@@ -51,6 +32,7 @@ static void judge(uint16_t minimum) {
   was_below = below;
 }
 
+/* In every tick: judges the last measurement (analog.h). */
 void supply_task(void) {
   const uint16_t result = analog_take_bandgap();
   if (result < RESULT_MIN) {
@@ -60,7 +42,7 @@ void supply_task(void) {
     has_settled = true;
     return;
   }
-  voltage = millivolts(parameters_u16(PARAMETER_BANDGAP), result);
+  voltage = (uint16_t)(parameters_u16(PARAMETER_BANDGAP) * 1024ul / result);
   judge(parameters_u16(PARAMETER_SUPPLY_MINIMUM));
 }
 

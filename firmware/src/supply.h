@@ -12,9 +12,6 @@ extern "C" {
 
 void supply_start(void);
 
-/* In every tick: judges the last measurement (analog.h). */
-void supply_task(void) __attribute__((noinline));
-
 /* mV; 0: not yet measured. */
 uint16_t supply_voltage(void);
 

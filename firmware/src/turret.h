@@ -13,14 +13,13 @@
 extern "C" {
 #endif
 
+void turret_start(void);
+
 /* Turns to an angle in 1/10000 rad, -16000..16000. */
 void turret_hold(int16_t angle);
 
 /* No pulses from the next servo frame on. */
 void turret_release(void);
-
-/* Once per servo frame: releases a turret that was switched off. */
-void turret_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

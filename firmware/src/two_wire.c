@@ -1,8 +1,8 @@
 /* two_wire.c: see two_wire.h. */
 #include "two_wire.h"
 
-#include "bounds.h"
 #include "hal/hal.h"
+#include "hal/interrupts.h"
 
 /* Shared with the interrupt: what a transfer is to do is settled before it begins. */
 static uint8_t target; /* address << 1, and 1 while reading */
@@ -22,14 +22,15 @@ void two_wire_stop(void) {
 
 void two_wire_begin(uint8_t address, const uint8_t *bytes, uint8_t writes, uint8_t reads) {
   target = (uint8_t)(address << 1);
-  BOUNDED(TWO_WIRE_WRITE_MAX, for (uint8_t i = 0; i < writes; i++)) {
+  for (uint8_t i = 0; i < writes; i++) {
+    LOOP_BOUND(TWO_WIRE_WRITE_MAX);
     to_write[i] = bytes[i];
   }
   write_count = writes;
   read_count = reads;
   written = has_read = 0;
   result = TWO_WIRE_BUSY;
-  HAL_ATOMIC { hal_two_wire_begin(); }
+  hal_two_wire_begin();
 }
 
 two_wire_result two_wire_ended(void) { return (two_wire_result)result; }
@@ -41,8 +42,7 @@ static inline void end(two_wire_result how) {
   hal_two_wire_end();
 }
 
-/* With other interrupts on, but for the last step: what it asks of the bus ends it (hal.h). */
-HAL_INTERRUPT_TWO_WIRE {
+void two_wire_on_step(void) {
   switch (hal_two_wire_status()) {
     case HAL_TWO_WIRE_STARTED:
     case HAL_TWO_WIRE_STARTED_AGAIN:

@@ -1,11 +1,11 @@
 /* whisker.c: see whisker.h. */
 #include "whisker.h"
 
-#include "generated/messages.h"
+#include "events.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "link/events.h"
-#include "link/parameters.h"
-#include "pins.h"
+#include "parameters.h"
+#include "tasks.h"
 
 #define PRESSED_SAMPLES 2u
 #define RELEASED_SAMPLES 4u
@@ -28,7 +28,7 @@ bool whisker_debounce(whisker_state *state, bool touching) {
 void whisker_start(void) {
   HAL_PIN_PULL_UP(WHISKER_LEFT);
   HAL_PIN_PULL_UP(WHISKER_RIGHT);
-  HAL_ZERO(states);
+  states[LEFT] = states[RIGHT] = (whisker_state){0};
 }
 
 void whisker_task(void) {

@@ -22,8 +22,6 @@ typedef struct {
 bool whisker_debounce(whisker_state *state, bool touching);
 
 void whisker_start(void);
-void whisker_task(void) __attribute__((noinline));
-
 /* WHISKERS_... bits. */
 uint8_t whisker_read(void);
 

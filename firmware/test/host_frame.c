@@ -1,10 +1,11 @@
 /* host_frame.c: see host_frame.h. The names that frame.c exports are changed, for the board's build is linked too. */
 #define FRAME_OF_HOST
-#define frame_checksum host_frame_checksum
 #define frame_encode host_frame_encode
 #define frame_decoder_start host_frame_decoder_start
 #define frame_decoder_seed host_frame_decoder_seed
-#define frame_decode_end host_frame_decode_end
+#define frame_decoder_cut host_frame_decoder_cut
+#define frame_decoder_take host_frame_decoder_take
+#define frame_decoder_accept host_frame_decoder_accept
 #include "link/frame.c"
 
 #include "host_frame.h"

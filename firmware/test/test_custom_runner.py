@@ -1,6 +1,8 @@
 """How `pio test` builds and runs our unit tests. They are written with doctest, whose header is the system's (Debian's
-doctest-dev) where there is one; elsewhere PlatformIO fetches it. main.cpp beside this file holds doctest's own code:
-it is compiled once for all tests."""
+doctest-dev) where there is one; elsewhere PlatformIO fetches it.
+
+All tests of a pin map are one program: main.cpp beside this file holds doctest's own code, test_units a file for each
+subject. An environment of platformio.ini may name those that it builds (custom_units)."""
 
 from __future__ import annotations
 
@@ -32,9 +34,14 @@ class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
             self.EXTRA_LIB_DEPS = None  # nothing to fetch: it is there, or no test is built
 
     def configure_build_env(self, env: Any) -> None:
-        """Makes `#include <doctest.h>` find the system's header."""
+        """Makes `#include <doctest.h>` find the system's header, and takes the files that the environment names."""
         if FOLDER is not None:
             env.Append(CCFLAGS=[("-isystem", str(FOLDER))])
+        units = env.GetProjectOption("custom_units", "").split()
+        if units:
+            beside = [pattern for pattern in env["PIOTEST_SRC_FILTER"] if "PIOTEST_RUNNING_NAME" not in pattern]
+            env.Replace(PIOTEST_SRC_FILTER=[*beside, *(f"+<$PIOTEST_RUNNING_NAME/{unit}.cpp>" for unit in units)])
+        env.AddBuildMiddleware(compiled_fast, "*/firmware/test/*.cpp")
 
     def stage_testing(self) -> None:
         """Runs the program; each of its test cases is one of PlatformIO's."""
@@ -56,6 +63,13 @@ class CustomTestRunner(DoctestTestRunner):  # type: ignore[misc]
             click.echo(case.humanize())
         if done.returncode != 0 and failures == 0:
             raise UnitTestSuiteError(f"the program ended with code {done.returncode} although no test case failed")
+
+
+def compiled_fast(env: Any, source: Any) -> Any:
+    """Compiles a test without optimisation and sanitizers, which are for the firmware: it takes longer to compile than
+    to run."""
+    flags = [flag for flag in env["CCFLAGS"] if not str(flag).startswith(("-O", "-f"))]
+    return env.Object(source, CCFLAGS=[*flags, "-O0"])
 
 
 def test_case(element: ElementTree.Element) -> TestCase:

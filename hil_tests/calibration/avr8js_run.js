@@ -7,7 +7,8 @@
 // By node: node avr8js_run.js FOLDER-OF-THE-PACKAGE PROGRAM.bin ANSWERS QUIET, result as JSON.
 'use strict';
 
-function calibrate(avr8js, flash, answers, quiet) {
+// An Uno that is about to run those bytes: its processor, its port B, its UART.
+function uno(avr8js, flash) {
   const words = new Uint16Array(16384);
   flash.forEach((byte, i) => { words[i >> 1] |= byte << (8 * (i & 1)); });
   const cpu = new avr8js.CPU(words);
@@ -20,8 +21,11 @@ function calibrate(avr8js, flash, answers, quiet) {
   new avr8js.AVRADC(cpu, avr8js.adcConfig);
   new avr8js.AVREEPROM(cpu, new avr8js.EEPROMMemoryBackend(1024));
   new avr8js.AVRTWI(cpu, avr8js.twiConfig, 16e6);
-  const usart = new avr8js.AVRUSART(cpu, avr8js.usart0Config, 16e6);
+  return { cpu, portB, usart: new avr8js.AVRUSART(cpu, avr8js.usart0Config, 16e6) };
+}
 
+function calibrate(avr8js, flash, answers, quiet) {
+  const { cpu, portB, usart } = uno(avr8js, flash);
   const result = { bytes: [], byte_cycles: [], edge_cycles: [] };
   const waiting = ['?'.charCodeAt(0)];
   let text = '';
@@ -60,3 +64,5 @@ if (typeof require === 'function' && typeof module === 'object' && require.main 
   const flash = Array.from(fs.readFileSync(program));
   process.stdout.write(JSON.stringify(calibrate(avr8js, flash, Array.from(Buffer.from(answers)), Number(quiet))));
 }
+
+if (typeof module === 'object') module.exports = { uno };

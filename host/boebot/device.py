@@ -28,9 +28,11 @@ def pin_name(number: int) -> str:
 
 
 class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, tag_field="type"):
-    """What every device has. `on = false` reserves its pins and leaves it switched off."""
+    """What every device has. `on = false` reserves its pins and leaves it switched off; `plugged = false`: of a
+    simulated robot's board it is switched on, but its plug is out."""
 
     on: bool = True
+    plugged: bool = True
 
     PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)

@@ -24,7 +24,9 @@ def parameters_of(robot: RobotDescription) -> dict[str, float]:
     values: dict[str, float] = {"devices": sum(int(bit) for bit, device in DEVICE_OF_BIT.items() if robot.has(device))}
     for parameter, spec in PARAMETERS.items():
         owner, _, key = spec.default_from.partition(".")
-        if owner == "body":
+        if owner == "robot":
+            values[parameter] = float(getattr(robot, key))
+        elif owner == "body":
             values[parameter] = float(getattr(robot.body, key))
         elif robot.has(owner):
             values[parameter] = float(getattr(robot.device[owner], key))
@@ -44,9 +46,10 @@ def configure(link: Link, robot: RobotDescription) -> RobotDescription:
         BoardError: the board does not answer, or refuses one.
     """
     assert link.hello is not None
+    wanted = {name: value for name, value in parameters_of(robot).items() if name in link.parameters}
     if link.hello.parameters_saved:
-        return adapted(robot, {name: link.get_parameter(name) for name in parameters_of(robot)})
-    for parameter, value in parameters_of(robot).items():
+        return adapted(robot, {name: link.get_parameter(name) for name in wanted})
+    for parameter, value in wanted.items():
         if parameter != "baud_rate":  # the board speaks at the right one, or nothing would be heard
             link.set_parameter(parameter, value)
     return robot

@@ -15,6 +15,7 @@ from boebot.devices.battery import Battery
 from boebot.devices.light import Light
 from boebot.devices.ping import Ping
 from boebot.devices.whisker import Whisker
+from boebot.link.messages import PingStatus
 
 Layout = Mapping[str, slice]
 """Where the readings of each device of the description stand."""
@@ -142,7 +143,9 @@ def _reader(device: robots.AnyDevice, where: slice) -> Reader | None:
 
             def sonar(sample: Readings) -> Ping:
                 value = sample.values[first]
-                return Ping(value if value < beyond else None, sample.ages[first], True)
+                near = value < beyond
+                status = PingStatus.OK if near else PingStatus.NOTHING_NEAR
+                return Ping(value if near else None, sample.ages[first], True, status)
 
             return sonar
         case vehicle_devices.Laser():

@@ -14,7 +14,7 @@ import numpy as np
 from boebot import figures, hangs
 from boebot.boards import Truth, WatchdogReset
 from boebot.brain_record import BrainRecord
-from boebot.link.messages import Identity, Status
+from boebot.link.messages import EventKind, Identity, Status
 from boebot.link.session import text
 from boebot.readings import Layout
 from boebot.readings_series import ReadingsSeries
@@ -189,7 +189,14 @@ class RunResult:
     @cached_property
     def dead_man_stops(self) -> int:
         """Times the motors stopped because no fresh set-point came."""
-        return self.series.rising(Status.DEAD_MAN)
+        told = sum(event.kind == EventKind.DEAD_MAN for event in self.record.events)
+        return max(self.series.rising(Status.DEAD_MAN), told)  # telemetry is not heard while a session is lost
+
+    @cached_property
+    def fallback_takeovers(self) -> int:
+        """Times the board's own brain took over because the host was silent."""
+        told = sum(event.kind == EventKind.FALLBACK and event.value == 1 for event in self.record.events)
+        return max(self.series.rising(Status.FALLBACK), told)
 
     @property
     def has_odometry(self) -> bool:
@@ -270,6 +277,7 @@ class RunResult:
             "bad_frames": self.bad_frames if on_board else None,
             "overruns": self.overruns if on_board else None,
             "dead_man_stops": self.dead_man_stops if on_board else None,
+            "fallback_takeovers": self.fallback_takeovers if on_board else None,
             "resets": self.resets if on_board else None,
             "sessions_lost": self.sessions_lost if on_board else None,
             "hung_at": hangs.places(self.watchdog_resets),

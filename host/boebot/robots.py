@@ -103,6 +103,7 @@ class Encoder(Device, tag="encoder", frozen=True, kw_only=True):
 
     pin: int | str
     edges_per_turn: Annotated[int, msgspec.Meta(ge=2, le=4096)]
+    LINES: ClassVar[int] = 1
 
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
@@ -114,7 +115,8 @@ class QuadratureEncoder(Device, tag="quadrature_encoder", frozen=True, kw_only=T
 
     pin_a: int | str
     pin_b: int | str
-    edges_per_turn: Annotated[int, msgspec.Meta(ge=4, le=4096)]
+    edges_per_turn: Annotated[int, msgspec.Meta(ge=4, le=4096)]  # of both lines together
+    LINES: ClassVar[int] = 2
 
     PINS: ClassVar[dict[str, str]] = {"pin_a": "a", "pin_b": "b"}
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
@@ -199,8 +201,8 @@ class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
     heading_rad: float
 
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge.
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(8), *_ANALOG)}
+    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *_ANALOG)}
 
 
 class Compass(Device, tag="compass", frozen=True, kw_only=True):
@@ -275,6 +277,16 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     def has_board(self) -> bool:
         """Whether a board drives it; otherwise motor signals do, in the simulated world only."""
         return self.board != NO_BOARD
+
+    @property
+    def encoder_gap_us(self) -> float:
+        """Edges of one encoder line that follow faster are bounces (us): a quarter of the time between two edges at the
+        wheel's top speed. 0: there are no encoders."""
+        encoder = self.device.get("encoder_left")
+        if not isinstance(encoder, Encoder | QuadratureEncoder):
+            return 0.0
+        edge_m = 2 * math.pi * self.body.wheel_radius_m * encoder.LINES / encoder.edges_per_turn
+        return min(0.25 * edge_m / self.body.wheel_speed_maximum_m_s * 1e6, 65535.0)
 
     def has(self, name: str) -> bool:
         """Whether the robot has a device of that name, switched on."""
@@ -394,6 +406,8 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
         if not isinstance(device, VehicleDevice):
             kind = device.__struct_config__.tag
             raise RobotError(f"{file}: device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}")
+        if not device.plugged:
+            raise RobotError(f"{file}: device.{name}.plugged is false, but a robot without a board has no plugs")
     for name in ("motor_left", "motor_right"):
         if not (robot.has(name) and isinstance(robot.device[name], Motor)):
             raise RobotError(

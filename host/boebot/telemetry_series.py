@@ -135,6 +135,7 @@ class TelemetrySeries(Series):
             "infrared_age_s": (self.infrared_age, 3),
             "ping_distance_m": (self.ping_distance, 4),
             "ping_age_s": (self.ping_age, 3),
+            "ping_status": (self.raw["ping_status"], None),
             "pulse_left_us": (self.left_pulse_us, 4),
             "pulse_right_us": (self.right_pulse_us, 4),
             "status": (raw["status"], None),

@@ -151,6 +151,9 @@ class Peer:
         self.counts = dict.fromkeys(messages.Counters._fields, 0)
         self._own = 0
         self._new_nonce()
+        self._event: messages.Event | None = None
+        self._events: deque[tuple[int, int, int]] = deque()
+        self._merged: dict[int, tuple[int, int, int]] = {}  # by kind: the latest that found no room in the queue
         self._begin_numbers()
         if self.answers:
             self._hello()
@@ -184,17 +187,18 @@ class Peer:
         self._request_number = self.first_number
         self._last_answer: messages.Answer | None = None
         self._event_number = self.first_number
-        self._event: messages.Event | None = None
+        waiting = [self._event[1:]] if self._event is not None else []
+        waiting += [*self._events, *sorted(self._merged.values(), key=lambda event: event[2])]
+        self._event, self._merged = None, {}
         self._event_sent_s = 0.0
-        self._events: deque[tuple[int, int, int]] = deque()
-        self._merged: dict[int, tuple[int, int, int]] = {}  # by kind: the latest that found no room in the queue
+        self._events = deque((kind, value, us) for kind, value, us in waiting if kind != EventKind.WHISKERS)
 
     def _open(self, message: messages.Open) -> None:
         seed = message.board_nonce ^ message.host_nonce
         if seed == self.session and seed:
             self._hello()
             return
-        if message.protocol_version != self.protocol_version or seed in (0, SEED):
+        if message.protocol_version // 16 != self.protocol_version // 16 or seed in (0, SEED):
             return
         if self.protections.nonce and message.board_nonce != self.nonce:
             return
@@ -492,6 +496,7 @@ class Peer:
             infrared_age=self.ticks % 5,
             ping_echo=round(ahead * 2 / 343.5 * 1e6) if ahead < 3.0 else 0,
             ping_age=self.ticks % 5,
+            ping_status=messages.PingStatus.OK if ahead < 3.0 else messages.PingStatus.NOTHING_NEAR,
             pulse_left=self._pulse(self.command[0], 200),
             pulse_right=self._pulse(self.command[1], -200),
             supply=self.supply_mv if self.supply_measured else 0,
@@ -531,8 +536,6 @@ class Peer:
 
     def _happened(self, kind: int, value: int) -> None:
         """Something to be told exactly once."""
-        if not self.session:
-            return
         us = self.board_us()
         if len(self._events) + (self._event is not None) < QUEUE and not self._merged:
             self._events.append((kind, value, us))
@@ -540,7 +543,7 @@ class Peer:
             self.counts["deferred"] += 1
             closed = self._merged[kind][1] & 0xFF00 if kind == EventKind.WHISKERS and kind in self._merged else 0
             self._merged[kind] = (kind, value | closed, us)
-        if self._event is None:
+        if self._event is None and self.session:
             self._send_event()
 
     def _send_event(self) -> None:

@@ -28,7 +28,7 @@ from boebot.cognition import (
     wrapped,
 )
 from boebot.errors import BrainError
-from boebot.link.messages import CompassStatus
+from boebot.link.messages import CompassStatus, PingStatus
 
 RADIUS = QUAD.body.wheel_radius_m
 TRACK = QUAD.body.track_width_m
@@ -349,10 +349,12 @@ def test_near_is_the_nearest_of_all(left: float, right: float) -> None:
 @pytest.mark.parametrize(
     ("fields", "expected"),
     [
-        ({"ping_echo": 0, "ping_age": 1}, 0.0),  # no echo: nothing ahead
-        ({"ping_echo": 1166, "ping_age": 1}, 0.5),  # 0.2 m at 343 m/s, of 0.4 m
-        ({"ping_echo": 1166, "ping_age": 255}, None),
-        ({"ping_echo": 18_000, "ping_age": 1}, 0.0),  # 3.1 m: beyond
+        ({"ping_status": PingStatus.NOTHING_NEAR, "ping_age": 1}, 0.0),
+        ({"ping_status": PingStatus.TOO_NEAR, "ping_age": 1}, 1.0),
+        ({"ping_status": PingStatus.ABSENT, "ping_age": 1}, None),
+        ({"ping_status": PingStatus.OK, "ping_echo": 1166, "ping_age": 1}, 0.5),  # 0.2 m at 343 m/s, of 0.4 m
+        ({"ping_status": PingStatus.OFF, "ping_age": 255}, None),
+        ({"ping_status": PingStatus.OK, "ping_echo": 18_000, "ping_age": 1}, 0.0),  # 3.1 m: beyond
     ],
 )
 def test_nearness_ahead_of_what_ping_says(fields: dict[str, int], expected: float | None) -> None:
@@ -375,6 +377,7 @@ ANYTHING = st.fixed_dictionaries(
         "infrared_age": BYTES,
         "ping_echo": WORDS,
         "ping_age": BYTES,
+        "ping_status": st.sampled_from([int(one) for one in PingStatus]),
         "pulse_left": WORDS,
         "pulse_right": WORDS,
         "battery": st.integers(0, 1023),

@@ -200,11 +200,7 @@ def test_new_brain_runs_and_is_never_overwritten(
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = boebot(capsys, "--version")
-    assert (
-        code == 0
-        and out.startswith("boebot ")
-        and f"protocol {messages.PROTOCOL_VERSION}, schema {messages.SCHEMA_HASH:08x}" in out
-    )
+    assert code == 0 and out.startswith("boebot ") and f"protocol 3.0, schema {messages.SCHEMA_HASH:08x}" in out
     code, out, _ = boebot(capsys, "--help")
     assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
 
@@ -483,7 +479,9 @@ def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixtu
     assert abs(seen["clock_drift_ppm"]) < 200 and seen["clock_bound_us"] < 500
     board.read(0.01)
     assert board.peer.session == 0 and board.peer.accepted == [], "closed, and nothing has moved"
+    board.peer._happened(messages.EventKind.DEAD_MAN, 7)
     code, out, _ = boebot(capsys, "link", "--once")
+    assert "motors stopped by the dead-man" in " ".join(out.split())
     for name in (
         "round trip p99",
         "clock drift",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
+from channel import Channel
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
@@ -69,6 +70,25 @@ def test_board_in_a_session_of_another_host_is_found_too() -> None:
     peer._open(messages.Open(messages.PROTOCOL_VERSION, peer.nonce, 12345))
     Link(port).open()
     assert port.baud == 57_600 and port.now() < 2.5
+
+
+@pytest.mark.parametrize("spoilt", [0.01, 0.02, 0.05])
+def test_line_that_spoils_bytes_is_not_taken_for_another_rate(spoilt: float) -> None:
+    """Of a hundred bytes so many are wrong. Where no session comes about in time that is said."""
+    opened, lines = 0, 30
+    for seed in range(lines):
+        port = Port(Peer(), 500_000)
+        port.channel = Channel(bit_errors=1 - (1 - spoilt) ** (1 / 8), seed=seed)
+        link = Link(port)
+        said = ""
+        try:
+            link.open()
+            opened += 1
+        except BoebotError as error:
+            said = str(error)
+        assert not said or "spoils what it carries: " in said
+        assert link.notices == [] and port.baud == 500_000
+    assert opened == lines or (spoilt == 0.05 and opened >= lines / 2)
 
 
 class Sketch(Port):

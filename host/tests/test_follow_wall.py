@@ -14,6 +14,7 @@ from boebot.devices import turret as turret_device
 from boebot.devices.ping import speed_of_sound
 from boebot.devices.told import NOTHING_TOLD, Told
 from boebot.link import messages
+from boebot.link.messages import PingStatus
 from boebot.robots import PositionServo
 
 
@@ -41,7 +42,7 @@ class Followed(Stepped):
             message = turret_device.command(turret)
             self.pulse = turret_device.pulse_of(message, TURRET.centre_us, TURRET.gain_us_per_rad)
         echo = 18500 if wall is None else round(2 * wall / speed_of_sound() * 1e6)
-        self.see(ping_echo=echo, infrared=infrared)
+        self.see(ping_echo=echo, ping_status=PingStatus.OK, infrared=infrared)
         devices = NOTHING_TOLD.devices._replace(turret_pulse=self.pulse)
         self.robot.observation = self.robot.observation._replace(slow=Told(devices, 0))
         self.brain.step(self.robot)

@@ -122,8 +122,99 @@ def test_only_messages_of_ones_own_direction_are_accepted(to_board: bool) -> Non
         receiver = frame.Decoder(SEED, to_board=to_board)
         wire = frame.encode(number, 0, bytes(LENGTHS.get(number, 1)), SEED)
         accepted = number in (TO_BOARD if to_board else TO_HOST)
+        echo = (number < 0x80) != to_board
         assert len(receiver.feed(wire)) == accepted, "an unknown message, or the echo of what was sent"
-        assert (receiver.good, receiver.bad) == (accepted, not accepted)
+        assert (receiver.good, receiver.bad, receiver.unknown) == (accepted, echo, not accepted and not echo)
+
+
+def test_messages_of_a_later_minor_version_are_counted_and_nothing_else() -> None:
+    """Of whatever length, up to the longest that is known; where one is damaged it is damaged."""
+    receiver = frame.Decoder(SEED)
+    sent = [
+        (TELEMETRY, bytes(LENGTH)),
+        (0xFE, b""),
+        (0x95, bytes(range(frame.LONGEST_PAYLOAD))),
+        (TELEMETRY, bytes(LENGTH)),
+    ]
+    wires = [frame.encode(number, n, payload, SEED) for n, (number, payload) in enumerate(sent)]
+    assert [number for number, _, _ in receiver.feed(b"".join(wires))] == [TELEMETRY, TELEMETRY]
+    assert (receiver.good, receiver.unknown, receiver.bad, receiver.lost, receiver.resynchronised) == (2, 2, 0, 0, 0)
+    receiver.feed(wires[1].replace(b"\xfe", b"\xfc"))
+    assert (receiver.unknown, receiver.bad) == (2, 1)
+
+
+# ---- one wrong bit that makes or unmakes a delimiter ----------------------------------------------------------------
+
+
+def seed_that_fits(first: bytes, second: bytes) -> int | None:
+    """The seed from which both have the same checksum: a checksum is linear in its seed."""
+
+    def differs(seed: int) -> int:
+        return reference_frame.crc21(first, seed) ^ reference_frame.crc21(second, seed)
+
+    rest, seed = differs(0), 0
+    basis: list[tuple[int, int]] = []
+    for bit in range(21):
+        row, of = differs(1 << bit) ^ differs(0), 1 << bit
+        for known, known_of in basis:
+            row, of = min((row, of), (row ^ known, of ^ known_of))
+        if row:
+            basis.append((row, of))
+    for known, of in sorted(basis, reverse=True):
+        rest, seed = min((rest, seed), (rest ^ known, seed ^ of))
+    return seed if rest == 0 else None
+
+
+def spoilt(wire: bytes) -> list[bytes]:
+    """The frame with each bit wrong that makes or unmakes a delimiter."""
+    bits = [(at, bit) for at, byte in enumerate(wire) for bit in range(8) if byte in (0, 1 << bit)]
+    return [wire[:at] + bytes([wire[at] ^ 1 << bit]) + wire[at + 1 :] for at, bit in bits]
+
+
+def test_rest_of_a_frame_that_one_wrong_bit_has_cut_is_refused() -> None:
+    """Telemetry in which a zero byte is followed by another: bit 0 of the code byte 01 between them is cleared. What
+    follows is a clock_answer, and with this seed its checksum is right."""
+    tail = bytes([0, 0, messages.ClockAnswer.ID, *range(1, messages.ClockAnswer.LENGTH + 2)])
+    payload = bytes(range(1, LENGTH - len(tail) + 1)) + tail
+    stuffed = reference_frame.cobs(bytes([TELEMETRY, 7]) + payload)
+    at = len(stuffed) - messages.ClockAnswer.LENGTH - 4
+    seed = seed_that_fits(stuffed, stuffed[at + 1 :])
+    assert seed is not None and stuffed[at] == 1
+    wire = bytearray(frame.encode(TELEMETRY, 7, payload, seed))
+    wire[1 + at] ^= 1
+    rest = bytes(wire[1 + at :])
+    assert [number for number, _, _ in frame.Decoder(seed).feed(b"\0" + rest)] == [messages.ClockAnswer.ID]
+    neighbour = frame.encode(TELEMETRY, 8, payload, seed)
+    assert frame.Decoder(seed).feed(neighbour + bytes(wire) + neighbour) == [(TELEMETRY, 8, payload)] * 2
+
+
+@st.composite
+def messages_to(draw: st.DrawFn, to_board: bool) -> tuple[int, bytes]:
+    number = draw(st.sampled_from(TO_BOARD if to_board else TO_HOST))
+    byte = st.one_of(st.just(0), st.sampled_from(sorted(LENGTHS)), st.integers(0, 255))
+    payload = bytearray(draw(st.lists(byte, min_size=LENGTHS[number], max_size=LENGTHS[number])))
+    if number == messages.Open.ID:
+        payload[0] = messages.PROTOCOL_VERSION
+    return number, bytes(payload)
+
+
+@given(st.data(), st.booleans(), sequences)
+def test_no_wrong_bit_shows_a_piece_that_only_the_checksum_would_refuse(
+    data: st.DataObject, to_board: bool, sequence: int
+) -> None:
+    """Whatever its checksum: of all bits that make or unmake a delimiter. All but the two that PROTOCOL.md names."""
+    number, payload = data.draw(messages_to(to_board))
+    wire = frame.encode(number, sequence, payload, SEED)
+    sizes = {number: LENGTHS[number] + 6 for number in (TO_BOARD if to_board else TO_HOST)}
+    for stream in spoilt(wire):
+        for piece, may_be in reference_frame.pieces(b"\0" + stream + b"\0", sizes):
+            try:
+                shown = cobs.decode(piece[:-3])[0] if may_be and all(byte & 0x80 for byte in piece[-3:]) else 0
+            except (cobs.DecodeError, IndexError):
+                continue
+            if sizes.get(shown) == len(piece):
+                pair = {messages.MESSAGES[number].NAME, messages.MESSAGES[shown].NAME}
+                assert "describe" in pair and pair & {"close", "setpoint_coast", "buzzer"}
 
 
 # ---- sessions -------------------------------------------------------------------------------------------------------
@@ -167,12 +258,10 @@ class PlainDecoder:
 
     def decode(self, stream: bytes) -> list[Message]:
         found: list[Message] = []
-        *blocks, _unfinished = stream.split(b"\0")
         damaged = False
-        for place, block in enumerate(blocks):
-            if not block:
-                continue
-            message = self.open(block)
+        sizes = {number: LENGTHS[number] + 6 for number in self.numbers}
+        for place, (block, may_be) in enumerate(reference_frame.pieces(stream, sizes)):
+            message = self.open(block) if may_be else None
             if message is not None:
                 if found:
                     self.lost += (message[1] - found[-1][1] - 1) % 256
@@ -180,7 +269,7 @@ class PlainDecoder:
                 self.good += 1
                 self.resynchronised += damaged
                 damaged = False
-            elif place > 0:  # what precedes the first delimiter may be the tail of a frame
+            elif place > 0 or stream[0] == 0:  # what precedes the first delimiter may be the tail of a frame
                 self.bad += 1
                 damaged = True
         return found

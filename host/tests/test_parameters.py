@@ -37,7 +37,7 @@ def test_board_is_told_all_of_them() -> None:
     assert told["servo_left_centre"] == 24000
     assert told["wheel_speed_maximum"] == 1700
     owners = {name: spec.default_from.partition(".")[0] for name, spec in messages.PARAMETERS.items()}
-    described = {name for name, owner in owners.items() if owner == "body" or robot.has(owner)} | {
+    described = {name for name, owner in owners.items() if owner in ("robot", "body") or robot.has(owner)} | {
         "devices",
         "infrared_sweep",
     }

@@ -71,6 +71,10 @@ def variant(folder: Path, text: str) -> Path:
     [
         ("remove = ['motor_left']", "device.motor_left is missing or off; a robot without a board needs a dc_motor"),
         ("pin_map = 'shieldbot'", "pin_map is 'shieldbot', but a robot without a board has no pins"),
+        (
+            "[device.compass]\nplugged = false",
+            "device.compass.plugged is false, but a robot without a board has no plugs",
+        ),
         ("[device.buzzer]\ntype = 'buzzer'\npin = 4", "device.buzzer is buzzer, which needs a board's pins"),
         ("[device.compass]\nsigma_rad = -1.0", "device.compass.sigma_rad: expected float >= 0.0"),
         ("[device.laser]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\nrays = 0", "device.laser.rays: expected"),

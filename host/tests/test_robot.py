@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from boebot.devices.ping import speed_of_sound
 from boebot.errors import BrainError
 from boebot.link import messages
+from boebot.link.messages import PingStatus
 from boebot.robot import Command, Equipment, Observation, Robot
 from boebot.robots import load_robot
 
@@ -52,25 +53,31 @@ def test_infrared_never_read() -> None:
 @given(st.floats(0.02, 3.0))
 def test_echo_becomes_distance(distance: float) -> None:
     echo_us = round(2 * distance / speed_of_sound() * 1e6)
-    ping = observe(ping_echo=echo_us, ping_age=3).ping
+    ping = observe(ping_echo=echo_us, ping_age=3, ping_status=PingStatus.OK).ping
     assert ping.distance == pytest.approx(distance, abs=0.0002)
     assert ping.valid and ping.age == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize(
-    ("echo_us", "ticks", "distance_known", "valid"),
+    ("told", "echo_us", "ticks", "shown", "valid"),
     [
-        (0, 2, False, True),
-        (17_600, 2, True, True),
-        (18_500, 2, False, True),
-        (5000, 255, False, False),
-        (5000, 90, True, False),
+        (PingStatus.NOTHING_NEAR, 0, 2, PingStatus.NOTHING_NEAR, True),
+        (PingStatus.OK, 17_600, 2, PingStatus.OK, True),
+        (PingStatus.OK, 18_500, 2, PingStatus.NOTHING_NEAR, True),
+        (PingStatus.OK, 101, 2, PingStatus.TOO_NEAR, False),
+        (PingStatus.TOO_NEAR, 0, 2, PingStatus.TOO_NEAR, False),
+        (PingStatus.ABSENT, 0, 2, PingStatus.ABSENT, False),
+        (PingStatus.OFF, 0, 255, PingStatus.OFF, False),
+        (PingStatus.OK, 5000, 90, PingStatus.OK, False),
     ],
 )
-def test_ping_says_what_it_does_not_know(echo_us: int, ticks: int, distance_known: bool, valid: bool) -> None:
-    ping = observe(ping_echo=echo_us, ping_age=ticks).ping
-    assert (ping.distance is not None) is distance_known
-    assert ping.valid is valid
+def test_ping_says_what_it_does_not_know(
+    told: PingStatus, echo_us: int, ticks: int, shown: PingStatus, valid: bool
+) -> None:
+    ping = observe(ping_echo=echo_us, ping_age=ticks, ping_status=told).ping
+    assert ping.status == shown and ping.valid is valid
+    assert (ping.distance is not None) is (shown == PingStatus.OK)
+    assert (ping.too_near, ping.absent) == (shown == PingStatus.TOO_NEAR, shown == PingStatus.ABSENT)
 
 
 def test_encoder() -> None:

@@ -285,6 +285,16 @@ def test_dead_man_stops_are_counted(session: InProcess) -> None:
     assert result.dead_man_stops == 1
 
 
+def test_takeovers_by_the_boards_own_brain_are_counted(session: InProcess) -> None:
+    def taken_over_twice(robot: Robot) -> None:
+        robot.drive(0.5, 0.5)
+        session.peer.status &= ~messages.Status.FALLBACK
+        if 0.2 < robot.time < 0.4 or 0.6 < robot.time < 0.7:
+            session.peer.status |= messages.Status.FALLBACK
+
+    assert boebot.run(taken_over_twice, seconds=1).fallback_takeovers == 2
+
+
 def test_nothing_commanded_means_motors_off(session: InProcess) -> None:
     result = boebot.run(lambda robot: None, seconds=1)
     assert all(isinstance(message, messages.SetpointCoast) for message in session.peer.setpoints)
@@ -360,6 +370,33 @@ def test_session_that_the_board_ends_is_opened_and_armed_again(session: InProces
     assert result.run_time == pytest.approx(2.0)
     assert result.telemetry.left_pulse_us[-1] == 1600
     assert np.flatnonzero(result.telemetry.left_pulse_us == 0)[-1] < 70, "driving again within a tenth of a second"
+
+
+def test_dead_man_stop_that_came_with_the_end_of_the_session_is_counted(session: InProcess) -> None:
+    """The line to the board is cut until its session has ended, and the other one before the board could tell of it."""
+    session.peer.parameters[messages.PARAMETERS["session_time_out"].id] = 400
+    carry = session.channel.carry
+    ends_s = {"board": 1.6, "host": 1.5}
+
+    def cut(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
+        return [] if {"board": 1.0, "host": 1.2}[way] < at_s < ends_s[way] else carry(way, frame, at_s)
+
+    session.channel.carry = cut  # type: ignore[method-assign]
+    result = boebot.run(straight, seconds=4)
+    assert (result.error, result.sessions_lost, result.dead_man_stops) == (None, 1, 1)
+    assert result.notices == []
+    stop = next(event for event in result.record.events if event.kind == messages.EventKind.DEAD_MAN)
+    assert stop.earlier and stop.time == pytest.approx(1.25, abs=0.05)
+
+
+def test_stop_of_before_the_run_is_told_and_is_not_the_runs(session: InProcess) -> None:
+    session.peer._happened(messages.EventKind.DEAD_MAN, 7)
+    session.read(0.5, 0.5)
+    result = boebot.run(straight, seconds=1)
+    assert result.dead_man_stops == 0
+    assert result.notices == [
+        "before this run, by the clock of the board at peer: 0.000 s: motors stopped by the dead-man"
+    ]
 
 
 @pytest.mark.parametrize(("telemetry_ticks", "period", "stepping"), [(2, 0.05, 0.06), (5, 0.05, 0.05), (10, 0.01, 0.1)])

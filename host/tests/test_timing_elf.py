@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import re
 import struct
 import subprocess
 from dataclasses import replace
@@ -16,7 +15,7 @@ from avr_image import build, disassembly
 from boebot.errors import TimingError
 from boebot.timing.elf import Image, read_image
 from boebot.timing.graph import load_program
-from boebot.timing.program import FrameRow, InterruptRow, LoopBound, SensorRow, TaskRow
+from boebot.timing.program import InterruptRow, LoopBound, SensorRow, TaskRow
 
 IMAGE = Path(__file__).resolve().parents[2] / "build" / "images" / "shieldbot.elf"
 PROGRAM = """
@@ -75,13 +74,6 @@ def test_symbols_are_those_of_avr_nm() -> None:
     }
 
 
-def test_variables_are_those_of_avr_nm(tmp_path: Path) -> None:
-    path = build(tmp_path, PROGRAM)
-    lines = [line.split() for line in output("avr-nm", "-S", path).splitlines()]
-    sizes = {words[3]: int(words[1], 16) for words in lines if len(words) == 4 and words[2] in "bBdD"}
-    assert sizes and read_image(path).variables == sizes
-
-
 def test_the_code_is_that_of_avr_objcopy(tmp_path: Path) -> None:
     binary = tmp_path / "flash.bin"
     output("avr-objcopy", "-O", "binary", "-R", ".eeprom", IMAGE, binary)
@@ -138,12 +130,10 @@ def rows(folder: Path, *lines: str) -> Image:
 
 def test_the_rows_of_the_timing_table_are_read_in_their_order(tmp_path: Path) -> None:
     lines = ["TASK whisker 1 0 200", "INTERRUPT receive 18 48 600 320", "SENSOR ping 18500 5 20000", "TASK ir 2 1 900"]
-    lines.append("FRAME setpoint 16 8")
     table = rows(tmp_path, *lines).table
     assert table.tasks == (TaskRow("whisker", 1, 0, 200), TaskRow("ir", 2, 1, 900))
     assert table.interrupts == (InterruptRow("receive", 18, 48, 600, 320),)
     assert table.sensors == (SensorRow("ping", 18500, 5, 20000),)
-    assert table.frames == (FrameRow("setpoint", 16, 8),)
 
 
 @pytest.mark.parametrize(
@@ -153,10 +143,8 @@ def test_the_rows_of_the_timing_table_are_read_in_their_order(tmp_path: Path) ->
         ("TASK whisker 1 0 -200", "a name and 3 whole numbers are expected"),
         ("TASK whisker 1 0 2e2", "a name and 3 whole numbers are expected"),
         ("INTERRUPT receive 18 48 600", "a name and 4 whole numbers are expected"),
-        ("FRAME setpoint 16", "a name and 2 whole numbers are expected"),
-        ("FRAME setpoint 256 8", "256 as an id or a length; expected at most 255"),
         ("SENSOR", "a name and 3 whole numbers are expected"),
-        ("JOB whisker 1 0 200", "is of no known kind: TASK, INTERRUPT, SENSOR, FRAME, CONSTANT are expected"),
+        ("JOB whisker 1 0 200", "is of no known kind: TASK, INTERRUPT, SENSOR, CONSTANT are expected"),
         ("CONSTANT slot_cycles", "a name and 1 whole numbers are expected"),
         ("CONSTANT slot_cycles 0", "a constant of 0; expected at least 1"),
         ("   ", "is of no known kind"),
@@ -252,19 +240,3 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path) -> None:
         except TimingError:  # anything else fails the test
             refusals += 1
     assert 0 < refusals < 100
-
-
-@pytest.mark.parametrize(
-    ("records", "says"),
-    [
-        ((4, 24), "section .boebot.ids has 4 bytes"),
-        ((3, 24), "at 0x3; expected one of 32 registers and an instruction's address"),
-        ((2, 32), "in register 32 at 0x2; expected one of 32 registers"),
-        ((0x8000, 1), "at 0x8000"),
-    ],
-)
-def test_a_damaged_place_of_an_id_is_refused(tmp_path: Path, records: tuple[int, int], says: str) -> None:
-    words = records[: 1 if "4 bytes" in says else 2]
-    text = 'main: ret\n.section .boebot.ids, "", @progbits\n' + "".join(f".long {word}\n" for word in words)
-    with pytest.raises(TimingError, match=re.escape(says)):
-        read_image(build(tmp_path, text, assembler=True))

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from avr_image import assembled, build, compiled, disassembly, function, refusal
-from boebot.errors import TimingError
 from boebot.timing.elf import read_image
 from boebot.timing.graph import load_program
 
@@ -151,8 +150,7 @@ def test_a_comparison_the_wrong_way_is_refused(tmp_path: Path) -> None:
     place = data.index(read_image(image).code[branch - 8 : branch + 4]) + 8
     data[place + 1] ^= 0x04  # brcc and brcs differ in this bit
     image.write_bytes(data)
-    with pytest.raises(TimingError):
-        load_program(image)
+    assert main.entry in load_program(image).unproven
 
 
 def test_a_table_of_functions_in_flash_is_followed(tmp_path: Path) -> None:

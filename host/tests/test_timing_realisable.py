@@ -162,7 +162,9 @@ def test_run_over_a_slow_line_is_refused_and_takes_the_longer_period_by_force(mo
 
 def test_json_names_the_events_that_break() -> None:
     robot = load_robot("shieldbot")
-    assert judge(robot, 0.05, baud=123).as_dict()["breaking_events"] == ["telemetry, 46 B"]  # 46 bytes in 3.7 s
+    assert judge(robot, 0.05, baud=123).as_dict()["breaking_events"] == [
+        f"telemetry, {realisable.TELEMETRY_BYTES} B"
+    ]  # in 3.7 s
     assert judge(robot, 0.05).as_dict()["breaking_events"] == []
 
 

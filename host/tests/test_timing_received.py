@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_timing_latency import Machine
 
-from avr_image import assembled
+from avr_image import assembled, compiled
 from boebot.timing.blocked import ENTRY, Blocked
 from boebot.timing.latency import HORIZON, Latencies
-from boebot.timing.loads import RECEIVE
+from boebot.timing.loads import ENCODERS, RECEIVE
 from boebot.timing.program import Instruction, Program
 from boebot.timing.response import Source
 from boebot.timing.steps import Steps
@@ -46,6 +46,47 @@ def wait(program: Program, intervals: Sequence[int], byte: int = BYTE) -> int:
     requests = {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)}
     requests |= {RECEIVE: [Source("bytes", 1, byte)], RECEIVE + 1: [Source("i", 1, ONCE)]}
     return Latencies(Blocked(program), requests).of(RECEIVE)
+
+
+# ---- in C --------------------------------------------------------------------------------------------------------
+
+IN_C = """
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <stdbool.h>
+#include <stdint.h>
+volatile uint8_t ring[128], head, tail;
+static inline void take(void) {{
+  const uint8_t byte = UDR0, at = head;
+  ring[at] = byte;
+  if ((uint8_t)(at + 1u) % 128u == tail) {{
+    UCSR0B = (uint8_t)(UCSR0B & (uint8_t)~_BV(RXCIE0));
+  }} else {{
+    head = (uint8_t)(at + 1u) % 128u;
+  }}
+}}
+ISR(USART_RX_vect) {{ take(); }}
+ISR(PCINT1_vect) {{ PORTB ^= 1; {look} }}
+int main(void) {{ sei(); for (;;) {{ PORTB ^= 2; }} }}
+"""
+LOOKS = {
+    "bit": "if ((UCSR0A & _BV(RXC0)) != 0 && (UCSR0B & _BV(RXCIE0)) != 0) { take(); }",
+    "sign": "if ((int8_t)UCSR0A < 0 && (int8_t)UCSR0B < 0) { take(); }",
+    "switch first": "if (bit_is_set(UCSR0B, RXCIE0)) { if (bit_is_clear(UCSR0A, RXC0)) { return; } take(); }",
+    "unasked": "if ((UCSR0A & _BV(RXC0)) != 0) { take(); }",
+}
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_look_in_c(tmp_path: Path, look: str) -> None:
+    """Of a byte that waits it takes one, in the same time whatever it is written like; and only one of these does so
+    while the receive interrupt is off."""
+    found = taken(compiled(tmp_path, IN_C.format(look=LOOKS[look]), "-flto"), ENCODERS)
+    assert found.takes and found.heeds_switch == (look != "unasked")
+    if look != "switch first":  # else the receive interrupt may be off
+        assert found.run(0) is None, "it must take it"
+    run, until = found.run(1), found.until(0)
+    assert run is not None and until is not None and until + 30 < run < until + 80
 
 
 # ---- by hand -------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from boebot.timing.response import (
     Piece,
     Schedule,
     Source,
-    background,
+    Spell,
     longest_gap,
     misses,
     response,
@@ -39,7 +39,7 @@ def test_overload_is_said() -> None:
     assert response(1, [Source("a", 5, 10), Source("b", 5, 10)]) is None, "interrupts alone take all"
     full = Schedule(((Piece("task", 60),),), slot_cycles=100, slots_per_tick=1)
     assert responses(full, [Source("a", 4, 10)]) is None
-    assert longest_gap(full, [Source("a", 4, 10)], 0, 0) is None and background(full, [Source("a", 5, 10)]) == 0
+    assert longest_gap(full, [Source("a", 4, 10)], 0, 0) is None
     assert responses(full, [Source("a", 3, 10)]) is not None
 
 
@@ -58,6 +58,32 @@ def test_bursts_have_both_bounds() -> None:
     pairs = Source("bytes", 1, 10, bursts=((3, 100), (4, 1000)))
     assert [pairs.requests(w) for w in (30, 100, 101, 1000, 1001)] == [3, 3, 4, 4, 8]
     assert pairs.load == Fraction(4, 1000)
+
+
+def test_source_that_ends_while_the_main_loop_is_busy() -> None:
+    """By hand: 3 bytes of 4 cycles, one each 5, and then no more: 20 cycles of work end after 32."""
+    ring = Source("receive", 4, 5, most=3)
+    assert [ring.requests(w) for w in (0, 5, 6, 11, 1_000_000)] == [0, 1, 2, 3, 3]
+    assert response(20, [ring]) == 32 and response(20, [Source("receive", 4, 5)]) == 100
+    always = Schedule(((Piece("task", 60),),), slot_cycles=100, slots_per_tick=1)
+    bound = responses(always, [ring, Source("b", 3, 10)])
+    assert bound is not None and bound.tick == 105, "72 cycles of these, and 33 of 11 others"
+    assert responses(always, [Source("receive", 4, 5), Source("b", 3, 10)]) is None
+
+
+def test_source_that_comes_in_its_spells_only() -> None:
+    """By hand: three from 20 to 50 in each 100, one each 10."""
+    found = Source("burst", 1, 10, spells=(Spell(20, 50, 3, 10),), period=100)
+    assert [found.requests(w, 0) for w in (10, 20, 29, 30, 60, 119, 120, 150)] == [0, 1, 1, 2, 3, 3, 4, 6]
+    assert [found.requests(5, start) for start in (0, 20, 46, 60, 115, 146)] == [0, 1, 1, 0, 1, 1]
+    assert found.requests(40) == 4, "at any time"
+
+
+def test_several_frames_on_one_line() -> None:
+    """By hand: 3 bytes in each 100 and 2 in each 1000 cycles, one each 10."""
+    line = Source("bytes", 1, 10, parts=((3, 100), (2, 1000)))
+    assert [line.requests(w) for w in (10, 40, 100, 101, 1001)] == [1, 4, 5, 8, 37]
+    assert line.load == Fraction(3, 100) + Fraction(2, 1000)
 
 
 # ---- simulation: one cycle after another ---------------------------------------------------------------------------
@@ -184,9 +210,3 @@ def test_gap_by_hand() -> None:
     assert longest_gap(slot, [receive], 60, 20) == response(220, [receive]) == 276
     late = Schedule(((Piece("long", 14),), (Piece("short", 4),)), slot_cycles=10, slots_per_tick=2)
     assert longest_gap(late, [], 3, 1) == 40
-
-
-def test_background_is_what_is_left() -> None:
-    """Of 1000 cycles a slot takes 140, bytes 200."""
-    slot = Schedule(((Piece("a", 100), Piece("b", 40)),), 1000, 1)
-    assert background(slot, [Source("receive", 2, 10)]) == Fraction(660, 1000)

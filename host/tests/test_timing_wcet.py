@@ -40,6 +40,18 @@ NESTED = """main: nop
 9: ret
 """
 TWO_ENTRIES = "main: ldi r25, 3\n sbrc r24, 0\n rjmp 2f\n 1: nop\n nop\n nop\n 2: nop\n dec r25\n brne 1b\n ret"
+# From wherever X points to three bytes behind it.
+STEPPED = """main: ldi r24, 3
+ ldi r25, 0
+ movw r30, r26
+ add r24, r26
+ adc r25, r27
+1: ld r0, X+
+ cp r26, r24
+ cpc r27, r25
+ brne 1b
+ ret
+"""
 
 
 def cycles_of(folder: Path, source: str, name: str = "main") -> int:
@@ -70,13 +82,17 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         ("main: set\n bld r1, 3\n 1: lsr r24\n lsr r1\n brne 1b\n ret", 2 + 3 * (2 + 2) + (2 + 1) + 4),  # 8, 4, 2, 1
         ("main: ldi r24, 1\n rjmp 2f\n 1: ldi r24, 0\n 2: cpse r24, r1\n rjmp 1b\n ret", 3 + (1 + 2 + 1) + 2 + 4),
         ("main: ldi r24, 96\n ldi r25, 0\n bst r24, 5\n 1: bld r25, 7\n inc r25\n brmi 1b\n ret", 3 + 127 * 4 + 3 + 4),
-        (TWO_ENTRIES, 1 + 2 + 3 * (3 + 2) + 2 * 2 + 1 + 4),  # skips the jump, then three passes
-        (TWO_ENTRIES.replace("rjmp", "jmp"), 1 + 3 + 3 * (3 + 2) + 2 * 2 + 1 + 4),  # skips two words
+        (STEPPED, 2 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
+        (STEPPED.replace("ldi r24, 3", "ldi r24, 3\n ldi r26, 250\n ldi r27, 1"), 4 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 +
+        4),
+        (STEPPED.replace("ld r0, X+", "st X+, r0"), 2 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
+        (STEPPED.replace("add r24, r26\n adc r25, r27", "movw r24, r26\n adiw r24, 3"),
+         2 + 1 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
          "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted",
-         "flag", "bit of another", "two entries", "two entries, farther", "waits"],
+         "flag", "bit of another", "up to a pointer", "up to a known one", "stored", "from a copy", "waits"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles
@@ -110,8 +126,8 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
         ("main: bst r25, 5\n bld r1, 3\n 1: nop\n dec r1\n brne 1b\n ret", "has no bound"),
         ("main: rcall f\n ret\n f: rcall main\n ret", "recursion at .*: main calls f calls main"),
         ("main: rjmp main", "has no bound"),
-        ("main: sbrc r24, 0\n rjmp 2f\n 1: bounded 3\n dec r24\n 2: tst r25\n brne 3f\n dec r25\n rjmp 1b\n"
-         " 3: brcs 1b\n tst r24\n brcs 2b\n ret", "passed without"),  # two loops, one row
+        (TWO_ENTRIES, "can be entered at two places"),
+        (STEPPED.replace("cp r26, r24", "cp r30, r24"), "has no bound"),
     ],
 )  # fmt: skip
 def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None:
@@ -178,6 +194,8 @@ def test_loop_by_what_its_function_is_called_with(tmp_path: Path, source: str, c
         ("cpse r24, r1\n rjmp 1f", 0, 2 + 2 + 4),
         ("cpse r24, r1\n rjmp 1f", 1, 1 + 2 + 4),
         ("subi r24, 5\n sbc r25, r1\n brcc 1f", 4, 1 + 1 + 1 + 2 + 4),  # r25 is not known
+        ("cpi r25, 3\n brne 1f\n cpi r25, 4\n brne 1f", 0, 1 + 1 + 1 + 2 + 4),  # it is 3 behind the first
+        ("subi r25, 1\n brcc 1f\n inc r25\n brne 1f", 0, 1 + 1 + 1 + 1 + 2 + 4),  # 255 behind the first, then 0
     ],
 )  # fmt: skip
 def test_ways_that_an_argument_closes_do_not_count(tmp_path: Path, test: str, value: int, cycles: int) -> None:
@@ -186,8 +204,9 @@ def test_ways_that_an_argument_closes_do_not_count(tmp_path: Path, test: str, va
     assert cycles_of(tmp_path, source) == 1 + 3 + cycles + 4
 
 
-@pytest.mark.parametrize(("said", "passes"), [(4, 4), (10, 7), (7, 7)])
-def test_lesser_of_a_loops_bound_and_its_count_holds(tmp_path: Path, said: int, passes: int) -> None:
+@pytest.mark.parametrize(("said", "passes"), [(4, 7), (10, 7)])
+def test_count_that_the_code_shows_holds(tmp_path: Path, said: int, passes: int) -> None:
+    """Whatever is said: the row may be that of a loop within, which the compiler left out."""
     source = f"main: ldi r20, 7\n 1: bounded {said}\n sbic 5, 0\n rjmp 2f\n dec r20\n brne 1b\n 2: ret"
     a_pass = 2 + 1 + 2  # sbic skips
     leaves = max(1 + 2, 2 + 1 + 1)  # by the jump, by the branch

@@ -46,12 +46,11 @@ CONSTANTS = {
     "slot_cycles": 40_000,
     "slots_per_tick": 4,
     "slots_kept": 8,
-    "receive_due": 64,
-    "encoder_limit": 80,
+    "receive_ring": 127,
+    "poll_bytes": 17,
+    "changes_ring": 64,
     "changes_due": 8,
-    "change_bytes": 4,
-    "changes_close": 256,
-    "changes_storm": 4,
+    "changes_storm": 5,
 }
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware" / "src"
 

@@ -171,6 +171,6 @@ def test_the_hash_of_the_schema_stands_in_it() -> None:
 
 def test_a_message_of_too_many_parts_is_refused() -> None:
     long = schema.Message("long", 0x70, "to_board", "telemetry", "", [schema.Field("text", "text[65]")])
-    spec = schema.Schema(SCHEMA.version, SCHEMA.flags, SCHEMA.enum, [*SCHEMA.message, long], [])
+    spec = schema.Schema(SCHEMA.version, 0, SCHEMA.flags, SCHEMA.enum, [*SCHEMA.message, long], [])
     with pytest.raises(ValueError, match="long: 9 CAN frames"):
         can_database.frames(spec, long)

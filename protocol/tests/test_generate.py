@@ -57,5 +57,32 @@ def test_hash_ignores_explanations_and_sees_layout(tmp_path: Path) -> None:
     file = tmp_path / "messages.toml"
     file.write_text(original.replace('doc = "Asks for the identity."', 'doc = "Asks who it is."'))
     assert schema.load(file).hash == schema.load().hash
-    file.write_text(original.replace('name = "answers_tick", type = "u16"', 'name = "answers_tick", type = "u32"', 1))
+    file.write_text(original.replace('name = "answers_tick", type = "u16"', 'name = "answers_tick", type = "i16"', 1))
     assert schema.load(file).hash != schema.load().hash
+
+
+def test_hash_ignores_what_a_minor_version_adds(tmp_path: Path) -> None:
+    """A message, a parameter, flags and values at the end; without `since` each would be another version."""
+    original = (PROTOCOL / "messages.toml").read_text()
+    count = len(schema.load().parameter)
+    added = {
+        "minor = 0": "minor = 1",
+        '\n[[parameter]]\nname = "devices"': '\n[[message]]\nname = "more"\nid = 0x9E\ndirection = "to_host"\n'
+        'delivery = "telemetry"\ndoc = ""\nsince = 1\nfields = [{ name = "x", type = "u8" }]\n'
+        '\n[[parameter]]\nname = "devices"',
+        '"latched_again", "busy"]': '"latched_again", "busy", "tired"]\nsince = { tired = 1 }',
+        "max = 2047": "max = 4095",
+    }
+    text = original
+    for before, after in added.items():
+        assert text.count(before) == 1, before
+        text = text.replace(before, after)
+    text += f'\n[[parameter]]\nname = "mood"\nid = {count}\ntype = "u16"\nunit = ""\ndoc = ""\nmin = 0\nmax = 1\n'
+    file = tmp_path / "messages.toml"
+    file.write_text(text + "since = 1\n")
+    spec, ours = schema.load(file), schema.load()
+    assert spec.hash == ours.hash and spec.version_byte == ours.version_byte + 1
+    assert [spec.message_hash(m) for m in ours.message] == [ours.message_hash(m) for m in ours.message]
+    for mark in ("since = { tired = 1 }", "since = 1\nfields", "since = 1\n"):
+        file.write_text((text + "since = 1\n").replace(mark, mark.partition("fields")[1]))
+        assert schema.load(file).hash != ours.hash, mark

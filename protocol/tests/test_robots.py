@@ -20,7 +20,7 @@ def test_bundled_robots_load_under_their_own_names() -> None:
     assert (
         {load_robot(name).name for name in robot_names()}
         == set(robot_names())
-        >= {"shieldbot", "shieldbot-quad", "boebot"}
+        >= {"shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot"}
     )
 
 
@@ -30,6 +30,37 @@ def test_shieldbot_pins_are_those_of_the_default_map() -> None:
     assert pins["infrared_left"] == {"led": 9, "receiver": 10} and pins["infrared_right"] == {"led": 2, "receiver": 3}
     assert pins["whisker_left"] == {"": 5} and pins["whisker_right"] == {"": 7} and pins["ping"] == {"": 8}
     assert pins["encoder_left"] == {"": 16} and pins["encoder_right"] == {"": 17}
+
+
+def test_the_basic_shieldbot_is_wired_as_in_the_book() -> None:
+    """Parallax, "Robotics with the Board of Education Shield for Arduino": chapters 5 to 7."""
+    robot = load_robot("shieldbot-basic")
+    pins = {name: device.pins() for name, device in robot.device.items() if device.on and name != "uart"}
+    assert pins == {
+        "servo_left": {"": 13},
+        "servo_right": {"": 12},
+        "whisker_left": {"": 5},
+        "whisker_right": {"": 7},
+        "infrared_left": {"led": 9, "receiver": 10},
+        "infrared_right": {"led": 2, "receiver": 3},
+        "infrared": {},
+        "light_left": {"": 8},
+        "light_right": {"": 6},
+        "buzzer": {"": 4},
+    }
+
+
+def test_the_page_has_the_pins_of_every_map() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "robots.md").read_text()
+    section = page[page.index("| device | `shieldbot`") :].partition("\n\n")[0].splitlines()
+    head, _, *rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in section]
+    for column, name in enumerate(head[1:], start=1):
+        devices = {key: device for key, device in load_robot(name).device.items() if device.PINS}
+        assert {row[0]: row[column] for row in rows if row[column] != "–"} == {
+            key: pins if device.on else f"({pins})"
+            for key, device in devices.items()
+            for pins in [", ".join(f"{role} {pin_name(pin)}".strip() for role, pin in device.pins().items())]
+        }
 
 
 def test_quad_replaces_encoders_and_gives_up_their_pins() -> None:
@@ -78,7 +109,7 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
         ("[device.servo_left]\npin = 20", "there is no pin 20; expected 0..13 or 'A0'..'A5'"),
         (
             "[device.servo_left]\npin = 13\nwidth_us = 3",
-            "servo_left: there is no key 'width_us' here; expected on, pin",
+            "servo_left: there is no key 'width_us' here; expected on, plugged, pin",
         ),
         ("[body]\nmass_kg = -1.0", "body.mass_kg: expected float > 0"),
         ("[body]\nmass_kg = 'heavy'", "body.mass_kg: expected float, got str"),

@@ -28,7 +28,7 @@ def place(image: Image, address: int) -> str:
     if not within and at >= 0 and functions[at][1] == 0:  # a label of a program in assembler
         within = [functions[at][3]]
     line = image.lines.get(address & ~1)
-    parts = [f"in {within[-1]}" if within else "", f"({line})" if line else ""]
+    parts = [f"in {within[-1].partition('.')[0]}" if within else "", f"({line})" if line else ""]
     return " ".join(part for part in parts if part)
 
 

@@ -17,12 +17,27 @@ static double wheel_angle(const encoder *self) {
   return self->side == 0 ? s->wheel_left : s->wheel_right;
 }
 
-/* An edge of one channel at cycle `at`: as it is, or missed, or with a flicker after it. */
-static void show(encoder *self, uint64_t at, uint8_t pin, uint8_t level) {
+/* Goes back and forth after an edge at cycle `at`. Returns when it has settled. */
+static uint64_t bounce(encoder *self, uint64_t at, uint8_t pin, uint8_t level) {
   const encoder_parameters *p = &self->parameters;
-  if (pin == PART_NO_PIN || self->part.chassis->driven[pin] == level) return; /* the one before it was missed */
+  const uint64_t pairs = (uint64_t)(noise_next_uniform(&self->part.noise) * (p->bounces + 1.0));
+  for (uint64_t i = 0; i < 2 * pairs; i++) {
+    at += 2u + (uint64_t)(2.0 * p->bounce_s * BOARD_CLOCK_HZ * noise_next_uniform(&self->part.noise));
+    part_drive(&self->part, at, pin, (i & 1) ? level : (uint8_t)!level);
+  }
+  return at;
+}
+
+/* An edge of one channel (0: A, 1: B) at cycle `at`: as it is, or missed, or with bounces or a flicker after it. */
+static void show(encoder *self, uint64_t at, int channel, uint8_t level) {
+  const encoder_parameters *p = &self->parameters;
+  const uint8_t pin = self->part.pins[channel].pin;
+  if (pin == PART_NO_PIN || self->part.level[channel] == level) return; /* the one before it was missed */
   if (p->missed > 0.0 && noise_next_uniform(&self->part.noise) < p->missed) return;
   part_drive(&self->part, at, pin, level);
+  if (p->bounces > 0.0 && self->part.noise.on) {
+    at = bounce(self, at, pin, level);
+  }
   if (!(p->extra > 0.0) || noise_next_uniform(&self->part.noise) >= p->extra) return;
   const double mean = p->flicker_s * BOARD_CLOCK_HZ;
   const uint64_t off = at + 2u + (uint64_t)(mean * noise_next_uniform(&self->part.noise));
@@ -44,8 +59,8 @@ static void step(part *base) {
     if (!(share > 0.0)) share = 0.0;
     if (share > 1.0) share = 1.0;
     const uint64_t at = c->since + PART_GUARD + (uint64_t)(share * (double)c->step_cycles);
-    if (level_a(self, next) != level_a(self, self->index)) show(self, at, self->pin_a, level_a(self, next));
-    if (level_b(next) != level_b(self->index)) show(self, at, self->pin_b, level_b(next));
+    if (level_a(self, next) != level_a(self, self->index)) show(self, at, 0, level_a(self, next));
+    if (level_b(next) != level_b(self->index)) show(self, at, 1, level_b(next));
     self->index = next;
   }
 }

@@ -3,7 +3,7 @@
  * Each world step turns the wheel from one angle to the next; the edges in between are put on the pins at the cycles that
  * linear interpolation gives. `edges_per_turn` counts both edges of all channels. With two channels A leads B when the
  * wheel turns forward: (A, B) = 00, 10, 11, 01. A sensor too near or too far from its disc sees edges that are none, and
- * misses some (section 7 of the hardware's fact sheet).
+ * misses some (section 7 of the hardware's fact sheet); one whose output has no hysteresis bounces at each edge.
  */
 #ifndef PART_ENCODER_H
 #define PART_ENCODER_H
@@ -16,6 +16,8 @@ typedef struct {
   double missed;    /* probability that an edge of a channel is not seen; the next one then changes nothing; 0: never */
   double extra;     /* probability that a channel flickers after an edge: two more edges; 0: never */
   double flicker_s; /* how long such a flicker lasts, on average */
+  double bounces;   /* after each edge a channel goes back and forth 0 to so many times, all equally often; 0: never */
+  double bounce_s;  /* from one of these edges to the next, on average */
 } encoder_parameters;
 /* python: end */
 

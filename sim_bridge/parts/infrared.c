@@ -5,7 +5,8 @@
 
 #define PERIOD_MINIMUM 360u /* 44.4 kHz */
 #define PERIOD_MAXIMUM 480u /* 33.3 kHz */
-#define CYCLES_TO_HEAR 8u
+#define GAP 800u            /* longer: a new train */
+#define CYCLES_TO_HEAR INFRARED_CYCLES_TO_HEAR
 #define HOLD_CYCLES (10u * 421u) /* the output stays low for ten periods after the last one */
 
 static void forget_past_light(infrared *self, uint64_t cycle) {
@@ -51,20 +52,26 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   infrared *self = (infrared *)base;
   (void)pin;
   if (level != BOARD_HIGH) return;
-  const uint64_t period = cycle - self->last_rise;
+  if (cycle - self->last_rise > GAP) {
+    self->carrier_cycles = 0;
+    self->seen = 0;
+  } else {
+    self->carrier_cycles++;
+  }
   self->last_rise = cycle;
-  if (period < PERIOD_MINIMUM || period > PERIOD_MAXIMUM) {
+  uint64_t *first = &self->rises[self->carrier_cycles % CYCLES_TO_HEAR];
+  const uint64_t span = cycle - *first; /* of the last CYCLES_TO_HEAR cycles, when there are so many */
+  *first = cycle;
+  if (self->carrier_cycles < CYCLES_TO_HEAR) return;
+  if (span < CYCLES_TO_HEAR * PERIOD_MINIMUM || span > CYCLES_TO_HEAR * PERIOD_MAXIMUM) {
     self->carrier_cycles = 0;
     self->seen = 0;
     return;
   }
-  self->carrier_cycles++;
-  self->period = (uint32_t)period;
+  self->period = (uint32_t)(span / CYCLES_TO_HEAR);
   if (self->carrier_cycles == CYCLES_TO_HEAR) look(self, cycle);
-  if (self->carrier_cycles >= CYCLES_TO_HEAR) {
-    if (self->sent_from == self->sent_until) self->sent_from = cycle;
-    self->sent_until = cycle + 1;
-  }
+  if (self->sent_from == self->sent_until) self->sent_from = cycle;
+  self->sent_until = cycle + 1;
   if (self->seen) { /* low from now on takes back the end that was queued a period ago */
     self->lit_until = cycle + HOLD_CYCLES;
     drive_output(self, cycle);
@@ -85,7 +92,7 @@ int infrared_take_burst(infrared *self, infrared_burst *burst, infrared_light *s
 }
 
 void infrared_see_burst(infrared *self, const infrared_burst *burst, const infrared_light *span) {
-  if (self->part.off || !(self->pair.direct > 0.0)) return;
+  if (self->part.taken || self->part.unplugged || !(self->pair.direct > 0.0)) return;
   const viewpoint from = part_view(&self->part, span->from);
   if (!infrared_pair_sees_burst(&self->pair, &from, burst)) return;
   infrared_light light = {span->from, span->until + HOLD_CYCLES};

@@ -12,6 +12,8 @@
 #include "part.h"
 
 #define INFRARED_FOREIGN 8 /* bursts of others that wait to be seen */
+#define INFRARED_CYCLES_TO_HEAR \
+  8u /* the receiver's filter hears their mean frequency: a cycle that jitters changes little */
 
 /* Light from elsewhere: the receiver is lit from one cycle to another. */
 typedef struct {
@@ -24,6 +26,7 @@ typedef struct {
   beam_parameters mount;
   infrared_pair pair;
   uint64_t last_rise;
+  uint64_t rises[INFRARED_CYCLES_TO_HEAR];  /* the last ones, by carrier_cycles modulo their number */
   uint32_t period;                          /* of the carrier, cycles */
   uint32_t carrier_cycles;                  /* in a row */
   uint8_t seen;                             /* in this burst */

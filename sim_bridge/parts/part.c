@@ -7,15 +7,36 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
   self->op = op;
   self->chassis = place->chassis;
   self->noise = place->noise;
-  self->off = 0;
+  self->taken = 0;
+  self->unplugged = 0;
   self->turret = NULL;
-  for (int i = 0; i < PART_PINS; i++) self->pins[i] = i < count ? pins[i] : (part_pin){PART_NO_PIN, 0};
+  for (int i = 0; i < PART_PINS; i++) {
+    self->pins[i] = i < count ? pins[i] : (part_pin){PART_NO_PIN, 0};
+    self->level[i] = BOARD_RELEASED;
+  }
+}
+
+static void drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+  self->chassis->driven[pin] = level;
+  self->chassis->board->op->drive(self->chassis->board, at, pin, level);
 }
 
 void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
-  if (pin >= BOARD_PIN_COUNT || self->off) return;
-  self->chassis->driven[pin] = level;
-  self->chassis->board->op->drive(self->chassis->board, at, pin, level);
+  if (pin >= BOARD_PIN_COUNT) return;
+  for (int i = 0; i < PART_PINS; i++) {
+    if (self->pins[i].pin == pin) self->level[i] = level;
+  }
+  if (!self->taken && !self->unplugged) drive(self, at, pin, level);
+}
+
+void part_unplug(part *self, int unplugged) {
+  const uint64_t now = self->chassis->board->op->now(self->chassis->board);
+  self->unplugged = unplugged;
+  if (self->taken) return;
+  for (int i = 0; i < PART_PINS; i++) {
+    if (!(self->pins[i].role & PART_DRIVES) || self->pins[i].pin >= BOARD_PIN_COUNT) continue;
+    drive(self, now, self->pins[i].pin, unplugged ? (uint8_t)BOARD_RELEASED : self->level[i]);
+  }
 }
 
 /* The body that would carry the part, turned about the turret's axis by `angle`, in its place. */

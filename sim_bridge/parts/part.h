@@ -115,8 +115,10 @@ struct part {
   chassis *chassis;
   noise_source noise;
   part_pin pins[PART_PINS];
+  uint8_t level[PART_PINS];  /* what it does to each of them, or would if it were plugged in */
   const part_turret *turret; /* that carries it; NULL: the body does */
-  int off;                   /* 1: its pins were taken from it; it neither hears nor drives */
+  int taken;                 /* 1: a test has its pins; it drives none */
+  int unplugged;             /* 1: its plug is out; it neither hears nor drives */
 };
 
 /* Where a part is joined; the loop knows it when the part is made. */
@@ -130,6 +132,9 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
 
 /* From cycle `at` on the part drives `pin` to LOW, HIGH, or lets go of it. Replaces what was queued from `at` on. */
 void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
+
+/* Pulls its plug out (1) or puts it in again (0). */
+void part_unplug(part *self, int unplugged);
 
 /* End of the world's step under way. */
 static inline uint64_t part_step_end(const part *self) { return self->chassis->since + self->chassis->step_cycles; }

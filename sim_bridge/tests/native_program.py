@@ -20,16 +20,20 @@ FIRMWARE = next(
 PREAMBLE = """
 #include "firmware.h"
 #include "hal/hal.h"
+#include "hal/interrupts.h"
 static void start(void);
 static void slot(void);
 static inline void say(const void *bytes, uint8_t count) { hal_serial_send(bytes, count); }
 void firmware_start(void) { hal_start_serial(5000u); start(); hal_start_timers(); }
 void firmware_poll(void) {}
-bool firmware_due(void) { return false; }
-HAL_INTERRUPT_SLOT { hal_slot_arm((uint16_t)(hal_time() + HAL_SLOT_CYCLES)); slot(); }
-HAL_INTERRUPT_EDGE {}
-HAL_INTERRUPT_CAPTURE {}
-volatile uint8_t schedule_slot;
+uint8_t firmware_due(void) { return 0; }
+void schedule_on_slot(void) { hal_slot_arm((uint16_t)(hal_time() + HAL_SLOT_CYCLES)); slot(); }
+void servo_on_edge(void) {}
+void ping_on_edge(uint16_t time) { (void)time; }
+void pin_changes_on_change(uint16_t time, uint8_t port_bits) { (void)time, (void)port_bits; }
+void light_on_left_fall(uint16_t time) { (void)time; }
+void light_on_change(uint16_t time) { (void)time; }
+void two_wire_on_step(void) {}
 """
 
 

@@ -45,34 +45,8 @@ def test_a_write_takes_3_4_ms() -> None:
     assert said(board) == b"-b--"  # slots at 2.5, 5 and 7.5 ms
 
 
-READY = """
-static uint8_t runs;
-HAL_INTERRUPT_EEPROM {
-  say("r", 1);
-  runs++;
-  if (runs == 3) hal_eeprom_write_start(2, 0x22);
-  if (runs == 5) hal_eeprom_interrupt(false);
-}
-static void start(void) {
-  hal_eeprom_write_start(1, 0x11);
-  hal_eeprom_interrupt(true);
-}
-static void slot(void) {}
-"""
-
-
-def test_ready_interrupt_runs_while_ready_and_on() -> None:
-    board = native_program(READY)
-    board.advance(10 * MS)
-    ready = [cycle for cycle, _ in board.receive()]
-    assert len(ready) == 5
-    assert ready[0] == WRITE + BYTE  # at the end of the write, and the time of the byte that tells
-    assert 2 * WRITE < ready[3] - BYTE < 2 * WRITE + 1000  # the second write
-    assert board.read_eeprom()[1:3] == b"\x11\x22"
-
-
 def test_a_run_does_not_depend_on_how_it_is_cut() -> None:
-    whole, cut = native_program(READY), native_program(READY)
+    whole, cut = native_program(WRITER), native_program(WRITER)
     whole.advance(10 * MS)
     while cut.now < 10 * MS:
         cut.run(min(1009, 10 * MS - cut.now))

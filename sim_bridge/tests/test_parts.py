@@ -210,6 +210,29 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
     assert (count > 50) == forward
 
 
+def bouncing(monkeypatch: pytest.MonkeyPatch, *, noise: bool) -> list[tuple[int, int]]:
+    """A turning wheel's edges, at each of which the sensor goes back and forth up to three times."""
+    monkeypatch.setattr(imperfections, "ENCODER_BOUNCES", 3)
+    robot = scripted(noise=noise, without=("servo_spread", "servo_centre"))
+    robot.pulses(2.0, {LEFT: 1600, RIGHT: 1400})
+    robot.run(2.0)
+    return edges(robot, 16)
+
+
+def test_encoder_bounces(monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = bouncing(monkeypatch, noise=True)
+    gaps = np.diff([cycle for cycle, _ in changes])
+    within = gaps < 1 * MS  # the wheel's own edges are 20 ms apart
+    assert gaps[within].min() > 0 and gaps[within].max() <= 40 * US + 2
+    assert gaps[within].mean() == pytest.approx(20 * US, rel=0.1)
+    sizes = np.diff(np.flatnonzero(np.append(True, ~within)))  # changes at each of the wheel's edges
+    assert set(sizes) == {1, 3, 5, 7}
+
+
+def test_without_noise_no_encoder_bounces(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert np.diff([cycle for cycle, _ in bouncing(monkeypatch, noise=False)]).min() > 10 * MS
+
+
 # ---- whisker ---------------------------------------------------------------------------------------------
 
 
@@ -523,3 +546,67 @@ def test_pins_of_no_part_are_left_alone() -> None:
     driven = {pin for pin in range(20) if robot.inputs(pin)}
     assert driven == {*ENCODERS, *WHISKERS, 10, 3}
     assert lib.script_board_inputs(robot.script, 99, ffi.NULL, ffi.NULL, 0) == 0
+
+
+# ---- plugs -----------------------------------------------------------------------------------------------
+
+
+def ping_twice(robot: Scripted, first_ms: int) -> list[tuple[int, int]]:
+    """What a Ping does to its pin after two triggers, 40 ms apart."""
+    before = len(robot.inputs(PING))
+    for at in (first_ms, first_ms + 40):
+        robot.edge(at * MS, PING, 1)
+        robot.edge(at * MS + 5 * US, PING, 2)
+    robot.run(0.08)
+    return robot.inputs(PING)[before:]
+
+
+def test_an_unplugged_ping_neither_hears_nor_answers() -> None:
+    robot = scripted()
+    assert len(ping_twice(robot, 1)) == 6
+    robot.pins.unplug("ping")
+    assert ping_twice(robot, 81) == []
+    robot.pins.plug("ping")
+    assert len(ping_twice(robot, 161)) == 6
+
+
+def test_a_plug_pulled_in_mid_pulse_ends_it() -> None:
+    robot = scripted()
+    robot.edge(1 * MS, PING, 1)
+    robot.edge(1 * MS + 5 * US, PING, 2)
+    robot.run(0.005)
+    robot.pins.unplug("ping")
+    robot.run(0.05)
+    assert [level for _, level in robot.inputs(PING)] == [1, 2]
+
+
+def test_a_device_may_begin_unplugged() -> None:
+    shieldbot = load_robot("shieldbot")
+    unplugged = {
+        name: msgspec.structs.replace(shieldbot.device[name], plugged=False)
+        for name in ("ping", "whisker_left", "servo_left")
+    }
+    robot = scripted(robot=msgspec.structs.replace(shieldbot, device=shieldbot.device | unplugged))
+    robot.pulses(0.2, {LEFT: 1700, RIGHT: 1300})
+    robot.run(0.2)
+    assert robot.robot.body().wheel_left < 0.1 * robot.robot.body().wheel_right
+    assert robot.inputs(5)[-1] == (0, 2)
+    assert ping_twice(robot, 201) == []
+
+
+def test_an_encoder_plugged_in_again_shows_the_level_of_its_disc() -> None:
+    robot, other = scripted(), scripted()
+    robot.pins.unplug("encoder_left")
+    for each in (robot, other):
+        each.pulses(0.5, {LEFT: 1700, RIGHT: 1300})
+        each.run(0.5)
+    assert robot.inputs(16)[-1] == (0, 2)
+    robot.pins.plug("encoder_left")
+    robot.run(0.0001)
+    assert robot.inputs(16)[-1][1] == other.inputs(16)[-1][1]
+
+
+def test_no_plug_of_what_the_robot_lacks() -> None:
+    for device in ("laser", "buzzer"):  # the second one is off: it has no part
+        with pytest.raises(BoardError, match=f"device '{device}': the robot has no such thing"):
+            scripted().pins.unplug(device)

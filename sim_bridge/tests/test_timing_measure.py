@@ -105,26 +105,18 @@ def test_nothing_is_lost_in_the_figures(figures: Run) -> None:
     assert set(figures.lost.values()) == {0}
 
 
-def test_a_saturated_line_is_full_both_ways_and_nothing_is_lost() -> None:
-    """Four encoder lines at 4 kHz beside it. Ticks may be late (hil_tests/test_jitter.py), but none is left out."""
-    image, seconds = avr_image("shieldbot-quad"), 0.5
-    saturated = run(image, robot_of(image), "saturated", seconds, 1)
-    for count in (saturated.sent, saturated.received):
-        assert count > seconds * 50_000 * 0.95  # the first tick is a phase
-    names = [name for name in saturated.measurement().losses if name != "late_ticks"]
-    assert {name: saturated.lost[name] for name in names} == dict.fromkeys(names, 0)
-
-
-@pytest.mark.parametrize("seed", [1, 6])
-def test_a_noisy_line_is_masked_and_told_and_the_other_wheel_loses_nothing(seed: int) -> None:
-    """Neither a tick nor, where the other wheel's line changes less than once while noise has stopped the interrupt, an
-    edge: at these phases one comes between the look at the port and the end of the stop."""
-    ticks = 50
-    noise = run(IMAGE, robot_of(IMAGE), "noise", ticks / 100, seed)
-    assert ticks - 3 <= noise.lost["masked"] <= ticks + 4, "told from the tick on in which it began"
-    assert {name for name, count in noise.lost.items() if count} == {"masked"}
-    counted = noise.spans[noise.spans["id"] == 4]  # pin changes of the encoders' port
-    assert len(counted) < ticks / 100 * 200_000 / 20, "the line still interrupts"
+def test_an_overload_fills_the_line_and_masks_the_noise_without_a_late_tick() -> None:
+    """50,000 bytes/s come; noise is told from the tick on in which it began."""
+    image, ticks = avr_image("shieldbot-quad"), 50
+    found = run(image, robot_of(image), "overload", ticks / 100, 1)
+    assert found.sent > ticks / 100 * 50_000 * 0.95  # the first tick is a phase
+    assert ticks - 3 <= found.lost["masked"] <= ticks + 4
+    assert {name: found.lost[name] for name in ("ticks", "late_ticks", "resets")} == dict.fromkeys(
+        ("ticks", "late_ticks", "resets"), 0
+    )
+    counted = found.spans[found.spans["id"] == 4]  # pin changes of the encoders' port
+    assert len(counted) < ticks * (3 * 40 + 16), "the noisy line still interrupts"
+    assert found.measurement().late_slots < ticks
 
 
 def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
@@ -145,9 +137,9 @@ def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
         }
         told = line.wait(Counters, after)
     kinds = [events[number].kind for number in sorted(events)]
-    waited = kinds[4 : 4 + len(EventKind)]
-    assert sorted(waited) == sorted(EventKind), kinds
-    assert told.deferred > 3 * len(EventKind)
+    all_kinds = set(EventKind) - {EventKind.FALLBACK}  # no brain is on
+    assert set(kinds[4 : 4 + len(all_kinds)]) == all_kinds, kinds
+    assert told.deferred > 3 * len(all_kinds)
     assert MASKED in seen, "noise of both wheels in one tick"
 
 
@@ -170,11 +162,11 @@ def test_runs_together() -> None:
     assert both.load == pytest.approx((one.load + two.load) / 2, rel=1e-3)
     assert both.tasks["safety"].largest == max(one.tasks["safety"].largest, two.tasks["safety"].largest)
     assert not both.by_scenario  # one scenario, which is all of it
-    other = run(IMAGE, robot, "noise", 0.05, 1, losses=False).measurement()
+    other = run(IMAGE, robot, "overload", 0.05, 1, losses=False).measurement()
     scenarios = merged([both, merged([other, one])]).by_scenario
-    assert list(scenarios) == ["figures", "noise"]
+    assert list(scenarios) == ["figures", "overload"]
     assert as_json(scenarios["figures"]) == as_json(merged([both, one]))
-    assert as_json(scenarios["noise"]) == as_json(other)
+    assert as_json(scenarios["overload"]) == as_json(other)
     with pytest.raises(ValueError, match="expected one at least"):
         merged([])
 
@@ -194,7 +186,7 @@ def test_statistics() -> None:
     ("scenario", "seconds", "message"),
     [
         ("figure", 1.0, "expected one of figures"),
-        ("noise", 0.0, "expected more than 0 s"),
+        ("overload", 0.0, "expected more than 0 s"),
         ("everything", 0.1, "0.35 s"),
     ],
 )

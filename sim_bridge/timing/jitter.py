@@ -6,6 +6,7 @@ A run is made in jitter_run.py; here its record becomes values, one for each pul
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,10 +20,9 @@ from sim_bridge.timing.latency_limits import Limits
 from sim_bridge.timing.line import Heard
 from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
 from sim_bridge.timing.losses import losses
-from sim_bridge.timing.stamps import timer_start
 
-SAME_EDGE = 2_000  # cycles that a stamp may be off and still be that edge's: echoes are further apart
 CYCLES_PER_US = 16
+SAME_WIDTH = 16  # cycles by which a pulse may differ from what it is taken for
 
 
 def measure_jitter(
@@ -33,9 +33,8 @@ def measure_jitter(
     `progress` is called with the share that is done, 0 to 1.
 
     Raises:
-        BoardError: the image cannot be loaded, does not answer, crashes, or lacks the variables that are read.
+        BoardError: the image cannot be loaded, does not answer, or crashes.
     """
-    start = timer_start(elf)
     found: list[Distribution] = []
     missing: list[Losses] = []
     for number, load in enumerate(loads):
@@ -45,7 +44,7 @@ def measure_jitter(
                 progress((number + done) / len(loads))
 
         with Bench(elf) as bench:
-            run = drive(bench, start, load, seconds, seed, share)
+            run = drive(bench, load, seconds, seed, share)
             found += distributions(run)
             missing.append(lost(run))
     return JitterReport(tuple(found), tuple(missing))
@@ -55,18 +54,14 @@ def distributions(run: Run) -> list[Distribution]:
     """All quantities of a run."""
     return [
         *servo_pulses(run),
-        _of(
-            run,
-            "tick start",
-            "from its nominal cycle to its interrupt's count",
-            run.tick_starts.delays,
-            limits.TICK_START,
-        ),
-        *edge_stamps(run),
-        *echo_stamps(run),
-        *reactions(run),
-        *observations(run),
+        echo_lengths(run),
+        *(_only_counted(one) if run.load.is_overload else one for one in (*reactions(run), *observations(run))),
     ]
+
+
+def _only_counted(one: Distribution) -> Distribution:
+    """Without limits: where frames are dropped nothing is promised of how soon something is told."""
+    return replace(one, least=None, most=None)
 
 
 def _of(run: Run, quantity: str, meaning: str, values: Iterable[int], may: Limits | None = None) -> Distribution:
@@ -98,32 +93,14 @@ def servo_pulses(run: Run) -> list[Distribution]:
     return found
 
 
-def edge_stamps(run: Run) -> list[Distribution]:
-    """How late encoder edges are stamped."""
-    errors: list[int] = []
-    for train in (train for wheel in run.encoders for train in wheel):
-        stamps = run.edge_stamps.changes[train.pin - 14]
-        if len(stamps) == len(train.edges):  # else some were lost, which `lost` tells; nobody knows which
-            errors += [stamp - edge for stamp, edge in zip(stamps, train.edges, strict=True)]
-    return [_of(run, "encoder stamp", "less the cycle of the edge at the pin", errors)]
-
-
-def echo_stamps(run: Run) -> list[Distribution]:
-    """Stamps of echoes against their edges, and their told lengths."""
-    errors, lengths = [], []
-    rises = np.array([rise for rise, _ in run.ping.echoes], dtype=np.int64)
-    for rise, fall in run.echo_stamps.echoes:
-        nearest = int(np.argmin(np.abs(rises - rise)))
-        true_rise, true_fall = run.ping.echoes[nearest]
-        if abs(true_rise - rise) < SAME_EDGE:
-            errors += [rise - true_rise, fall - true_fall]
-            lengths.append(fall - rise - (true_fall - true_rise))
-    told = [heard.message.ping_echo * CYCLES_PER_US - (fall - rise) for (rise, fall), heard in echoes_told(run)]
-    return [
-        _of(run, "echo stamp", "less the cycle of the edge at the pin", errors, limits.ECHO_STAMP),
-        _of(run, "echo length, stamped", "less that of the pulse", lengths, limits.ECHO_STAMP),
-        _of(run, "echo length, told", "in whole microseconds, less that of the pulse", told, limits.ECHO_STAMP),
+def echo_lengths(run: Run) -> Distribution:
+    """How far an echo's told length is off."""
+    told = [
+        heard.message.ping_echo * CYCLES_PER_US - (fall - rise)
+        for (rise, fall), heard in echoes_told(run)
+        if run.begun < rise < run.ended
     ]
+    return _of(run, "echo length", "as told, in whole microseconds, less that of the pulse", told, limits.ECHO)
 
 
 def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:
@@ -155,7 +132,8 @@ def reactions(run: Run) -> list[Distribution]:
         pulses = run.bench.pulses(run.pins[f"servo {side}"])
         delays = []
         for change in run.traffic.changes[1:]:  # with the first one pulses begin
-            new = pulses[(pulses[:, 0] > change.arrived) & (pulses[:, 1] == width_of(side, change.signals)), 0]
+            off = np.abs(pulses[:, 1] - width_of(side, change.signals))
+            new = pulses[(pulses[:, 0] > change.arrived) & (off <= SAME_WIDTH), 0]
             if len(new):
                 delays.append(int(new[0]) - change.arrived)
         meaning = "from a set-point's last byte to the rise of the first pulse of its width"
@@ -168,19 +146,17 @@ def observations(run: Run) -> list[Distribution]:
     telemetry = run.line.telemetry
     found = []
     for side, bit in (("left", 1), ("right", 2)):
-        for name, field, may in (
-            (f"whisker {side}", "whiskers", limits.WHISKER),
-            (f"ir {side}", "infrared", limits.infrared(2 if side == "left" else 3)),
-        ):
-            delays = []
-            for closed in run.contacts[name].closings:
-                seen = (one.last for one in telemetry if one.last > closed and getattr(one.message, field) & bit)
-                if closed < run.ended and (last := next(seen, None)) is not None:
-                    delays.append(last - closed)
-            found.append(_of(run, f"{name} to observation", "from the pin's fall", delays, may))
+        delays = []
+        for closed in run.contacts[f"whisker {side}"].closings:
+            seen = (one.last for one in telemetry if one.last > closed and one.message.whiskers & bit)
+            if closed < run.ended and (last := next(seen, None)) is not None:
+                delays.append(last - closed)
+        found.append(_of(run, f"whisker {side} to observation", "from the pin's fall", delays, limits.WHISKER))
     echoes = [heard.last - fall for (_, fall), heard in echoes_told(run)]
     found.append(_of(run, "echo to observation", "from the echo's end", echoes, limits.NEXT_TICK))
     for side, wheel in zip(MIRROR, run.encoders, strict=False):
+        if not wheel:
+            continue
         edges = np.sort(np.concatenate([train.edges for train in wheel]))
         counts = np.array([getattr(one.message, f"encoder_{side}") for one in telemetry])
         order = np.searchsorted(counts, np.arange(1, len(edges) + 1))  # the first telemetry with that count

@@ -1,7 +1,7 @@
 """One run under a load: what acts on the board, and all that is kept of it.
 
 Periods of all that comes from outside share no factor with the control tick, so that a run sweeps the phases; another
-`seed` begins at other ones. Nothing is added to the image; stamps are read from its RAM (stamps.py).
+`seed` begins at other ones. Nothing is added to the image, and nothing read from it.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from boebot.link import messages
 from boebot.robots import RobotDescription, load_robot
 from sim_bridge.boards.board import Level
 from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels
-from sim_bridge.timing.stamps import EchoStamps, EncoderStamps, TickStarts
-from sim_bridge.timing.traffic import EachTick, FullLine, Traffic
+from sim_bridge.timing.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise
+from sim_bridge.timing.traffic import EachTick, FullLine
 
 Progress = Callable[[float], None]
 
@@ -24,8 +23,8 @@ MIRROR = {"left": 1, "right": -1}  # the right servo turns the other way round
 PHASE_STEP = 7_919  # cycles from one seed's beginning to the next one's, a prime
 DRAIN_TICKS = 20  # after a run, for what is under way
 # cycles, from one closing to the next: what remains of whole ticks, and of whole sweeps, sweeps both evenly
-CONTACT_PERIODS = {"whisker left": 2_178_887, "whisker right": 2_338_897, "ir left": 2_894_429, "ir right": 2_894_441}
-CONTACT_CLOSED = 1_120_000  # cycles: longer than a sweep
+CONTACT_PERIODS = {"whisker left": 2_178_887, "whisker right": 2_338_897}
+CONTACT_CLOSED = 1_120_000  # cycles
 
 
 @dataclass
@@ -38,26 +37,25 @@ class Run:
     pins: dict[str, int]
     begun: int
     ended: int
-    traffic: Traffic
-    encoders: list[list[PulseTrain]]
+    traffic: EachTick | FullLine
+    encoders: list[list[PulseTrain]]  # lines by wheel; none of a wheel that has a noisy one
     contacts: dict[str, Contact]
     ping: Ping
-    edge_stamps: EncoderStamps
-    echo_stamps: EchoStamps
-    tick_starts: TickStarts
 
 
-def drive(bench: Bench, start: int, load: Load, seconds: float, seed: int, share: Progress) -> Run:
+def drive(bench: Bench, load: Load, seconds: float, seed: int, share: Progress) -> Run:
     """Runs a board under a load for that long, and then until all that was under way has come."""
     line = Line(bench)
     robot = load_robot(line.open().robot.split(b"\0", 1)[0].decode())
     pins = pins_of(robot)
-    for pin in (pin for name, pin in pins.items() if name.startswith(("whisker", "ir"))):
+    for pin in (pin for name, pin in pins.items() if name.startswith(("whisker", "ir"))):  # nothing is seen
         bench.access.drive(pin, Level.HIGH)
     prepare(line)
     first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
     lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]
-    traffic = FullLine(line, first) if load.full_line else EachTick(line, first)
+    traffic: EachTick | FullLine = FullLine(line, first) if load.is_overload else EachTick(line, first)
+    turning = wheels([one for one in lines if one], load.edges_per_s, first)
+    noisy = load.is_overload and bool(turning)
     run = Run(
         load=load,
         bench=bench,
@@ -66,20 +64,17 @@ def drive(bench: Bench, start: int, load: Load, seconds: float, seed: int, share
         begun=first + TICK_CYCLES,
         ended=first + TICK_CYCLES + round(seconds * 16e6),
         traffic=traffic,
-        encoders=wheels([one for one in lines if one], load.edges_per_s, first),
+        encoders=[[], *turning[1:]] if noisy else turning,
         contacts={
             name: Contact(pins[name], period, CONTACT_CLOSED, first + 3 * TICK_CYCLES + number * PHASE_STEP)
             for number, (name, period) in enumerate(CONTACT_PERIODS.items())
         },
         ping=Ping(pins["ping"]),
-        edge_stamps=EncoderStamps(bench, start),
-        echo_stamps=EchoStamps(bench, start),
-        tick_starts=TickStarts(bench, start),
     )
-    trains = [train for wheel in run.encoders for train in wheel]
+    trains = with_noise(turning, first) if noisy else [train for wheel in turning for train in wheel]
     bench.sources += [*trains, *run.contacts.values(), run.ping, traffic]
     while bench.now < run.ended:
-        run.tick_starts.watch()
+        bench.run(TICK_CYCLES)
         share(min(1.0, 1.0 - (run.ended - bench.now) / (seconds * 16e6)))
     bench.sources[:] = [run.ping]  # an echo ends that has begun
     bench.run(DRAIN_TICKS * TICK_CYCLES)
@@ -110,6 +105,7 @@ def prepare(line: Line) -> None:
     """All that the loads name is on and at its fastest; the motors are armed."""
     line.set("ping_period", int(messages.PARAMETERS["ping_period"].minimum))
     line.set("infrared_sweep", 1)
+    line.set("encoder_gap", 0)  # these edges do not bounce
     line.set("infrared_period", int(messages.PARAMETERS["infrared_period"].minimum))
     for side, mirror in MIRROR.items():
         line.set(f"servo_{side}_centre", CENTRE)

@@ -22,12 +22,8 @@ class Limits(NamedTuple):
     most: int | None
 
 
-EXACT = Limits(-2, 2)  # servo width and period: the figure to reach
-ECHO_STAMP = Limits(-8, 8)  # the same
-
-# A tick begins with slot 0 or 4, where no exact edge and no burst is near, so that the slot's interrupt waits for what
-# that of an exact edge does: 600 (tasks.def, the latency of `edge`). It counts the slot within 50 cycles more.
-TICK_START = Limits(0, 600 + 50)
+EXACT = Limits(-16, 16)  # servo width and period: 1 us, under every load
+ECHO = Limits(-16, 16)  # the same, whole microseconds included
 
 RISE = 8_000  # from the slot's start to the rising edge (servo.c)
 TELEMETRY_BYTES = 46
@@ -59,13 +55,3 @@ WHISKER = Limits(TOLD_EARLIEST, SLOT_CYCLES + TICK_CYCLES + TOLD_LATEST)
 
 # Counted, or captured, at once; told in the next slot 0 whose task has not yet run.
 NEXT_TICK = Limits(TOLD_EARLIEST, TICK_CYCLES + TOLD_LATEST)
-
-BURST_CYCLES = 16_000  # from the slot's start to the look at the receiver (infrared.c)
-SWEEP_TICKS = 5  # between two bursts at 38 kHz
-
-
-def infrared(slot: int) -> Limits:
-    """Of the receiver that is looked at at the end of the burst in `slot` of a tick, once in a sweep; told in slot 0 of
-    the next tick."""
-    told_after = TICK_CYCLES - slot * SLOT_CYCLES - BURST_CYCLES
-    return Limits(told_after, SWEEP_TICKS * TICK_CYCLES + told_after + TOLD_LATEST)

@@ -34,12 +34,13 @@ class Load:
 
     name: str
     edges_per_s: int
-    full_line: bool  # frames back to back both ways, else a set-point and telemetry each tick
+    is_overload: bool  # frames back to back both ways, else a set-point and telemetry each tick; and noise on one line
 
 
-FIGURES = Load("figures", edges_per_s=1500, full_line=False)
-SATURATED = Load("saturated", edges_per_s=4000, full_line=True)
-LOADS = (FIGURES, SATURATED)
+FIGURES = Load("figures", edges_per_s=1500, is_overload=False)
+OVERLOAD = Load("overload", edges_per_s=4000, is_overload=True)
+LOADS = (FIGURES, OVERLOAD)
+NOISE_PERIOD = 159  # cycles from edge to edge: 100,000 a second, in step with nothing
 
 
 class Source(Protocol):
@@ -148,7 +149,7 @@ class Bench:
 
 
 class PulseTrain:
-    """A pin that changes its level every `period` cycles from `first` on, up to `last`."""
+    """A pin, high until then, that changes its level every `period` cycles from `first` on, up to `last`."""
 
     def __init__(self, pin: int, period: int, first: int, last: int | None = None) -> None:
         self.pin, self.period, self.first, self.last = pin, period, first, last
@@ -160,7 +161,7 @@ class PulseTrain:
         end = until if self.last is None else min(until, self.last + 1)
         due = range(self.edges.stop, end, self.period)
         if due:
-            level = Level.LOW if len(self.edges) % 2 else Level.HIGH
+            level = Level.HIGH if len(self.edges) % 2 else Level.LOW
             bench.access.wave(self.pin, self.period, due.start, len(due), level)
             self.edges = range(self.first, due[-1] + self.period, self.period)
 
@@ -188,6 +189,13 @@ def wheels(pins: Sequence[tuple[int, ...]], edges_per_s: int, first: int) -> lis
         [PulseTrain(pin, period, first + line * (period // 2)) for line, pin in enumerate(lines)]
         for lines, period in zip(pins, periods, strict=True)
     ]
+
+
+def with_noise(turning: Sequence[Sequence[PulseTrain]], first: int) -> list[PulseTrain]:
+    """The lines of wheels, of which the first one's first line is not theirs but noise."""
+    (pin, *rest), *others = ([train.pin for train in wheel] for wheel in turning)
+    by_pin = {train.pin: train for wheel in turning for train in wheel}
+    return [PulseTrain(pin, NOISE_PERIOD, first), *(by_pin[each] for each in (*rest, *(p for o in others for p in o)))]
 
 
 class Contact:
@@ -237,9 +245,9 @@ class Ping:
         """See Source. Triggers from before the first call get no answer."""
         del until
         log = bench.edges[self.pin]
-        for edge in log[self._seen if self._seen is not None else len(log) :]:
-            if edge.level == Level.LOW:
-                self._answer(bench, edge.cycle)
+        for i in range(self._seen if self._seen is not None else len(log), len(log)):
+            if log[i].level == Level.LOW and i > 0 and log[i - 1].level == Level.HIGH:
+                self._answer(bench, log[i].cycle)
         self._seen = len(log)
 
     def _answer(self, bench: Bench, triggered: int) -> None:

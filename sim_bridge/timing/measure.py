@@ -30,7 +30,7 @@ from sim_bridge.timing.scenarios import RANGES, SILENCE, STATES, load, numbers_o
 from sim_bridge.timing.watched import Circumstances, Watched, measurement, watched
 from sim_bridge.timing.world_access import WorldAccess
 
-SCENARIOS = ("figures", "saturated", "noise", "faults", "everything")
+SCENARIOS = ("figures", "overload", "faults", "everything")
 HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never returns; what comes then is the watchdog's
 HANGS_AFTER = 5 * TICK_CYCLES
 WATCHDOG = 6  # vector (data sheet, table 12-6)

@@ -19,11 +19,10 @@ from boebot import robots
 from boebot.link import frame, messages
 from boebot.robots import RobotDescription
 from sim_bridge.timing.line import BYTE_CYCLES, Line
-from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels
+from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
 from sim_bridge.timing.traffic import EachTick, FullLine
 
-EDGES_PER_S = {"figures": 1500, "saturated": 4000, "noise": 1500, "faults": 1500, "everything": 1500}
-NOISE_PERIOD = 80  # cycles from edge to edge of a 100 kHz square wave
+EDGES_PER_S = {"figures": 1500, "overload": 4000, "faults": 1500, "everything": 1500}
 BURSTS = ((10, 120, 101_009), (110, 300, 397_001))  # edges, cycles apart and to the next burst: too close; too many
 BOUNCE_PERIOD, BOUNCE_CLOSED = 283_007, 90_001  # "faults": two slots are a touch, four without one its end
 CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how long one lasts
@@ -225,6 +224,7 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     line.set("devices", int(devices))
     line.set("infrared_period", 2)
     line.set("infrared_sweep", 1)
+    line.set("encoder_gap", 0)  # these edges do not bounce
     line.set("ping_period", messages.PARAMETERS["ping_period"].minimum)
     if scenario == "everything":
         line.set("devices_period", 1)
@@ -236,10 +236,11 @@ def turn(bench: Bench, robot: RobotDescription, scenario: str, numbers: Numbers,
     """Turns the wheels. Returns the encoder lines of each; a noisy wheel has none."""
     first = start + numbers.wheels
     turning = wheels(encoder_pins(robot), EDGES_PER_S[scenario], first)
+    if scenario == "overload" and turning:
+        bench.sources += with_noise(turning, first)
+        return [[], *turning[1:]]
     noise: list[Source] = []
-    if scenario == "noise":
-        noise = [PulseTrain(wheel[0].pin, NOISE_PERIOD, first) for wheel in turning[:1]]
-    elif scenario == "faults":
+    if scenario == "faults":
         noise = [Bursts(wheel[0].pin, *burst, first) for wheel, burst in zip(turning, BURSTS, strict=False)]
     lines = [train for number, wheel in enumerate(turning) for train in wheel[number < len(noise) :]]
     bench.sources += [*noise, *lines]
@@ -280,5 +281,5 @@ def load(
         bench.sources.append(Deaf(line, first))
         return turning
     signals = [(numbers.signal - 10_000, 10_000 - numbers.signal // 2)]
-    bench.sources.append((FullLine if scenario == "saturated" else EachTick)(line, first, signals, probes=False))
+    bench.sources.append((FullLine if scenario == "overload" else EachTick)(line, first, signals, probes=False))
     return turning

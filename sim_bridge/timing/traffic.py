@@ -45,9 +45,12 @@ class Traffic:
         self.line = line
         self._choice, self._probing = signals, probes
         self.changes: list[Change] = []
+        self.newest = first
+        """the cycle at which the last byte of the last set-point has arrived"""
         self.probes: list[Probe] = []
         self._change_at = self._probe_at = first
         self._signals = 0
+        self._muted = False
 
     def setpoint(self, at: int) -> None:
         """A set-point in answer to the newest telemetry; now and then another one than before."""
@@ -56,9 +59,13 @@ class Traffic:
             self._change_at += HOLD
             self._signals += 1
         signals = self._choice[self._signals % len(self._choice)]
-        arrived = self.line.send(messages.SetpointSignal(*signals, TIME_TO_LIVE_MS, self.line.tick), at)
+        self.newest = arrived = self.line.send(messages.SetpointSignal(*signals, TIME_TO_LIVE_MS, self.line.tick), at)
         if changed:
             self.changes.append(Change(arrived, signals))
+
+    def mute(self) -> None:
+        """No set-point more."""
+        self._muted = True
 
     def probe(self, at: int) -> bool:
         """A probe, if it is time for one."""
@@ -102,7 +109,7 @@ class FullLine(Traffic):
     def queue(self, bench: Bench, until: int) -> None:
         """See Source. The board answers a request that comes again as it answered the first time."""
         while (at := max(self._first, self.line.free, bench.now)) < until:
-            if self._count % EVERY_SETPOINT == 0:
+            if self._count % EVERY_SETPOINT == 0 and not self._muted:
                 self.setpoint(at)
             elif not self.probe(at):
                 self.line.send(self._request, at)

@@ -33,6 +33,7 @@ class Watched:
     entries: tuple[int, ...]
     names: tuple[str, ...]
     vectors: dict[int, str]
+    first: str | None = None  # the task that runs first in each slot
 
     @property
     def watch(self) -> Watch:
@@ -65,6 +66,7 @@ def watched(image: Image) -> Watched:
         entries=tuple(found.values()),
         names=tuple(found),
         vectors=vectors,
+        first=next((row.name for row in image.table.tasks if row.period == 1), None),
     )
 
 
@@ -95,7 +97,7 @@ def measurement(
         found = _spans(name, spans[spans["id"] == FUNCTION_IDS + index], under)
         (others if name == POLL else tasks)[name] = found
     interrupts = {
-        name: _spans(name, spans[spans["id"] == vector], under, latency=True) for vector, name in what.vectors.items()
+        name: _spans(name, spans[spans["id"] == vector], under, since) for vector, name in what.vectors.items()
     }
     work, busy = _ticks(what, spans, since)
     return Measurement(
@@ -108,20 +110,23 @@ def measurement(
         scenarios=(under.scenario,),
         functions=others,
         busiest_tick=int(busy.max(initial=0)),
+        late_slots=_late_slots(what, spans, since),
         between_polls=_between_polls(what, spans),
         tick=_fullest_tick(what, spans, since, work),
         losses=losses,
     )
 
 
-def _spans(name: str, spans: NDArray[Any], under: Circumstances, latency: bool = False) -> Spans:
+def _spans(name: str, spans: NDArray[Any], under: Circumstances, latency_since: int | None = None) -> Spans:
     at = int(spans["begin"][np.argmax(spans["net"])]) if len(spans) else 0
     return Spans(
         name=name,
         net=spans["net"].copy(),
         gross=spans["gross"].copy(),
         worst=Worst(under.scenario, under.seed, at),
-        latency=spans["latency"].copy() if latency else np.empty(0, dtype=np.uint32),
+        latency=np.empty(0, dtype=np.uint32)
+        if latency_since is None
+        else spans["latency"][spans["begin"] >= latency_since].copy(),
     )
 
 
@@ -138,6 +143,22 @@ def _ticks(what: Watched, spans: NDArray[Any], since: int) -> tuple[NDArray[Any]
     whole = (tick >= 0) & (tick < len(starts) - 1)
     work = np.bincount(tick[whole], weights=counted["net"][whole], minlength=len(starts) - 1)
     return work.astype(np.int64), np.diff(starts["executed"].astype(np.int64))
+
+
+def _late_slots(what: Watched, spans: NDArray[Any], since: int) -> int:
+    """Slots from `since` on whose tasks ended when the next one had begun. The n-th run of the first task is that of
+    the n-th slot."""
+    if what.first is None:
+        return 0
+    tasks = np.sort(spans[(spans["id"] >= FUNCTION_IDS) & (spans["id"] != what.poll_id)], order="begin")
+    starts = spans[spans["id"] == SLOT_VECTOR]["begin"]
+    firsts = tasks[tasks["id"] == FUNCTION_IDS + what.names.index(what.first)]["begin"]
+    count = min(len(firsts), len(starts)) - 1
+    if count < 1:
+        return 0
+    last = np.searchsorted(tasks["begin"], firsts[1 : count + 1]) - 1
+    ends = tasks["begin"][last] + tasks["gross"][last]
+    return int(np.sum((ends > starts[1 : count + 1]) & (starts[:count] >= since)))
 
 
 def _fullest_tick(what: Watched, spans: NDArray[Any], since: int, work: NDArray[Any]) -> tuple[Moment, ...]:

@@ -28,7 +28,6 @@ from tools.bench.figures import FIGURES, Figure
 RESULT = Path("build/bench.json")
 MODULES = (
     "codec",
-    "board_link",
     "busy",
     "clock",
     "speed",

@@ -146,7 +146,7 @@ def measure(elf: Path, load: Load, seconds: float) -> list[Distribution]:
         trains = wheels(ENCODERS, load.edges_per_s, bench.now + TICK_CYCLES)
         bench.sources += [
             *(train for wheel in trains for train in wheel),
-            Bytes(bench.now + TICK_CYCLES, load.full_line),
+            Bytes(bench.now + TICK_CYCLES, load.is_overload),
         ]
         begun = bench.now + 2 * TICK_CYCLES
         bench.run_until(begun + round(seconds * 16e6))

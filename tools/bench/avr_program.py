@@ -37,6 +37,7 @@ def build(
     extra: tuple[str, ...] = (),
     environment: str = ENVIRONMENT,
     folder: Path | None = None,
+    compiler: str = "avr-gcc",
 ) -> Path:
     """The firmware's ELF file at `image`, with `main` in place of its main.c; its sources may be a copy in a `folder`.
     Raises CalledProcessError."""
@@ -44,5 +45,5 @@ def build(
     own = folder / "main.c"
     firmware = [path for path in sorted(folder.rglob("*.c")) if "native" not in path.parts]
     sources = [str(main or path) if path == own else str(path) for path in firmware]
-    subprocess.run(["avr-gcc", *flags(environment), *extra, f"-I{folder}", "-o", str(image), *sources], check=True)
+    subprocess.run([compiler, *flags(environment), *extra, f"-I{folder}", "-o", str(image), *sources], check=True)
     return image

@@ -1,17 +1,20 @@
-"""What proving and measuring the times of an image takes, and the load that is measured."""
+"""What proving and measuring the times of an image takes, and what is promised of them."""
 
 from __future__ import annotations
 
+import functools
 import time
-from functools import partial
 
+from boebot.errors import BoebotError
 from boebot.robots import load_robot
 from boebot.timing import budget, loads
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import Bench
 from sim_bridge.timing.measure import CLOCK_HZ, Run, run
 from sim_bridge.timing.scenarios import load, numbers_of, prepare
+from tools import timing_page
 from tools.bench.figures import Peer, figure
+from tools.timing_promises import PROMISES, Promise
 
 SECONDS = 1.0  # of the board's time
 
@@ -45,19 +48,30 @@ def bounds() -> float:
     return time.process_time() - started
 
 
-for _scenario, _when in (("figures", " at the figures' load"), ("saturated", ", line full both ways")):
+for _scenario, _when in (("figures", " at the figures' load"), ("overload", ", overloaded")):
     figure(
         f"timing: untouched image recorded{_when}",
         "× real time",
         at_least=10,
-        peers=[Peer("the same, not recorded", partial(_unrecorded, _scenario))],
+        peers=[Peer("the same, not recorded", functools.partial(_unrecorded, _scenario))],
         rounds=3,
-    )(partial(_speed, _scenario))
+    )(functools.partial(_speed, _scenario))
 
 
-def _load(pin_map: str) -> float:
-    return 100.0 * _recorded(pin_map, "figures").measurement().load
+@functools.cache
+def _reports(image: str) -> timing_page.Reports:
+    return timing_page.reports(image, timing_page.measured(image))
 
 
-for _pin_map in ("boebot", "shieldbot", "shieldbot-quad"):
-    figure(f"timing: CPU load at the figures, {_pin_map}", "% of its cycles", at_most=40)(partial(_load, _pin_map))
+def _reached(image: str, promise: Promise) -> float:
+    found = promise.figure(_reports(image)[promise.load])
+    if found is None:
+        raise BoebotError(f"{image}: {promise.what} is not known: overload")
+    return found
+
+
+for _image in timing_page.IMAGES:
+    for _promise in PROMISES:
+        figure(f"timing: {_image}, {_promise.load}: {_promise.what}", _promise.unit, at_most=_promise.most)(
+            functools.partial(_reached, _image, _promise)
+        )

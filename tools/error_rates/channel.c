@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "link/crc21.h"
 #include "link/frame.h"
 
 #define LIST_ROW(id, length, hash) {(id), (length)},
@@ -263,11 +264,12 @@ static void earlier_session(channel *line, const clean_line *clean, channel_roun
 
 /* The checksum of whatever stands between the delimiters, right. */
 static size_t close_frame(uint8_t *wire, size_t stuffed, uint32_t seed) {
-  const uint32_t check = frame_checksum(seed, wire + 1, (uint8_t)stuffed);
+  crc21 crc = crc21_start(seed);
   wire[0] = 0;
-  for (size_t i = 0; i < 3; i++) {
-    wire[1u + stuffed + i] = (uint8_t)(0x80u | (check >> (14u - 7u * i) & 0x7Fu));
+  for (size_t i = 1; i <= stuffed; i++) {
+    crc21_add(&crc, wire[i]);
   }
+  crc21_put(crc, wire + 1u + stuffed);
   wire[stuffed + 4u] = 0;
   return stuffed + 5u;
 }
@@ -310,7 +312,6 @@ static void foreign(channel *line, const clean_line *clean, channel_round *round
 }
 
 void channel_send(channel *line, channel_fault fault, channel_round *round) {
-  static const uint8_t IDLE[1] = {0};
   clean_line clean = {.size = 0};
   round->size = 0;
   round->garbage = round->next = round->wrong = 0;
@@ -356,7 +357,6 @@ void channel_send(channel *line, channel_fault fault, channel_round *round) {
       foreign(line, &clean, round);
       break;
   }
-  put(round, IDLE, sizeof IDLE);
 }
 
 /* ---- the judge ---- */

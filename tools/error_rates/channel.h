@@ -2,8 +2,7 @@
  * receiver made of them. One and the same for every receiver: the firmware's C, the host library's Python, the image in
  * the emulated board.
  *
- * A round is a handful of frames on the line, one fault among them, and an idle line (one more delimiter) at its end; so
- * nothing of a round reaches into the next. A round knows what was sent, which frames the fault touched, and
+ * A round is a handful of frames on the line and one fault among them. A round knows what was sent, which frames the fault touched, and
  * which whole pieces it added that nobody sent in this session (garbage).
  *
  * Judgement. What the receiver accepts must be a frame of the round that has not been passed over: byte by byte the id,

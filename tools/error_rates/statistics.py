@@ -7,6 +7,7 @@ import numpy as np
 CONFIDENCE = 0.95
 RATE_ALLOWED = 2.0**-20  # of wrong frames accepted, per damaged frame
 LOST_ALLOWED = 0.005  # untouched frames lost, per damaged frame
+LOST_ALLOWED_CUT = 0.02  # the same for frames whose end and delimiter are missing: the next may look like their rest
 
 
 def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:

@@ -32,22 +32,8 @@ static void prepare(const wrong_bits_frame *frame, wire_scene *scene) {
   }
 }
 
-/* What the decoder makes of the spoilt bytes and the delimiter that follows them. The decoder then stands where it stood
- * before, with nothing collected, so that the neighbour behind is accepted just as the one before was. */
+/* What the decoder makes of the spoilt bytes and of the neighbour behind them. */
 static void judge(const wire_scene *scene, wrong_bits_tally *tally) {
-  frame_decoder decoder = scene->idle;
-  uint32_t accepted = 0;
-  for (uint8_t i = 0; i < scene->size; i++) {
-    accepted += frame_decode(&decoder, scene->wire[i]);
-  }
-  accepted += frame_decode(&decoder, 0);
-  tally->patterns++;
-  tally->accepted += accepted != 0;
-  tally->lost += decoder.count != 0 || !decoder.synchronised;
-}
-
-/* The same with the neighbour behind, byte by byte. */
-static void judge_with_neighbour(const wire_scene *scene, wrong_bits_tally *tally) {
   frame_decoder decoder = scene->idle;
   uint32_t accepted = 0;
   for (uint8_t i = 0; i < scene->size; i++) {
@@ -75,12 +61,12 @@ void wrong_bits_all(const wrong_bits_frame *frame, uint8_t bits, wrong_bits_tall
   for (uint32_t one = 0; one < count; one++) {
     flip(&scene, one);
     if (bits == 1) {
-      judge_with_neighbour(&scene, tally);
+      judge(&scene, tally);
     }
     for (uint32_t two = one + 1; bits > 1 && two < count; two++) {
       flip(&scene, two);
       if (bits == 2) {
-        judge_with_neighbour(&scene, tally);
+        judge(&scene, tally);
       }
       for (uint32_t three = two + 1; bits > 2 && three < count; three++) {
         flip(&scene, three);
@@ -121,7 +107,7 @@ void wrong_bits_some(const wrong_bits_frame *frame, uint8_t bits, uint64_t count
     for (uint8_t bit = 0; bit < bits; bit++) {
       flip(&scene, drawn[bit]);
     }
-    judge_with_neighbour(&scene, tally);
+    judge(&scene, tally);
     for (uint8_t bit = 0; bit < bits; bit++) {
       flip(&scene, drawn[bit]);
     }

@@ -10,6 +10,7 @@ from functools import cache
 
 from boebot.link import messages
 from tools.error_rates.library import ROOT, ffi, library, new
+from tools.error_rates.statistics import LOST_ALLOWED
 
 FRAME_OVERHEAD = 8
 BITS = (1, 2, 3, 4, 5)
@@ -27,6 +28,11 @@ class BitTally:
     patterns: int = 0
     accepted: int = 0
     lost: int = 0
+
+    @property
+    def met(self) -> bool:
+        """Whether nothing wrong was accepted and few neighbours were lost, none of them by a single bit."""
+        return self.accepted == 0 and self.lost <= (self.bits > 1) * LOST_ALLOWED * self.patterns
 
     def row(self) -> dict[str, object]:
         """Everything, for JSON."""

@@ -81,6 +81,100 @@ def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str
     assert not guilty
 
 
+FIRMWARE = ROOT / "firmware" / "src"
+
+
+def code(source: Path) -> str:
+    """The text of a C file without its comments."""
+    return re.sub(r"/\*.*?\*/", " ", source.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def firmware_code() -> dict[str, str]:
+    """The firmware's own C by path from firmware/src; what protocol/generate.py makes is not among it."""
+    found = {source.relative_to(FIRMWARE).as_posix(): code(source) for source in FIRMWARE.rglob("*.[ch]")}
+    return {name: text for name, text in found.items() if not name.startswith("generated/")}
+
+
+def closure(start: str, includes: dict[str, set[str]]) -> set[str]:
+    """All that a file includes, directly or by what it includes."""
+    found: set[str] = set()
+    waiting = [start]
+    while waiting:
+        new = includes.get(waiting.pop(), set()) - found
+        found |= new
+        waiting += new
+    return found
+
+
+@pytest.fixture(scope="module")
+def firmware_includes() -> dict[str, set[str]]:
+    """What each C file of the firmware includes directly."""
+    found: dict[str, set[str]] = {}
+    for source, name in included("firmware/src"):
+        found.setdefault(source.relative_to(ROOT).as_posix(), set()).add(name)
+    return found
+
+
+def test_below_the_link_nothing_knows_it(firmware_includes: dict[str, set[str]]) -> None:
+    link = ("firmware/src/link/", "firmware/src/generated/messages.h")
+    above = (*link, "firmware/src/firmware.c")
+    guilty = [
+        f"{source} includes {name}"
+        for source, names in firmware_includes.items()
+        for name in names
+        if name.startswith(link) and not source.startswith(above)
+    ]
+    assert not guilty
+
+
+def test_includes_of_the_firmware_make_no_circle(firmware_includes: dict[str, set[str]]) -> None:
+    assert not [name for name in firmware_includes if name in closure(name, firmware_includes)]
+
+
+@pytest.mark.parametrize("source", ["link/frame.c", "link/frame.h", "link/crc21.h"])
+def test_frames_are_made_without_a_board(source: str, firmware_includes: dict[str, set[str]]) -> None:
+    allowed = ("link/frame.h", "link/crc21.h", "bounds.h", "generated/")
+    own = {name for name in closure(f"firmware/src/{source}", firmware_includes) if name.startswith("firmware/")}
+    assert own
+    assert all(name.removeprefix("firmware/src/").startswith(allowed) for name in own), own
+
+
+def test_who_owns_an_interrupt_stands_in_one_place() -> None:
+    """hal/interrupts.h declares the handlers, hal/avr/interrupts.c has their vectors and names the board's own ones."""
+    handlers = set(re.findall(r"\bvoid (\w+)\(", code(FIRMWARE / "hal" / "interrupts.h")))
+    vectors = FIRMWARE / "hal" / "avr" / "interrupts.c"
+    assert handlers
+    assert handlers == {name for name in handlers if re.search(rf"\b{name}\(", code(vectors))}
+    for name, text in firmware_code().items():
+        if not name.startswith("hal/"):
+            called = {handler for handler in handlers if re.search(rf"(?<!void )\b{handler}\(", text)}
+            assert not called, f"{name}: only the board calls {called}"
+    head = vectors.read_text(encoding="utf-8").split("*/")[0]
+    elsewhere = {name for name, text in firmware_code().items() if "ISR(" in text} - {"hal/avr/interrupts.c"}
+    assert all(name.startswith("hal/avr/") and Path(name).name in head for name in elsewhere), elsewhere
+
+
+def test_the_firmware_is_plain_c() -> None:
+    """No assembly but notes that are not loaded, no naked function but the first of the start, no reserved registers
+    or addresses, no state in registers of the chip that are free."""
+    assert not list(FIRMWARE.rglob("*.[sS]"))
+    for name, text in firmware_code().items():
+        for statement in re.findall(r"\b(?:__)?asm(?:__)?\b[^;]*;?", text):
+            assert name in ("bounds.h", "schedule.c") and ".pushsection .boebot." in statement, f"{name}: {statement}"
+        for line in text.splitlines():
+            assert "naked" not in line or 'section(".init3")' in line, f"{name}: {line}"
+            for section in re.findall(r'section\("(.+?)"\)', line):
+                assert section in (".init3", ".noinit"), f"{name}: {line}"
+            assert not re.search(r"\b(GPIOR\d|OCR0B|register)\b", line), f"{name}: {line}"
+
+
+def test_the_firmware_is_compiled_by_the_platforms_options() -> None:
+    texts = [ROOT / "platformio.ini", *(ROOT / "tools" / "platformio").glob("*.py")]
+    options = {option for text in texts for option in re.findall(r"(?<![\w-])--?[fmO][\w-]+", text.read_text())}
+    sanitizers = {"-fno-omit-frame-pointer", "-fsanitize", "-fno-sanitize-recover", "-O1"}
+    assert options <= {"-flto", "-ffunction-sections", "-fdata-sections", *sanitizers}
+
+
 def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
     users = {
         source

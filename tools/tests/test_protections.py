@@ -1,7 +1,7 @@
 """Each protection of the firmware is tested: with that one taken away a unit test fails.
 
-A row names the protection, the file that holds it, the text that is it, what stands there without it, and the suite of
-firmware/test that must notice. The checks of a frame are taken away in test_fuzz.py and test_error_rates.py.
+A row names the protection, the file that holds it, the text that is it, what stands there without it, and the file of
+firmware/test/test_units that must notice. The checks of a frame are taken away in test_fuzz.py and test_error_rates.py.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Row(NamedTuple):
         file: in firmware/src.
         text: stands there exactly once.
         instead: takes its place.
-        suite: of firmware/test, without "test_"; its assertions fail then.
+        suite: of firmware/test/test_units; its assertions fail then.
     """
 
     protection: str
@@ -45,28 +45,45 @@ class Row(NamedTuple):
 
 ROWS = (
     Row("a set-point's age by its tick", "safety.c", "age >= life || ", "", "safety"),
-    Row("order of set-points", "safety.c", "|| has_newer(self, answers_tick, sequence) ", "", "safety"),
+    Row("order of set-points", "safety.c", "|| has_newer(answers_tick, sequence) ", "", "safety"),
     Row(
         "set-points from before arming",
         "safety.c",
-        "self->ticks_are_over && (int16_t)(answers_tick",
+        "own.ticks_are_over && (int16_t)(answers_tick",
         "false && (0",
         "safety",
     ),
-    Row("copies from before a dead-man stop", "safety.c", "  end_ticks(self, self->last_tick);\n", "", "safety"),
-    Row("latch", "safety.c", "self->latch != LATCH_NONE || ", "", "safety"),
-    Row("longest time to live", "safety.c", "time_to_live > TIME_TO_LIVE_MAX", "false", "safety"),
-    Row("arm names the latch that it ends", "safety.c", "known_latches != self->latches", "false", "safety"),
-    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - self->deadline) >= 0", "false", "safety"),
-    Row("no arming below the supply's minimum", "safety.c", "supply_low() || ", "", "safety"),
-    Row("no arming before the supply is measured", "safety.c", "|| supply_voltage() == 0", "", "safety"),
+    Row("copies from before a dead-man stop", "safety.c", "  end_ticks(own.last_tick);\n", "", "safety"),
+    Row("latch", "safety.c", "own.latch != LATCH_NONE || ", "", "safety"),
+    Row("longest time to live", "safety.c", "time_to_live > SAFETY_TIME_TO_LIVE_MAX", "false", "safety"),
+    Row("arm names the latch that it ends", "safety.c", "known_latches != own.latches", "false", "safety"),
+    Row("dead-man", "safety.c", "(int32_t)(schedule_time() - own.deadline) >= 0", "false", "safety"),
+    Row("no arming below the supply's minimum", "safety.c", "if (supply_low() || ", "if (", "safety"),
+    Row(
+        "no arming before the supply is measured",
+        "safety.c",
+        "if (supply_low() || supply_voltage() == 0",
+        "if (supply_low()",
+        "safety",
+    ),
+    Row(
+        "no fallback before the supply is measured",
+        "safety.c",
+        "|| supply_voltage() == 0) {\n    return false",
+        ") {\n    return false",
+        "fallback",
+    ),
+    Row("no fallback after a stop", "safety.c", "own.fallback_allowed = false;\n  stop_all", "stop_all", "fallback"),
+    Row("no fallback while a host speaks", "fallback.c", "silence = 0;\n  if (drives)", "if (0)", "fallback"),
     Row("a low supply latches", "safety.c", "if (supply_low()) {", "if (false) {", "safety"),
     Row("one low measurement is not low", "supply.c", "below && was_below", "below", "supply"),
     Row("range of set-points", "link/dispatch.c", "beyond(message.left, most) ||", "", "safety"),
     Row("stop latches", "link/dispatch.c", "safety_latch(LATCH_STOP_COMMAND);", "", "safety"),
-    Row("the end of a session latches", "link/session.c", "safety_latch(LATCH_SESSION_ENDED);", "", "session"),
-    Row("open names the board's nonce", "link/session.c", "|| message->board_nonce != board_nonce", "", "session"),
-    Row("open names the version", "link/session.c", "message->protocol_version != PROTOCOL_VERSION", "0", "session"),
+    Row("closing latches", "link/session.c", "safety_latch(LATCH_SESSION_ENDED);\n  begin", "begin", "session"),
+    Row("a new opening latches", "link/session.c", "safety_latch(LATCH_SESSION_ENDED);\n    begin", "begin", "session"),
+    Row("the silence of a host latches", "link/session.c", "safety_host_lost();", "", "safety"),
+    Row("open names the board's nonce", "link/session.c", "message->board_nonce != board_nonce", "false", "session"),
+    Row("open names the version", "link/session.c", "PROTOCOL_MAJOR(message->protocol_version) !=", "0 &&", "session"),
     Row("time-out of the session", "link/session.c", "parameters_u16(PARAMETER_SESSION_TIME_OUT)", "~0ul", "session"),
     Row("the handshake keeps no session open", "link/link.c", "!message_is_handshake(id)", "true", "session"),
     Row("close names its session", "link/session.c", "of != seed", "false", "session"),
@@ -81,23 +98,35 @@ ROWS = (
     Row("a copy of a request is not a new one", "link/requests.c", "number == answer.number", "false", "requests"),
     Row("order of requests", "link/requests.c", "(uint16_t)(answer.number + 1u)", "number", "requests"),
     Row("no new parameters during a save", "link/requests.c", "if (must_wait(id))", "if (false)", "requests"),
-    Row("an event is sent again", "link/events.c", "wait = retry_time();", "wait = UINT16_MAX;", "events"),
-    Row("acknowledgements name the event", "link/events.c", "arrived != number", "false", "events"),
-    Row("what finds the queue full is told later", "link/events.c", "counters_count(deferred);", "return;", "events"),
-    Row("touches that were merged", "link/events.c", "EVENT_KIND_WHISKERS) {", "UINT8_MAX) {", "events"),
-    Row("cells of the EEPROM are read back", "storage.c", "!= self->record.bytes[self->step_first]", "< 0", "storage"),
+    Row(
+        "an event is sent again",
+        "link/event_delivery.c",
+        "wait = retry_time();",
+        "wait = UINT16_MAX;",
+        "event_delivery",
+    ),
+    Row("acknowledgements name the event", "link/event_delivery.c", "arrived != number", "false", "event_delivery"),
+    Row("touches of an earlier session", "link/session.c", "events_forget_touches();", "", "event_delivery"),
+    Row("what finds the queue full is told later", "events.c", "deferred++;", "return;", "events"),
+    Row("touches that were merged", "events.c", "waits[what->kind] && what->kind", "false && 0", "events"),
+    Row("what is left of a cut frame", "link/link.c", "  frame_decoder_cut(&decoder);\n", "", "link"),
+    Row("bytes that found no room are counted", "link/link.c", "  counters_lose_bytes();\n", "", "link"),
+    Row("a storm masks its line", "pin_changes.c", " || row == STORM", "", "pin_changes"),
+    Row("a full ring masks its line", "pin_changes.c", "is_full || row", "row", "pin_changes"),
+    Row("pulses too short to be seen", "pin_changes.c", "unseen > UNSEEN_MAX", "false", "pin_changes"),
+    Row("cells of the EEPROM are read back", "storage.c", "own.is_writing && !reads_back()", "false", "storage"),
     Row("the mark is void during a write", "storage.c", "= MARK_VOID;", "= MARK_VALID;", "storage"),
     Row("a record's checksum", "storage.c", "&& crc == expected", "", "storage"),
     Row(
         "range of a loaded parameter",
-        "link/parameters.c",
+        "parameters.c",
         "!is_allowed(parameter, kept[parameter], range_of(parameter))",
         "0",
         "storage",
     ),
     Row("no save while the supply is low", "storage.c", "supply_low()) {\n    return", "0) {\n    return", "storage"),
     Row("no cell while the supply is low", "storage.c", "supply_low()) {\n    give", "0) {\n    give", "storage"),
-    Row("a start counts after 10 s", "storage.c", "self->run_ticks == RUN_TICKS && ", "", "storage"),
+    Row("a start counts after 10 s", "storage.c", "own.run_slots == RUN_SLOTS && ", "", "storage"),
 )
 SUITES = tuple(sorted({row.suite for row in ROWS}))
 
@@ -119,7 +148,7 @@ class Workshop:
         """Begins to compile everything into the folder."""
         self.folder = folder
         sources = (TEST / "main.cpp", TEST / "host_frame.c", *firmware_sources())
-        suites = {name: TEST / f"test_{name}" / f"test_{name}.cpp" for name in SUITES}
+        suites = {name: TEST / "test_units" / f"{name}.cpp" for name in SUITES}
         self.objects = {path: pool.submit(self.compiled, path, f"{number}") for number, path in enumerate(sources)}
         self.suites = {name: pool.submit(self.compiled, path, f"suite-{name}") for name, path in suites.items()}
 

@@ -1,4 +1,4 @@
-/* messages.h: every message of the protocol, from protocol/messages.toml.
+/* messages.h: the layout of every message of the protocol, from protocol/messages.toml.
  * Made by protocol/generate.py; do not edit. */
 #ifndef GENERATED_MESSAGES_H
 #define GENERATED_MESSAGES_H
@@ -6,134 +6,19 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 2u
-#define SCHEMA_HASH 0x2253866Eul
+#include "generated/values.h"
+
+#define PROTOCOL_VERSION 0x30u /* 3.0 */
+#define PROTOCOL_MAJOR(version) ((version) / 16u)
+#define SCHEMA_HASH 0x4451FF50ul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
-
-/* Whiskers, debounced: a set bit is a pressed whisker. */
-#define WHISKERS_LEFT (1u << 0)
-#define WHISKERS_RIGHT (1u << 1)
-
-/* IR pairs at the last burst: a set bit is an object seen. */
-#define INFRARED_LEFT (1u << 0)
-#define INFRARED_RIGHT (1u << 1)
-
-/* State and faults of the board. */
-#define STATUS_MOTORS_ENABLED (1u << 0)
-#define STATUS_DEAD_MAN (1u << 1)
-#define STATUS_LATCHED (1u << 2)
-#define STATUS_ENCODER_LEFT_MASKED (1u << 3)
-#define STATUS_ENCODER_RIGHT_MASKED (1u << 4)
-#define STATUS_TICK_OVERRUN (1u << 5)
-#define STATUS_RECEIVE_OVERRUN (1u << 6)
-#define STATUS_WATCHDOG_RESET (1u << 7)
-#define STATUS_SUPPLY_LOW (1u << 8)
-#define STATUS_SAVING (1u << 9)
-
-/* Devices switched on. */
-#define DEVICES_SERVOS (1u << 0)
-#define DEVICES_ENCODERS (1u << 1)
-#define DEVICES_WHISKERS (1u << 2)
-#define DEVICES_INFRARED (1u << 3)
-#define DEVICES_PING (1u << 4)
-#define DEVICES_BATTERY (1u << 5)
-#define DEVICES_LIGHT (1u << 6)
-#define DEVICES_ANALOG_INFRARED (1u << 7)
-#define DEVICES_COMPASS (1u << 8)
-#define DEVICES_TURRET (1u << 9)
-#define DEVICES_BUZZER (1u << 10)
-
-/* Why the microcontroller started. */
-enum {
-  RESET_CAUSE_UNKNOWN = 0,
-  RESET_CAUSE_POWER = 1,
-  RESET_CAUSE_EXTERNAL = 2,
-  RESET_CAUSE_BROWN_OUT = 3,
-  RESET_CAUSE_WATCHDOG = 4,
-  RESET_CAUSE_WATCHDOG_IN_WHISKER = 5,
-  RESET_CAUSE_WATCHDOG_IN_SAFETY = 6,
-  RESET_CAUSE_WATCHDOG_IN_ANALOG = 7,
-  RESET_CAUSE_WATCHDOG_IN_LIGHT = 8,
-  RESET_CAUSE_WATCHDOG_IN_EVENTS = 9,
-  RESET_CAUSE_WATCHDOG_IN_ENCODER = 10,
-  RESET_CAUSE_WATCHDOG_IN_INFRARED = 11,
-  RESET_CAUSE_WATCHDOG_IN_PING = 12,
-  RESET_CAUSE_WATCHDOG_IN_TELEMETRY = 13,
-  RESET_CAUSE_WATCHDOG_IN_REQUESTS = 14,
-  RESET_CAUSE_WATCHDOG_IN_SESSION = 15,
-  RESET_CAUSE_WATCHDOG_IN_SUPPLY = 16,
-  RESET_CAUSE_WATCHDOG_IN_COUNTERS = 17,
-  RESET_CAUSE_WATCHDOG_IN_STORAGE = 18,
-  RESET_CAUSE_WATCHDOG_IN_TURRET = 19,
-  RESET_CAUSE_WATCHDOG_IN_BUZZER = 20,
-  RESET_CAUSE_WATCHDOG_IN_COMPASS = 21,
-  RESET_CAUSE_WATCHDOG_IN_DEVICES = 22,
-};
-
-/* The tasks of the firmware, from firmware/src/tasks.def. */
-enum {
-  TASK_WHISKER = 0,
-  TASK_SAFETY = 1,
-  TASK_ANALOG = 2,
-  TASK_LIGHT = 3,
-  TASK_EVENTS = 4,
-  TASK_ENCODER = 5,
-  TASK_INFRARED = 6,
-  TASK_PING = 7,
-  TASK_TELEMETRY = 8,
-  TASK_REQUESTS = 9,
-  TASK_SESSION = 10,
-  TASK_SUPPLY = 11,
-  TASK_COUNTERS = 12,
-  TASK_STORAGE = 13,
-  TASK_TURRET = 14,
-  TASK_BUZZER = 15,
-  TASK_COMPASS = 16,
-  TASK_DEVICES = 17,
-};
-
-/* Why the motors are latched off. */
-enum {
-  LATCH_NONE = 0,
-  LATCH_START = 1,
-  LATCH_STOP_COMMAND = 2,
-  LATCH_SESSION_ENDED = 3,
-  LATCH_SUPPLY_LOW = 4,
-};
-
-/* How a numbered request ended. */
-enum {
-  ANSWER_STATUS_OK = 0,
-  ANSWER_STATUS_UNKNOWN_PARAMETER = 1,
-  ANSWER_STATUS_OUT_OF_RANGE = 2,
-  ANSWER_STATUS_SUPPLY_LOW = 3,
-  ANSWER_STATUS_STORAGE_FAILED = 4,
-  ANSWER_STATUS_LATCHED_AGAIN = 5,
-  ANSWER_STATUS_BUSY = 6,
-};
-
-/* How the last exchange with the compass ended. */
-enum {
-  COMPASS_STATUS_OFF = 0,
-  COMPASS_STATUS_OK = 1,
-  COMPASS_STATUS_NO_ANSWER = 2,
-  COMPASS_STATUS_BUS_STUCK = 3,
-  COMPASS_STATUS_FAILED = 4,
-};
-
-/* What happened, and what `value` is. */
-enum {
-  EVENT_KIND_WHISKERS = 0,
-  EVENT_KIND_LATCH = 1,
-  EVENT_KIND_DEAD_MAN = 2,
-};
 
 /* Opens a session with the seed (board_nonce XOR host_nonce), or confirms the one that has it. */
 #define MSG_OPEN_ID 0x01u
 #define MSG_OPEN_LENGTH 9u
 typedef struct __attribute__((packed)) {
-  uint8_t protocol_version; /* version that the host speaks */
+  uint8_t protocol_version; /* of the host: 16 x version + minor */
   uint32_t board_nonce; /* as in the hello that this answers; another one is refused */
   uint32_t host_nonce; /* drawn by the host for each session */
 } msg_open;
@@ -160,8 +45,8 @@ typedef struct __attribute__((packed)) {
 #define MSG_HELLO_ID 0x80u
 #define MSG_HELLO_LENGTH 44u
 typedef struct __attribute__((packed)) {
-  uint8_t protocol_version;
-  uint32_t schema_hash; /* CRC-32 of the normalised messages.toml */
+  uint8_t protocol_version; /* of the board: 16 x version + minor */
+  uint32_t schema_hash; /* CRC-32 of what all of this version have in common */
   uint32_t board_nonce; /* what the next open must name: another one after every start, opening and end of a session */
   uint32_t session; /* seed of the session that is open; 0: none */
   uint16_t tick_rate; /* Hz */
@@ -207,7 +92,7 @@ typedef struct __attribute__((packed)) {
   uint8_t token; /* comes back in stopped */
 } msg_stop;
 
-/* The host leaves: the session ends at once. */
+/* The host leaves: the session ends at once. Not acknowledged. */
 #define MSG_CLOSE_ID 0x09u
 #define MSG_CLOSE_LENGTH 4u
 typedef struct __attribute__((packed)) {
@@ -282,7 +167,7 @@ typedef struct __attribute__((packed)) {
 #define MSG_BUZZER_FREQUENCY_MAX (8000)
 
 /* Asks for one parameter. */
-#define MSG_GET_PARAMETER_ID 0x20u
+#define MSG_GET_PARAMETER_ID 0x25u
 #define MSG_GET_PARAMETER_LENGTH 3u
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the request: 1 for the first of a session, then one more each */
@@ -343,7 +228,7 @@ typedef struct __attribute__((packed)) {
 
 /* Everything the board knows, once per control tick or less often where the line is slow. */
 #define MSG_TELEMETRY_ID 0x90u
-#define MSG_TELEMETRY_LENGTH 38u
+#define MSG_TELEMETRY_LENGTH 39u
 typedef struct __attribute__((packed)) {
   uint32_t tick; /* control ticks since reset */
   uint32_t time; /* us; board time at the start of this tick, since its clock started (some 0.15 s after reset); rolls over after 71.6 min */
@@ -354,8 +239,9 @@ typedef struct __attribute__((packed)) {
   uint8_t whiskers; /* whiskers */
   uint8_t infrared; /* infrared */
   uint8_t infrared_age; /* ticks; age of the older IR reading; 255: never or older */
-  uint16_t ping_echo; /* us; length of the last echo pulse; 0: no echo */
-  uint8_t ping_age; /* ticks; ticks since that echo ended or was given up; 255: never or older */
+  uint16_t ping_echo; /* us; length of the last echo pulse where ping_status is ok, else 0 */
+  uint8_t ping_age; /* ticks; ticks since that measurement ended or was given up; 255: never or older */
+  uint8_t ping_status; /* ping_status */
   uint16_t pulse_left; /* 0.0625 us; servo pulse in force; 0: no pulses */
   uint16_t pulse_right; /* 0.0625 us */
   uint16_t supply; /* 0.001 V; supply voltage against the bandgap; 0: not yet measured */
@@ -368,10 +254,11 @@ typedef struct __attribute__((packed)) {
 
 /* What the board's end of the link has counted since reset, modulo 65536; sent in turn with task_time. */
 #define MSG_COUNTERS_ID 0x91u
-#define MSG_COUNTERS_LENGTH 20u
+#define MSG_COUNTERS_LENGTH 22u
 typedef struct __attribute__((packed)) {
   uint16_t good; /* frames accepted */
   uint16_t bad; /* frames refused: length, checksum, stuffing or seed */
+  uint16_t unknown; /* whole frames of messages that came with a later minor version, and are ignored */
   uint16_t resynchronised; /* times that a good frame followed bad ones */
   uint16_t retransmitted; /* events sent again */
   uint16_t duplicate; /* requests that came again and were only answered */
@@ -433,7 +320,7 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the request */
   uint8_t status; /* answer_status */
-  int32_t value; /* of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale */
+  int32_t value; /* of get_parameter and set_parameter, refused or not: the value in force, in counts of the parameter's scale; else, and where it is busy or the parameter unknown, 0 */
 } msg_answer;
 
 /* Something happened. Sent again until acknowledged. */
@@ -442,7 +329,7 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uint16_t number; /* of the event: 1 for the first of a session, then one more each */
   uint8_t kind; /* event_kind */
-  uint16_t value; /* see event_kind */
+  uint16_t value; /* its meaning stands at each event_kind */
   uint32_t time; /* us; board time */
 } msg_event;
 
@@ -526,26 +413,6 @@ static inline int16_t message_length_to_host(uint8_t id) {
   }
 }
 
-/* X(name, id, bytes of payload) for each message to the board, in plain decimals. */
-#define MESSAGES_TO_BOARD(X) \
-  X(open, 1, 9)              \
-  X(identify, 2, 0)          \
-  X(describe, 3, 5)          \
-  X(stop, 8, 1)              \
-  X(close, 9, 4)             \
-  X(setpoint_signal, 16, 8)  \
-  X(setpoint_speed, 17, 8)   \
-  X(setpoint_coast, 18, 4)   \
-  X(turret, 24, 3)           \
-  X(buzzer, 25, 4)           \
-  X(get_parameter, 32, 3)    \
-  X(set_parameter, 33, 7)    \
-  X(save_parameters, 34, 2)  \
-  X(reset_parameters, 35, 2) \
-  X(arm, 36, 3)              \
-  X(acknowledge, 40, 2)      \
-  X(clock_probe, 48, 2)
-
 /* Whether the message belongs to the handshake, whose checksums start from the constant seed. */
 static inline bool message_is_handshake(uint8_t id) {
   switch (id) {
@@ -574,23 +441,23 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x12, 4, 0xD86ACD27ul)  \
   X(0x18, 3, 0x76F31EB3ul)  \
   X(0x19, 4, 0xB81D6D3Ful)  \
-  X(0x20, 3, 0x9199C85Ful)  \
-  X(0x21, 7, 0x93310006ul)  \
+  X(0x21, 7, 0x885FEFDBul)  \
   X(0x22, 2, 0x1DEAD58Cul)  \
   X(0x23, 2, 0x5C7C21EEul)  \
   X(0x24, 3, 0x7A25B50Eul)  \
+  X(0x25, 3, 0xEE5C19C7ul)  \
   X(0x28, 2, 0x306E772Cul)  \
   X(0x30, 2, 0x1011476Bul)  \
-  X(0x80, 44, 0xDFD6FEB4ul) \
+  X(0x80, 44, 0xA76FFC9Bul) \
   X(0x81, 60, 0xF379E8B5ul) \
   X(0x82, 8, 0xACE09C27ul)  \
   X(0x88, 1, 0x24E076A5ul)  \
-  X(0x90, 38, 0x425355C1ul) \
-  X(0x91, 20, 0x7EF8DA38ul) \
-  X(0x92, 31, 0xFF7B65CCul) \
-  X(0x93, 3, 0xF7716504ul)  \
-  X(0xA0, 7, 0x754ACE51ul)  \
-  X(0xA1, 9, 0xCCFD276Eul)  \
+  X(0x90, 39, 0x421C7CB9ul) \
+  X(0x91, 22, 0x87F975A3ul) \
+  X(0x92, 31, 0xA1006857ul) \
+  X(0x93, 3, 0x9EADF1CFul)  \
+  X(0xA0, 7, 0x90997173ul)  \
+  X(0xA1, 9, 0x515D19B5ul)  \
   X(0xB0, 6, 0xFC092B76ul)
 
 #endif

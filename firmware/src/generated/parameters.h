@@ -27,7 +27,11 @@
 #define PARAMETER_TURRET_CENTRE 21u /* 0.0625 us: pulse at which the turret looks straight ahead */
 #define PARAMETER_TURRET_GAIN 22u /* 0.0625 us/rad: pulse for each radian of the turret to the left; negative for a servo that turns the other way */
 #define PARAMETER_START_BEEP 23u /* 0.01 s: length of the tone at each start, so that a reset is heard; 0: none */
-#define PARAMETER_COUNT 24u
+#define PARAMETER_ENCODER_GAP 24u /* us: shortest time between two edges of one encoder line that both count; 0: all count */
+#define PARAMETER_FALLBACK_AFTER 25u /* ms: silence of the host after which the board's own brain takes over; 0: never */
+#define PARAMETER_FALLBACK_AT_START 26u /* flag: 1: the board's own brain may also take over after a reset, before any host has armed the motors; 0: not */
+#define PARAMETER_COUNT 27u
+#define PARAMETER_TABLE 0x6A0Fu /* tells tables of parameters apart */
 
 /* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */
 #define PARAMETER_LIST(X)                                              \
@@ -54,6 +58,9 @@
   X(DEVICES_PERIOD, u16, 1, 100, 2)                                    \
   X(TURRET_CENTRE, u16, 16000, 32000, DEFAULT_TURRET_CENTRE)           \
   X(TURRET_GAIN, i16, -16000, 16000, DEFAULT_TURRET_GAIN)              \
-  X(START_BEEP, u16, 0, 100, 0)
+  X(START_BEEP, u16, 0, 100, 0)                                        \
+  X(ENCODER_GAP, u16, 0, 65535, DEFAULT_ENCODER_GAP)                   \
+  X(FALLBACK_AFTER, u16, 0, 65535, 0)                                  \
+  X(FALLBACK_AT_START, u16, 0, 1, 0)
 
 #endif

@@ -1,36 +1,30 @@
 /* counters.c: see counters.h. */
 #include "link/counters.h"
 
-#include <string.h>
-
+#include "events.h"
 #include "hal/hal.h"
 #include "link/link.h"
 #include "link/send.h"
 #include "link/session.h"
 #include "link/telemetry.h"
 #include "task_times.h"
+#include "tasks.h"
 
 #define PERIOD 4u /* ticks on a fast line */
 
 msg_counters counters;
-static bool bytes_lost;
+static bool lost_in_tick, bytes_lost;
 static uint8_t due_in;          /* ticks */
 static msg_task_time task_time; /* the last that was told */
 
 void counters_start(void) {
-  HAL_ZERO(counters);
-  HAL_ZERO(bytes_lost);
-  HAL_ZERO(due_in);
-  HAL_ZERO(task_time);
+  counters = (msg_counters){0};
+  lost_in_tick = bytes_lost = false;
+  due_in = 0;
+  task_time.task = 0;
 }
 
-void counters_count_at(uint8_t offset) {
-  uint8_t *const at = (uint8_t *)&counters + offset;
-  uint16_t count = 0;
-  memcpy(&count, at, sizeof count);
-  count++;
-  memcpy(at, &count, sizeof count);
-}
+void counters_lose_bytes(void) { lost_in_tick = true; }
 
 bool counters_bytes_lost(void) {
   const bool lost = bytes_lost;
@@ -38,10 +32,16 @@ bool counters_bytes_lost(void) {
   return lost;
 }
 
+/* In every tick: looks whether received bytes were lost; in a session sends one task's longest time or the counters
+ * now and then. */
 void counters_task(void) {
   if (hal_serial_overrun()) {
-    counters_count(overrun);
+    counters_lose_bytes();
+  }
+  if (lost_in_tick) {
+    counters.overrun++;
     bytes_lost = true;
+    lost_in_tick = false;
   }
   if (due_in != 0) {
     due_in--;
@@ -54,6 +54,7 @@ void counters_task(void) {
   const uint8_t task = ++task_time.task;
   if (task == TASKS) {
     link_count(&counters);
+    counters.deferred = events_deferred();
     send_message(MSG_COUNTERS_ID, &counters, sizeof counters);
     task_time.task = UINT8_MAX; /* the next is the first task's turn */
     return;

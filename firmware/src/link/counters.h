@@ -3,7 +3,6 @@
 #define LINK_COUNTERS_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "generated/messages.h"
 
@@ -16,15 +15,10 @@ extern msg_counters counters;
 
 void counters_start(void);
 
-/* Counts one, in the field of that name. */
-#define counters_count(field) counters_count_at(offsetof(msg_counters, field))
-void counters_count_at(uint8_t offset);
+/* Received bytes were lost: it is counted in this tick, and told in the next telemetry. */
+void counters_lose_bytes(void);
 
-/* In every tick: looks whether received bytes were lost; in a session sends one task's longest time or the counters
- * now and then. */
-void counters_task(void) __attribute__((noinline));
-
-/* Whether received bytes were lost since the last call. */
+/* Whether it was counted since the last call. */
 bool counters_bytes_lost(void);
 
 #ifdef __cplusplus

@@ -11,13 +11,14 @@
 #include "light.h"
 #include "link/frame.h"
 #include "link/link.h"
-#include "link/parameters.h"
 #include "link/send.h"
 #include "link/session.h"
+#include "parameters.h"
 #include "pins.h"
 #include "schedule.h"
 #include "servo.h"
 #include "supply.h"
+#include "tasks.h"
 
 #define LINE_SHARE 4u /* it fills a quarter of the line at most */
 #define DEVICES \
@@ -36,6 +37,8 @@ static bool any_on(void) {
          (parameters_device_on(DEVICES_INFRARED) && parameters_u16(PARAMETER_INFRARED_SWEEP) != 0);
 }
 
+/* In every tick: sends it when it is its turn, in a session, while one of the devices is on, if no message from the host
+ * waits for room for its answer and the next telemetry has room after it. */
 void devices_task(void) {
   if (since < UINT8_MAX) {
     since++;

@@ -6,13 +6,13 @@
 #include "buzzer.h"
 #include "generated/messages.h"
 #include "link/counters.h"
-#include "link/events.h"
+#include "link/event_delivery.h"
 #include "link/identity.h"
-#include "link/parameters.h"
 #include "link/requests.h"
 #include "link/send.h"
 #include "link/session.h"
 #include "motion.h"
+#include "parameters.h"
 #include "safety.h"
 #include "schedule.h"
 #include "turret.h"
@@ -21,11 +21,16 @@
 static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
   const safety_verdict verdict = safety_accept(time_to_live, answers_tick, sequence);
   if (verdict == SAFETY_LATE) {
-    counters_count(late);
+    counters.late++;
   }
   *refused = verdict == SAFETY_REFUSED;
   return verdict == SAFETY_ACCEPTED;
 }
+
+_Static_assert(MSG_SETPOINT_SIGNAL_TIME_TO_LIVE_MAX == SAFETY_TIME_TO_LIVE_MAX &&
+                   MSG_SETPOINT_SPEED_TIME_TO_LIVE_MAX == SAFETY_TIME_TO_LIVE_MAX &&
+                   MSG_SETPOINT_COAST_TIME_TO_LIVE_MAX == SAFETY_TIME_TO_LIVE_MAX,
+               "one limit for all");
 
 static bool beyond(int16_t value, int16_t most) { return value > most || value < -most; }
 
@@ -115,17 +120,20 @@ static bool describe(const uint8_t *payload) {
 static void acknowledge(const uint8_t *payload) {
   msg_acknowledge message;
   memcpy(&message, payload, sizeof message);
-  events_acknowledge(message.number);
+  event_delivery_acknowledge(message.number);
 }
 
+/* Not in line: so the length of what each of them sends stays a constant, which the bound of a poll needs. */
+#define SENDS static __attribute__((noinline)) void
+
 /* The confirmation may be lost for want of room: the host asks again. Stopping waits for nothing. */
-static void stop(const uint8_t *payload) {
+SENDS stop(const uint8_t *payload) {
   safety_latch(LATCH_STOP_COMMAND);
   const msg_stopped stopped = {.token = payload[0]};
   send_message(MSG_STOPPED_ID, &stopped, sizeof stopped);
 }
 
-static void clock_probe(const uint8_t *payload) {
+SENDS clock_probe(const uint8_t *payload) {
   msg_clock_answer answer = {.time = schedule_time()};
   memcpy(&answer.token, payload, sizeof answer.token);
   send_message(MSG_CLOCK_ANSWER_ID, &answer, sizeof answer);
@@ -133,8 +141,6 @@ static void clock_probe(const uint8_t *payload) {
 
 uint8_t dispatch_room(uint8_t id) {
   switch (id) {
-    case MSG_IDENTIFY_ID:
-      return SEND_RESERVE + MSG_IDENTITY_LENGTH;
     case MSG_DESCRIBE_ID:
       return SEND_RESERVE + MSG_DESCRIPTION_LENGTH;
     case MSG_CLOCK_PROBE_ID:
@@ -155,7 +161,7 @@ bool dispatch(uint8_t id, uint8_t sequence, const uint8_t *payload) {
     case MSG_OPEN_ID:
       return open(payload);
     case MSG_IDENTIFY_ID:
-      identity_send();
+      session_identify();
       return true;
     case MSG_DESCRIBE_ID:
       return describe(payload);

@@ -1,98 +1,157 @@
 /* frame.c: see frame.h. */
 #include "link/frame.h"
 
-#include "hal/hal.h"
-#include "link/cobs.h"
+#include "bounds.h"
 #include "link/crc21.h"
 
 #define HEAD_BYTES 3u /* code byte, id, sequence */
 #define CHECK_BYTES 3u
-#define ACCEPTED_MAX (FRAME_ACCEPTED_MAX + HEAD_BYTES) /* stuffed, without its checksum */
-#define INSIDE_MIN 6u                                  /* code byte, id, sequence, checksum */
+#define INSIDE_MIN (HEAD_BYTES + CHECK_BYTES)
 
-/* The register that starts from a seed aligned with it. */
-static inline crc21 crc_from(uint32_t aligned) {
-  return (crc21){(uint8_t)(aligned >> 16), (uint8_t)(aligned >> 8), (uint8_t)aligned};
-}
-
-static inline crc21 crc_start(uint32_t seed) { return crc_from(crc21_align(seed)); }
-_Static_assert(FRAME_NO_SESSION > 0xFFFFFFul && FRAME_SEED_MAX << 3 <= 0xFFFFFFul, "seeds and none");
-
-uint32_t frame_checksum(uint32_t seed, const uint8_t *bytes, uint8_t count) {
-  crc21 crc = crc_start(seed);
-  if (count > 0) {
-    crc21_take_all(&crc, bytes, count, UINT8_MAX);
+/* Consistent overhead byte stuffing (Cheshire and Baker 1999) of frames, which are too short for a second code byte: each zero,
+ * and the code byte before the first byte, becomes the distance to the next zero or to the end. In place; bytes[0] is the
+ * code byte's place. */
+static void stuff(uint8_t *bytes, uint8_t count) {
+  uint8_t *code = bytes;
+  uint8_t distance = 1;
+  for (uint8_t i = 1; i < count; i++) {
+    LOOP_BOUND(FRAME_PAYLOAD_MAX + HEAD_BYTES);
+    if (bytes[i] == 0) {
+      *code = distance;
+      code = &bytes[i];
+      distance = 0;
+    }
+    distance++;
   }
-  return ((uint32_t)crc.high << 16 | (uint32_t)crc.middle << 8 | crc.low) >> 3;
+  *code = distance;
 }
 
 uint8_t frame_encode(uint8_t *wire, uint8_t id, uint8_t sequence, const void *payload, uint8_t length, uint32_t seed) {
-  *wire = 0;
-  cobs_stuffing stuffing = {hal_serial_beyond(wire, (uint8_t)(length + 4u)), 1};
-  if (length != 0) {
-    cobs_put_all(&stuffing, (const uint8_t *)payload + length, length, FRAME_PAYLOAD_MAX);
+  uint8_t *const inside = wire + 1;
+  const uint8_t stuffed = (uint8_t)(length + HEAD_BYTES);
+  wire[0] = 0;
+  inside[1] = id;
+  inside[2] = sequence;
+  const uint8_t *from = payload;
+  uint8_t *to = inside + HEAD_BYTES;
+  for (uint8_t left = length; left != 0; left--) {
+    LOOP_BOUND(FRAME_PAYLOAD_MAX);
+    *to++ = *from++;
   }
-  cobs_put(&stuffing, sequence);
-  cobs_put(&stuffing, id);
-  hal_serial_put_before(&stuffing.to, stuffing.distance);
-  crc21 crc = crc_start(message_is_handshake(id) ? FRAME_SEED : seed);
-  crc21_take_sent(&crc, &stuffing.to, (uint8_t)(length + HEAD_BYTES), FRAME_PAYLOAD_MAX + HEAD_BYTES);
-  crc21_spread(&crc);
-  hal_serial_put(&stuffing.to, crc.high);
-  hal_serial_put(&stuffing.to, crc.middle);
-  hal_serial_put(&stuffing.to, crc.low);
-  *stuffing.to = 0;
+  stuff(inside, stuffed);
+  crc21 crc = crc21_start(message_is_handshake(id) ? FRAME_SEED : seed);
+  for (to = inside; to != inside + stuffed; to++) {
+    LOOP_BOUND(FRAME_PAYLOAD_MAX + HEAD_BYTES);
+    crc21_add(&crc, *to);
+  }
+  crc21_put(crc, to);
+  inside[stuffed + CHECK_BYTES] = 0;
   return (uint8_t)(length + FRAME_OVERHEAD);
 }
 
-/* Whether what was collected is a message; leaves it unstuffed. What is too long to be one has no id of that length. */
-static inline bool accept(const frame_decoder *decoder, uint8_t *bytes, uint8_t count) {
-  if (count < INSIDE_MIN || bytes[0] < 2) {
+/* Takes the stuffing off in place; false unless it ends exactly at the end. No byte of it is zero. */
+static bool unstuff(uint8_t *bytes, uint8_t count) {
+  uint8_t at = 0;
+  while (at < count) {
+    LOOP_BOUND(FRAME_ACCEPTED_MAX + HEAD_BYTES);
+    const uint8_t step = bytes[at];
+    bytes[at] = 0;
+    if (step > count - at) {
+      return false;
+    }
+    at = (uint8_t)(at + step);
+  }
+  return true;
+}
+
+static bool has_right_check(const uint8_t *bytes, uint8_t stuffed, uint32_t seed) {
+  crc21 crc = crc21_start(seed);
+  for (uint8_t i = 0; i < stuffed; i++) {
+    LOOP_BOUND(FRAME_ACCEPTED_MAX + HEAD_BYTES);
+    crc21_add(&crc, bytes[i]);
+  }
+  uint8_t right[CHECK_BYTES];
+  crc21_put(crc, right);
+  const uint8_t *check = bytes + stuffed;
+  return check[0] == right[0] && check[1] == right[1] && check[2] == right[2];
+}
+
+/* A message that came with a later minor version may have any length. */
+static bool has_right_length(uint8_t id, uint8_t length) {
+  const int16_t right = frame_accepted_length(id);
+  return right < 0 ? (id & 0x80u) == FRAME_ACCEPTED_IDS : right == (int16_t)length;
+}
+
+/* The code byte of a message is at least 2: its id is not zero. */
+static bool is_message(frame_decoder *decoder, uint8_t count) {
+  uint8_t *bytes = decoder->bytes;
+  if (count < INSIDE_MIN || count > FRAME_INSIDE_MAX || bytes[0] < 2) {
     return false;
   }
   const uint8_t id = bytes[1];
-  const uint8_t off = (uint8_t)((uint8_t)frame_accepted_length(id) - (uint8_t)(count - INSIDE_MIN));
-  if (off != 0) {
+  if (!has_right_length(id, (uint8_t)(count - INSIDE_MIN))) {
     return false;
   }
-  const uint32_t aligned = message_is_handshake(id) ? FRAME_SEED << 3 : decoder->aligned;
-  if ((uint8_t)(aligned >> 24) != 0) { /* no session */
+  const uint32_t seed = message_is_handshake(id) ? FRAME_SEED : decoder->seed;
+  const uint8_t stuffed = (uint8_t)(count - CHECK_BYTES);
+  return seed != FRAME_NO_SESSION && has_right_check(bytes, stuffed, seed) && unstuff(bytes, stuffed);
+}
+
+void frame_decoder_start(frame_decoder *decoder, uint32_t seed) { *decoder = (frame_decoder){.seed = seed}; }
+
+void frame_decoder_seed(frame_decoder *decoder, uint32_t seed) { decoder->seed = seed; }
+
+void frame_decoder_cut(frame_decoder *decoder) {
+  decoder->count = 0;
+  decoder->synchronised = decoder->begins = false;
+}
+
+bool frame_decoder_take(frame_decoder *decoder, uint8_t byte) {
+  if (byte != 0) {
+    if (decoder->count <= FRAME_INSIDE_MAX) {
+      decoder->bytes[decoder->count] = byte;
+      decoder->count++;
+    }
     return false;
   }
-  crc21 crc = crc_from(aligned);
-  const uint8_t size = (uint8_t)(count - CHECK_BYTES);
-  crc21_take_all(&crc, bytes, size, ACCEPTED_MAX);
-  crc21_spread(&crc);
-  const uint8_t expected[CHECK_BYTES] = {crc.high, crc.middle, crc.low};
-  const uint8_t *const check = bytes + size;
-  /* branches, for a value made of them takes 14 bytes more */
-  if (check[0] == expected[0] && check[1] == expected[1] && check[2] == expected[2] &&
-      unstuff(bytes, size, ACCEPTED_MAX - 2u)) {
+  if (decoder->count != 0) {
     return true;
   }
+  decoder->synchronised = true;
+  decoder->begins = true;
   return false;
 }
 
-void frame_decoder_start(frame_decoder *decoder, uint32_t seed) {
-  *decoder = (frame_decoder){0};
-  frame_decoder_seed(decoder, seed);
+/* Bytes between the delimiters of the frame that a piece begins by its id; 0: it begins none that is known. */
+static uint8_t begun_size(const frame_decoder *decoder, uint8_t count) {
+  const int16_t length = decoder->begins && count > 1u ? frame_accepted_length(decoder->bytes[1]) : -1;
+  return length < 0 ? 0 : (uint8_t)((uint8_t)length + INSIDE_MIN);
 }
 
-void frame_decoder_seed(frame_decoder *decoder, uint32_t seed) { decoder->aligned = crc21_align(seed); }
+/* Whether a piece is the rest of a frame: of one that was joined late, or of one in which a wrong bit made a delimiter. Then
+ * the piece before it, one delimiter away, began a frame that ends exactly with this one. Once in 2^21 the checksum of a rest
+ * fits all the same. */
+static bool is_rest(const frame_decoder *decoder, uint8_t count) {
+  return !decoder->begins && (!decoder->synchronised || decoder->used + count == decoder->whole);
+}
 
-bool frame_decode_end(frame_decoder *decoder) {
+bool frame_decoder_accept(frame_decoder *decoder) {
   const uint8_t count = decoder->count;
-  const bool synchronised = decoder->synchronised;
+  const bool synchronised = decoder->synchronised, rest = is_rest(decoder, count);
+  decoder->whole = begun_size(decoder, count);
+  decoder->used = (uint8_t)(count + 1u);
   decoder->count = 0;
+  decoder->begins = false;
   decoder->synchronised = true;
-  if (count == 0) {
-    return false;
-  }
-  if (!accept(decoder, decoder->bytes, count)) {
+  if (rest || !is_message(decoder, count)) {
     if (synchronised) {
       decoder->bad++;
       decoder->lost = true;
     }
+    return false;
+  }
+  if (frame_accepted_length(frame_id(decoder)) < 0) {
+    decoder->unknown++;
     return false;
   }
   decoder->good++;

@@ -1,10 +1,7 @@
 /* link.c: see link.h. */
 #include "link/link.h"
 
-#include <stddef.h>
-#include <string.h>
-
-#include "bounds.h"
+#include "hal/hal.h"
 #include "link/counters.h"
 #include "link/devices.h"
 #include "link/dispatch.h"
@@ -12,12 +9,17 @@
 #include "link/send.h"
 #include "link/session.h"
 #include "link/telemetry.h"
+#include "tasks.h"
+
+#define POLL_BYTES (FRAME_ACCEPTED_MAX + FRAME_OVERHEAD) /* one frame with both delimiters */
+_Static_assert(POLL_BYTES == CONSTANT_poll_bytes, "constants of tasks.def");
 
 static frame_decoder decoder;
 uint8_t link_room;
 
 void link_start(uint16_t baud) {
-  HAL_ZERO(decoder); /* its seed is the session's to set */
+  frame_decoder_start(&decoder, FRAME_NO_SESSION);
+  link_room = 0;
   send_start(baud);
   counters_start();
   telemetry_start_line();
@@ -30,28 +32,48 @@ void link_use_seed(uint32_t seed) {
   link_room = 0; /* a request of the session before is not carried out any more */
 }
 
-/* One piece between delimiters, and an empty one before it. What else waits stays due: so this takes a known time, whatever
- * came. */
+uint8_t link_due(void) {
+  if (hal_serial_due() == 0) {
+    return 0;
+  }
+  return hal_serial_room(link_room);
+}
+
+/* After a stop of reception, when all that came before it is worked off: what comes next is the middle of a frame. */
+static void resume(void) {
+  counters_lose_bytes();
+  frame_decoder_cut(&decoder);
+  hal_serial_resume();
+}
+
+/* Takes received bytes, up to the end of a piece or as many as one frame has; true at the end of a piece. So this takes a
+ * known time, whatever came. */
+static bool take_piece(void) {
+  for (uint8_t n = 0; n < POLL_BYTES; n++) {
+    uint8_t byte = 0;
+    if (!hal_serial_receive(&byte)) {
+      if (hal_serial_stopped()) {
+        resume();
+      }
+      return false;
+    }
+    if (frame_decoder_take(&decoder, byte)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 bool link_take_frame(void) {
   hal_serial_seen();
-  bool ended = false;
-  BOUNDED(2, for (uint8_t pieces = 0; pieces < 2u; pieces++)) {
-    ended = hal_serial_receive_block(decoder.bytes, &decoder.count, sizeof decoder.bytes);
-    if (!ended || decoder.count != 0) {
-      break;
-    }
-    decoder.synchronised = true; /* by an empty frame too */
-  }
-  if (hal_serial_received()) {
+  const bool ended = take_piece();
+  if (hal_serial_waiting() || hal_serial_stopped()) {
     hal_serial_again();
   }
-  return ended && frame_decode_end(&decoder);
+  return ended && frame_decoder_accept(&decoder);
 }
 
 void link_poll(void) {
-  if (hal_serial_due() == 0) {
-    return;
-  }
   if (link_room == 0) {
     if (!link_take_frame()) {
       return;
@@ -68,17 +90,13 @@ void link_poll(void) {
   }
   link_room = 0;
   if (!dispatch(frame_id(&decoder), frame_sequence(&decoder), frame_payload(&decoder))) {
-    counters_count(refused);
+    counters.refused++;
   }
 }
 
-/* The three stand in the same order in both. */
-#define COUNTS_FROM offsetof(frame_decoder, good)
-#define COUNTS_TO offsetof(msg_counters, good)
-#define SAME(field) (offsetof(frame_decoder, field) - COUNTS_FROM == offsetof(msg_counters, field) - COUNTS_TO)
-_Static_assert(SAME(bad) && SAME(resynchronised), "one copy");
-
 void link_count(msg_counters *into) {
-  const uint8_t size = sizeof into->good + sizeof into->bad + sizeof into->resynchronised;
-  memcpy((uint8_t *)into + COUNTS_TO, (const uint8_t *)&decoder + COUNTS_FROM, size);
+  into->good = decoder.good;
+  into->bad = decoder.bad;
+  into->unknown = decoder.unknown;
+  into->resynchronised = decoder.resynchronised;
 }

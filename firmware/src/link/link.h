@@ -29,12 +29,8 @@ void link_poll(void) __attribute__((noinline));
 
 extern uint8_t link_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */
 
-static inline __attribute__((always_inline)) bool link_due(void) {
-  if (hal_serial_due() == 0) {
-    return false;
-  }
-  return hal_serial_room(link_room);
-}
+/* Not 0: there is something for link_poll() to do. */
+uint8_t link_due(void);
 
 /* Frames accepted and refused, and times that a good one followed bad ones, into the counters. */
 void link_count(msg_counters *into);

@@ -6,11 +6,11 @@
 
 #include "generated/messages.h"
 #include "link/counters.h"
-#include "link/parameters.h"
 #include "link/send.h"
-#include "motion.h"
+#include "parameters.h"
 #include "safety.h"
 #include "storage.h"
+#include "tasks.h"
 
 /* Beside the statuses that are sent. */
 enum {
@@ -58,7 +58,6 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *val
       msg_set_parameter message;
       memcpy(&message, payload, sizeof message);
       status = parameters_set(message.parameter, message.value);
-      motion_use_parameters();
       *value = parameters_get(message.parameter);
       break;
     }
@@ -70,7 +69,6 @@ static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *val
       break;
     case MSG_RESET_PARAMETERS_ID:
       parameters_reset();
-      motion_use_parameters();
       break;
     default: /* MSG_ARM_ID */
       status = safety_arm(payload[offsetof(msg_arm, latches)]);
@@ -84,7 +82,7 @@ bool requests_take(uint8_t id, const uint8_t *payload) {
   memcpy(&number, payload, sizeof number);
   if (number == answer.number && answer.status != NO_REQUEST) {
     if (answer.status != SAVING) {
-      counters_count(duplicate);
+      counters.duplicate++;
     }
   } else if (number == (uint16_t)(answer.number + 1u) && answer.status != SAVING) {
     int32_t value = 0;
@@ -97,6 +95,7 @@ bool requests_take(uint8_t id, const uint8_t *payload) {
   return true;
 }
 
+/* In every tick: answers what has taken its time. */
 void requests_task(void) {
   if (answer.status == SAVING && !storage_busy() && send_has_room(MSG_ANSWER_LENGTH)) {
     answer.status = storage_result();

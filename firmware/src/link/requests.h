@@ -16,9 +16,6 @@ void requests_start(void);
  * last. The caller has seen to room for the answer. */
 bool requests_take(uint8_t id, const uint8_t *payload);
 
-/* In every tick: answers what has taken its time. */
-void requests_task(void) __attribute__((noinline));
-
 #ifdef __cplusplus
 }
 #endif

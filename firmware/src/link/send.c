@@ -10,19 +10,20 @@
 
 static uint8_t next_sequence;
 static uint16_t baud_rate; /* 100 bit/s */
+static uint8_t wire[FRAME_SIZE_MAX];
 
 void send_start(uint16_t baud) {
-  HAL_ZERO(next_sequence);
+  next_sequence = 0;
   baud_rate = baud;
 }
 
 bool send_message(uint8_t id, const void *payload, uint8_t length) {
   const uint8_t sequence = next_sequence++;
   if (!hal_serial_room((uint8_t)(length + FRAME_OVERHEAD))) {
-    counters_count(dropped);
+    counters.dropped++;
     return false;
   }
-  hal_serial_queue(frame_encode(hal_serial_place(), id, sequence, payload, length, session_seed()));
+  hal_serial_send(wire, frame_encode(wire, id, sequence, payload, length, session_seed()));
   return true;
 }
 

@@ -20,7 +20,7 @@ void send_start(uint16_t baud);
 bool send_message(uint8_t id, const void *payload, uint8_t length);
 
 /* Whether there is room for a message with a payload of that length and, after it, for the next telemetry, which is never
- * left out for the sake of others. If not, the CPU is woken when there is. */
+ * left out for the sake of others. If not, the main loop is woken when there is. */
 #define SEND_RESERVE (MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD) /* beside the payload */
 bool send_has_room(uint8_t length);
 

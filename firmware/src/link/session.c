@@ -2,19 +2,22 @@
 #include "link/session.h"
 
 #include "buzzer.h"
+#include "events.h"
+#include "fallback.h"
 #include "hal/hal.h"
-#include "link/events.h"
+#include "link/event_delivery.h"
 #include "link/frame.h"
 #include "link/identity.h"
 #include "link/link.h"
-#include "link/parameters.h"
 #include "link/requests.h"
 #include "link/send.h"
 #include "link/telemetry.h"
+#include "parameters.h"
 #include "reset.h"
 #include "safety.h"
 #include "schedule.h"
 #include "task_times.h"
+#include "tasks.h"
 
 #define TICK_MS (SCHEDULE_TICK_US / 1000u)
 #define HELLO_PERIOD_ALONE 10u /* ticks */
@@ -24,9 +27,10 @@
 static uint32_t seed;        /* of the session, or FRAME_NO_SESSION */
 static uint32_t board_nonce; /* that the next opening must name */
 static uint16_t silence;     /* ms since a frame of the session came, in whole ticks */
-static uint8_t hello_in;     /* ticks until the next hello; 0: it waits for room */
+static uint8_t hello_in;     /* ticks until the next hello; 0: it waits for the task, or for room */
+static bool identify;        /* the host has asked for the identity */
 
-/* Says hello now or, where it would leave no room for the next telemetry, in a later tick. */
+/* Says hello or, where that would leave no room for the next telemetry, does so in a later tick. */
 static void say_hello(void) {
   uint8_t room = MSG_HELLO_LENGTH + FRAME_OVERHEAD;
   uint8_t period = HELLO_PERIOD_ALONE;
@@ -44,20 +48,21 @@ static void say_hello(void) {
 
 /* Begins anew, with a session or without (FRAME_NO_SESSION). Hello is due. */
 static void begin(uint32_t new_seed) {
-  safety_latch(LATCH_SESSION_ENDED);
   seed = new_seed;
   board_nonce = reset_nonce();
   link_use_seed(new_seed);
   requests_start();
-  events_start();
+  events_forget_touches();
+  event_delivery_start();
   telemetry_start();
   task_times_start();
   buzzer_start_session();
-  session_heard();
+  silence = 0;
   hello_in = 0;
 }
 
 void session_start(void) {
+  identify = false;
   begin(FRAME_NO_SESSION);
   say_hello();
 }
@@ -67,13 +72,18 @@ bool session_open(const msg_open *message) {
   if (wanted == 0 || (wanted & ~FRAME_SEED_MAX) != 0 || wanted == FRAME_SEED) {
     return false;
   }
-  if (wanted != seed) {
-    if (message->protocol_version != PROTOCOL_VERSION || message->board_nonce != board_nonce) {
-      return false;
-    }
-    begin(wanted);
+  const bool is_new = wanted != seed;
+  if (is_new && (PROTOCOL_MAJOR(message->protocol_version) != PROTOCOL_MAJOR(PROTOCOL_VERSION) ||
+                 message->board_nonce != board_nonce)) {
+    return false;
   }
-  say_hello();
+  fallback_host_spoke();
+  if (is_new) {
+    safety_latch(LATCH_SESSION_ENDED);
+    begin(wanted);
+    parameters_host_has_come();
+  }
+  hello_in = 0;
   return true;
 }
 
@@ -81,9 +91,12 @@ bool session_close(uint32_t of) {
   if (of != seed) {
     return false;
   }
-  session_start();
+  safety_latch(LATCH_SESSION_ENDED);
+  begin(FRAME_NO_SESSION);
   return true;
 }
+
+void session_identify(void) { identify = true; }
 
 uint32_t session_seed(void) { return seed; }
 
@@ -91,12 +104,20 @@ bool session_is_open(void) { return (uint8_t)(seed >> 24) == 0; /* seeds have 21
 
 uint32_t session_board_nonce(void) { return board_nonce; }
 
-void session_heard(void) { silence = 0; }
+void session_heard(void) {
+  silence = 0;
+  fallback_host_spoke();
+}
 
+/* In every tick: says hello now and then, ends the session when the host was silent for too long. */
 void session_task(void) {
   silence = (uint16_t)(silence + TICK_MS); /* rolls over only without a session */
   if (session_is_open() && silence > parameters_u16(PARAMETER_SESSION_TIME_OUT)) {
+    safety_host_lost();
     begin(FRAME_NO_SESSION); /* hello in the next tick: both together would be the longest run by half */
+  } else if (identify && send_has_room(MSG_IDENTITY_LENGTH)) {
+    identify = false;
+    identity_send();
   } else if (hello_in == 0 || --hello_in == 0) {
     say_hello();
   }

@@ -12,14 +12,17 @@
 extern "C" {
 #endif
 
-/* No session is open; says hello. */
+/* At start: no session is open; says hello. */
 void session_start(void);
 
-/* The host opens a session, or confirms the one that is open: answers with hello. False if that is refused. */
+/* The host opens a session, or confirms the one that is open: hello follows. False if that is refused. */
 bool session_open(const msg_open *message);
 
 /* The host leaves the session of that seed. False if it is not the one that is open. */
 bool session_close(uint32_t seed);
+
+/* The host asks for the identity: it follows. */
+void session_identify(void);
 
 /* Its seed; FRAME_NO_SESSION: none is open. */
 uint32_t session_seed(void);
@@ -30,9 +33,6 @@ uint32_t session_board_nonce(void);
 
 /* A frame of the session was accepted. */
 void session_heard(void);
-
-/* In every tick: says hello now and then, ends the session when the host was silent for too long. */
-void session_task(void) __attribute__((noinline));
 
 #ifdef __cplusplus
 }

@@ -6,9 +6,9 @@
 #include "infrared.h"
 #include "link/counters.h"
 #include "link/frame.h"
-#include "link/parameters.h"
 #include "link/send.h"
 #include "link/session.h"
+#include "parameters.h"
 #include "ping.h"
 #include "pins.h"
 #include "reset.h"
@@ -17,6 +17,7 @@
 #include "servo.h"
 #include "storage.h"
 #include "supply.h"
+#include "tasks.h"
 #include "whisker.h"
 
 static uint8_t line_period; /* ticks */
@@ -63,6 +64,8 @@ static uint16_t status_bits(const encoder_reading *left, const encoder_reading *
   return status;
 }
 
+/* In every tick: collects and sends when it is its turn in a session. Latest wins: without room on the line it is left
+ * out, and the host sees the gap. */
 void telemetry_task(void) {
   const encoder_reading *left = encoder_read(LEFT);
   const encoder_reading *right = encoder_read(RIGHT);
@@ -83,6 +86,7 @@ void telemetry_task(void) {
       .infrared_age = infrared_age(),
       .ping_echo = ping_echo(),
       .ping_age = ping_age(),
+      .ping_status = ping_status(),
       .pulse_left = servo_pulse(LEFT),
       .pulse_right = servo_pulse(RIGHT),
       .supply = supply_voltage(),

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from boebot.cli import experiment, info, link, new, options, parameters, run, serve, teleop, timing
-from boebot.link import messages
+from boebot.link import messages, mismatch
 
 app = typer.Typer(
     name="boebot",
@@ -38,7 +38,7 @@ def _version(wanted: bool) -> None:
         except PackageNotFoundError:
             installed = "not installed"
         print(
-            f"boebot {installed} (protocol {messages.PROTOCOL_VERSION}, schema {messages.SCHEMA_HASH:08x}, "
+            f"boebot {installed} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
             f"Python {sys.version.split()[0]})"
         )
         raise typer.Exit

@@ -10,7 +10,7 @@ import typer
 from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
 from boebot.errors import BoardError
-from boebot.link import messages, reset_cause
+from boebot.link import messages, mismatch, reset_cause
 from boebot.link.session import Link, text
 from boebot.robots import load_robot
 
@@ -31,7 +31,7 @@ def info(
         values: dict[str, Any] = {
             "board": session.description,
             "robot": text(hello.robot),
-            "protocol_version": hello.protocol_version,
+            "protocol_version": mismatch.version_name(hello.protocol_version),
             "schema": f"{hello.schema_hash:08x}",
             "firmware": text(identity.firmware_version),
             "compiler": text(identity.compiler),
@@ -48,7 +48,7 @@ def info(
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
             ],
         }
-        parameters = {name: round(link.get_parameter(name), 6) for name in messages.PARAMETERS if name != "devices"}
+        parameters = {name: round(link.get_parameter(name), 6) for name in link.parameters if name != "devices"}
         telemetry = _latest(link)
         link.close()
     finally:
@@ -75,7 +75,4 @@ def _latest(link: Link) -> messages.Telemetry:
 
 
 def _name(kind: type[messages.Latch], value: int) -> str:
-    try:
-        return kind(value).name.lower().replace("_", " ")
-    except ValueError:
-        return f"unknown ({value})"
+    return kind(value).name.lower().replace("_", " ")

@@ -59,12 +59,12 @@ def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]
         if now() >= next_look or ended:
             if not once or ended:
                 show(look(watched, before))
-            before = Rates(watched)
+                before = Rates(watched)
             next_look += _PERIOD_S
         if ended:
             return
         watched.poll(max(min(next_look - now(), _WAIT_S), 0.0))
-        watched.events()
+        before.events += [str(event) for event in watched.events()]
 
 
 class Rates:
@@ -73,6 +73,7 @@ class Rates:
     def __init__(self, watched: Link) -> None:
         self.at_s = watched.transport.now()
         self.good = watched.decoder.good
+        self.events: list[str] = []  # since then
 
 
 def look(watched: Link, before: Rates) -> dict[str, Any]:
@@ -96,6 +97,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "clock_drift_ppm": round(clock.drift * 1e6, 2) if clock.bounded else None,
         "clock_bound_us": round(clock.bound * 1e6, 1) if clock.bounded else None,
         "clock_restarts": clock.restarts,
+        "events": before.events,
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
         "task_longest_us": {

@@ -11,7 +11,6 @@ import typer
 
 from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import options, output
-from boebot.link import messages
 from boebot.link.parameter_values import parameter_counts, parameter_spec
 from boebot.link.session import Link
 from boebot.robots import load_robot
@@ -96,7 +95,7 @@ def _show(name: str, value: float, as_json: bool) -> None:
 def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
     """All parameters: value, unit, range, meaning."""
     with _link(on, robot) as link:
-        rows = [described(name, link.get_parameter(name)) for name in messages.PARAMETERS]
+        rows = [described(name, link.get_parameter(name)) for name in link.parameters]
         assert link.hello is not None
         saved = bool(link.hello.parameters_saved)
     if json:

@@ -91,7 +91,8 @@ def sensors(robot: Robot) -> str:
         parts.append(f"IR {'L' if robot.left_ir.detected else '·'}{'R' if robot.right_ir.detected else '·'}")
     if equipment.has("ping"):
         distance = robot.ping.distance
-        parts.append("ping    –  " if distance is None else f"ping {distance:4.2f} m")
+        unknown = robot.ping.status.name.lower().replace("_", " ")
+        parts.append(f"ping {unknown}" if distance is None else f"ping {distance:4.2f} m")
     if equipment.has("left_encoder") and equipment.has("right_encoder"):
         parts.append(f"encoders {robot.left_encoder.count} {robot.right_encoder.count}")
     return "   ".join(parts)

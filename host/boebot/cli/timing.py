@@ -50,7 +50,7 @@ def timing(
     ] = None,
     robot: options.RobotName = "shieldbot",
     load: Annotated[
-        str, typer.Option("--load", metavar="L", help="How often interrupts come: figures, saturated or everything.")
+        str, typer.Option("--load", metavar="L", help="How often interrupts come: figures, overload or everything.")
     ] = "figures",
     measure: Annotated[
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")

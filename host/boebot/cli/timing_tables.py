@@ -55,11 +55,11 @@ def _rows(report: Report, kind: str, measured: bool, board: bool) -> Table:
 
 def _cells(row: Row, titles: Iterable[str]) -> list[str]:
     numbers = {
-        "bound": row.bound,
+        "bound": row.bound if row.unbounded is None else None,
         "emulator": row.emulator,
         "board": row.board,
         "budget": row.budget,
-        "slack": row.slack,
+        "slack": row.slack if row.unbounded is None else None,
         "response": row.response,
         "latency": row.latency,
         "limit": row.latency_limit,
@@ -100,8 +100,7 @@ def _sums(report: Report) -> dict[str, Any]:
         "poll_gap_in_emulator_cycles": own.between_polls if own else None,
         "receive_ring_needed_bytes": _of(report.ring, report.ring_holds),
         "changes_ring_needed": _of(report.changes, report.changes_held),
-        "frames_coming_per_tick": round(report.frames_coming, 1),
-        "frames_proven_per_tick,_all_the_costliest": round(report.frames_proven, 1),
+        "bound_to_emulator_of_the_ticks_tasks": None if report.ratio is None else round(report.ratio, 2),
         "stack_bound_bytes": memory.stack,
         "stack_in_emulator_bytes": memory.stack_seen,
         "static_ram_bytes": memory.static,

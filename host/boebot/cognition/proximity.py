@@ -75,8 +75,8 @@ def nearness_ahead(robot: Robot) -> float | None:
 
 
 def ping_nearness(robot: Robot) -> float | None:
-    """The same of what Ping sees, wherever it looks; None: no fresh reading."""
-    return _of_distance(robot.ping)
+    """The same of what Ping sees, wherever it looks; 1: too near to be measured; None: no fresh reading."""
+    return 1.0 if robot.ping.too_near else _of_distance(robot.ping)
 
 
 def _of_distance(device: Ping | AnalogInfrared) -> float | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.devices.infrared import NEVER, STALE_PERIODS
-from boebot.link.messages import Telemetry
+from boebot.link.messages import PingStatus, Telemetry
 
 TEMPERATURE_C = 20.0
 
@@ -27,13 +27,26 @@ class Ping(NamedTuple):
     distance: float | None
     """Metres to the nearest thing ahead, or None if no echo came back from within its range."""
     age: float
-    """Seconds since the echo ended or was given up; infinite if nothing was measured yet."""
+    """Seconds since the measurement ended or was given up; infinite if nothing was measured yet."""
     valid: bool
-    """The measurement is fresh. Fresh and None means: nothing near ahead."""
+    """The measurement is fresh, and its status is OK or NOTHING_NEAR. Valid and None means: nothing near ahead."""
+    status: PingStatus
+    """OK: there is a distance. NOTHING_NEAR: no echo from within its range. TOO_NEAR: something is so near that its
+    distance cannot be measured. ABSENT: no sensor answers. OFF: switched off, or not yet measured."""
+
+    @property
+    def too_near(self) -> bool:
+        """Something is ahead, nearer than can be measured."""
+        return self.status == PingStatus.TOO_NEAR
+
+    @property
+    def absent(self) -> bool:
+        """No sensor answers: it is missing, or its wire is broken."""
+        return self.status == PingStatus.ABSENT
 
 
 class PingReader:
-    """Reads the Ping; distances outside its range count as no echo."""
+    """Reads the Ping; echoes from outside its range count as nothing near or too near."""
 
     def __init__(self, range_min_m: float, range_max_m: float, period_ticks: int, tick_s: float) -> None:
         self._metres_per_us = speed_of_sound() / 2 * 1e-6
@@ -45,12 +58,17 @@ class PingReader:
 
     def __call__(self, telemetry: Telemetry) -> Ping:
         """The last measurement as of that tick."""
-        ticks = telemetry.ping_age
+        ticks, status = telemetry.ping_age, PingStatus(telemetry.ping_status)
         if ticks >= NEVER:
-            return Ping(None, float("inf"), False)
+            return Ping(None, float("inf"), False, status)
         echo_us = telemetry.ping_echo
-        distance = echo_us * self._metres_per_us if self._least_us <= echo_us <= self._greatest_us else None
-        return Ping(distance, ticks * self._tick_s, ticks <= self._fresh)
+        if status == PingStatus.OK and echo_us > self._greatest_us:
+            status = PingStatus.NOTHING_NEAR
+        elif status == PingStatus.OK and echo_us < self._least_us:
+            status = PingStatus.TOO_NEAR
+        distance = echo_us * self._metres_per_us if status == PingStatus.OK else None
+        knows = status in (PingStatus.OK, PingStatus.NOTHING_NEAR)
+        return Ping(distance, ticks * self._tick_s, knows and ticks <= self._fresh, status)
 
     def distances(self, echo_us: NDArray[Any], age_ticks: NDArray[Any]) -> NDArray[np.float64]:
         """Distances of many telemetry messages at once (m), NaN where there was no echo."""

@@ -49,7 +49,9 @@ _BYTES_TO_LIVE = 300
 _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
-_LATCH = 34  # offset in telemetry
+_LATCH = messages.Telemetry.OFFSETS["latch"]
+_UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
+_SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
 _TICK = Struct("<I")  # telemetry begins with it
 _NOT_YET = 1 << 32  # no tick is later
 
@@ -105,6 +107,7 @@ class BoardDriver:
         self.late_steps = 0
         self.clock_offset_s = 0.0  # transport's clock at the run's time 0
         self._session = 0  # of the link that was configured and armed
+        self._first_session = 0
         self._armed_tick = -1
         self._halted = False  # by the brain's emergency stop
         self._told_payload: bytes | None = None
@@ -113,6 +116,8 @@ class BoardDriver:
     def begin(self) -> None:
         """Configures and arms the board."""
         self._make_ready()
+        self._first_session = self._session
+        self._take_events()
         self.link.forget_telemetry()
 
     # ---- before the first step, and after each new session ---------------------------------------------------
@@ -303,7 +308,7 @@ class BoardDriver:
             if payload[_LATCH] and last > self._armed_tick:
                 self._heed_latch(payload)
             if waiting_events:
-                self.record.events += link.events()
+                self._take_events()
             heard_s = now_s
             if time_s >= end_s:
                 break
@@ -351,6 +356,16 @@ class BoardDriver:
             self._armed_tick = -1
         return [*received, *self.link.fetch_telemetry()]
 
+    def _take_events(self) -> None:
+        """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
+        for event in self.link.events():
+            if not event.earlier or self.link.sessions != self._first_session:
+                self.record.events.append(event)
+            elif event.kind in _UNASKED or (event.kind, event.value) == _SUPPLY_LOW:
+                self.notices.append(
+                    f"before this run, by the clock of the board at {self.link.transport.name}: {event}"
+                )
+
     def _time_after_reset(self, times: list[float], host_s: float) -> float:
         """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
         passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
@@ -362,7 +377,7 @@ class BoardDriver:
         self._put_devices_aside()
         with contextlib.suppress(BoebotError, KeyboardInterrupt):
             self.link.stop_and_confirm(STOP_LIMIT_S)
-            self.record.events += self.link.events()
+            self._take_events()
             self.link.close()
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:

@@ -13,6 +13,7 @@
 typedef struct {
   uint32_t good;           /* frames accepted */
   uint32_t bad;            /* frames refused: length, checksum, stuffing or seed */
+  uint32_t unknown;        /* whole frames of messages that a later minor version has added: ignored */
   uint32_t resynchronised; /* times that a good frame followed bad ones */
   uint32_t lost;           /* frames that never came, by the gaps in the sequence numbers */
 } codec_counts;

@@ -1,14 +1,15 @@
 /* codec_end.h: one end's decoder. Included once by each end, with END(name) as prefix of its own functions; the
  * firmware's functions get it too, since the two ends' versions of them are linked into one library. */
-#define frame_checksum END(frame_checksum)
 #define frame_encode END(frame_encode)
 #define frame_decoder_start END(frame_decoder_start)
 #define frame_decoder_seed END(frame_decoder_seed)
-#define frame_decode_end END(frame_decode_end)
-#define BOUNDS_UNCHECKED
+#define frame_decoder_cut END(frame_decoder_cut)
+#define frame_decoder_take END(frame_decoder_take)
+#define frame_decoder_accept END(frame_decoder_accept)
 #include "link/frame.c"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "codec.h"
 
@@ -68,8 +69,9 @@ static void take_counts(codec_decoder *self) {
   frame_decoder *frames = &self->frames;
   self->counts.good += frames->good;
   self->counts.bad += frames->bad;
+  self->counts.unknown += frames->unknown;
   self->counts.resynchronised += frames->resynchronised;
-  frames->good = frames->bad = frames->resynchronised = 0;
+  frames->good = frames->bad = frames->unknown = frames->resynchronised = 0;
 }
 
 _Static_assert(CODEC_FOUND >= CODEC_SLICE / 7 + 1, "room for the shortest frames");
@@ -86,6 +88,9 @@ uint32_t END(feed)(codec_decoder *self, const uint8_t *bytes, uint32_t size, cod
       found->ids[count] = frame_id(&self->frames);
       found->sequences[count] = frame_sequence(&self->frames);
       found->ends[count++] = end;
+      count_lost(self);
+    }
+    if (self->frames.unknown != 0) {
       count_lost(self);
     }
     if (bytes[i] == 0) {

@@ -15,12 +15,9 @@ const char *codec_encode(uint8_t id, uint8_t sequence, const uint8_t *payload, u
 }
 
 void codec_check(uint8_t *check, const uint8_t *stuffed, uint32_t size, uint32_t seed) {
-  crc21 crc = crc_start(seed);
+  crc21 crc = crc21_start(seed);
   for (uint32_t i = 0; i < size; i++) {
-    crc21_take(&crc, stuffed[i]);
+    crc21_add(&crc, stuffed[i]);
   }
-  crc21_spread(&crc);
-  check[0] = crc.high;
-  check[1] = crc.middle;
-  check[2] = crc.low;
+  crc21_put(crc, check);
 }

@@ -13,7 +13,7 @@ _MODULUS = 65536
 class HostCounters:
     """What the host's end has counted since the link was made.
 
-    Eight of them have the board's names, so that both ends stand side by side: good, bad, resynchronised,
+    Nine of them have the board's names, so that both ends stand side by side: good, bad, unknown, resynchronised,
     retransmitted, duplicate, overrun, dropped, late. Where they are about other things at the other end they say so.
     The decoder counts good, bad, resynchronised and lost frames, the transport overrun, the session the rest.
     """
@@ -22,6 +22,8 @@ class HostCounters:
     """frames accepted"""
     bad: int = 0
     """frames refused: length, checksum, stuffing or seed"""
+    unknown: int = 0
+    """whole frames of messages that a later minor version of the protocol has added, and that were ignored"""
     resynchronised: int = 0
     """times that a good frame followed bad ones"""
     lost: int = 0

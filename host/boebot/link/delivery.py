@@ -222,10 +222,32 @@ class BoardEvent:
     value: int
     time: float
     """board time since its reset (s)"""
+    earlier: bool = False
+    """it happened before the session in which it was told: no host was there, or none that heard it"""
+
+    def __str__(self) -> str:
+        """As in "12.340 s: motors stopped by the dead-man"."""
+        return f"{self.time:.3f} s: {self._what()}"
+
+    def _what(self) -> str:
+        match self.kind:
+            case messages.EventKind.WHISKERS:
+                pressed = [one.name.lower() for one in messages.Whiskers if self.value & one and one.name]
+                return f"whiskers pressed: {', '.join(pressed) or 'none'}"
+            case messages.EventKind.LATCH if self.value == messages.Latch.NONE:
+                return "motors armed"
+            case messages.EventKind.LATCH:
+                return f"motors latched off: {messages.Latch(self.value).name.lower().replace('_', ' ')}"
+            case messages.EventKind.DEAD_MAN:
+                return "motors stopped by the dead-man"
+            case messages.EventKind.FALLBACK:
+                return f"the board's own brain {'took over' if self.value else 'drives no more'}"
+        return f"event of kind {self.kind}, value {self.value}"
 
 
 class Events:
-    """The board's events of one session, each handed on once and in order, until somebody fetches them.
+    """The board's events, each handed on once and in order, until somebody fetches them. Numbers are of one session; an
+    event that was told and not acknowledged when a session ended is told again in the next.
 
     Attributes:
         duplicate, stray, held: counted.
@@ -239,13 +261,20 @@ class Events:
         self.stray = 0
         self.held = 0
         self._last: int | None = None
+        self._handed_on: messages.Event | None = None
 
     def new_session(self) -> None:
         """Numbers begin anew."""
         self._last = None
 
-    def take(self, event: messages.Event, time_s: float) -> int | None:
-        """The number to acknowledge, or None: not to be acknowledged."""
+    def take(self, event: messages.Event, time_s: float, earlier: bool) -> int | None:
+        """The number to acknowledge, or None: not to be acknowledged.
+
+        Args:
+            event: as it came.
+            time_s: board time since its reset.
+            earlier: it is of before this session.
+        """
         if event.number == self._last:
             self.duplicate += 1
             return event.number
@@ -255,8 +284,12 @@ class Events:
         if len(self.waiting) >= self.ROOM:
             self.held += 1
             return None
-        self._last = event.number
-        self.waiting.append(BoardEvent(event.kind, event.value, time_s))
+        again = self._last is None and self._handed_on is not None and event[1:] == self._handed_on[1:]
+        self._last, self._handed_on = event.number, event
+        if again:
+            self.duplicate += 1
+        else:
+            self.waiting.append(BoardEvent(event.kind, event.value, time_s, earlier))
         return event.number
 
     def fetch(self) -> Iterator[BoardEvent]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import messages, reset_cause
+from boebot.link import messages, mismatch, reset_cause
 from boebot.link.frame import SEED, checksum
 from boebot.link.transport import BaudSelectable, Transport
 
@@ -16,6 +16,7 @@ _SHORTEST = 3 + _CHECK_BYTES  # code byte, id, sequence number
 _TEXT_LEAST = 8  # characters that make a text
 _TEXT_SHARE = 0.9
 _QUOTED = 40
+_SPOILT_SHARE = 0.2  # of the frames damaged: then that is why there is no session
 
 
 class Heard:
@@ -43,16 +44,27 @@ class Heard:
 
     @property
     def frames(self) -> bool:
-        """Whether something looked like a frame at the present rate."""
-        return any(_is_frame(piece) or _has_checksum(piece) for piece in _pieces(self._sample))
+        """Whether something looked like a frame at the present rate, whole or damaged."""
+        return any(
+            _is_frame(piece) or _has_checksum(piece) or _is_damaged_frame(piece) for piece in _pieces(self._sample)
+        )
 
     @property
     def bytes_here(self) -> int:
         """How many bytes came at the present rate."""
         return len(self._sample)
 
-    def verdict(self, transport: Transport, limit_s: float, hello: messages.Hello | None) -> BoebotError:
-        """Why there is no session: one sentence. `hello`: the last that the board has said."""
+    def verdict(
+        self, transport: Transport, limit_s: float, hello: messages.Hello | None, counts: tuple[int, int]
+    ) -> BoebotError:
+        """Why there is no session: one sentence.
+
+        Args:
+            transport: where it was to be.
+            limit_s: what was waited.
+            hello: the last that the board has said.
+            counts: frames that came whole and damaged at the last rate.
+        """
         where = transport.name
         baud = transport.baud if isinstance(transport, BaudSelectable) else None
         self.rate_changes(baud)
@@ -61,18 +73,24 @@ class Heard:
                 f"the board at {where} says hello, but there is no session within {limit_s:g} s; its last reset was by "
                 f"{reset_cause.hang_in_words(hello.reset_cause)}"
             )
+        whole, damaged = counts
+        if hello is not None and damaged > _SPOILT_SHARE * (whole + damaged):
+            return _spoilt(where, limit_s, damaged, whole + damaged)
         if hello is not None:
             return BoardError(f"the board at {where} says hello, but does not hear us: no session within {limit_s:g} s")
         if not self.count:
             return BoardError(f"nothing answers at {where} within {limit_s:g} s: is the robot on and flashed?")
         for rate, sample in self._samples:
             pieces = _pieces(sample)
+            spoilt = sum(_is_damaged_frame(piece) for piece in pieces)
+            if spoilt > _SPOILT_SHARE * len(pieces):
+                return _spoilt(where, limit_s, spoilt, len(pieces))
             if any(_is_frame(piece) for piece in pieces):
                 return ProtocolError(f"the board at {where} sends frames but does not say hello within {limit_s:g} s")
             if any(_has_checksum(piece) for piece in pieces):
                 return ProtocolError(
                     f"the board at {where} speaks another version of this protocol{_at(rate)}, this kit speaks version "
-                    f"{messages.PROTOCOL_VERSION}; flash the firmware that came with this kit"
+                    f"{mismatch.version_name()}; flash the firmware that came with this kit"
                 )
         for rate, sample in self._samples:
             if said := _text(sample):
@@ -139,7 +157,7 @@ def _pieces(sample: bytes | bytearray) -> list[bytes]:
 
 
 def _is_frame(piece: bytes) -> bool:
-    """Whether it unstuffs to an id and a length of the table, whatever its seed."""
+    """Whether it unstuffs to an id and a length of the table, whatever the session's seed."""
     if any(byte < 0x80 for byte in piece[-_CHECK_BYTES:]):
         return False
     stuffed = piece[:-_CHECK_BYTES]
@@ -154,7 +172,29 @@ def _is_frame(piece: bytes) -> bool:
     if at != len(stuffed) or len(content) < 2:
         return False
     kind = messages.MESSAGES.get(content[0])
-    return kind is not None and content[0] >= 0x80 and len(content) - 2 == kind.LENGTH
+    if kind is None or content[0] < 0x80 or len(content) - 2 != kind.LENGTH:
+        return False
+    return kind.DELIVERY != "handshake" or _has_checksum(piece)
+
+
+def _is_damaged_frame(piece: bytes) -> bool:
+    """Whether id, length and check bytes are a message's to the host, but for one byte of the check: so it looks where
+    a line spoils some bytes, and hardly ever where the rate is wrong."""
+    kind = messages.MESSAGES.get(piece[1])
+    return (
+        kind is not None
+        and kind.ID >= 0x80
+        and len(piece) == kind.LENGTH + _SHORTEST
+        and sum(byte >= 0x80 for byte in piece[-_CHECK_BYTES:]) >= _CHECK_BYTES - 1
+        and not _is_frame(piece)
+    )
+
+
+def _spoilt(where: str, limit_s: float, damaged: int, frames: int) -> BoardError:
+    return BoardError(
+        f"the line to the board at {where} spoils what it carries: {damaged} of {frames} frames came damaged, and "
+        f"there is no session within {limit_s:g} s; expected a sound cable, or a lower baud rate"
+    )
 
 
 def _has_checksum(piece: bytes) -> bool:

@@ -4,6 +4,7 @@
 
 The work is done by the firmware's own C (codec.h), so that both ends of the link agree by construction; the tests
 compare it with protocol/reference_frame.py. Damaged frames are counted and dropped; the next delimiter starts afresh.
+No single wrong bit passes.
 """
 
 from __future__ import annotations
@@ -69,6 +70,7 @@ class Decoder:
     Attributes:
         good: frames accepted.
         bad: frames refused: length, checksum, stuffing, seed, or a message of the other direction.
+        unknown: whole frames of messages that a later minor version has added; they are ignored.
         resynchronised: times that a good frame followed bad ones.
         lost: frames that never came, by the gaps in the sequence numbers. A hello of another start or session begins a
             new count, and so does another seed.
@@ -76,6 +78,7 @@ class Decoder:
 
     good = _Count()
     bad = _Count()
+    unknown = _Count()
     resynchronised = _Count()
     lost = _Count()
 

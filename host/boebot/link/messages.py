@@ -12,8 +12,8 @@ import struct
 from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
-PROTOCOL_VERSION = 2
-SCHEMA_HASH = 0x2253866E
+PROTOCOL_VERSION = 0x30  # 3.0
+SCHEMA_HASH = 0x4451FF50
 
 
 class Whiskers(IntFlag):
@@ -43,6 +43,7 @@ class Status(IntFlag):
     WATCHDOG_RESET = 1 << 7
     SUPPLY_LOW = 1 << 8
     SAVING = 1 << 9
+    FALLBACK = 1 << 10
 
 
 class Devices(IntFlag):
@@ -77,7 +78,19 @@ DEVICE_OF_BIT: dict[Devices, str] = {
 }
 
 
-class ResetCause(IntEnum):
+class _Values(IntEnum):
+    """Values by name; one that a later minor version has added is called by its number."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> _Values | None:
+        if not isinstance(value, int):
+            return None
+        unknown = int.__new__(cls, value)
+        unknown._name_, unknown._value_ = f"UNKNOWN_{value}", value
+        return unknown
+
+
+class ResetCause(_Values):
     """Why the microcontroller started."""
 
     UNKNOWN = 0
@@ -103,9 +116,10 @@ class ResetCause(IntEnum):
     WATCHDOG_IN_BUZZER = 20
     WATCHDOG_IN_COMPASS = 21
     WATCHDOG_IN_DEVICES = 22
+    WATCHDOG_IN_FALLBACK = 23
 
 
-class Task(IntEnum):
+class Task(_Values):
     """The tasks of the firmware, from firmware/src/tasks.def."""
 
     WHISKER = 0
@@ -126,9 +140,10 @@ class Task(IntEnum):
     BUZZER = 15
     COMPASS = 16
     DEVICES = 17
+    FALLBACK = 18
 
 
-class Latch(IntEnum):
+class Latch(_Values):
     """Why the motors are latched off."""
 
     NONE = 0
@@ -138,7 +153,7 @@ class Latch(IntEnum):
     SUPPLY_LOW = 4
 
 
-class AnswerStatus(IntEnum):
+class AnswerStatus(_Values):
     """How a numbered request ended."""
 
     OK = 0
@@ -150,7 +165,17 @@ class AnswerStatus(IntEnum):
     BUSY = 6
 
 
-class CompassStatus(IntEnum):
+class PingStatus(_Values):
+    """What the Ping's last measurement was."""
+
+    OFF = 0
+    OK = 1
+    NOTHING_NEAR = 2
+    ABSENT = 3
+    TOO_NEAR = 4
+
+
+class CompassStatus(_Values):
     """How the last exchange with the compass ended."""
 
     OFF = 0
@@ -160,16 +185,17 @@ class CompassStatus(IntEnum):
     FAILED = 4
 
 
-class EventKind(IntEnum):
+class EventKind(_Values):
     """What happened, and what `value` is."""
 
     WHISKERS = 0
     LATCH = 1
     DEAD_MAN = 2
+    FALLBACK = 3
 
 
 class _OpenFields(NamedTuple):
-    protocol_version: int  # version that the host speaks
+    protocol_version: int  # of the host: 16 x version + minor
     board_nonce: int  # as in the hello that this answers; another one is refused
     host_nonce: int  # drawn by the host for each session
 
@@ -183,6 +209,7 @@ class Open(_OpenFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 9
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<BII")
+    OFFSETS: ClassVar[dict[str, int]] = {"protocol_version": 0, "board_nonce": 1, "host_nonce": 5}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -207,6 +234,7 @@ class Identify(_IdentifyFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 0
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<")
+    OFFSETS: ClassVar[dict[str, int]] = {}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -232,6 +260,7 @@ class Describe(_DescribeFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 5
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<BI")
+    OFFSETS: ClassVar[dict[str, int]] = {"index": 0, "board_nonce": 1}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -244,8 +273,8 @@ class Describe(_DescribeFields):
 
 
 class _HelloFields(NamedTuple):
-    protocol_version: int
-    schema_hash: int  # CRC-32 of the normalised messages.toml
+    protocol_version: int  # of the board: 16 x version + minor
+    schema_hash: int  # CRC-32 of what all of this version have in common
     board_nonce: int  # what the next open must name: another one after every start, opening and end of a session
     session: int  # seed of the session that is open; 0: none
     tick_rate: int  # Hz
@@ -267,6 +296,7 @@ class Hello(_HelloFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 44
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIIIHHBIBBI16s")
+    OFFSETS: ClassVar[dict[str, int]] = {"protocol_version": 0, "schema_hash": 1, "board_nonce": 5, "session": 9, "tick_rate": 13, "session_time_out": 15, "telemetry_period": 17, "boot_counter": 18, "reset_cause": 22, "parameters_saved": 23, "devices": 24, "robot": 28}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -295,6 +325,7 @@ class Identity(_IdentityFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 60
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<12s24s16sII")
+    OFFSETS: ClassVar[dict[str, int]] = {"firmware_version": 0, "compiler": 12, "pin_map": 36, "image_size": 52, "image_hash": 56}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -323,6 +354,7 @@ class Description(_DescriptionFields):
     DELIVERY: ClassVar[str] = "handshake"
     LENGTH: ClassVar[int] = 8
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBBI")
+    OFFSETS: ClassVar[dict[str, int]] = {"index": 0, "count": 1, "id": 2, "length": 3, "hash": 4}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -347,6 +379,7 @@ class Stop(_StopFields):
     DELIVERY: ClassVar[str] = "stop"
     LENGTH: ClassVar[int] = 1
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    OFFSETS: ClassVar[dict[str, int]] = {"token": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -363,7 +396,7 @@ class _CloseFields(NamedTuple):
 
 
 class Close(_CloseFields):
-    """The host leaves: the session ends at once."""
+    """The host leaves: the session ends at once. Not acknowledged."""
 
     __slots__ = ()
     ID: ClassVar[int] = 0x09
@@ -371,6 +404,7 @@ class Close(_CloseFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 4
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<I")
+    OFFSETS: ClassVar[dict[str, int]] = {"session": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -398,6 +432,7 @@ class SetpointSignal(_SetpointSignalFields):
     DELIVERY: ClassVar[str] = "set_point"
     LENGTH: ClassVar[int] = 8
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<hhHH")
+    OFFSETS: ClassVar[dict[str, int]] = {"left": 0, "right": 2, "time_to_live": 4, "answers_tick": 6}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -425,6 +460,7 @@ class SetpointSpeed(_SetpointSpeedFields):
     DELIVERY: ClassVar[str] = "set_point"
     LENGTH: ClassVar[int] = 8
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<hhHH")
+    OFFSETS: ClassVar[dict[str, int]] = {"left": 0, "right": 2, "time_to_live": 4, "answers_tick": 6}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -450,6 +486,7 @@ class SetpointCoast(_SetpointCoastFields):
     DELIVERY: ClassVar[str] = "set_point"
     LENGTH: ClassVar[int] = 4
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HH")
+    OFFSETS: ClassVar[dict[str, int]] = {"time_to_live": 0, "answers_tick": 2}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -475,6 +512,7 @@ class Turret(_TurretFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 3
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<hB")
+    OFFSETS: ClassVar[dict[str, int]] = {"angle": 0, "hold": 2}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -501,6 +539,7 @@ class Buzzer(_BuzzerFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 4
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBB")
+    OFFSETS: ClassVar[dict[str, int]] = {"frequency": 0, "duration": 2, "token": 3}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -521,11 +560,12 @@ class GetParameter(_GetParameterFields):
     """Asks for one parameter."""
 
     __slots__ = ()
-    ID: ClassVar[int] = 0x20
+    ID: ClassVar[int] = 0x25
     NAME: ClassVar[str] = "get_parameter"
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 3
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0, "parameter": 2}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -552,6 +592,7 @@ class SetParameter(_SetParameterFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 7
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBi")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0, "parameter": 2, "value": 3}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -576,6 +617,7 @@ class SaveParameters(_SaveParametersFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 2
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -600,6 +642,7 @@ class ResetParameters(_ResetParametersFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 2
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -625,6 +668,7 @@ class Arm(_ArmFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 3
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HB")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0, "latches": 2}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -649,6 +693,7 @@ class Acknowledge(_AcknowledgeFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 2
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -673,6 +718,7 @@ class ClockProbe(_ClockProbeFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 2
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<H")
+    OFFSETS: ClassVar[dict[str, int]] = {"token": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -697,6 +743,7 @@ class Stopped(_StoppedFields):
     DELIVERY: ClassVar[str] = "stop"
     LENGTH: ClassVar[int] = 1
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+    OFFSETS: ClassVar[dict[str, int]] = {"token": 0}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -718,8 +765,9 @@ class _TelemetryFields(NamedTuple):
     whiskers: int  # whiskers
     infrared: int  # infrared
     infrared_age: int  # ticks; age of the older IR reading; 255: never or older
-    ping_echo: int  # us; length of the last echo pulse; 0: no echo
-    ping_age: int  # ticks; ticks since that echo ended or was given up; 255: never or older
+    ping_echo: int  # us; length of the last echo pulse where ping_status is ok, else 0
+    ping_age: int  # ticks; ticks since that measurement ended or was given up; 255: never or older
+    ping_status: int  # ping_status
     pulse_left: int  # 0.0625 us; servo pulse in force; 0: no pulses
     pulse_right: int  # 0.0625 us
     supply: int  # 0.001 V; supply voltage against the bandgap; 0: not yet measured
@@ -737,8 +785,9 @@ class Telemetry(_TelemetryFields):
     ID: ClassVar[int] = 0x90
     NAME: ClassVar[str] = "telemetry"
     DELIVERY: ClassVar[str] = "telemetry"
-    LENGTH: ClassVar[int] = 38
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBHHHHBBBB")
+    LENGTH: ClassVar[int] = 39
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<IIiiHHBBBHBBHHHHBBBB")
+    OFFSETS: ClassVar[dict[str, int]] = {"tick": 0, "time": 4, "encoder_left": 8, "encoder_right": 12, "edge_period_left": 16, "edge_period_right": 18, "whiskers": 20, "infrared": 21, "infrared_age": 22, "ping_echo": 23, "ping_age": 25, "ping_status": 26, "pulse_left": 27, "pulse_right": 29, "supply": 31, "status": 33, "latch": 35, "latches": 36, "setpoint_sequence": 37, "overruns": 38}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -753,6 +802,7 @@ class Telemetry(_TelemetryFields):
 class _CountersFields(NamedTuple):
     good: int  # frames accepted
     bad: int  # frames refused: length, checksum, stuffing or seed
+    unknown: int  # whole frames of messages that came with a later minor version, and are ignored
     resynchronised: int  # times that a good frame followed bad ones
     retransmitted: int  # events sent again
     duplicate: int  # requests that came again and were only answered
@@ -770,8 +820,9 @@ class Counters(_CountersFields):
     ID: ClassVar[int] = 0x91
     NAME: ClassVar[str] = "counters"
     DELIVERY: ClassVar[str] = "telemetry"
-    LENGTH: ClassVar[int] = 20
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HHHHHHHHHH")
+    LENGTH: ClassVar[int] = 22
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HHHHHHHHHHH")
+    OFFSETS: ClassVar[dict[str, int]] = {"good": 0, "bad": 2, "unknown": 4, "resynchronised": 6, "retransmitted": 8, "duplicate": 10, "overrun": 12, "dropped": 14, "late": 16, "refused": 18, "deferred": 20}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -814,6 +865,7 @@ class DevicesTelemetry(_DevicesTelemetryFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 31
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<IHBBBHBHBHHBhhhBBHB")
+    OFFSETS: ClassVar[dict[str, int]] = {"tick": 0, "supply": 4, "infrared_zone_left": 6, "infrared_zone_right": 7, "infrared_zone_age": 8, "battery": 9, "battery_age": 11, "analog_infrared": 12, "analog_infrared_age": 14, "light_left": 15, "light_right": 17, "light_age": 19, "compass_x": 20, "compass_y": 22, "compass_z": 24, "compass_age": 26, "compass_status": 27, "turret_pulse": 28, "buzzer_token": 30}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -839,6 +891,7 @@ class TaskTime(_TaskTimeFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 3
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH")
+    OFFSETS: ClassVar[dict[str, int]] = {"task": 0, "longest": 1}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -853,7 +906,7 @@ class TaskTime(_TaskTimeFields):
 class _AnswerFields(NamedTuple):
     number: int  # of the request
     status: int  # answer_status
-    value: int  # of get_parameter and set_parameter: the value now in force, in counts of the parameter's scale
+    value: int  # of get_parameter and set_parameter, refused or not: the value in force, in counts of the parameter's scale; else, and where it is busy or the parameter unknown, 0
 
 
 class Answer(_AnswerFields):
@@ -865,6 +918,7 @@ class Answer(_AnswerFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 7
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBi")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0, "status": 2, "value": 3}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -879,7 +933,7 @@ class Answer(_AnswerFields):
 class _EventFields(NamedTuple):
     number: int  # of the event: 1 for the first of a session, then one more each
     kind: int  # event_kind
-    value: int  # see event_kind
+    value: int  # its meaning stands at each event_kind
     time: int  # us; board time
 
 
@@ -892,6 +946,7 @@ class Event(_EventFields):
     DELIVERY: ClassVar[str] = "exactly_once"
     LENGTH: ClassVar[int] = 9
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HBHI")
+    OFFSETS: ClassVar[dict[str, int]] = {"number": 0, "kind": 2, "value": 3, "time": 5}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -917,6 +972,7 @@ class ClockAnswer(_ClockAnswerFields):
     DELIVERY: ClassVar[str] = "telemetry"
     LENGTH: ClassVar[int] = 6
     STRUCT: ClassVar[struct.Struct] = struct.Struct("<HI")
+    OFFSETS: ClassVar[dict[str, int]] = {"token": 0, "time": 2}
 
     def pack(self) -> bytes:
         """The payload."""
@@ -973,7 +1029,7 @@ MESSAGES: dict[int, type[Message]] = {
     0x12: SetpointCoast,
     0x18: Turret,
     0x19: Buzzer,
-    0x20: GetParameter,
+    0x25: GetParameter,
     0x21: SetParameter,
     0x22: SaveParameters,
     0x23: ResetParameters,
@@ -995,7 +1051,7 @@ HASHES: dict[int, int] = {
     0x01: 0xE0471814,
     0x02: 0xBD434780,
     0x03: 0xDDE1C4B0,
-    0x80: 0xDFD6FEB4,
+    0x80: 0xA76FFC9B,
     0x81: 0xF379E8B5,
     0x82: 0xACE09C27,
     0x08: 0xF533989A,
@@ -1005,20 +1061,20 @@ HASHES: dict[int, int] = {
     0x12: 0xD86ACD27,
     0x18: 0x76F31EB3,
     0x19: 0xB81D6D3F,
-    0x20: 0x9199C85F,
-    0x21: 0x93310006,
+    0x25: 0xEE5C19C7,
+    0x21: 0x885FEFDB,
     0x22: 0x1DEAD58C,
     0x23: 0x5C7C21EE,
     0x24: 0x7A25B50E,
     0x28: 0x306E772C,
     0x30: 0x1011476B,
     0x88: 0x24E076A5,
-    0x90: 0x425355C1,
-    0x91: 0x7EF8DA38,
-    0x92: 0xFF7B65CC,
-    0x93: 0xF7716504,
-    0xA0: 0x754ACE51,
-    0xA1: 0xCCFD276E,
+    0x90: 0x421C7CB9,
+    0x91: 0x87F975A3,
+    0x92: 0xA1006857,
+    0x93: 0x9EADF1CF,
+    0xA0: 0x90997173,
+    0xA1: 0x515D19B5,
     0xB0: 0xFC092B76,
 }
 
@@ -1033,6 +1089,7 @@ class ParameterSpec(NamedTuple):
     maximum: int  # counts
     doc: str
     default_from: str = ""  # key of the robot description that gives the default
+    since: int = 0  # minor version
 
 
 PARAMETERS: dict[str, ParameterSpec] = {
@@ -1060,4 +1117,7 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "turret_centre": ParameterSpec(21, "us", 0.0625, 16000, 32000, "pulse at which the turret looks straight ahead", "turret.centre_us"),
     "turret_gain": ParameterSpec(22, "us/rad", 0.0625, -16000, 16000, "pulse for each radian of the turret to the left; negative for a servo that turns the other way", "turret.gain_us_per_rad"),
     "start_beep": ParameterSpec(23, "s", 0.01, 0, 100, "length of the tone at each start, so that a reset is heard; 0: none"),
+    "encoder_gap": ParameterSpec(24, "us", 1.0, 0, 65535, "shortest time between two edges of one encoder line that both count; 0: all count", "robot.encoder_gap_us"),
+    "fallback_after": ParameterSpec(25, "ms", 1.0, 0, 65535, "silence of the host after which the board's own brain takes over; 0: never"),
+    "fallback_at_start": ParameterSpec(26, "flag", 1.0, 0, 1, "1: the board's own brain may also take over after a reset, before any host has armed the motors; 0: not"),
 }

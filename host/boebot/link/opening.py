@@ -107,7 +107,8 @@ class Opening(Line):
             if self._foreign_since is not None:
                 self._wait_for_other_host(now)
             elif now >= search.end_s:
-                raise self._heard.verdict(self.transport, limit_s, self.hello)
+                counts = self.decoder.good, self.decoder.bad
+                raise self._heard.verdict(self.transport, limit_s, self.hello, counts)
             elif self.hello is None:
                 baud = search.next_baud(now, self._heard)
                 if baud is not None:
@@ -306,6 +307,8 @@ class Opening(Line):
             self._end_session()
 
         def describe(index: int) -> messages.Description:
+            if hello.session:
+                raise BoardError(f"the board at {self.transport.name} has a session with another host")
             return self._ask(
                 messages.Describe(index, hello.board_nonce),
                 messages.Description,

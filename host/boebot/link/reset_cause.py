@@ -21,10 +21,7 @@ def hang_in_words(cause: int) -> str:
 
 def in_words(cause: int) -> str:
     """As in "watchdog, in task encoder"; a cause that this kit does not know is told by its number."""
-    try:
-        name = messages.ResetCause(cause).name
-    except ValueError:
-        return f"unknown ({cause})"
+    name = messages.ResetCause(cause).name
     if name.startswith(_IN_TASK):
         return f"watchdog, in task {name.removeprefix(_IN_TASK).lower()}"
     if cause == messages.ResetCause.WATCHDOG:

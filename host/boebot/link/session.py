@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection
 
 from boebot.devices.buzzer import next_token
 from boebot.errors import BoardError
-from boebot.link import messages
+from boebot.link import messages, mismatch
 from boebot.link.delivery import BoardEvent, LatchedAgainError, LinkTimes, RequestKind
 from boebot.link.line import SHORTEST_S
 from boebot.link.parameter_values import parameter_counts, parameter_spec
@@ -32,9 +32,8 @@ _ROUNDS = 4  # in which each task was told at least once, or something is wrong
 _LOOK_S = 0.05
 _ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop so much before what was waited for
 
-# offsets in telemetry
-_SUPPLY = 30
-_LATCHES = 35
+_SUPPLY = messages.Telemetry.OFFSETS["supply"]
+_LATCHES = messages.Telemetry.OFFSETS["latches"]
 
 
 def text(field: bytes) -> str:
@@ -106,8 +105,9 @@ class Link(Traffic):
         return self._events.waiting
 
     def events(self) -> list[BoardEvent]:
-        """What happened on the board since the last call, in order. Events that nobody fetches are, after some, no
-        longer acknowledged, so that the board keeps them."""
+        """What happened on the board since the last call, in order; stops of the motors that nobody was told of before
+        this session come first (`earlier`). Events that nobody fetches are, after some, no longer acknowledged, so that
+        the board keeps them."""
         return list(self._events.fetch()) if self._events.waiting else []
 
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
@@ -215,6 +215,13 @@ class Link(Traffic):
             self._turn(end)
         return self.latest
 
+    @property
+    def parameters(self) -> list[str]:
+        """Names of the parameters that the board knows: those of its minor version."""
+        assert self.hello is not None, "a session is open"
+        minor = mismatch.minor_of(self.hello)
+        return [name for name, spec in messages.PARAMETERS.items() if spec.since <= minor]
+
     def get_parameter(self, name: str) -> float:
         """The value of a parameter, in its unit."""
         spec = parameter_spec(name)
@@ -299,8 +306,5 @@ class Link(Traffic):
 
 
 def _reason(status: int) -> str:
-    """Why a board refuses; a status that this kit does not know is told by its number."""
-    try:
-        return messages.AnswerStatus(status).name.lower().replace("_", " ")
-    except ValueError:
-        return f"status {status}"
+    """Why a board refuses."""
+    return messages.AnswerStatus(status).name.lower().replace("_", " ")

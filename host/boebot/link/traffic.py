@@ -21,7 +21,7 @@ _PERIOD = messages.PARAMETERS["telemetry_period"]
 _STOP_BYTES = 20
 _PERIODS_LATE = 3  # telemetry that comes later than so many of its periods after its tick is counted
 _TELEMETRY_ROOM = 4096  # messages that nobody fetched
-_LATCH = 34  # offset in telemetry
+_LATCH = messages.Telemetry.OFFSETS["latch"]
 _FRAME_TICKS = 2  # of the servos: no pulse shows sooner
 _TASKS = tuple(task.name.lower() for task in messages.Task)
 
@@ -61,6 +61,7 @@ class Traffic(Opening):
         self._last_tick = -1  # of the session before
         self._last_heard_s = 0.0
         self._latest_s = 0.0
+        self._first_us = 0  # board time of the session's first telemetry
         self._requests = Requests()
         self._events = Events()
         self._stopping = Stopping()
@@ -83,6 +84,7 @@ class Traffic(Opening):
         return HostCounters(
             good=decoder.good,
             bad=decoder.bad,
+            unknown=decoder.unknown,
             resynchronised=decoder.resynchronised,
             lost=decoder.lost,
             retransmitted=requests.retransmitted + self._stopping.retransmitted + self._wants.retransmitted,
@@ -297,6 +299,7 @@ class Traffic(Opening):
         if was_reset or self._last_tick < 0:
             self._tell_watchdog()
         self.clock.expect(tick * self._tick_s, now)
+        self._first_us = self.clock.unwrap(int.from_bytes(payload[4:8], "little"), now)
 
     def _tell_watchdog(self) -> None:
         assert self.hello is not None
@@ -321,7 +324,8 @@ class Traffic(Opening):
         if self.latest is None:
             return  # not acknowledged: it comes again, when board time can be told
         event = messages.Event.unpack(payload)
-        number = self._events.take(event, self.clock.unwrap(event.time, now) * 1e-6)
+        us = self.clock.unwrap(event.time, now)
+        number = self._events.take(event, us * 1e-6, us < self._first_us)
         if number is not None:
             self._send(messages.Acknowledge.ID, messages.Acknowledge.STRUCT.pack(number))
 

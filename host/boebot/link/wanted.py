@@ -9,8 +9,8 @@ import math
 
 from boebot.link import messages
 
-_TURRET_PULSE = 28  # offsets in devices_telemetry
-_BUZZER_TOKEN = 30
+_TURRET_PULSE = messages.DevicesTelemetry.OFFSETS["turret_pulse"]
+_BUZZER_TOKEN = messages.DevicesTelemetry.OFFSETS["buzzer_token"]
 _NEAR = 2  # counts that the board's pulse may lie beside the host's: both round
 
 

@@ -39,7 +39,7 @@ _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
 
 # bits of the page's `flags` array
-LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF = (1 << bit for bit in range(7))
+LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(8))
 
 
 def write(results: Sequence[RunResult], path: Path) -> Path:
@@ -107,6 +107,7 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         | _contact(result) * CONTACT
         | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
+        | ((status & int(Status.FALLBACK)) != 0) * FALLBACK
     )
     return {
         "title": f"{result.brain} on {result.robot.name} ({result.board})",

@@ -13,15 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import partial
 
 from boebot.errors import TimingError
 from boebot.timing.flag import Flag, State, after
 from boebot.timing.loops import IrreducibleError, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Block, Function, Instruction, Program
-from boebot.timing.registers import CALL_CLOBBERED, written
-from boebot.timing.split import successors
 from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
@@ -108,7 +105,6 @@ class Blocked:
         self._effects: dict[tuple[int, bool], Effect] = {}
         self._flows: dict[tuple[int, bool], Flow] = {}
         self._plain: dict[int, bool] = {}
-        self._written: dict[int, frozenset[int]] = {}
         self._under_way: set[tuple[int, bool]] = set()
 
     def of(self, function: str | int) -> Stretch:
@@ -168,26 +164,15 @@ class Blocked:
     def _is_plain(self, entry: int) -> bool:
         """Nothing in it or below it writes the flag."""
         if entry not in self._plain:
-            self._plain[entry] = False  # while it is worked out: what calls itself is not plain
-            blocks = self.program.functions[entry].blocks.values()
-            self._plain[entry] = all(
-                not _writes_flag(block) and all(self._is_plain(callee) for callee in block.calls) for block in blocks
-            )
+            below, work = {entry}, [entry]
+            for at in work:  # grows meanwhile
+                blocks = self.program.functions[at].blocks.values()
+                more = {callee for block in blocks for callee in block.calls} - below
+                below |= more
+                work += more
+            blocks_below = (block for at in below for block in self.program.functions[at].blocks.values())
+            self._plain[entry] = not any(map(_writes_flag, blocks_below))
         return self._plain[entry]
-
-    def _clobbers(self, entry: int) -> frozenset[int]:
-        """Registers that a callee writes, of those that it need not keep: the compiler knows of its library's routines
-        that they leave some of these alone."""
-        if entry not in self._written:
-            self._written[entry] = CALL_CLOBBERED  # while it is worked out: of what calls itself
-            result: set[int] = set()
-            for block in self.program.functions[entry].blocks.values():
-                for instruction in block.instructions[: -1 if block.calls else None]:
-                    result |= written(instruction)
-                for callee in block.calls:
-                    result |= self._clobbers(callee)
-            self._written[entry] = CALL_CLOBBERED.intersection(result)
-        return self._written[entry]
 
     def _effect(self, function: Function, on: bool) -> Effect:
         flow = self.flow(function.entry, on)
@@ -240,7 +225,10 @@ class Blocked:
     def _around(self, entry: int, start: Node) -> dict[int, frozenset[int]]:
         """The loops that a node is in the midst of: headers and blocks."""
         blocks = self.worst_case.inside(entry).function.blocks
-        following = partial(successors, blocks)
+
+        def following(start: int) -> list[int]:
+            return [edge.to for edge in blocks[start].edges]
+
         try:
             loops = natural_loops(reverse_postorder(entry, following), following)
         except IrreducibleError:  # refused by whoever looks for paths
@@ -279,7 +267,7 @@ class Blocked:
         instruction = block.instructions[number]
         clobbered = None
         if block.calls and number + 1 == len(block.instructions):
-            clobbered = frozenset[int]().union(*(self._clobbers(callee) for callee in block.calls))
+            clobbered = self.program.clobbered(block)
         states = after(instruction, state, clobbered)
         found: list[Node] = []
         if number + 1 < len(block.instructions):

@@ -6,9 +6,11 @@ is wrong, and counts like any broken budget. What a task or an interrupt takes b
 scenario that was measured; what a tick takes is compared with the scenario of the report's own load alone.
 
 What must end in time is the tick: tasks, interrupts, edges. Frames are worked off in what they leave, and never keep a
-slot waiting longer than one of them takes. So what of them the bound can prove is a figure, and no budget: for each
-kind of message whether a line full of it is worked off, and how many bytes wait meanwhile (full_line.py). The bytes of
-`ring` are those that come between two polls alone; they are all that wait where the link was not behind before.
+slot waiting longer than one of them takes. The bytes of `ring` are those that come between two polls of the link; they
+are all that wait where the link was not behind before. Under an overload bytes and edges may be lost; judged are the
+tick, and of the interrupts those on which the tick and the pulses of the servos depend.
+
+A task without a bound is named, and counts with its budget; that it keeps it is for the emulator to show.
 """
 
 from __future__ import annotations
@@ -18,28 +20,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from boebot.errors import TimingError
 from boebot.timing.blocked import WAKE
-from boebot.timing.changes import CHANGES_RING
 from boebot.timing.changes import of_image as changes_of
-from boebot.timing.costs import SLOT_BEGINS, Costs, costs
-from boebot.timing.elf import read_image
-from boebot.timing.frames import frame_costs
-from boebot.timing.full_line import FullLines, full_lines
+from boebot.timing.costs import Costs, costs, task_entry
+from boebot.timing.elf import Image, read_image
 from boebot.timing.graph import program_of
-from boebot.timing.loads import RECEIVE, Load
+from boebot.timing.loads import RECEIVE, SLOT, Load
 from boebot.timing.measured import Measurement, Spans, as_json
 from boebot.timing.program import Program, Table
-from boebot.timing.response import Responses, Schedule, Source, background, load, longest_gap, misses, responses
+from boebot.timing.response import Responses, Schedule, Source, load, longest_gap, misses, response, responses
 from boebot.timing.stack import Stack
 from boebot.timing.table_check import check_table
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
 FLASH_BYTES = 0x8000
-RECEIVE_RING = "hal_receive_ring"  # the variable in which received bytes wait; one of them stays free
 FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
-RATIO_MOST = 1.5  # bound to the longest measured; above it one of the two could be better
-OF_ROWS = 0.4  # share of the work that tasks and interrupts are, where messages are bounded too
 STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
@@ -49,12 +46,14 @@ class Row:
 
     name: str
     kind: str  # "task" or "interrupt"
-    bound: int
+    bound: int  # of a task without one: its budget
     budget: int
+    unbounded: str | None = None  # why it has no bound
     emulator: int | None = None
     board: int | None = None  # with the interrupts that came in between: a board cannot tell them apart
     response: int | None = None  # of a task: from the beginning of its slot to its end, interrupts included
     latency: int | None = None  # of an interrupt: from request to acceptance
+    waited: int | None = None  # the longest that was measured of it under the report's load
     latency_limit: int | None = None
 
     @property
@@ -64,18 +63,20 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """The bound to the longest that was measured in the emulator; None: nothing was."""
-        return self.bound / self.emulator if self.emulator else None
+        """The bound to the longest that was measured in the emulator; None: nothing was, or there is none."""
+        return self.bound / self.emulator if self.emulator and self.unbounded is None else None
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """Bytes; `stack_seen` is the deepest that was measured."""
+    """Bytes; `stack_seen` is the deepest that was measured. `stack` is the bound, but for tasks of which it is not
+    known how deep they go (`unknown`): with these it is what was measured, if that is more."""
 
     static: int
     stack: int
     stack_seen: int | None
     flash: int
+    unknown: tuple[str, ...] = ()
 
     @property
     def left(self) -> int:
@@ -97,13 +98,11 @@ class Report:
     responses: Responses | None
     gap: int | None  # cycles between two polls of the link, while slots wait
     ring: int | None  # bytes that wait in the receive ring meanwhile, when the link was not behind before
-    ring_holds: int | None  # bytes for which it has room; None: the image has no such ring
+    ring_holds: int  # bytes for which it has room
     changes: int | None  # of the encoders' lines, that wait in their ring at most; None also: no encoders
-    changes_held: int | None  # for which it has room; None: the image has no such ring
+    changes_held: int  # for which it has room
     taken: int | None  # cycles from a frame's last byte to the end of what it asks for, likewise
     frames: Source  # that the host sends
-    frames_proven: float  # of these in a tick, so many are worked off whatever they are, in the long run
-    lines: FullLines  # a line full of each message
     memory: Memory
     measured: Measurement | None = None
 
@@ -126,32 +125,42 @@ class Report:
     @property
     def executed(self) -> int:
         """Cycles of a tick in which instructions run at most: with frames, and a pass of the main loop for whatever
-        wakes it."""
+        wakes it. A tick is longer by what the slot's interrupt waits at its end."""
         names = {row.name for row in self.rows if row.kind == "interrupt"}
         wakes = sum(source.requests(self.tick_cycles) for source in self.sources if source.name in names)
         frames = self.frames.cycles * (self.frames.requests(self.tick_cycles) + 1)  # one may have waited
-        return min(self.tick_cycles, self.demand + frames + wakes * (WAKE + self.costs.loop + self.costs.edges))
+        slots = {row.name for row in self.table.interrupts if row.vector == SLOT}
+        late = max((row.latency or 0 for row in self.rows if row.kind == "interrupt" and row.name in slots), default=0)
+        return min(self.tick_cycles + late, self.demand + frames + wakes * (WAKE + self.costs.loop + self.costs.edges))
 
     @property
-    def frames_coming(self) -> float:
-        """The host's frames in a tick, in the long run."""
-        return float(self.frames.load / self.frames.cycles * self.tick_cycles) if self.frames.cycles else 0.0
+    def ratio(self) -> float | None:
+        """Of the sum of the bounds of the fullest tick's tasks to that of the longest that were measured of each; None:
+        one of them has not run, or has no bound."""
+        rows = {row.name: row for row in self.rows if row.kind == "task"}
+        tick = max(range(self.schedule.ticks), key=self.schedule.tick_work)
+        slots = self.schedule.slots[tick * self.schedule.slots_per_tick :][: self.schedule.slots_per_tick]
+        found = [rows[piece.name] for slot in slots for piece in slot if piece.name in rows]
+        if any(row.ratio is None for row in found):
+            return None
+        return sum(row.bound for row in found) / sum(row.emulator or 0 for row in found)
 
     @property
     def edge_age(self) -> int | None:
-        """Cycles from an edge to the moment at which the time is told of it: each slot begins with that. None: there is
-        overload, or no encoder."""
-        if self.responses is None or not self.costs.change:
+        """Cycles from an edge to the moment at which the time is told of it. None: there is overload, where the board
+        notices if that is too late, or no encoder.
+
+        Each slot begins with that, and so does each round of the main loop: it waits for no frame.
+        """
+        if self.responses is None or not self.costs.change or self.load.is_overload:
             return None
-        return self.schedule.slot_cycles + self.responses.pieces[SLOT_BEGINS]
+        begins = response(self.costs.loop + self.costs.round, self.sources)
+        return None if begins is None else self.schedule.slot_cycles + begins
 
     @property
     def own(self) -> Measurement | None:
         """What was measured under the report's own load; None: nothing."""
-        if self.measured is None:
-            return None
-        alone = self.measured if self.measured.scenarios == (self.load.name,) else None
-        return self.measured.by_scenario.get(self.load.name, alone)
+        return _own(self.measured, self.load)
 
     @property
     def load_bound(self) -> float:
@@ -165,17 +174,20 @@ class Report:
 
     @property
     def notes(self) -> list[str]:
-        """What is not broken: bounds far above what was measured, of which one could be better; what is not known."""
+        """What is not broken, and not known."""
         found = [
-            f"task {row.name}: its bound of {row.bound} cycles is {row.ratio:.2f} times the {row.emulator} measured"
+            f"task {row.name} is not bounded ({row.unbounded}): its budget of {row.budget} cycles counts, "
+            + ("and nothing was measured" if row.emulator is None else f"{row.emulator} were measured")
             for row in self.rows
-            if row.kind == "task" and row.ratio is not None and row.ratio > RATIO_MOST
+            if row.unbounded is not None
         ]
-        if self.ring and self.ring_holds is None:
-            found.append(f"whether {self.ring} bytes fit its receive ring is not known: it has no {RECEIVE_RING}")
-        if self.changes and self.changes_held is None:
-            found.append(f"whether {self.changes} changes fit its ring of them is not known: it has no {CHANGES_RING}")
-        return found + _frames_unproven(self)
+        if self.memory.unknown:
+            seen = self.memory.stack_seen
+            found.append(
+                f"the stack of task {', '.join(self.memory.unknown)} is not bounded: "
+                + ("nothing was measured" if seen is None else f"{seen} bytes were measured of the whole image")
+            )
+        return found
 
     @property
     def is_met(self) -> bool:
@@ -215,12 +227,11 @@ class Report:
             "frame_bound_cycles": self.frames.cycles,
             "frame_taken_bound_cycles": self.taken,
             "edge_age_bound_cycles": self.edge_age,
-            "frames_coming_per_tick": round(self.frames_coming, 2),
-            "frames_proven_per_tick": round(self.frames_proven, 2),
-            "full_lines": self.lines.as_dict(self.ring_holds),
+            "bound_to_emulator_of_the_ticks_tasks": None if self.ratio is None else round(self.ratio, 3),
             "losses_in_emulator": None if own is None else own.losses,
             "ram_static_bytes": memory.static,
             "stack_bound_bytes": memory.stack,
+            "stack_not_bounded_of": list(memory.unknown),
             "stack_emulator_max_bytes": memory.stack_seen,
             "ram_bytes": RAM_BYTES,
             "flash_bytes": memory.flash,
@@ -236,6 +247,7 @@ def prove(
     measured: Measurement | None = None,
     board: Mapping[str, int] | None = None,
     program: Program | None = None,
+    like: Report | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Report:
     """The report of an image.
@@ -246,7 +258,8 @@ def prove(
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
         program: the image's, if it has been read already.
-        progress: called with the share of its tasks, interrupts and messages that are bounded, 0 to 1.
+        like: its report under another load: what does not depend on that is taken from there.
+        progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
 
     Raises:
         TimingError: the file is no image, carries no table, or its timing cannot be told.
@@ -254,43 +267,60 @@ def prove(
     image = read_image(path)
     program = program or program_of(image)
     check_table(path, program)
-    of_rows = OF_ROWS if asked.is_full else 1.0
-    found = costs(program, asked, lambda share: progress(of_rows * share))
-    schedule, sources = found.schedule(program), tuple(found.sources(program, asked))
-    deepest = Stack(program).image()
-    seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
-    answers = responses(schedule, sources)
-    between = (*sources, *found.between(program, asked))
-    frames = found.of_frames(asked)
-    kinds = frame_costs(program, lambda share: progress(OF_ROWS + (1 - OF_ROWS) * share)) if asked.is_full else ()
-    gap, ring, taken = _of_link(program, found, schedule, between, asked)
+    found = costs(program, asked, progress) if like is None else like.costs.under(program, asked)
+    schedule, sources, busy = found.schedule(program), found.sources(program, asked), found.busy(program, asked)
+    answers = responses(schedule, busy)
+    gap, ring, taken = _of_link(program, found, schedule, (*busy, *found.between(program, asked)), asked)
     return Report(
         path=str(path),
         table=program.table,
         load=asked,
-        rows=tuple(_rows(program, found, answers, measured, board or {})),
+        rows=tuple(_rows(program, asked, found, answers, measured, board or {})),
         costs=found,
         schedule=schedule,
-        sources=sources,
+        sources=tuple(sources),
         responses=answers,
         gap=gap,
-        ring=ring,
-        ring_holds=image.variables[RECEIVE_RING] - 1 if RECEIVE_RING in image.variables else None,
-        changes=None if answers is None else changes_of(program, found, schedule, asked),
-        changes_held=image.variables[CHANGES_RING] // program.constants.change_bytes - 1
-        if CHANGES_RING in image.variables
-        else None,
+        ring=None if asked.is_overload else ring,
+        ring_holds=program.constants.receive_ring,
+        changes=None if answers is None or asked.is_overload else changes_of(program, found, schedule, asked),
+        changes_held=program.constants.changes_ring - 1,
         taken=taken,
-        frames=frames,
-        frames_proven=_proven(schedule, between, frames),
-        lines=full_lines(program, found, schedule, asked, kinds),
-        memory=Memory(image.ram_bytes, deepest.bytes, seen, image.flash_bytes),
+        frames=found.of_frames(asked),
+        memory=_memory(program, image, found, measured),
         measured=measured,
     )
 
 
+def _memory(program: Program, image: Image, found: Costs, measured: Measurement | None) -> Memory:
+    """A task whose depth is not known counts with what was measured of the image."""
+    unknown, stack = [], Stack(program)
+    for name in found.unbounded:
+        try:
+            stack.of(task_entry(program, name))
+        except TimingError:
+            unknown.append(name)
+    deepest = Stack(program, [task_entry(program, name) for name in unknown]).image().bytes
+    seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
+    most = max(deepest, seen) if unknown and seen is not None else deepest
+    return Memory(image.ram_bytes, most, seen, image.flash_bytes, tuple(unknown))
+
+
+def prove_all(path: Path, loads: Mapping[str, Load], measured: Measurement | None = None) -> dict[str, Report]:
+    """The reports of an image under several loads; see `prove`."""
+    program, found = program_of(read_image(path)), dict[str, Report]()
+    for name, asked in loads.items():
+        found[name] = prove(path, asked, measured, program=program, like=next(iter(found.values()), None))
+    return found
+
+
 def _rows(
-    program: Program, found: Costs, answers: Responses | None, measured: Measurement | None, board: Mapping[str, int]
+    program: Program,
+    asked: Load,
+    found: Costs,
+    answers: Responses | None,
+    measured: Measurement | None,
+    board: Mapping[str, int],
 ) -> list[Row]:
     def largest(spans: Mapping[str, Spans], name: str) -> int | None:
         return spans[name].largest if name in spans and len(spans[name].net) else None
@@ -301,6 +331,7 @@ def _rows(
             kind="task",
             bound=found.tasks[row.name],
             budget=row.budget,
+            unbounded=found.unbounded.get(row.name),
             emulator=largest(measured.tasks, row.name) if measured else None,
             board=board.get(row.name),
             response=answers.pieces[row.name] if answers else None,
@@ -316,11 +347,25 @@ def _rows(
             emulator=largest(measured.interrupts, row.name) if measured else None,
             board=board.get(row.name),
             latency=found.latencies[row.name],
-            latency_limit=row.latency,
+            waited=_waited(measured, asked, row.name),
+            latency_limit=row.latency if row.vector not in asked.may_be_late else None,
         )
         for row in program.table.interrupts
     ]
     return rows
+
+
+def _own(measured: Measurement | None, asked: Load) -> Measurement | None:
+    """What was measured under that load; None: nothing."""
+    if measured is None:
+        return None
+    return measured.by_scenario.get(asked.name, measured if measured.scenarios == (asked.name,) else None)
+
+
+def _waited(measured: Measurement | None, asked: Load, name: str) -> int | None:
+    own = _own(measured, asked)
+    spans = None if own is None else own.interrupts.get(name)
+    return int(spans.latency.max()) if spans is not None and len(spans.latency) else None
 
 
 def _of_link(
@@ -346,13 +391,7 @@ def _of_link(
     def come(window: int) -> int:
         return sum(source.requests(window + 1) for source in bytes_)
 
-    return gap, max(come(gap), program.constants.receive_due - 1 + come(idle)), taken
-
-
-def _proven(schedule: Schedule, sources: tuple[Source, ...], frames: Source) -> float:
-    """Frames that slots and interrupts leave time for in a tick."""
-    left = background(schedule, sources) * schedule.tick_cycles
-    return float(left / frames.cycles) if frames.cycles else 0.0
+    return gap, max(come(gap), program.constants.poll_bytes + come(idle)), taken
 
 
 def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
@@ -360,13 +399,16 @@ def _rows_broken(rows: tuple[Row, ...]) -> list[str]:
     for row in rows:
         who = f"{row.kind} {row.name}"
         if row.emulator is not None and row.emulator > row.bound:
-            found.append(_above(f"{who} took {row.emulator} cycles in the emulator", row.emulator, "bound", row.bound))
+            what = "bound" if row.unbounded is None else "budget"
+            found.append(_above(f"{who} took {row.emulator} cycles in the emulator", row.emulator, what, row.bound))
         if row.board is not None and row.response is not None and row.board > row.response:
             found.append(
                 _above(f"{who} took {row.board} cycles on the board", row.board, "bound with interrupts", row.response)
             )
         if row.bound > row.budget:
             found.append(_above(f"{who} may take {row.bound} cycles", row.bound, "budget", row.budget))
+        if row.waited is not None and row.latency is not None and row.waited > row.latency:
+            found.append(_above(f"{who} waited {row.waited} cycles in the emulator", row.waited, "bound", row.latency))
         if row.latency is not None and row.latency_limit is not None and row.latency > row.latency_limit:
             wait = "for ever" if row.latency >= FOR_EVER else f"{row.latency} cycles"
             found.append(_above(f"{who} may wait {wait}", row.latency, "latency limit", row.latency_limit))
@@ -389,17 +431,16 @@ def _tick_broken(report: Report) -> list[str]:
     if report.responses.tick > report.tick_cycles:
         says = f"the work of a tick and its interrupts may take {report.responses.tick} cycles"
         found.append(_above(says, report.responses.tick, "length", report.tick_cycles))
-    for slot in misses(report.schedule, report.responses.slots):
+    late = [] if report.load.is_overload else misses(report.schedule, report.responses.slots)
+    for slot in late:
         found.append(
             f"slot {slot} may end {report.responses.slots[slot]} cycles after it began, when the next tick has begun"
         )
-    if report.ring is not None and report.ring_holds is not None and report.ring > report.ring_holds:
+    if report.ring is not None and report.ring > report.ring_holds:
         found.append(f"{report.ring} bytes may wait for a poll of the link; the ring holds {report.ring_holds}")
-    if report.changes is not None and report.changes_held is not None and report.changes > report.changes_held:
-        found.append(
-            f"ring of changes: {report.changes} may wait for a poll of the encoders; it holds {report.changes_held}"
-        )
-    if report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
+    if report.changes is not None and report.changes > report.changes_held:
+        found.append(f"ring of changes: {report.changes} may wait to be worked off; it holds {report.changes_held}")
+    if not report.load.is_overload and report.edge_age is not None and report.edge_age >= STAMP_ROLLS_OVER:
         found.append(f"the time of an edge may be asked for after {report.edge_age} cycles; its stamp has 16 bits")
     return found
 
@@ -418,22 +459,6 @@ def _measured_broken(report: Report) -> list[str]:
     return [_above(f"{says} in the emulator", took, "bound", most) for says, took, most in figures if took > most]
 
 
-def _frames_unproven(report: Report) -> list[str]:
-    """What is known of the frames that the bound leaves no time for."""
-    proven, coming = round(report.frames_proven, 1), round(report.frames_coming, 1)
-    if proven >= coming:
-        return []
-    says = f"frames: the bound proves {proven:g} of the {coming:g} that come per tick, if all are of the costliest; "
-    if report.own is None:
-        says += "that none of the others is lost is not proven, and nothing was measured"
-    elif any(lost := [report.own.losses.get(kind, 0) for kind in ("frames", "bytes")]):
-        says += f"the emulator lost {lost[0]} frames and {lost[1]} bytes"
-    else:
-        says += "that none of the others is lost is measured, not proven"
-    found = [says if report.ring_holds is None else f"{says}; the receive ring holds {report.ring_holds} bytes"]
-    return [*found, f"frames: {report.lines.says(report.ring_holds)}"] if report.lines.lines else found
-
-
 def _memory_broken(memory: Memory) -> list[str]:
     found = []
     if memory.stack > memory.left:
@@ -449,7 +474,8 @@ def _memory_broken(memory: Memory) -> list[str]:
 def _row_dict(row: Row) -> dict[str, Any]:
     common = {
         "name": row.name,
-        "bound_cycles": row.bound,
+        "bound_cycles": row.bound if row.unbounded is None else None,
+        "not_bounded": row.unbounded,
         "emulator_max_cycles": row.emulator,
         "ratio": None if row.ratio is None else round(row.ratio, 3),
         "board_max_cycles": row.board,
@@ -458,7 +484,11 @@ def _row_dict(row: Row) -> dict[str, Any]:
     }
     if row.kind == "task":
         return common | {"response_bound_cycles": row.response}
-    return common | {"latency_bound_cycles": row.latency, "latency_limit_cycles": row.latency_limit}
+    return common | {
+        "latency_bound_cycles": row.latency,
+        "latency_emulator_max_cycles": row.waited,
+        "latency_limit_cycles": row.latency_limit,
+    }
 
 
 def _percent(part: int, whole: int) -> float:

@@ -1,4 +1,4 @@
-"""How many changes of the encoders' lines may wait in their ring: whether it can become full.
+"""How many changes of the encoders' lines and the light sensor's may wait in their ring: whether it can become full.
 
 A poll works off what waits when it begins; what comes from then on waits for the next poll. There are two ways in which
 that one can be far off:
@@ -16,11 +16,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from boebot.timing.costs import Costs
-from boebot.timing.loads import ENCODERS, TICK, Load
+from boebot.timing.loads import ENCODERS, Load
 from boebot.timing.program import Program
 from boebot.timing.response import Schedule, Source, response
-
-CHANGES_RING = "hal_changes"  # the variable in which they wait; one place stays free
 
 
 def of_image(program: Program, found: Costs, schedule: Schedule, asked: Load) -> int | None:
@@ -29,9 +27,7 @@ def of_image(program: Program, found: Costs, schedule: Schedule, asked: Load) ->
     if row is None or not found.change:
         return None
     changes = asked.sources(row, 0)
-    if found.other:  # the light sensor's edge is a change like any
-        changes.append(Source("light's edge", 0, 2 * TICK))
-    return most_waiting(found, schedule, found.requested(program, asked), changes, found.latencies[row.name])
+    return most_waiting(found, schedule, found.requested(program, asked), changes, found.latencies[row.name] or 0)
 
 
 def most_waiting(
@@ -50,13 +46,12 @@ def most_waiting(
         latency: from a change to its interrupt, at which it comes into the ring.
     """
     slots = max(map(schedule.work, range(len(schedule.slots))))
-    rare = found.other + found.storm
 
     def peak(work: int, left: int) -> int | None:
         """With so much work before the next poll looks, and so many changes that wait already."""
         most = freed = 0
         while True:
-            until = response(work + rare + (freed + 1) * found.change, interrupts)
+            until = response(work + (freed + 1) * found.change, interrupts)
             if until is None:
                 return None
             waiting = left + sum(one.requests(until + latency + 1) for one in changes) - freed
@@ -66,7 +61,7 @@ def most_waiting(
 
     needed = peak(found.loop + found.frame + found.round, found.changes_due - 1)
     while needed is not None:
-        more = peak(slots + rare + needed * found.change + found.round, 0)
+        more = peak(slots + needed * found.change + found.round, 0)
         if more is not None and more <= needed:
             break
         needed = more

@@ -2,15 +2,17 @@
 
 Conditional constant propagation (M. Wegman, F. Zadeck, "Constant Propagation with Conditional Branches", 1991): a
 register counts as known where every way to the place gives it the same number, and ways that a branch or skip cannot
-take with what is known are none. Arithmetic and flags after the AVR instruction set manual. Three things are taken from
-avr-gcc's calling convention (https://gcc.gnu.org/wiki/avr-gcc): a callee keeps what is not its own, r1 is 0 at a call
-and behind it, and stores through pointers do not reach the registers.
+take with what is known are none. Of a word that is not known it is followed by how much others are more (Part): so
+a loop from a pointer to its end has a count. Arithmetic and flags after the AVR instruction set manual. Three things
+are taken from avr-gcc's calling convention (https://gcc.gnu.org/wiki/avr-gcc): a callee keeps what is not its own, r1
+is 0 at a call and behind it, and stores through pointers do not reach the registers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from boebot.timing.instructions import BRANCHES, SKIPS
 from boebot.timing.program import Block, Edge, Function, Instruction
@@ -35,19 +37,33 @@ CONDITIONS = {
 Context = tuple[tuple[int, int], ...]  # registers and what they hold, at the entry of a function
 
 
+class Part(NamedTuple):
+    """The low or the high byte of an unknown word and `more`, modulo 2^16. `word`: the address of the instruction that
+    copied it last; all parts with that number are of the same copy."""
+
+    word: int
+    more: int
+    high: bool
+
+
 @dataclass(frozen=True, slots=True)
 class State:
-    """What is known at a place: registers by number, flags by letter (of these C, Z, N, V and T are followed). None of
-    both may be changed."""
+    """What is known at a place: registers by number, flags by letter (of these C, Z, N, V and T are followed), and
+    registers that are parts of unknown words. None of these may be changed. `carried`: C is what the low byte of that
+    word carried when so much was added."""
 
     registers: dict[int, int] = field(default_factory=dict)
     flags: dict[str, bool] = field(default_factory=dict)
+    parts: dict[int, Part] = field(default_factory=dict)
+    carried: tuple[Part, int] | None = None
 
     def merge(self, other: State) -> State:
         """What holds on both ways."""
         return State(
             {r: value for r, value in self.registers.items() if other.registers.get(r) == value},
             {f: value for f, value in self.flags.items() if other.flags.get(f) == value},
+            {r: part for r, part in self.parts.items() if other.parts.get(r) == part},
+            self.carried if self.carried == other.carried else None,
         )
 
     def word(self, low: int) -> int | None:
@@ -71,9 +87,10 @@ class Known:
             state = step(instruction, state)
         return state
 
-    def behind(self, block: Block) -> State:
-        """Behind the block's last instruction, where that is not a call also behind what it calls."""
-        return step(block.instructions[-1], self.before_last(block))
+    def behind(self, block: Block, to: int) -> State:
+        """Behind the block's last instruction, on the way to that block; behind a call, when that has returned."""
+        after = step(block.instructions[-1], self.before_last(block))
+        return _told_by(block, next(edge for edge in block.edges if edge.to == to), after)
 
     def handed(self, block: Block) -> Context:
         """With which the function is entered that the block's last instruction calls or leads to."""
@@ -98,29 +115,33 @@ def known(function: Function, context: Context) -> Known:
     while work:
         block = function.blocks[work.pop()]
         taken[block.start], state = _through(block, states[block.start])
-        work += [edge.to for edge in taken[block.start] if _arrive(states, edge.to, state)]
+        work += [edge.to for edge in taken[block.start] if _arrive(states, edge.to, _told_by(block, edge, state))]
     blocks = {start: replace(function.blocks[start], edges=tuple(edges)) for start, edges in sorted(taken.items())}
     return Known(replace(function, blocks=blocks), context, states)
 
 
-def once_round(function: Function, header: int, nodes: Collection[int], state: State) -> State | None:
+def once_round(function: Function, header: int, nodes: Collection[int], state: State) -> tuple[State | None, bool]:
     """What is known at a loop's header after one pass, from what was known before it; None: no way leads back to it.
+    And whether it was known of any way out of the loop, or round it, that it is not taken.
 
     Args:
         nodes: the blocks of the loop.
     """
     states = {header: state}
     back: dict[int, State] = {}
+    decided = False
     work = [header]
     while work:
         block = function.blocks[work.pop()]
         edges, after = _through(block, states[block.start])
+        decided = decided or (len(edges) < len(block.edges) and any(e.to not in nodes for e in block.edges))
         for edge in edges:
+            behind = _told_by(block, edge, after)
             if edge.to == header:
-                _arrive(back, header, after)
-            elif edge.to in nodes and _arrive(states, edge.to, after):
+                _arrive(back, header, behind)
+            elif edge.to in nodes and _arrive(states, edge.to, behind):
                 work.append(edge.to)
-    return back.get(header)
+    return back.get(header), decided
 
 
 def _through(block: Block, state: State) -> tuple[list[Edge], State]:
@@ -129,6 +150,28 @@ def _through(block: Block, state: State) -> tuple[list[Edge], State]:
         state = step(instruction, state)
     last = block.instructions[-1]
     return [edge for edge in block.edges if _may_take(last, edge, state)], step(last, state)
+
+
+def _told_by(block: Block, edge: Edge, state: State) -> State:
+    """What is known besides on one way out of a block, by the branch that leads there: what was compared is equal, what
+    came out is zero, or what was counted below zero is 255."""
+    last = block.instructions[-1]
+    behind = last.address + last.size
+    if last.mnemonic not in CONDITIONS or len(block.instructions) < 2 or last.operands[-1] == behind:
+        return state
+    flag, value = CONDITIONS[last.mnemonic]
+    is_set = value == (edge.to == last.operands[-1])
+    setter = block.instructions[-2]
+    name, operands = setter.mnemonic, setter.operands
+    number = None
+    if flag == "Z" and is_set:
+        number = operands[1] if name == "cpi" else 0 if name in ("dec", "inc", "subi", "sub", "and", "andi") else None
+    elif flag == "C" and is_set and name == "subi" and operands[1] == 1:
+        number = 0xFF
+    if number is None:
+        return state
+    parts = {r: part for r, part in state.parts.items() if r != operands[0]}
+    return replace(state, registers=state.registers | {operands[0]: number}, parts=parts)
 
 
 def _arrive(states: dict[int, State], place: int, state: State) -> bool:
@@ -173,11 +216,13 @@ def step(instruction: Instruction, state: State) -> State:
     """What is known behind an instruction; behind a call, when its callee has returned."""
     name, operands = instruction.mnemonic, instruction.operands
     if name in ("call", "rcall", "icall") and not pushes_only(instruction):
-        return State(_without(state.registers, written(instruction)) | {ZERO: 0})
+        changed = written(instruction)
+        kept = {r: part for r, part in state.parts.items() if r not in changed}
+        return State(_without(state.registers, changed) | {ZERO: 0}, {}, kept)
     registers = _without(state.registers, written(instruction))
     writes_flags = (name == "out" and operands[0] == SREG_IO) or (name == "sts" and operands[0] == SREG_DATA)
     flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
-    for register, value in _moved(name, operands, state):
+    for register, value in (*_pointer(name, operands, state), *_moved(name, operands, state)):
         registers[register] = value
     if name in SETS:
         flag, value = SETS[name]
@@ -188,7 +233,8 @@ def step(instruction: Instruction, state: State) -> State:
         flags = _transfer(state) | _byte(name, operands, state, registers)
     elif name in ("adiw", "sbiw"):
         flags = _transfer(state) | _word(name, operands, state, registers)
-    return State(registers, flags)
+    parts, carried = _parts(instruction, state, registers, flags)
+    return State(registers, flags, parts, carried)
 
 
 def _transfer(state: State) -> dict[str, bool]:
@@ -224,6 +270,122 @@ def _moved(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple
     elif name == "bld" and operands[0] in state.registers and "T" in state.flags:
         bit = 1 << operands[1]
         yield operands[0], state.registers[operands[0]] & ~bit | bit * state.flags["T"]
+
+
+def _parts(
+    instruction: Instruction, state: State, registers: dict[int, int], flags: dict[str, bool]
+) -> tuple[dict[int, Part], tuple[Part, int] | None]:
+    """The parts of unknown words behind an instruction, and the carry that one has left. What a comparison or a
+    difference of two parts tells goes to `registers` and `flags`."""
+    name, operands, old = instruction.mnemonic, instruction.operands, state.parts
+    changed = written(instruction)
+    new = {r: part for r, part in old.items() if r not in changed} if changed else old.copy()
+    carried = state.carried if name in KEEPS else None
+    if name in ("mov", "movw"):
+        new.update(_copied(instruction, state, new))
+    elif name in ("adiw", "sbiw"):
+        _step_on(operands[0], operands[1] if name == "adiw" else -operands[1], old, new)
+    elif name == "st":
+        _step_on(operands[0], operands[1], old, new)
+    elif name in ("ld", "lpm") and operands[0] not in (operands[1], operands[1] + 1):
+        _step_on(operands[1], operands[2], old, new)
+    elif old and name in _PART_KINDS:
+        carried = _arithmetic(name, operands, state, new, registers, flags)
+    return new, carried
+
+
+def _copied(instruction: Instruction, state: State, new: dict[int, Part]) -> dict[int, Part]:
+    """A copy of parts; or of what is not known at all, which is a word from then on."""
+    to, source = instruction.operands[:2]
+    count = 2 if instruction.mnemonic == "movw" else 1
+    sources = range(source, source + count)
+    if not any(r in state.registers or r in state.parts for r in sources):
+        for register in [r for r, part in new.items() if part.word == instruction.address]:
+            del new[register]
+        born = {r: Part(instruction.address, 0, r > source) for r in sources}
+        return born | {to + r - source: part for r, part in born.items()}
+    return {to + r - source: state.parts[r] for r in sources if r in state.parts}
+
+
+def _step_on(low: int, more: int, old: Mapping[int, Part], new: dict[int, Part]) -> None:
+    """A pair of registers that is a whole word becomes so much more."""
+    one, other = old.get(low), old.get(low + 1)
+    if one is not None and other == one._replace(high=True) and not one.high:
+        moved = one._replace(more=one.more + more & 0xFFFF)
+        new[low], new[low + 1] = moved, moved._replace(high=True)
+
+
+_PART_KINDS = frozenset(("add", "subi", "sub", "inc", "dec", "adc", "sbci", "sbc", "cp", "cpc"))
+
+
+def _arithmetic(
+    name: str,
+    operands: tuple[int, ...],
+    state: State,
+    new: dict[int, Part],
+    registers: dict[int, int],
+    flags: dict[str, bool],
+) -> tuple[Part, int] | None:
+    """Of a part and a number, or of two parts. Returns the carry that it leaves, where the next instruction can use
+    it."""
+    to, part = operands[0], state.parts.get(operands[0])
+    if part is None and name in ("add", "adc"):
+        part, number = state.parts.get(operands[1]), state.registers.get(to)
+    else:
+        number = _number(name, operands, state)
+    if part is None:
+        return None
+    other = state.parts.get(operands[1]) if name in ("sub", "cp", "cpc") else None
+    if other is not None:
+        _difference_of(name, to, part, other, state, registers, flags)
+        return None
+    if number is None or name in ("cp", "cpc"):
+        return None
+    if name in ("add", "subi", "sub", "inc", "dec"):
+        if part.high:
+            return None
+        new[to] = part._replace(more=part.more + number & 0xFFFF)
+        return None if name in ("inc", "dec") else (part, number)
+    if part.high and state.carried is not None and state.carried[0] == part._replace(high=False):
+        whole = part._replace(more=part.more + state.carried[1] + (number << 8) & 0xFFFF)
+        new[to] = whole
+        low = part._replace(more=part.more + state.carried[1] & 0xFFFF, high=False)
+        new.update({r: whole._replace(high=False) for r, one in list(new.items()) if one == low})
+    return None
+
+
+def _number(name: str, operands: tuple[int, ...], state: State) -> int | None:
+    """What an instruction adds, if that is known."""
+    if name in ("inc", "dec"):
+        return 1 if name == "inc" else -1
+    number = operands[1] if name in ("subi", "sbci") else state.registers.get(operands[1])
+    return number if number is None or name in ("add", "adc") else -number
+
+
+def _difference_of(
+    name: str, to: int, one: Part, other: Part, state: State, registers: dict[int, int], flags: dict[str, bool]
+) -> None:
+    """What is known of the difference of two bytes of the same word."""
+    if one.word != other.word or one.high != other.high:
+        return
+    more = one.more - other.more & 0xFFFF
+    if not one.high and name in ("sub", "cp"):
+        flags["Z"] = more & 0xFF == 0
+        if name == "sub":
+            registers[to] = more & 0xFF
+    elif one.high and name == "cpc" and "Z" in state.flags and (more == 0 or not state.flags["Z"] or more & 0xFF == 0):
+        flags["Z"] = state.flags["Z"] and more == 0
+
+
+def _pointer(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple[int, int]]:
+    """The pair of registers with which an instruction steps on through memory."""
+    low, change = operands[:2] if name == "st" else operands[1:3] if name in ("ld", "lpm") else (0, 0)
+    held = state.word(low)
+    if change and held is not None:
+        moved = held + change & 0xFFFF
+        yield from (
+            (r, byte) for r, byte in ((low, moved & 0xFF), (low + 1, moved >> 8)) if name == "st" or r != operands[0]
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,14 @@
 """What the pieces of a board's work cost, from its image alone: tasks, what is around them, interrupts, edges, frames.
 
-The main loop does one thing in each pass: a slot's tasks; if no slot waits, the encoders' changes; if none of these do,
-one received frame. So frames are background work. A slot waits for one of them at most, which the main loop was at when
-the slot began; how many can be worked off is a question of what slots and interrupts leave.
+The main loop does in each pass a slot's tasks; or, if no slot waits, it works off pin changes and then one received
+frame. So frames are background work. A slot waits for one of them at most, which the main loop was at when the slot
+began; how many can be worked off is a question of what slots and interrupts leave.
 
-A slot begins with the changes of the encoders. What looking for them costs when there are none is the slot's; what
-each takes more is counted with the interrupt that brings it: otherwise each slot would be taken to find the ring full.
+A slot begins with the pin changes. What looking for them costs when there are none is the slot's; what each takes more
+is counted with the interrupt that brings it: otherwise each slot would be taken to find the ring full.
+
+A task that has no bound (it calls a library routine that has none) is taken to need its budget; `unbounded` says why it
+has none. Nobody has proven that it keeps its budget: the emulator looks whether it does.
 
 For this some functions of the firmware must be functions of the image too (SCHEDULER is refused otherwise, the others
 are then counted with all that they can find): they are kept from being in line where they are declared. What a compiler
@@ -16,13 +19,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import ENTRY, Blocked
 from boebot.timing.constants import Context, Known
 from boebot.timing.latency import Latencies
-from boebot.timing.loads import ENCODERS, RECEIVE, TICK, Load
+from boebot.timing.loads import ENCODERS, RECEIVE, SEND, SENT_WHILE_BUSY, Load
 from boebot.timing.loops import Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Block, Function, Program, TaskRow
@@ -32,11 +35,9 @@ from boebot.timing.wcet import Bound, WorstCase
 
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
 AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task that runs
-ENCODER_POLL, LINK_POLL = "encoder_poll", "link_poll"
-TAKE, DECODE, ROOM = "link_take_frame", "frame_decode_end", "hal_serial_room"  # parts of a poll of the link
-RARE, WHEEL, OTHER, BACK = "keep_limit", "see_wheel", "see_other", "take_back"  # parts of a poll of the encoders
+CHANGES_POLL, LINK_POLL = "pin_changes_poll", "link_poll"
+WHEEL = "encoder_edge"  # called for each edge of a change
 SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the scheduler does
-PIECES = 2  # passes of loops of TAKE that are not over bytes
 
 
 class Given(WorstCase):
@@ -55,20 +56,54 @@ class Given(WorstCase):
 class Costs:
     """Cycles of each piece."""
 
-    tasks: dict[str, int]
+    tasks: dict[str, int]  # the bound; where there is none, the budget
+    unbounded: dict[str, str]  # tasks without a bound, and why they have none
     interrupts: dict[str, int]  # from acceptance to the end of RETI
     charged: dict[str, int]  # the same less the received bytes that they take, of which each is charged to its own
-    latencies: dict[str, int]  # from request to acceptance, under this load
+    heeding: frozenset[str]  # interrupts that take no byte while the receive interrupt is off
+    latencies: dict[str, int | None]  # from request to acceptance, under this load; None: of a byte that may be lost
     loop: int  # a pass of the main loop, without what it does in it
     round: int  # such a pass, with the scheduler around a slot's tasks
     around: int  # one task's share of the scheduler
     frame: int  # to work off one frame
-    partial: int  # to take bytes and find no whole frame
-    edges: int  # to look for edges
+    edges: int  # to look for pin changes
     change: int  # more, to work off one
-    other: int  # more, when it is the light sensor's, and lines come back
-    storm: int  # more, to stop a line that comes too often; 0: under this load none does
     changes_due: int  # so many changes the main loop works off between slots; fewer wait
+    found_by: Latencies | None = field(default=None, compare=False, repr=False)
+
+    def under(self, program: Program, load: Load) -> Costs:
+        """The same under another load, on which only the latencies depend."""
+        blocked = Blocked(program) if self.found_by is None else self.found_by.blocked
+        found = Latencies(blocked, _requests(program, load), self.found_by)
+        return replace(self, latencies=_latencies(program, load, found), found_by=found)
+
+    def busy(self, program: Program, load: Load) -> list[Source]:
+        """What comes while slots keep the main loop busy: of an overload no more bytes than the receive ring has room
+        for and one poll takes from it. One byte more finds it full.
+
+        Others may read bytes even then, but for those that look whether the interrupt is on (`heeding`). So each of
+        their runs is charged with all that it takes.
+
+        And no more bytes leave than the send ring held, than that poll may have answered, and than the tasks of each
+        tick send.
+        """
+        found = self.sources(program, load)
+        if not load.is_overload:
+            return found
+        said = program.constants
+        rows = {row.name: row for row in program.table.interrupts}
+        most = said.receive_ring + 1 + said.poll_bytes
+
+        def busy(one: Source) -> Source:
+            if one.name not in rows:
+                return one
+            if rows[one.name].vector == SEND:
+                return replace(one, parts=SENT_WHILE_BUSY)
+            if rows[one.name].vector == RECEIVE:
+                return replace(one, most=most)
+            return one if one.name in self.heeding else replace(one, cycles=self.interrupts[one.name])
+
+        return [busy(one) for one in found]
 
     def requested(self, program: Program, load: Load) -> list[Source]:
         """The interrupts under a load."""
@@ -78,15 +113,13 @@ class Costs:
         """The interrupts under a load, and the edges that they leave to the main loop."""
         found = self.requested(program, load)
         if self.change:
-            found += [replace(one, name="edges worked off") for one in self._changes(program, load, self.change)]
-            found += [Source("light's edge worked off", self.other, 2 * TICK)] if self.other else []
-            found += [Source("line stopped", self.storm, TICK)] if self.storm else []
+            found += [replace(one, name="changes worked off") for one in self._changes(program, load, self.change)]
         return found
 
     def between(self, program: Program, load: Load) -> list[Source]:
-        """What the main loop does besides when no slot waits: it looks for edges when so many are due."""
+        """What the main loop does besides when no slot waits: it looks for changes when so many are due."""
         return [
-            replace(one, name="looks for edges")
+            replace(one, name="looks for changes")
             for one in self._changes(program, load, -(-(self.loop + self.edges) // self.changes_due))
         ]
 
@@ -98,17 +131,18 @@ class Costs:
     def of_frames(self, load: Load) -> Source:
         """Frames, the shortest. The link is looked at twice for each: at one of its two delimiters in vain."""
         interval = load.byte_interval * load.frame_least
-        return Source("frames", 2 * self.loop + self.partial + self.frame, interval, bursts=load.frame_bursts)
+        return Source("frames", 2 * (self.loop + self.frame), interval, bursts=load.frame_bursts)
 
     @property
     def idle(self) -> int:
-        """What a slot may find when there is no frame: the main loop works off edges that have just become due."""
-        return self.loop + self.edges + self.changes_due * self.change + self.other + self.storm
+        """What a slot may find when there is no frame: the main loop works off changes that have just become due."""
+        return self.loop + self.edges + self.changes_due * self.change
 
     @property
     def blocking(self) -> int:
-        """The most that a slot may find: or the main loop is at a frame, and has left edges that were not due."""
-        return max(self.idle, self.loop + self.frame + (self.changes_due - 1) * self.change + self.other + self.storm)
+        """The most that a slot may find: the main loop works off changes that have just become due, and then a
+        frame."""
+        return self.idle + self.frame
 
     def schedule(self, program: Program) -> Schedule:
         """The slots of a whole cycle."""
@@ -136,118 +170,79 @@ def costs(program: Program, load: Load, progress: Callable[[float], None] = lamb
         progress: called with the share of tasks and interrupts that are done, 0 to 1.
 
     Raises:
-        TimingError: a task or the scheduler is no function, or has no bound.
+        TimingError: a task is no function; or an interrupt, the scheduler or a poll of the main loop has no bound.
     """
     worst, table = WorstCase(program), program.table
-    tasks, interrupts, waits = {}, {}, {}
+    tasks, interrupts = {}, {}
+    unbounded: dict[str, str] = {}
     rows = len(table.tasks) + len(table.interrupts)
     for done, task in enumerate(table.tasks, 1):
-        tasks[task.name] = worst.bound(task_entry(program, task.name)).cycles
+        if entry_of(program, f"{task.name}_task") is None and unbounded:  # behind one that never returns
+            raise TimingError(next(iter(unbounded.values())))
+        entry = task_entry(program, task.name)
+        try:
+            tasks[task.name] = worst.bound(entry).cycles
+        except TimingError as error:
+            tasks[task.name], unbounded[task.name] = task.budget, str(error)
         progress(done / rows)
-    latencies = Latencies(Blocked(program, worst), {row.vector: load.sources(row, 1) for row in table.interrupts})
     for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
         interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
-        waits[row.name] = latencies.of(row.vector)
         progress(done / rows)
-    waited = next((waits[row.name] for row in table.interrupts if row.vector == ENCODERS), 0)
-    storm = not load.is_calm(waited, program.constants)
-    edges = _edges(program, storm)
-    loop, scheduler = _rounds(program, edges.nothing)
+    latencies = Latencies(Blocked(program, worst), _requests(program, load))
+    charged, heeding = _charged(worst, interrupts)
+    edges, change = _edges(program)
+    loop, scheduler = _rounds(program, edges)
     return Costs(
         tasks=tasks,
+        unbounded=unbounded,
         interrupts=interrupts,
-        charged=_charged(worst, interrupts),
-        latencies=waits,
+        charged=charged,
+        heeding=heeding,
+        latencies=_latencies(program, load, latencies),
         loop=loop,
         round=loop + scheduler,
         around=sum(worst.bound(entry).cycles for entry in entries_of(program, AROUND_TASK)),
         frame=sum(worst.bound(entry).cycles for entry in entries_of(program, (LINK_POLL,))),
-        partial=_partial(program),
-        edges=edges.nothing,
-        change=edges.each,
-        other=edges.other,
-        storm=edges.storm,
+        edges=edges,
+        change=change,
         changes_due=program.constants.changes_due,
+        found_by=latencies,
     )
 
 
-def _charged(worst: WorstCase, interrupts: Mapping[str, int]) -> dict[str, int]:
+def _requests(program: Program, load: Load) -> dict[int, list[Source]]:
+    return {row.vector: load.requests(row, program) for row in program.table.interrupts}
+
+
+def _latencies(program: Program, load: Load, found: Latencies) -> dict[str, int | None]:
+    """Of a byte none, where bytes may be lost."""
+    rows = program.table.interrupts
+    return {row.name: None if load.is_overload and row.vector == RECEIVE else found.of(row.vector) for row in rows}
+
+
+def _charged(worst: WorstCase, interrupts: Mapping[str, int]) -> tuple[dict[str, int], frozenset[str]]:
+    """See `Costs.charged` and `Costs.heeding`."""
     rows = worst.program.table.interrupts
     each = next((interrupts[row.name] for row in rows if row.vector == RECEIVE), 0)
-    others = {row.name: Taken(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
-    taking = {name: taken.charged(each) for name, taken in others.items() if taken.takes}
-    return {**interrupts, **taking}
+    found = {row.name: Taken(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
+    taking = {name: taken for name, taken in found.items() if taken.takes}
+    charged = {name: taken.charged(each) for name, taken in taking.items()}
+    return {**interrupts, **charged}, frozenset(name for name, taken in taking.items() if taken.heeds_switch)
 
 
-@dataclass(frozen=True, slots=True)
-class _Edges:
-    """A poll of the encoders: what it takes when nothing waits, more for each edge, for the light sensor's, and to stop
-    a line. All 0 where there is none."""
+def _edges(program: Program) -> tuple[int, int]:
+    """A poll of the pin changes: what it takes when nothing waits, and more for each change. 0: there is none.
 
-    nothing: int = 0
-    each: int = 0
-    other: int = 0
-    storm: int = 0
-
-
-def _edges(program: Program, storm: bool) -> _Edges:
-    """Lines are stopped in functions of its own, outside its loop or RARE; where none ever is, they are not called.
-
-    BACK is one of these: lines come back that were stopped or switched off. The task that switches them on calls it
-    itself, and leaves it to the next poll only where a change waits. A line that was off brings none: it is the light
-    sensor's edge, with which it is counted.
-
-    A change that is one edge calls WHEEL once. In one that is several, each of them has been charged a whole change.
+    A change that is an edge of one wheel calls WHEEL once. In one that is an edge of both, each of them has been
+    charged a whole change.
     """
-    entry = entry_of(program, ENCODER_POLL)
+    entry = entry_of(program, CHANGES_POLL)
     if entry is None:
-        return _Edges()
-    blocks, inside = program.functions[entry].blocks, _in_loops(program.functions[entry])
-    outside = {callee for start, block in blocks.items() if start not in inside for callee in block.calls}
-    rare, wheel, other, back = (entries_of(program, (name,)) for name in (RARE, WHEEL, OTHER, BACK))
-    calm = dict.fromkeys((*outside, *rare, *wheel, *other), 0)
-    none, one, two = (Given(passed(program, entry, passes), calm).bound(entry).cycles for passes in (0, 1, 2))
-    each = Given(program, dict.fromkeys(rare, 0))
-    return _Edges(
-        nothing=none,
-        each=max(one - none, two - one) + sum(each.bound(callee).cycles for callee in wheel),
-        other=sum(WorstCase(program).bound(callee).cycles for callee in (*other, *(back if other else ()))),
-        storm=sum(WorstCase(program).bound(callee).cycles for callee in (*outside, *rare)) if storm else 0,
-    )
-
-
-def _partial(program: Program) -> int:
-    """A poll of the link that takes some bytes and finds no whole frame. 0: there is none.
-
-    The time for each of those bytes is counted with its frame.
-    """
-    entry, take = entry_of(program, LINK_POLL), entry_of(program, TAKE)
-    if entry is None:
-        return 0
-    if take is None:  # in line: what finds no frame cannot be told from what finds one
-        return WorstCase(program).bound(entry).cycles
-    decode = dict.fromkeys(entries_of(program, (DECODE,)), 0)
-    room = {callee: WorstCase(program).bound(callee).cycles for callee in entries_of(program, (ROOM,))}
-    taken = Given(passed(program, take, 1, above=PIECES), decode).bound(take).cycles
-    return _nothing(program, entry, room | {take: taken})
-
-
-def _nothing(program: Program, entry: int, calls: Mapping[int, int]) -> int:
-    """The longest way through a function that enters no loop and calls nothing but what takes so many cycles: what it
-    takes when nothing waits. Where there is none: its bound."""
-    worst = Given(program, calls)
-    known = worst.inside(entry)
-    function = known.function
-    inside = _in_loops(function)
-    open_ = {
-        start for start, block in function.blocks.items() if start not in inside and calls.keys() >= set(block.calls)
-    }
-    ways: dict[int, list[Way[int]]] = {}
-    for start in open_:
-        found = worst.ways(function.blocks[start], known)
-        ways[start] = [way for way in found if way.to is None or way.to in open_]
-    walk = longest(Graph(entry, ways, program.where)) if entry in open_ else None
-    return walk.cycles if walk is not None else WorstCase(program).bound(entry).cycles
+        return 0, 0
+    wheel = entries_of(program, (WHEEL,))
+    once = dict.fromkeys(wheel, 0)
+    none, one, two = (Given(_passed(program, entry, passes), once).bound(entry).cycles for passes in (0, 1, 2))
+    return none, max(one - none, two - one) + sum(WorstCase(program).bound(callee).cycles for callee in wheel)
 
 
 def _rounds(program: Program, edges: int) -> tuple[int, int]:
@@ -263,9 +258,9 @@ def _rounds(program: Program, edges: int) -> tuple[int, int]:
         )
     names = (*(f"{row.name}_task" for row in program.table.tasks), *AROUND_TASK)
     elsewhere = dict.fromkeys(entries_of(program, names), 0)
-    polls = dict.fromkeys(entries_of(program, (ENCODER_POLL, LINK_POLL)), edges)
+    polls = dict.fromkeys(entries_of(program, (CHANGES_POLL, LINK_POLL)), edges)
     alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
-    cycles = Given(passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
+    cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
     loop = entry_of(program, LOOP)
     if loop is None:
@@ -323,18 +318,12 @@ def _loops(function: Function) -> list[Loop[int]]:
     return natural_loops(reverse_postorder(function.entry, successors), successors)
 
 
-def _in_loops(function: Function) -> set[int]:
-    return {node for loop in _loops(function) for node in loop.nodes}
-
-
-def passed(program: Program, entry: int, passes: int, above: int = 0) -> Program:
-    """The program with each loop of a function passed so often at most, if it is bounded by more than `above`."""
+def _passed(program: Program, entry: int, passes: int) -> Program:
+    """The program with each loop of a function that has a bound in the source passed so often at most."""
     blocks = program.functions[entry].blocks.values()
     own = {instruction.address for block in blocks for instruction in block.instructions}
     bounds = [
-        replace(one, passes=min(one.passes, passes))
-        if one.address in own and one.passes is not None and one.passes > above
-        else one
+        replace(one, passes=min(one.passes, passes)) if one.address in own and one.passes is not None else one
         for one in program.bounds
     ]
     return replace(program, bounds=tuple(bounds))

@@ -11,16 +11,16 @@ from __future__ import annotations
 
 from boebot.timing.constants import Known, State, once_round
 from boebot.timing.loops import Loop
-from boebot.timing.program import Block, Function, Instruction
+from boebot.timing.program import Block, Function, Instruction, Program
 from boebot.timing.registers import KEEPS_FLAGS, before, written
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
-MOST_WORKED = 4096  # passes that are worked through
+MOST_WORKED = 1024  # passes that are worked through
 SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
 CALLS = frozenset(("call", "rcall", "icall"))
 
 
-def passes(loop: Loop[int], known: Known) -> int | None:
+def passes(loop: Loop[int], known: Known, program: Program) -> int | None:
     """How often the header runs at most for each entry of the loop; None if its code does not show it."""
     function = known.function
     entering = _entering(loop, known)
@@ -29,7 +29,7 @@ def passes(loop: Loop[int], known: Known) -> int | None:
     for start in loop.nodes - inner:
         block = function.blocks[start]
         if any(edge.to not in loop.nodes for edge in block.edges) and in_every_pass(start, loop, function):
-            count = _counted(block, loop, known, entering)
+            count = _counted(block, loop, known, entering, program)
             if count is not None:
                 found.append(count)
     return min(found, default=None)
@@ -44,10 +44,10 @@ def worked(loop: Loop[int], known: Known) -> int | None:
 
 def _worked(loop: Loop[int], function: Function, state: State) -> int | None:
     for count in range(1, MOST_WORKED + 1):
-        after = once_round(function, loop.header, loop.nodes, state)
+        after, decided = once_round(function, loop.header, loop.nodes, state)
         if after is None:
             return count
-        if after == state:  # all passes are like this one
+        if after == state or not decided:  # all passes are like this one, or may be for all that is known
             return None
         state = after
     return None
@@ -55,7 +55,8 @@ def _worked(loop: Loop[int], function: Function, state: State) -> int | None:
 
 def _entering(loop: Loop[int], known: Known) -> list[State]:
     """What is known on each way into a loop."""
-    found = [known.behind(block) for block in before(known.function)[loop.header] if block.start not in loop.nodes]
+    blocks = before(known.function)[loop.header]
+    found = [known.behind(block, loop.header) for block in blocks if block.start not in loop.nodes]
     if loop.header == known.function.entry:
         found.append(State(dict(known.context)))
     return found
@@ -77,7 +78,7 @@ def in_every_pass(start: int, loop: Loop[int], function: Function) -> bool:
     return True
 
 
-def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State]) -> int | None:
+def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State], program: Program) -> int | None:
     branch = block.instructions[-1]
     if branch.mnemonic not in ("brne", "breq", "brpl", "brmi", "brcc", "brcs") or len(block.edges) != 2:
         return None
@@ -89,7 +90,8 @@ def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State])
         for instruction in known.function.blocks[start].instructions:
             if instruction in instructions:
                 continue
-            if not written(instruction).isdisjoint(registers) or instruction.mnemonic in CALLS:
+            changed = program.clobbered(known.function.blocks[start]) if instruction.mnemonic in CALLS else None
+            if not (written(instruction) if changed is None else changed).isdisjoint(registers):
                 return None
     stays = branch.operands[-1] in loop.nodes
     counts: list[int] = []

@@ -1,8 +1,7 @@
 """Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
 
 What is taken: the bytes of the flash, symbols, the sizes of flash and RAM, source lines and the sections in which the
-firmware describes itself, `.boebot.timing`, `.boebot.loops`, `.boebot.entries` and `.boebot.ids`. The file need not
-have the last five.
+firmware describes itself, `.boebot.timing` and `.boebot.loops`. The file need not have the last three.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import TimingError
-from boebot.timing.program import IdPlace, LoopBound, Table
+from boebot.timing.program import LoopBound, Table
 from boebot.timing.source_lines import source_lines
 from boebot.timing.table import SECTION, table_of
 
@@ -30,7 +29,6 @@ DATA_SPACE = 0x800000
 EM_AVR = "EM_AVR"
 PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
 NOT_SAID = 0xFFFFFFFF
-REGISTERS = 32
 # What pyelftools raises on a damaged file.
 DAMAGE: tuple[type[Exception], ...] = (
     *(ELFError, DWARFError, ConstructError, struct.error, ValueError, LookupError),
@@ -61,14 +59,11 @@ class Image:
     symbols: tuple[Symbol, ...]  # those of flash, by address
     flash_bytes: int  # written to flash: code, constants, initial values of variables
     ram_bytes: int  # of all variables
-    variables: dict[str, int]  # bytes of each variable that has a name
     ram_end: int  # first address behind the last variable
     stack_start: int  # first value of the stack pointer
     lines: dict[int, str] = field(default_factory=dict)
     table: Table = field(default_factory=Table)
     bounds: tuple[LoopBound, ...] = ()
-    ids: tuple[IdPlace, ...] = ()
-    entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
 
 
 def read_image(path: Path) -> Image:
@@ -100,9 +95,6 @@ def _image(path: Path, elf: ELFFile) -> Image:
     code, written = _flash(path, elf)
     ram = _ram(elf)
     symbols, stack_start = _symbols(elf)
-    entries = _entries(path, _section(path, elf, ".boebot.entries"), len(code))
-    bounds = _bounds(path, _section(path, elf, ".boebot.loops"), entries, len(code))
-    told = {bound.address for bound in bounds}
     return Image(
         path=str(path),
         code=code,
@@ -111,14 +103,11 @@ def _image(path: Path, elf: ELFFile) -> Image:
         symbols=symbols,
         flash_bytes=written,
         ram_bytes=sum(size for _, size in ram),
-        variables=_variables(elf),
         ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
         stack_start=stack_start,
         lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
-        bounds=bounds,
-        entries={address: line for address, line in entries.items() if address not in told},
-        ids=_ids(path, _section(path, elf, ".boebot.ids"), len(code)),
+        bounds=_bounds(path, _section(path, elf, ".boebot.loops"), len(code)),
     )
 
 
@@ -190,17 +179,6 @@ def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
     return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
 
 
-def _variables(elf: ELFFile) -> dict[str, int]:
-    """Sizes of the variables in RAM, by name without what a compiler appends (`.lto_priv.3`)."""
-    return {
-        symbol.name.partition(".")[0]: symbol["st_size"]
-        for section in elf.iter_sections()
-        if isinstance(section, SymbolTableSection)
-        for symbol in section.iter_symbols()
-        if symbol["st_info"]["type"] == "STT_OBJECT" and RAM_START <= symbol["st_value"] < RAM_END
-    }
-
-
 def _section(path: Path, elf: ELFFile, name: str) -> bytes:
     section = elf.get_section_by_name(name)
     if section is None:
@@ -211,42 +189,14 @@ def _section(path: Path, elf: ELFFile, name: str) -> bytes:
     return data
 
 
-def _bounds(path: Path, data: bytes, entries: dict[int, int], end: int) -> tuple[LoopBound, ...]:
+def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
     """The records of `.boebot.loops`: address in a loop's body, most passes, most cycles, of 32 bits each."""
     if len(data) % 12:
         raise TimingError(f"{path}: section .boebot.loops has {len(data)} bytes: records of 12 bytes are expected")
     bounds = []
     for address, passes, cycles in struct.iter_unpack("<III", data):
-        _check_place(path, address, end)
+        if address >= end or address % 2:
+            raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")
         most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
-        bounds.append(LoopBound(address, most, longest, entries.get(address, 0)))
+        bounds.append(LoopBound(address, most, longest))
     return tuple(bounds)
-
-
-def _ids(path: Path, data: bytes, end: int) -> tuple[IdPlace, ...]:
-    """The records of `.boebot.ids`: address behind an instruction, register that holds a message's id; 32 bits each."""
-    if len(data) % 8:
-        raise TimingError(f"{path}: section .boebot.ids has {len(data)} bytes: records of 8 bytes are expected")
-    places = [IdPlace(address, register) for address, register in struct.iter_unpack("<II", data)]
-    for place in places:
-        if place.address >= end or place.address % 2 or place.register >= REGISTERS:
-            raise TimingError(
-                f"{path}: a message's id is said to be in register {place.register} at 0x{place.address:X}; expected "
-                f"one of {REGISTERS} registers and an instruction's address"
-            )
-    return tuple(places)
-
-
-def _entries(path: Path, data: bytes, end: int) -> dict[int, int]:
-    """The records of `.boebot.entries`, of 32 bits each: address of a loop's entry or bound, line of the loop."""
-    if len(data) % 8:
-        raise TimingError(f"{path}: section .boebot.entries has {len(data)} bytes: records of 8 bytes are expected")
-    entries = dict(struct.iter_unpack("<II", data))
-    for address in entries:
-        _check_place(path, address, end)
-    return entries
-
-
-def _check_place(path: Path, address: int, end: int) -> None:
-    if address >= end or address % 2:
-        raise TimingError(f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction")

@@ -8,8 +8,9 @@ instructions say, so nothing depends on the compiler:
 * `rcall .+0` makes room for two bytes on the stack and is no call: an instruction like others, which ends no block.
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
 * What writes registers, the stack pointer or SREG by their data addresses is refused.
-* Where `ijmp` and `icall` lead is found by `jumps`, or refused.
-* Loops with several entries get one each, by copies of blocks (split.py); halves of a loop become one (joined.py).
+* Where `ijmp` and `icall` lead is found by `jumps`. A function for which it is not found (Program.unproven) has no
+bound:
+  what is known of it is followed, as if its `icall` returned and its `ijmp` left it.
 
 The vectors are functions too: that of interrupt N is at address 4·N, with the jump to `__vector_N` as its tail call, so
 that its time is that of the interrupt from the end of the entry's four cycles.
@@ -19,17 +20,15 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from boebot.errors import TimingError
 from boebot.timing.elf import Image, Symbol, read_image
 from boebot.timing.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
-from boebot.timing.joined import joined
 from boebot.timing.jumps import NotProvenError, Step, targets_of
 from boebot.timing.program import Block, Edge, Function, Instruction, Program
-from boebot.timing.registers import REGISTERS
-from boebot.timing.split import reducible
+from boebot.timing.registers import CALL_CLOBBERED, REGISTERS, written
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
@@ -44,17 +43,38 @@ def load_program(path: Path) -> Program:
 def program_of(image: Image) -> Program:
     """The program of an image. Raises TimingError where the code cannot be followed."""
     names = _Names(image)
-    program = Program(str(image.path), {}, {}, image.bounds, image.entries, image.table, image.lines, image.ids)
+    program = Program(str(image.path), {}, {}, image.bounds, image.table, image.lines)
     explorer = _Explorer(image, names, program)
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
-        blocks = joined(reducible(_blocks(draft), entry), entry, program)
-        program.functions[entry] = Function(names.of(entry), entry, blocks)
+        program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
+    for entry in list(program.functions):
+        _note_clobbers(program, entry)
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:
             program.by_name.setdefault(symbol.name, symbol.address)
     return program
+
+
+def _note_clobbers(program: Program, entry: int) -> frozenset[int]:
+    """What a call of a function changes: the compiler knows of its library's routines that they leave some registers
+    alone which others need not keep."""
+    function = program.functions[entry]
+    if function.clobbers is not None:
+        return function.clobbers
+    program.functions[entry] = replace(
+        function, clobbers=CALL_CLOBBERED
+    )  # while it is worked out: of what calls itself
+    changed = set(CALL_CLOBBERED) if entry in program.unproven else set[int]()
+    for block in function.blocks.values():
+        for instruction in block.instructions[: -1 if block.calls else None]:
+            changed |= written(instruction)
+        for callee in block.calls:
+            changed |= _note_clobbers(program, callee)
+    found = CALL_CLOBBERED.intersection(changed)
+    program.functions[entry] = replace(function, clobbers=found)
+    return found
 
 
 class _Names:
@@ -114,6 +134,7 @@ class _Explorer:
         self.waiting: dict[int, list[tuple[_Draft, int]]] = defaultdict(list)  # calls and tail calls of the others
         self.work: list[tuple[_Draft, int]] = []  # addresses to follow
         self.entries = set(names.functions)
+        self.unproven = program.unproven
 
     def follow(self) -> None:
         self._begin(self.image.entry)
@@ -252,9 +273,8 @@ class _Explorer:
         try:
             targets = targets_of(self.image.code, self._way_to(draft, address))
         except NotProvenError as error:
-            name = flow.instruction.mnemonic
-            text = f"where `{name}` leads cannot be proven: {error}"
-            raise self._refusal(address, f"{text}; expected a call by name, or a table with a limited index") from error
+            self._leads_anywhere(draft, flow, str(error))
+            return
         if targets == draft.computed[address]:
             return
         draft.computed[address] = targets
@@ -263,6 +283,17 @@ class _Explorer:
             known = self._jump(draft, flow.instruction, sorted(targets))
         draft.flows[address] = known
         self._leave(draft, known)
+
+    def _leads_anywhere(self, draft: _Draft, flow: _Flow, why: str) -> None:
+        """Goes on behind a computed call of which it is not known where it leads, and notes it."""
+        name, address = flow.instruction.mnemonic, flow.instruction.address
+        text = f"where `{name}` leads cannot be proven: {why}; expected a call by name, or a table with a limited index"
+        self.unproven[draft.entry] = str(self._refusal(address, text))
+        del draft.computed[address]
+        if name == "ijmp":
+            self._returns(draft.entry)
+        else:
+            self._come_back(draft, address)
 
     def _way_to(self, draft: _Draft, address: int) -> list[Step]:
         """The instructions that always run before the one at `address`, as far back as there is only one way."""

@@ -31,7 +31,7 @@ from collections.abc import Mapping, Sequence
 
 from boebot.errors import TimingError
 from boebot.timing.blocked import Blocked
-from boebot.timing.loads import APART, RECEIVE, densest
+from boebot.timing.loads import APART, NEVER_NEAR, RECEIVE, densest
 from boebot.timing.received import Line, Other, longest_wait
 from boebot.timing.response import Source
 from boebot.timing.steps import Steps
@@ -46,9 +46,13 @@ class Latencies:
     `requests`: by vector, what asks for it, at most; those of `densest`, where not given.
     """
 
-    def __init__(self, blocked: Blocked, requests: Mapping[int, Sequence[Source]] | None = None) -> None:
+    def __init__(
+        self, blocked: Blocked, requests: Mapping[int, Sequence[Source]] | None = None, like: Latencies | None = None
+    ) -> None:
+        """`like`: those of the same image with other requests, of which all is taken that does not depend on these."""
         self.blocked = blocked
-        self.steps = Steps(blocked)
+        self.steps: Steps = Steps(blocked) if like is None else like.steps
+        self.taken: dict[int, Taken] = {} if like is None else like.taken
         self.spans = {vector: blocked.interrupt(vector) for vector in blocked.vectors()}
         rows = blocked.program.table.interrupts
         self.requests = {row.vector: densest(row, blocked.program) for row in rows} if requests is None else requests
@@ -78,19 +82,28 @@ class Latencies:
 
     def _received(self, higher: Sequence[int], lower: int) -> int:
         """Of a byte, which the receiver keeps until somebody takes it."""
-        worst = self.blocked.worst_case
         others: dict[int, Other] = {}
         for number in higher:
             if (latency := self.of(number)) >= HORIZON:
                 return HORIZON
-            others[number] = Other(Taken(worst, 4 * number), self.requests[number], latency, self.spans[number][0])
+            others[number] = Other(self._taken(number), self.requests[number], latency, self.spans[number][0])
         inner = any(self.spans[number][1] is not None for number in higher)
 
         def steps(count: int) -> int:
             return self.steps.most(count, count if inner else 0)
 
-        line = Line(Taken(worst, 4 * RECEIVE), self.requests[RECEIVE], others, lower, steps)
-        return longest_wait(line, HORIZON)
+        own = self._taken(RECEIVE)
+
+        def wait(without: int) -> int:
+            near = {number: other for number, other in others.items() if number != without}
+            return longest_wait(Line(own, self.requests[RECEIVE], near, lower, steps), HORIZON)
+
+        return max(map(wait, NEVER_NEAR))
+
+    def _taken(self, vector: int) -> Taken:
+        if vector not in self.taken:
+            self.taken[vector] = Taken(self.blocked.worst_case, 4 * vector)
+        return self.taken[vector]
 
     def _behind(self, begun: int, higher: Sequence[int]) -> int:
         """The wait where one that takes so long has just begun."""

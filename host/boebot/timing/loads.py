@@ -1,8 +1,9 @@
 """What the interrupts of a board are asked for: the loads that its timing is judged under.
 
 A load says how often each interrupt comes; for one that it does not name, the image's own table says how often it can.
-The two stand for use as it is meant, with every usual device at its fastest, and for the most that the line and four
-encoder lines can bring.
+"figures" is use as it is meant, with every usual device at its fastest; then nothing is lost. "everything" has the
+other devices, too. "overload" is more than can be worked off: the most that the line and four encoder lines can bring,
+and noise on one of these. Then the tick and the pulses of the servos are kept, and bytes and edges may be lost.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ from dataclasses import dataclass, field, replace
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.timing.program import Constants, InterruptRow, Program
-from boebot.timing.response import Source
+from boebot.timing.program import InterruptRow, Program
+from boebot.timing.response import Source, Spell
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s
 # Vectors of the ATmega328P (data sheet, table 12-6), numbered as in __vector_N.
 ENCODERS, STAMP, WATCHDOG, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 6, 7, 10, 11, 12, 14
 RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
+VECTORS = 25
 
 _TELEMETRY = messages.Telemetry.LENGTH + FRAME_OVERHEAD
 _DEVICES = messages.DevicesTelemetry.LENGTH + FRAME_OVERHEAD
@@ -40,11 +42,17 @@ class Stream:
     interval: int = 0
     bursts: tuple[tuple[int, int], ...] = ()
     close: int = 0
+    parts: tuple[tuple[int, int], ...] = ()  # together at most the sum of n in each period
+    spells: tuple[Spell, ...] = ()  # of a servo frame, in which alone they come
 
     def source(self, row: InterruptRow, cycles: int) -> Source:
         """As what asks for an interrupt of so many cycles."""
         interval = self.interval or row.interval
-        return Source(row.name, cycles, interval, self.close * interval, self.bursts)
+        period = 2 * TICK if self.spells else 1
+        early = self.close * interval
+        return Source(
+            row.name, cycles, interval, early, self.bursts, parts=self.parts, spells=self.spells, period=period
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +60,8 @@ class Load:
     """Streams by vector, several where several lines share one; vectors in `off` are not asked for at all.
 
     The host's frames are of at least `frame_least` bytes, and come as the line carries them, or in `frame_bursts`.
+    `is_overload`: bytes and edges may be lost, and an encoder line is noisy. Interrupts in `may_be_late` may wait
+    longer than their rows of the image's table allow.
     """
 
     name: str
@@ -61,6 +71,8 @@ class Load:
     frame_least: int
     off: frozenset[int] = field(default_factory=frozenset)
     byte_interval: int = BYTE
+    is_overload: bool = False
+    may_be_late: frozenset[int] = field(default_factory=frozenset)
 
     def sources(self, row: InterruptRow, cycles: int) -> list[Source]:
         """What asks for an interrupt that takes so many cycles."""
@@ -68,43 +80,56 @@ class Load:
             return []
         return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]
 
-    @property
-    def is_full(self) -> bool:
-        """Frames come back to back."""
-        return not self.frame_bursts
-
-    def without_answers(self) -> Load:
-        """The same, where the board says what it says by itself and no more; with a tone, which frames can bring."""
-        return replace(self, streams={**self.streams, SEND: OWN_SENDING}, off=self.off - {BUZZER})
-
-    def is_calm(self, latency: int, said: Constants) -> bool:
-        """No line of the encoders is ever stopped for coming too often, when its interrupt waits so long at most: of
-        more changes than there are lines two are of one line, and a tick has no more of a line than the limit."""
-        lines = self.streams.get(ENCODERS, ())
-        closest = max(said.changes_storm * said.changes_close + latency, TICK // said.encoder_limit)
-        return 0 < len(lines) <= said.changes_storm and all(line.interval > closest for line in lines)
+    def requests(self, row: InterruptRow, program: Program) -> list[Source]:
+        """What asks for an interrupt at the worst, one by one; a noisy line stops its interrupt soon."""
+        return densest(row, program) if self.is_overload and row.vector == ENCODERS else self.sources(row, 1)
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
-# Cycles in which three of them can be: the left wheel's longest pulse ends 35,200 into slot 0, the right wheel's
-# shortest begins 8,000 into slot 1 and ends 28,800 into it; four: and the burst ends 16,000 into slot 2.
+# Cycles in which three of them can be: the left wheel's longest pulse ends 37,200 into slot 0, the right wheel's
+# shortest begins 10,000 into slot 1 and ends 30,800 into it; four: with the left pulse's beginning.
 _THREE_EDGES, _FOUR_EDGES = 33_600, 60_800
 _ECHO = 115 * 16  # the shortest, from rise to fall
 _HALF_PERIOD = 190  # of the carrier's highest frequency
 _BUS_STEP = 160  # the shortest of the two-wire bus, a bit at 100 kHz
-_BURST, _BURST_TO_BURST = 85, 39_000  # edges of the carrier in 1 ms, at its highest; bursts are in slots 2 and 3
+_BURST, _BURST_TO_BURST = 76, 39_000  # edges of the carrier in 1 ms, at its highest; bursts are in slots 2 and 3
 _COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK),))
-# In a servo frame: two edges of two wheels and of the turret, and four ends of IR bursts.
-_SERVOS_AND_BURSTS = Stream(_EDGE_TO_EDGE, ((2, _THREE_EDGES), (3, _FOUR_EDGES), (10, 2 * TICK)))
-_SWEEP = Stream(_HALF_PERIOD, ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)))
-_ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
-# What a board says by itself, at its fastest.
-OWN_SENDING = (
-    Stream(BYTE, ((_TELEMETRY, TICK),)),
-    Stream(BYTE, ((_DEVICES, 2 * TICK),)),
-    Stream(BYTE, ((_OWN, 4 * TICK),)),
-    Stream(BYTE, ((_HELLO, 20 * TICK),)),
+# In a servo frame: two edges of two wheels and of the turret.
+_SLOT_CYCLES, _RISE, _BURST_CYCLES = TICK // 4, 10_000, 16_036  # from a slot's begin to the rise (servo.c); of a burst
+_EARLY, _LATE = 2_000, 4_000  # by which a request is before what it is for, and by which it may wait
+_EDGES_OF = {0: 37_200, 1: 37_200, 4: 48_400}  # slots of the servos, and when the longest pulse ends (tasks.def)
+_SERVO_EDGES = Stream(
+    _EDGE_TO_EDGE,
+    ((2, _THREE_EDGES), (3, _FOUR_EDGES), (6, 2 * TICK)),
+    spells=tuple(
+        Spell(slot * _SLOT_CYCLES + _RISE - _EARLY, slot * _SLOT_CYCLES + end + _LATE, 2, _EDGE_TO_EDGE)
+        for slot, end in _EDGES_OF.items()
+    ),
 )
+_SWEEP = Stream(
+    _HALF_PERIOD,
+    ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)),
+    spells=tuple(
+        Spell(slot * _SLOT_CYCLES, slot * _SLOT_CYCLES + _BURST_CYCLES + _LATE, _BURST, _HALF_PERIOD)
+        for slot in (2, 3, 6, 7)
+    ),
+)
+_ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
+# What leaves while slots keep the main loop from polls: what the send ring held, 127 bytes, the answer of a poll
+# before, and one message of each task that sends in a tick, two of events.
+_EVENT = messages.Event.LENGTH + FRAME_OVERHEAD
+_ANSWERS = messages.Answer.LENGTH + FRAME_OVERHEAD
+_LONGEST = messages.Identity.LENGTH + FRAME_OVERHEAD
+_LONGEST_OF_POLL = messages.Description.LENGTH + FRAME_OVERHEAD
+SENT_WHILE_BUSY = (
+    (127 + _LONGEST_OF_POLL, 1 << 30),
+    (_TELEMETRY + _DEVICES + _OWN + _LONGEST + 2 * _EVENT + _ANSWERS, TICK),
+)
+# What a board says by itself, at its fastest.
+_SENDING = Stream(BYTE, parts=((_TELEMETRY, TICK), (_DEVICES, 2 * TICK), (_OWN, 4 * TICK), (_HELLO, 20 * TICK)))
+# 100,000 edges/s stop the interrupt after some five, and then the line until the tick ends; two ticks may be close.
+_LIGHT = Stream(2 * TICK)  # the edge of a light sensor, once in a servo frame
+_NOISE = Stream(160, ((16, TICK),))
 _DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
@@ -114,9 +139,9 @@ LOADS: dict[str, Load] = {
         "set-point each tick",
         {
             RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
-            SEND: OWN_SENDING,
+            SEND: (_SENDING,),
             ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
-            EDGE: (_SERVOS_AND_BURSTS,),
+            EDGE: (_SERVO_EDGES,),
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
@@ -124,21 +149,23 @@ LOADS: dict[str, Load] = {
         frame_least=_SET_POINT,
         off=_DEVICES_OFF,
     ),
-    "saturated": Load(
-        "saturated",
-        "the same with frames of 15 and 16 bytes back to back (longer ones would be fewer), 50,000 bytes/s each way, "
-        "four encoder lines of 4,000 edges/s",
+    "overload": Load(
+        "overload",
+        "the same with the line full both ways, 50,000 bytes/s each, four encoder lines of 4,000 edges/s, and noise of "
+        "100,000 edges/s on one",
         {
             RECEIVE: (Stream(BYTE),),
             SEND: (Stream(BYTE),),
-            ENCODERS: (Stream(16_000_000 // 4_000),) * 4,
-            EDGE: (_SERVOS_AND_BURSTS,),
+            ENCODERS: (*(Stream(16_000_000 // 4_000),) * 3, _NOISE),  # what comes on a noisy line is its noise
+            EDGE: (_SERVO_EDGES,),
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
         frame_bursts=(),
         frame_least=_REQUEST,
         off=_DEVICES_OFF,
+        is_overload=True,
+        may_be_late=frozenset(range(1, VECTORS + 1)) - {EDGE, SLOT},
     ),
 }
 LOADS["everything"] = replace(
@@ -147,12 +174,14 @@ LOADS["everything"] = replace(
     says="the load of the figures with every device built in: light, a tone of 8 kHz, compass, parameters being stored",
     streams={
         **LOADS["figures"].streams,
-        STAMP: (Stream(0, ((1, 2 * TICK),)),),
+        ENCODERS: (*LOADS["figures"].streams[ENCODERS], _LIGHT),
+        STAMP: (_LIGHT,),
         BUZZER: (Stream(),),
         EEPROM: (Stream(),),
         TWO_WIRE: (_COMPASS,),
     },
     off=frozenset({WATCHDOG}),
+    may_be_late=frozenset({RECEIVE}),  # so that no byte is lost is measured then, and not proven
 )
 
 
@@ -160,22 +189,23 @@ LOADS["everything"] = replace(
 _DENSEST: dict[int, Stream] = {
     CARRIER: _SWEEP,
     CAPTURE: _ECHOES,
-    EDGE: _SERVOS_AND_BURSTS,
+    EDGE: _SERVO_EDGES,
     SEND: Stream(close=1),  # the first byte goes on to the shift register at once
     EEPROM: Stream(close=1),  # ready when it is first asked
     TWO_WIRE: _COMPASS,
 }
 
 
-# Never together, by the slots of a servo frame (tasks.def): an exact edge of the wheels' servos meets no burst and no
-# slot's begin. (Others of the same interrupt do, and may be late: the turret's edge, the end of a burst.)
-APART = {EDGE: frozenset({CARRIER, SLOT})}
+# Never together, by the slots of a servo frame (tasks.def): no edge of a servo comes within 2,500 cycles of a burst,
+# and a burst, which begins with a slot, has ended long before the next one.
+NEVER_NEAR = (EDGE, CARRIER)
+APART = {EDGE: frozenset({CARRIER}), SLOT: frozenset({CARRIER})}
 
 
 def densest(row: InterruptRow, program: Program) -> list[Source]:
     """The most requests of an interrupt in any time, one by one."""
-    if row.vector == ENCODERS:  # with the first of a storm and those that make it one, before it masks itself
-        return [Stream(close=program.constants.changes_storm).source(row, 1)]
+    if row.vector == ENCODERS:  # those of a storm, before it masks itself
+        return [Stream(close=program.constants.changes_storm - 1).source(row, 1)]
     return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 

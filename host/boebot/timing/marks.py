@@ -1,21 +1,12 @@
 """Which bound belongs to which loop of the machine code, and which of its blocks it counts.
 
-A row of `.boebot.loops` counts how often its address runs for each entry of its loop. Where the image tells the
-instructions at which that loop is entered (`.boebot.entries`), it counts so in every loop that none of them is in;
-what the compiler did is no matter.
-
-Where it does not, the row belongs to the innermost loop around its address. Copies of one loop have the same line of
-the source, and rows at one address are of different loops, the outer one first: where nothing is to be done in the
+Where the code itself shows how often a loop runs (counted.py), that holds. Else a row of `.boebot.loops` does: it
+counts how often its address runs for each entry of the innermost loop around it. Copies of one row have the same line
+of the source, and rows at one address are of different loops, the outer one first: where nothing is to be done in the
 outer loop's body before the inner loop, both bodies begin at the inner loop's header. Copies of one row that run one
-after the other in one pass are of a loop within, which the compiler unrolled, and bound nothing around it. Two things
-such an ELF does not tell:
+after the other in one pass are of a loop within, which the compiler unrolled, and bound nothing around it.
 
-* A loop whose body is empty may have its row at its test, which runs once more than the body; count it there.
-* Where a loop without a bound has one with a bound in it of which the compiler left one pass only, the row seems to be
-  its own (source lines do not tell the two apart: those of branches are not reliable). So every loop of the source
-  needs a bound, not only those in which something is refused; a test of the firmware's sources keeps that.
-
-Where the code itself shows how often a loop runs (counted.py), the lesser of both holds.
+A loop whose body is empty may have its row at its test, which runs once more than the body; count it there.
 """
 
 from __future__ import annotations
@@ -24,10 +15,9 @@ from collections.abc import Hashable
 
 from boebot.timing import counted
 from boebot.timing.constants import Known
-from boebot.timing.joined import lines_at
 from boebot.timing.loops import IrreducibleError, Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Mark
-from boebot.timing.program import COPY, Function, Program
+from boebot.timing.program import Function, Program
 
 _Marks = dict[int, list[Mark]]
 _Found = list[tuple[Loop[int], Loop[int] | None]]
@@ -37,7 +27,6 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     """The bounds of a function's loops, by the blocks whose runs they count, in the context of `known`."""
     result = _said(program, function)
     whole = _with_parents(function)
-    _drop_copies(result, whole)
     for loop, parent in whole:
         if parent is not None:
             _move_out(result, loop, parent)
@@ -46,25 +35,14 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     loops = _with_parents(known.function)
     _drop_others(result, whole, loops)
     for loop, _ in loops:
-        _add_told(result, loop, known.function, program)
-        shown = counted.passes(loop, known)
-        if shown is None and not any(result.get(node) for node in _own(loop)):
+        shown = counted.passes(loop, known, program)
+        if shown is None:
             shown = counted.worked(loop, known)
         if shown is not None:
-            _lesser(result, loop, known.function, shown)
+            for node in _own(loop):
+                result.pop(node, None)
+            result[loop.header] = [Mark(loop.header, shown, None)]
     return result
-
-
-def _drop_copies(marks: _Marks, loops: _Found) -> None:
-    """Rows in copies of blocks (split.py) that are in no copy of their loop."""
-    nodes: dict[int, frozenset[int]] = {}
-    for loop, _ in loops:  # inner ones first
-        for node in loop.nodes:
-            nodes.setdefault(node, loop.nodes)
-    for node in marks:
-        around = {inside % COPY for inside in nodes.get(node, ())}
-        if node >= COPY and not around <= {inside % COPY for inside in nodes.get(node % COPY, ())}:
-            marks[node] = []
 
 
 def _drop_unrolled(marks: _Marks, loop: Loop[int], function: Function) -> None:
@@ -111,35 +89,10 @@ def _innermost(loops: _Found) -> dict[int, int]:
     return result
 
 
-def _lesser(marks: _Marks, loop: Loop[int], function: Function, shown: int) -> None:
-    """Of what is said of a loop and what its code shows."""
-    own = _own(loop)
-    rows = [(node, mark) for node in own for mark in marks.get(node, ())]
-    if len(rows) == 1:
-        node, mark = rows[0]
-        if mark.passes is not None and mark.passes < shown and counted.in_every_pass(node, loop, function):
-            return
-    for node in own:
-        marks.pop(node, None)
-    marks[loop.header] = [Mark(loop.header, shown, None)]
-
-
-def _add_told(marks: _Marks, loop: Loop[int], function: Function, program: Program) -> None:
-    """Rows of a loop of the source that is nowhere entered within this loop."""
-    told = {bound.address: bound for bound in program.bounds if bound.line}
-    entered = {line for node in loop.nodes for line in lines_at(function.blocks[node], program.entries)}
-    for node in _own(loop):
-        for instruction in function.blocks[node].instructions:
-            bound = told.get(instruction.address)
-            if bound is not None and bound.line not in entered:
-                source = (program.lines.get(bound.address, bound.address), bound.line, bound.passes, bound.cycles)
-                marks.setdefault(node, []).append(Mark(source, bound.passes, bound.cycles))
-
-
 def _said(program: Program, function: Function) -> _Marks:
     result: _Marks = {}
     at: dict[int, int] = {}
-    for bound in (bound for bound in program.bounds if not bound.line):
+    for bound in program.bounds:
         nth = at[bound.address] = at.get(bound.address, 0) + 1
         source = (program.lines.get(bound.address, bound.address), nth, bound.passes, bound.cycles)
         for block in function.blocks.values():

@@ -32,7 +32,7 @@ class Spans:
     gross: NDArray[np.uint32]
     worst: Worst
     latency: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
-    """of an interrupt: from each request to acceptance"""
+    """of an interrupt: from each request to acceptance, without those of the preparations"""
 
     @property
     def largest(self) -> int:
@@ -63,6 +63,7 @@ class Measurement:
     scenarios: tuple[str, ...] = field(default_factory=tuple)
     functions: dict[str, Spans] = field(default_factory=dict)  # others that were watched, as the link's poll
     busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
+    late_slots: int = 0  # whose tasks ended when the next slot had begun
     between_polls: int = 0  # most cycles from one poll of the link to the next without sleep
     tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
     losses: dict[str, int] = field(default_factory=dict)  # what should have come and did not, counted by kind
@@ -99,6 +100,7 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
         scenarios=names,
         functions=_together([run.functions for run in runs]),
         busiest_tick=max(run.busiest_tick for run in runs),
+        late_slots=sum(run.late_slots for run in runs),
         between_polls=max(run.between_polls for run in runs),
         tick=next((run.tick for run in runs if run.tick), ()),
         losses={name: sum(run.losses.get(name, 0) for run in runs) for run in runs for name in run.losses},
@@ -158,6 +160,7 @@ def as_json(measurement: Measurement) -> dict[str, Any]:
         "load_share": measurement.load,
         "worst_tick_cycles": measurement.worst_tick,
         "busiest_tick_cycles": measurement.busiest_tick,
+        "late_slots": measurement.late_slots,
         "between_polls_cycles": measurement.between_polls,
         "lowest_stack_address": measurement.lowest_stack,
         "losses": measurement.losses,

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 
 from boebot.errors import TimingError
 
-COPY = 0x10000  # behind all addresses: what a copy of a block has above its own (split.py)
-
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
@@ -43,7 +41,7 @@ class Block:
 
     A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
     call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
-    instruction takes then. A copy (split.py) has `start` above its first instruction's address.
+    instruction takes then.
     """
 
     start: int
@@ -65,6 +63,7 @@ class Function:
     name: str
     entry: int
     blocks: dict[int, Block]
+    clobbers: frozenset[int] | None = None  # registers that a call may change; None: all that a callee need not keep
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,14 +71,12 @@ class LoopBound:
     """What the source says of a loop: `address` lies in its body.
 
     At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
-    `cycles` in all, to which one more pass may come. None: not said. `line` is that of the loop where the image tells
-    all places at which it is entered (Program.entries), else 0; the instruction at `address` then runs once a pass.
+    `cycles` in all, to which one more pass may come. None: not said.
     """
 
     address: int
     passes: int | None
     cycles: int | None
-    line: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,41 +116,24 @@ class SensorRow:
 
 
 @dataclass(frozen=True, slots=True)
-class FrameRow:
-    """A message that the program takes: its name, its id, and the bytes of its payload."""
-
-    name: str
-    id: int
-    length: int
-
-
-@dataclass(frozen=True, slots=True)
-class IdPlace:
-    """What the source says of a message's id: it is in `register` behind the instruction that ends at `address`."""
-
-    address: int
-    register: int
-
-
-@dataclass(frozen=True, slots=True)
 class Constants:
     """What the program is built with and its bounds depend on.
 
     A control tick is `slots_per_tick` slots of `slot_cycles` cycles; when more than `slots_kept` wait, ticks are
-    dropped. Between slots the main loop is at the link when a frame has ended or `receive_due` bytes wait, and before
-    that at the encoders when `changes_due` changes do, of `change_bytes` bytes each. Their interrupt stops itself when
-    `changes_storm` in a row have come at most `changes_close` cycles after the one before; a line is stopped above
-    `encoder_limit` edges in a tick, if the parameter of that name is as it is at first.
+    dropped. Between slots the main loop is at the link when a frame has ended, or the receive ring is full. The
+    ring holds `receive_ring` bytes, and its interrupt is off while it is full; a poll of the link takes at most
+    `poll_bytes`. Before the link the main loop is at the pin changes when `changes_due` of them wait, in a ring of
+    `changes_ring` places, of which one stays free. Their interrupt masks itself when `changes_storm` come close one
+    after another.
     """
 
     slot_cycles: int
     slots_per_tick: int
     slots_kept: int
-    receive_due: int
-    encoder_limit: int
+    receive_ring: int
+    poll_bytes: int
+    changes_ring: int
     changes_due: int
-    change_bytes: int
-    changes_close: int
     changes_storm: int
 
 
@@ -164,7 +144,6 @@ class Table:
     tasks: tuple[TaskRow, ...] = ()
     interrupts: tuple[InterruptRow, ...] = ()
     sensors: tuple[SensorRow, ...] = ()
-    frames: tuple[FrameRow, ...] = ()
     constants: Constants | None = None
 
 
@@ -176,10 +155,9 @@ class Program:
     functions: dict[int, Function]
     by_name: dict[str, int]  # entry of each named function
     bounds: tuple[LoopBound, ...] = ()
-    entries: dict[int, int] = field(default_factory=dict)  # instructions that run when a loop is entered, and its line
     table: Table = field(default_factory=Table)
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
-    ids: tuple[IdPlace, ...] = ()
+    unproven: dict[int, str] = field(default_factory=dict)  # why it is not known where a function leads, by its entry
 
     @property
     def constants(self) -> Constants:
@@ -188,9 +166,14 @@ class Program:
             raise TimingError(f"{self.path} carries no constants; expected CONSTANT rows in its section .boebot.timing")
         return self.table.constants
 
+    def clobbered(self, block: Block) -> frozenset[int] | None:
+        """Registers that what a block calls may change; None: all that a callee need not keep."""
+        found = [self.functions[entry].clobbers for entry in block.calls]
+        known = [one for one in found if one is not None]
+        return frozenset[int]().union(*known) if known and len(known) == len(found) else None
+
     def where(self, address: int) -> str:
         """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""
-        address %= COPY
         text = f"0x{address:04X}"
         if line := self.lines.get(address):
             return f"{text} ({line})"

@@ -28,6 +28,7 @@ from boebot.timing.response import Source
 from boebot.timing.taken import Taken
 
 QUEUE_MOST = 16  # bytes without a moment at which none waits: more are overload
+WAIT_MOST = 1 << 12  # cycles without such a moment, likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ def longest_wait(line: Line, horizon: int) -> int:
     worst = 0
     for q in range(QUEUE_MOST):
         time = _time(line, q, horizon)
-        if time >= horizon:
+        if time >= min(horizon, WAIT_MOST):
             return horizon
         worst = max(worst, time - _earliest(line.bytes_, q) - reading)
         if time < _earliest(line.bytes_, q + 1):
@@ -102,7 +103,7 @@ def _time(line: Line, q: int, horizon: int) -> int:
     """The least fixed point: from byte 0 to the load that takes byte q."""
     time, longer = -1, 0
     while longer > time:
-        if longer >= horizon:
+        if longer >= min(horizon, WAIT_MOST):
             return horizon
         time, longer = longer, _meanwhile(line, q, longer)
     return time

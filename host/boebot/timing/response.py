@@ -13,11 +13,34 @@ What an interrupt itself waits is in blocked.py. All times are in cycles.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+BUSY_MOST = 3
 HORIZON = 1 << 24  # a second of 16 MHz: what has not ended by then is overload
+
+
+@dataclass(frozen=True, slots=True)
+class Spell:
+    """From `begin` to `end`, in each period of the schedule, something comes at most `most` times, one each
+    `interval`."""
+
+    begin: int
+    end: int
+    most: int = 1
+    interval: int = 1
+
+    def requests(self, start: int, window: int, period: int) -> int:
+        """Of how much comes at most in a window that begins `start` cycles after a period has begun."""
+        found = 0
+        first = start - start % period - period
+        for begun in range(first, start + window + 1, period):
+            shared = min(begun + self.end, start + window) - max(begun + self.begin, start)
+            if shared >= 0:
+                found += min(self.most, shared // self.interval + 1)
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +48,10 @@ class Source:
     """What requests an interrupt, and what each time costs.
 
     In any window of w cycles it comes at most ceil((w + jitter) / interval) times; and for each (n, period) of `bursts`
-    at most n times in each period, as the bytes of one frame a tick do.
+    at most n times in each period, as the bytes of one frame a tick do; and of `parts` so often as these n in their
+    periods are in sum, as the bytes of several frames on one line do. `most`: so often at most while slots keep the
+    main loop busy, however long that is, as the receive interrupt switches itself off when its ring is full. `spells`:
+    it comes in these only, of each `period` cycles from the beginning of slot 0 on.
     """
 
     name: str
@@ -33,23 +59,40 @@ class Source:
     interval: int
     jitter: int = 0
     bursts: tuple[tuple[int, int], ...] = ()
+    parts: tuple[tuple[int, int], ...] = ()
+    most: int | None = None
+    spells: tuple[Spell, ...] = ()
+    period: int = 1
 
     def __post_init__(self) -> None:
-        limits = (number for burst in self.bursts for number in burst)
+        limits = (number for burst in (*self.bursts, *self.parts) for number in burst)
         if self.cycles < 0 or self.interval <= 0 or self.jitter < 0 or any(number <= 0 for number in limits):
             raise ValueError(f"{self.name}: no source of interrupts: {self}")
 
-    def requests(self, window: int) -> int:
-        """The most that can come in a window of so many cycles."""
+    def requests(self, window: int, start: int | None = None) -> int:
+        """The most that can come in a window of so many cycles, which begins `start` cycles after slot 0; None: at any
+        time."""
         if window <= 0:
             return 0
         limits = ((1, self.interval), *self.bursts)
-        return min(most * _ceil(window + self.jitter, period) for most, period in limits)
+        found = min(most * _ceil(window + self.jitter, period) for most, period in limits)
+        if self.parts:
+            found = min(found, sum(most * _ceil(window + self.jitter, period) for most, period in self.parts))
+        if self.most is not None:
+            found = min(found, self.most)
+        if start is None or not self.spells:
+            return found
+        return min(found, sum(spell.requests(start, window, self.period) for spell in self.spells))
 
     @property
     def load(self) -> Fraction:
-        """Its share of all cycles in the long run."""
-        return min(Fraction(most * self.cycles, period) for most, period in ((1, self.interval), *self.bursts))
+        """Its share of all cycles in the long run of a busy main loop."""
+        if self.most is not None:
+            return Fraction(0)
+        limits = [Fraction(most, period) for most, period in ((1, self.interval), *self.bursts)]
+        if self.parts:
+            limits.append(sum((Fraction(most, period) for most, period in self.parts), Fraction(0)))
+        return min(limits) * self.cycles
 
 
 def _ceil(a: int, b: int) -> int:
@@ -61,13 +104,14 @@ def load(sources: Iterable[Source]) -> Fraction:
     return sum((source.load for source in sources), Fraction(0))
 
 
-def response(work: int, sources: Sequence[Source]) -> int | None:
-    """After how many cycles such work is done at the latest; None: overload."""
+def response(work: int, sources: Sequence[Source], start: int | None = None) -> int | None:
+    """After how many cycles such work is done at the latest that begins at `start` (Source.requests); None:
+    overload."""
     if work <= 0:
         return 0
     if load(sources) >= 1:
         return None
-    return _least(lambda time: work + sum(source.cycles * source.requests(time) for source in sources), work)
+    return _least(lambda time: work + sum(source.cycles * source.requests(time, start) for source in sources), work)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +171,8 @@ class Responses:
 
 
 def responses(schedule: Schedule, sources: Sequence[Source]) -> Responses | None:
-    """Bounds of all pieces, slots and of the tick; None: overload, or later than the schedule holds.
+    """Bounds of all pieces, slots and of the tick; None: overload, or later than the schedule holds, or the main loop
+    may be busy with slots for BUSY_MOST whole cycles of the schedule.
 
     A slot's work waits for that of earlier slots. So each slot is taken as the one that found the processor idle, and
     its busy period is followed through the slots after it for as long as they find it busy.
@@ -137,35 +182,38 @@ def responses(schedule: Schedule, sources: Sequence[Source]) -> Responses | None
     count = len(schedule.slots)
     pieces: dict[str, int] = {}
     slots = [0] * count
-    for first in range(count):
+    for first in range(math.lcm(count, *(source.period // schedule.slot_cycles or 1 for source in sources))):
+        start = first * schedule.slot_cycles
         work, slot, due = schedule.blocking, first, 0
         while True:
             done = due
             for piece in schedule.slots[slot % count]:
                 work += piece.cycles
-                ended = response(work, sources)
+                ended = response(work, sources, start)
                 if ended is None or 0 < schedule.latest < ended - due:
                     return None
                 done = max(due, ended)
                 pieces[piece.name] = max(pieces.get(piece.name, 0), done - due)
             slots[slot % count] = max(slots[slot % count], done - due)
             slot, due = slot + 1, due + schedule.slot_cycles
-            if (response(work, sources) or 0) <= due:  # idle before the next slot begins: that one is another case
+            if slot - first > BUSY_MOST * count:
+                return None
+            if (
+                response(work, sources, start) or 0
+            ) <= due:  # idle before the next slot begins: that one is another case
                 break
-    fullest = max(map(schedule.tick_work, range(schedule.ticks)))
-    tick = response(schedule.blocking + fullest, sources)
-    return None if tick is None else Responses(pieces, tuple(slots), tick)
+    ticks = [
+        response(schedule.blocking + schedule.tick_work(tick), sources, tick * schedule.tick_cycles)
+        for tick in range(schedule.ticks * math.lcm(schedule.ticks, 2))
+    ]
+    known = [tick for tick in ticks if tick is not None]
+    return Responses(pieces, tuple(slots), max(known)) if len(known) == len(ticks) else None
 
 
 def misses(schedule: Schedule, slots: Sequence[int]) -> list[int]:
     """Slots whose work may end only when the next tick has begun: the firmware counts that as an overrun."""
     left = [schedule.slots_per_tick - slot % schedule.slots_per_tick for slot in range(len(slots))]
     return [slot for slot, cycles in enumerate(slots) if cycles > left[slot] * schedule.slot_cycles]
-
-
-def background(schedule: Schedule, sources: Sequence[Source]) -> Fraction:
-    """The share of all cycles that slots and interrupts leave to other work at least, in the long run; 0: none."""
-    return max(Fraction(0), 1 - load(sources) - schedule.mean_load)
 
 
 def longest_gap(schedule: Schedule, sources: Sequence[Source], before: int, after: int) -> int | None:

@@ -8,6 +8,7 @@ there. A depth that depends on data (alloca, arrays of variable length) is refus
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from boebot.errors import TimingError
@@ -66,9 +67,10 @@ class _State:
 class Stack:
     """Depths of the functions of a program, each worked out once."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, left_out: Collection[int] = ()) -> None:
+        """`left_out`: entries of functions that count as if they needed nothing but their return address."""
         self.program = program
-        self._depths: dict[int, Depth] = {}
+        self._depths = {entry: Depth(0, (program.functions[entry].name,)) for entry in left_out}
         self._under_way: list[int] = []
 
     def of(self, function: str | int) -> Depth:
@@ -82,6 +84,8 @@ class Stack:
                 raise TimingError(f"{self.program.path} has no function {function}")
             function = self.program.by_name[function]
         if function not in self._depths:
+            if function in self.program.unproven:
+                raise TimingError(self.program.unproven[function])
             name = self.program.functions[function].name
             if function in self._under_way:
                 raise TimingError(

@@ -13,13 +13,12 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from boebot.errors import TimingError
-from boebot.timing.program import Constants, FrameRow, InterruptRow, SensorRow, Table, TaskRow
+from boebot.timing.program import Constants, InterruptRow, SensorRow, Table, TaskRow
 
 SECTION = ".boebot.timing"
 MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
 MOST = 0xFFFFFFFF  # of any number in a row
 VECTORS = 25  # interrupts of the ATmega328P (data sheet, table 12-6), the reset not counted
-BYTE_MOST = 0xFF  # of an id, and of a payload's length
 LONGEST_CYCLE = 4096  # slots until the schedule repeats: ten seconds
 _DIGITS = 12  # of a number; longer ones are too large anyway
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
@@ -36,14 +35,13 @@ class ConstantRow:
     value: int
 
 
-Row = TaskRow | InterruptRow | SensorRow | FrameRow | ConstantRow
-_Kind = type[TaskRow] | type[InterruptRow] | type[SensorRow] | type[FrameRow] | type[ConstantRow]
+Row = TaskRow | InterruptRow | SensorRow | ConstantRow
+_Kind = type[TaskRow] | type[InterruptRow] | type[SensorRow] | type[ConstantRow]
 
 ROWS: dict[str, tuple[_Kind, int]] = {
     "TASK": (TaskRow, 3),
     "INTERRUPT": (InterruptRow, 4),
     "SENSOR": (SensorRow, 3),
-    "FRAME": (FrameRow, 2),
     "CONSTANT": (ConstantRow, 1),
 }
 
@@ -79,26 +77,21 @@ def table_of(path: Path, data: bytes) -> Table:
         raise TimingError(
             f"{path}: the periods of its tasks repeat after {cycle} slots only; expected at most {LONGEST_CYCLE}"
         )
-    ids = [row.id for row in rows if isinstance(row, FrameRow)]
-    if twice := next((number for number in ids if ids.count(number) > 1), None):
-        raise TimingError(f"{path}: its timing table has two messages with the id {twice}; expected one")
     return Table(
         tasks=tuple(row for row in rows if isinstance(row, TaskRow)),
         interrupts=tuple(row for row in rows if isinstance(row, InterruptRow)),
         sensors=tuple(row for row in rows if isinstance(row, SensorRow)),
-        frames=tuple(row for row in rows if isinstance(row, FrameRow)),
         constants=_constants(path, {row.name: row.value for row in rows if isinstance(row, ConstantRow)}),
     )
 
 
 def _constants(path: Path, found: dict[str, int]) -> Constants | None:
-    """All of them, or none at all."""
-    if found and (wrong := sorted(found.keys() ^ set(CONSTANTS))):
-        what = "unknown" if wrong[0] in found else "missing"
+    """Those that are needed here, all of them or none at all."""
+    if found and (missing := [name for name in CONSTANTS if name not in found]):
         raise TimingError(
-            f"{path}: of the constants of its timing table {wrong[0]!r} is {what}; expected {', '.join(CONSTANTS)}"
+            f"{path}: of the constants of its timing table {missing[0]!r} is missing; expected {', '.join(CONSTANTS)}"
         )
-    return Constants(**found) if found else None
+    return Constants(**{name: found[name] for name in CONSTANTS}) if found else None
 
 
 def _section(path: Path, data: bytes) -> bytes:
@@ -153,7 +146,4 @@ def _contradiction(row: _Kind, numbers: list[int]) -> str | None:
         return None if budget and interval else "a budget or an interval of 0 cycles; expected at least 1"
     if row is ConstantRow:
         return None if numbers[0] else "a constant of 0; expected at least 1"
-    if row is FrameRow:
-        wrong = next((number for number in numbers if number > BYTE_MOST), None)
-        return None if wrong is None else f"{wrong} as an id or a length; expected at most {BYTE_MOST}"
     return None if numbers[1] else "a period of 0 ticks; expected at least 1"

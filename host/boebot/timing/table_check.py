@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 from boebot.errors import TimingError
@@ -50,7 +49,6 @@ def _impossible(table: Table, said: Constants) -> str | None:
 
     A latency may be above the interval: a request may wait for the next one, or be left out, as the row's owner says.
     """
-    share = Fraction(0)
     for name, budget, every in (
         *((row.name, row.budget, row.period * said.slot_cycles) for row in table.tasks),
         *((row.name, row.budget, row.interval) for row in table.interrupts),
@@ -60,12 +58,6 @@ def _impossible(table: Table, said: Constants) -> str | None:
                 f"row {name!r} of its timing table has a budget of {budget} cycles and is due each {every}; expected a "
                 "budget of at most these"
             )
-        share += Fraction(budget, every)
-    if share > 1:
-        return (
-            f"the budgets of its timing table, each as often as it is due, are {float(share):.1%} of all cycles; "
-            "expected at most 100 %"
-        )
     early = next((row for row in table.sensors if row.age < row.conversion), None)
     if early is not None:
         return (

@@ -2,8 +2,9 @@
 
 A byte that waits is taken by whoever reads the UART's data register: the receive interrupt, or one that keeps it
 waiting and looks after the line meanwhile. Where it does shows in its machine code: a load of UDR0. While a byte waits,
-a test of RXC (a skip on bit 7 of a register just loaded from UCSR0A) goes one way only, so the other one is left out:
-the bit is set when unread data exist in the receive buffer (data sheet, 20.11).
+a test of RXC (bit 7 of a register just loaded from UCSR0A, or its sign) goes one way only, so the other one is left
+out: the bit is set when unread data exist in the receive buffer (data sheet, 20.11). Who finds a byte takes it before
+he looks again or returns, as long as the receive ring is not full; that it is not is for others to show (budget.py).
 
 Of an interrupt's run, from its acceptance (entry: 4 cycles) to the end of its RETI, these times are told, in cycles,
 for bytes that wait all the time: with at most n bytes taken the longest whole run (`run`); from acceptance to the end
@@ -18,28 +19,33 @@ from dataclasses import dataclass
 from boebot.timing.blocked import ENTRY
 from boebot.timing.paths import Graph, Mark, Way, longest
 from boebot.timing.program import Block, Instruction
-from boebot.timing.registers import written
+from boebot.timing.registers import ZERO, written
 from boebot.timing.wcet import WorstCase
 
 LOAD = 2  # cycles of such a load, within which it sees the byte or not
-STATUS, COMPLETE, DATA = 0xC0, 7, 0xC6  # UCSR0A, RXC0 in it, UDR0: addresses in data space
+STATUS, SWITCH, DATA = 0xC0, 0xC1, 0xC6  # UCSR0A, UCSR0B, UDR0: addresses in data space
+BIT = 7  # RXC0 in UCSR0A, RXCIE0 in UCSR0B
 
 # A function, the calls that led there (each by its caller and the block behind it; None: a tail call), a block, and how
 # many loads of the data register in it have been passed.
 _Calls = tuple[tuple[int, int | None], ...]
 _Place = tuple[int, _Calls, int, int]
-_Node = tuple[int, _Place]  # bytes taken, place
+_Node = tuple[int, bool, _Place]  # bytes taken, whether one was found that is not yet taken, place
+SIGN = {"brlt": True, "brmi": True, "brge": False, "brpl": False}  # whether a branch is taken where bit 7 is set
 MANY = 8  # bytes in one run: it takes them in a loop
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """From a place to the next one (None: the end), whether a byte is taken, and whether one can wait then."""
+    """From a place to the next one (None: the end), whether a byte is taken, whether one can wait then, and whether one
+    was found by a look."""
 
     to: _Place | None
     cycles: int
     takes: bool
     waits: bool = True
+    finds: bool = False
+    is_on: bool = False  # the receive interrupt was found switched on
 
 
 class Taken:
@@ -75,6 +81,23 @@ class Taken:
     def next(self, taken: int) -> int | None:
         """The longest time from a look that found none until one byte more than so many is taken, in the same run."""
         return self._once("next", taken)
+
+    @property
+    def heeds_switch(self) -> bool:
+        """Whether it takes a byte only where it has found the receive interrupt switched on since the one before."""
+        seen: set[tuple[_Place, bool]] = set()
+        work = [(self.start, False)]
+        while work:
+            place, is_on = work.pop()
+            if (place, is_on) in seen:
+                continue
+            seen.add((place, is_on))
+            for step in self._ways[place]:
+                if step.takes and not is_on:
+                    return False
+                if step.to is not None:
+                    work.append((step.to, step.is_on or (is_on and not step.takes)))
+        return True
 
     def charged(self, each: int) -> int:
         """The longest run less so many cycles for each byte that it takes: what it costs where bytes are charged apart.
@@ -114,15 +137,16 @@ class Taken:
         """The longest way on which at most so many bytes are taken, ended with a number in `exits`, or (`until`) by the
         load of one more; `waiting`: bytes wait all the time."""
         ways: dict[_Node, list[Way[_Node]]] = {}
-        work: list[_Node] = [(0, start)]
+        first: _Node = (0, False, start)
+        work = [first]
         while work:
             node = work.pop()
             if node in ways:
                 continue
             ways[node] = []
-            count, place = node
+            count, found, place = node
             for step in self._ways[place]:
-                if waiting and not step.waits:
+                if waiting and (not step.waits or (found and (step.finds or (step.to is None and not step.takes)))):
                     continue
                 if step.takes and count == most:
                     if until:
@@ -130,18 +154,19 @@ class Taken:
                     continue
                 after = count + step.takes
                 if step.to is not None:
-                    ways[node].append(Way(node, (after, step.to), step.cycles))
-                    work.append((after, step.to))
+                    to = (after, waiting and (step.finds or (found and not step.takes)), step.to)
+                    ways[node].append(Way(node, to, step.cycles))
+                    work.append(to)
                 elif after in exits:
                     ways[node].append(Way(node, None, step.cycles))
-        walk = longest(Graph((0, start), ways, lambda node: self.program.where(node[1][2]), self._marks(ways)))
+        walk = longest(Graph(first, ways, lambda node: self.program.where(node[2][2]), self._marks(ways)))
         return None if walk is None else before + walk.cycles
 
     def _marks(self, ways: dict[_Node, list[Way[_Node]]]) -> dict[_Node, list[Mark]]:
         """Bounds of loops, by the nodes in front of any load of their blocks."""
         found: dict[_Node, list[Mark]] = {}
         for node in ways:
-            _, (function, _, block, part) = node
+            function, _, block, part = node[2]
             marks = self.worst_case.marks(function).get(block) if part == 0 else None
             if marks:
                 found[node] = marks
@@ -170,11 +195,12 @@ class Taken:
             self._idle.append((to, LOAD))
             return [_Step(to, cycles, True)]
         before = sum(each.cycles for each in block.instructions[first:last])
-        kept = _while_one_waits(block)
+        kept, switched = while_one_waits(block), behind_test(block, SWITCH)
         found = []
         for to, cycles, edge in self._behind(place, block):
-            waits = edge is None or edge in kept
-            found.append(_Step(to, before + cycles, takes, waits))
+            waits = edge is None or kept is None or edge == kept
+            is_on = edge is not None and edge == switched
+            found.append(_Step(to, before + cycles, takes, waits, waits and kept is not None, is_on))
             if not waits:
                 self._idle.append((to, LOAD + cycles))
             if takes:
@@ -222,17 +248,32 @@ def _takes(instruction: Instruction) -> bool:
     return instruction.mnemonic == "lds" and instruction.operands[1] == DATA
 
 
-def _while_one_waits(block: Block) -> set[int]:
-    """The blocks behind a block that can come while a byte waits."""
+def while_one_waits(block: Block) -> int | None:
+    """The block behind a look, if a byte waits then; None: the block does not end with a look."""
+    return behind_test(block, STATUS)
+
+
+def behind_test(block: Block, address: int) -> int | None:
+    """The block behind a test of bit 7 of a register of the UART, if that is set; None: the block ends with none.
+
+    A test is a skip on the bit of a register that holds it, or a branch on its sign, which `tst` (`and` of a register
+    with itself) or a comparison with zero told.
+    """
+    last, before = block.instructions[-1], list(block.instructions[:-1])
     ways = {edge.to for edge in block.edges}
-    *before, last = block.instructions
-    if last.mnemonic not in ("sbrc", "sbrs") or last.operands[1] != COMPLETE or len(ways) != 2:
-        return ways
-    register = last.operands[0]
-    for instruction in reversed(before):
-        if register in written(instruction):
-            if instruction.mnemonic == "lds" and instruction.operands[1] == STATUS:
-                skipped = max(ways)
-                return {skipped} if last.mnemonic == "sbrs" else ways - {skipped}
-            return ways
-    return ways
+    if len(ways) != 2:
+        return None
+    if last.mnemonic in ("sbrc", "sbrs") and last.operands[1] == BIT:
+        register, is_set = last.operands[0], max(ways) if last.mnemonic == "sbrs" else min(ways)
+    elif last.mnemonic in SIGN and before and _tells_sign(before[-1]):
+        register, taken = before.pop().operands[0], last.operands[-1]
+        is_set = taken if SIGN[last.mnemonic] else (ways - {taken}).pop()
+    else:
+        return None
+    load = next((one for one in reversed(before) if register in written(one)), None)
+    return is_set if load is not None and load.mnemonic == "lds" and load.operands[1] == address else None
+
+
+def _tells_sign(instruction: Instruction) -> bool:
+    name, operands = instruction.mnemonic, instruction.operands
+    return (name in ("and", "or") and operands[0] == operands[1]) or (name == "cp" and operands[1] == ZERO)

@@ -64,6 +64,8 @@ class WorstCase:
     def bound(self, entry: int, context: Context | None = None) -> Bound:
         """The same by entry; `context`: registers that hold constants there, else those of any call."""
         function = self.program.functions[entry]
+        if entry in self.program.unproven:
+            raise TimingError(self.program.unproven[entry])
         key = (entry, root(function) if context is None else context)
         if key not in self._bounds:
             if entry in self._under_way:

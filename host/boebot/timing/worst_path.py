@@ -16,7 +16,7 @@ from boebot.timing.blocked import ENTRY
 from boebot.timing.constants import Context, Known, known, root
 from boebot.timing.costs import task_entry
 from boebot.timing.marks import marks_of
-from boebot.timing.program import COPY, Block, Program
+from boebot.timing.program import Block, Program
 from boebot.timing.wcet import Visit, WorstCase
 
 ACCEPTANCE = "acceptance of the interrupt"
@@ -125,13 +125,13 @@ class _Lines:
             callee, callee_cycles = self._callee(block, inside)
             ran: set[_Place] = set()
             for address, cycles in _instructions(block, visit, visit.cycles - visit.times * callee_cycles):
-                place = (function.name, self.program.lines.get(address % COPY))
+                place = (function.name, self.program.lines.get(address))
                 share = found.setdefault(place, _Share())
                 share.cycles += cycles
                 ran.add(place)
             for place in ran:
                 found[place].runs = max(found[place].runs, visit.times)
-            first = found[function.name, self.program.lines.get(block.instructions[0].address % COPY)]
+            first = found[function.name, self.program.lines.get(block.instructions[0].address)]
             for mark in marks.get(visit.block, ()):
                 first.passes[mark.loop] = first.passes.get(mark.loop, 0) + visit.times
             if callee is not None:

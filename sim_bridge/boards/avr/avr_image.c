@@ -1,8 +1,8 @@
 /* avr_image.c: puts the program of an ELF file into flash and EEPROM.
  *
  * Reads the little of ELF32 that an AVR image has: the header and its loadable segments, whose physical addresses say
- * where they go: flash from 0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed. They also say where
- * the code ends, and where the variables do (their addresses are those of data memory and 0x800000).
+ * where they go: flash from 0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed. A program that begins
+ * in the boot section has its reset there (the fuse BOOTRST, 27.6). Segments also say where the code ends, and where the variables do (their addresses are those of data memory and 0x800000).
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -22,6 +22,7 @@
 #define DATA_BASE 0x800000u
 #define RAM_BEGIN 0x100u
 #define EEPROM_BASE 0x810000u
+#define BOOT_BEGIN 0x7000u /* of the largest boot section */
 
 static uint32_t half(const uint8_t *p) { return p[0] | (uint32_t)p[1] << 8; }
 static uint32_t word(const uint8_t *p) { return half(p) | half(p + 2) << 16; }
@@ -93,6 +94,12 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
     loaded = loaded || address < AVR_BOARD_FLASH_SIZE;
   }
   loaded = loaded && b->code_end > 0;
+  const uint32_t begin = word(elf + 24);
+  if (begin >= BOOT_BEGIN && begin < b->code_end) {
+    b->avr->reset_pc = begin;
+  } else {
+    b->code_begin = 1; /* nobody jumps to 0 but a reset */
+  }
   if (!loaded) snprintf(error, error_size, "it holds no program");
   return loaded;
 }

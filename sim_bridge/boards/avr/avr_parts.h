@@ -353,6 +353,7 @@ typedef struct avr_board {
   bool crashed;
   char fault[160];
   uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
+  uint32_t code_begin;           /* no jump leads to what is below, */
   uint32_t code_end;             /* no instruction of the image stands from here on */
   uint16_t lowest_stack;         /* lowest address in data memory that the stack may write: behind the variables */
   bool one_by_one;               /* each instruction by itself, and by simavr's core */
@@ -397,7 +398,9 @@ void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to
  * returns the cycle of the access. */
 uint64_t begin_access(avr_board *b);
 
-static inline bool is_code(const avr_board *b, uint32_t address) { return address - 1u < b->code_end - 1u; }
+static inline bool is_code(const avr_board *b, uint32_t address) {
+  return address - b->code_begin < b->code_end - b->code_begin;
+}
 
 /* avr_board.c */
 void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);

@@ -1,16 +1,16 @@
 /* devices_native.c: what the chip does for devices: IR carrier, Ping trigger and capture, tone, analog converter. */
 #include "hal/hal.h"
+#include "hal/interrupts.h"
 #include "hal/native/events.h"
-#include "pins.h"
 
 #define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
 #define CONVERSION_CYCLES (104u * HAL_CYCLES_PER_US) /* 13 cycles of 125 kHz */
 #define NOMINAL_VOLTS 5.0
 #define BAND_GAP_VOLTS 1.1
 
-static uint8_t carrier_pin, carrier_half_period;
+static uint8_t carrier_side, carrier_pin, carrier_half_period, toggles_left;
+static uint8_t receiver_high[SIDES]; /* at the end of its last burst */
 static enum { CAPTURE_OFF, CAPTURE_RISING, CAPTURE_FALLING } capture;
-static uint16_t capture_time;
 static uint32_t tone_half_period;
 static uint8_t analog_channel;
 static uint16_t analog_result;
@@ -23,45 +23,55 @@ void native_devices_reset(void) {
 
 /* ---- IR carrier ---- */
 
-void hal_carrier_start(uint8_t side, uint8_t half_period) {
+void hal_burst_start(uint8_t side, uint8_t half_period, uint8_t toggles) {
+  carrier_side = side;
   carrier_pin = side == LEFT ? PIN_INFRARED_LEFT_LED : PIN_INFRARED_RIGHT_LED;
   carrier_half_period = half_period;
+  toggles_left = toggles;
   native_next[EVENT_CARRIER] = native->now + half_period;
 }
 
-void hal_carrier_stop(void) {
-  native_next[EVENT_CARRIER] = NATIVE_NEVER;
-  hal_native_write(carrier_pin, false);
-}
+bool hal_burst_seen(uint8_t side) { return receiver_high[side] == 0; }
 
 void native_carrier_toggle(void) {
   native_next[EVENT_CARRIER] += carrier_half_period;
   native->interrupts++;
   hal_native_toggle(carrier_pin);
+  toggles_left--;
+  if (toggles_left == 0) {
+    native_next[EVENT_CARRIER] = NATIVE_NEVER;
+    receiver_high[carrier_side] =
+        carrier_side == LEFT ? HAL_PIN_READ(INFRARED_LEFT_RECEIVER) : HAL_PIN_READ(INFRARED_RIGHT_RECEIVER);
+  }
 }
 
 /* ---- Ping ---- */
 
 void hal_ping_trigger(void) {
-  capture = CAPTURE_OFF;
+#ifdef PIN_PING
   HAL_PIN_LOW(PING);
   HAL_PIN_OUTPUT(PING);
   HAL_PIN_HIGH(PING);
   native->now += PING_TRIGGER_CYCLES;
   HAL_PIN_LOW(PING);
   HAL_PIN_INPUT(PING);
-  capture = CAPTURE_RISING;
+#endif
 }
 
-void native_ping_edge(bool rising) {
+void native_capture_edge(bool rising) {
   if (capture == (rising ? CAPTURE_RISING : CAPTURE_FALLING)) {
-    capture_time = hal_time();
     native->interrupts++;
-    hal_native_capture();
+#ifdef LIGHT_LEFT_IS_CAPTURED
+    light_on_left_fall(hal_time());
+#else
+    ping_on_edge(hal_time());
+#endif
   }
 }
 
-uint16_t hal_capture_time(void) { return capture_time; }
+void hal_capture_start(void) { capture = CAPTURE_RISING; }
+
+void hal_capture_start_falling(void) { capture = CAPTURE_FALLING; }
 
 void hal_capture_falling(void) { capture = CAPTURE_FALLING; }
 

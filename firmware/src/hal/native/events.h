@@ -16,7 +16,7 @@ typedef enum {
   EVENT_SLOT,       /* and B */
   EVENT_ROOM,       /* a sender that asked for room has it */
   EVENT_CONVERSION, /* the end of one */
-  EVENT_EEPROM,     /* the end of a write, or the next ready interrupt */
+  EVENT_EEPROM,     /* the end of a write */
   EVENT_TONE,       /* the next toggle of the buzzer */
   EVENT_TWO_WIRE,   /* the next step of the bus */
   EVENTS
@@ -42,6 +42,6 @@ void native_devices_reset(void);
 void native_two_wire_reset(void);
 
 /* devices_native.c: an edge of the Ping pin. */
-void native_ping_edge(bool rising);
+void native_capture_edge(bool rising);
 
 #endif

@@ -1,13 +1,12 @@
 /* hal_native.c: the microcontroller as an event queue. Each source of interrupts has the cycle of its next event; the
  * earliest comes first, the firmware's interrupt runs at that cycle, and then its main loop if the event would have
  * woken it with something to do. Between events nothing happens, so nothing is spent. */
-#include <setjmp.h>
 #include <string.h>
 
 #include "firmware.h"
-#include "generated/messages.h"
+#include "generated/values.h"
 #include "hal/hal.h"
-#include "hal/native/bounds_native.h"
+#include "hal/interrupts.h"
 #include "hal/native/events.h"
 #include "pins.h"
 #include "schedule.h"
@@ -21,8 +20,8 @@ static uint64_t epoch; /* cycle at which the timer read 0 */
 
 static bool level_high[NATIVE_PINS]; /* PORT bits */
 static bool is_output[NATIVE_PINS];  /* DDR bits */
-static uint8_t pin_change_bits;      /* port C */
-static uint8_t stamp_bits;           /* port D */
+static uint8_t port_c_bits;          /* port C */
+static uint8_t port_d_bits;          /* port D */
 
 /* ---- pins ---- */
 
@@ -32,50 +31,7 @@ static uint8_t *port_of(uint8_t pin) {
 
 static uint8_t bit_of(uint8_t pin) { return (uint8_t)(1u << (pin < 8 ? pin : pin < 14 ? pin - 8 : pin - 14)); }
 
-hal_change hal_changes[HAL_CHANGES];
-volatile uint8_t hal_changes_head, hal_changes_tail;
-static bool changes_stopped;
-
-uint8_t hal_changes_stopped(void) { return changes_stopped; }
-
-void hal_changes_resume(void) { changes_stopped = false; }
-
-/* The pin-change interrupt. */
-static void pin_change(void) {
-  volatile hal_change *place = hal_change_after(hal_changes_head);
-  const volatile hal_change *previous = hal_change_at(hal_changes_head);
-  place->time = hal_time();
-  place->bits = PINC;
-  place->close = (uint16_t)(place->time - previous->time) <= HAL_CHANGES_CLOSE ? (uint8_t)(previous->close + 1u) : 0u;
-  const uint8_t next = (uint8_t)(hal_changes_head + HAL_CHANGE_BYTES);
-  const bool full = next == hal_changes_tail;
-  if (full || place->close >= HAL_CHANGES_STORM) {
-    hal_pin_change_mask(0);
-    changes_stopped = true;
-  }
-  if (!full) {
-    hal_changes_head = next;
-  }
-}
-
-uint8_t hal_stamp_slot;
-uint16_t hal_stamp_time;
-
-void hal_stamp_arm(uint8_t bits) { stamp_bits = bits; }
-
-void hal_stamp_disarm(void) { stamp_bits = 0; }
-
-bool hal_stamp_awaited(void) { return stamp_bits != 0; }
-
-/* The pin-change interrupt of port D. */
-static void stamp(uint8_t changed) {
-  if ((stamp_bits & changed) != 0) {
-    native->interrupts++;
-    hal_stamp_slot = schedule_slot;
-    hal_stamp_time = hal_time();
-    stamp_bits = 0;
-  }
-}
+#define CAPTURE_PIN 8u
 
 /* Works out the level on a pin; interrupts if it has changed. */
 static void settle(uint8_t pin) {
@@ -93,15 +49,16 @@ static void settle(uint8_t pin) {
     return;
   }
   *port = (uint8_t)(*port ^ bit);
-  if (port == &hal_native_port_c && (pin_change_bits & bit) != 0) {
+  if (port == &hal_native_port_c && (port_c_bits & bit) != 0) {
     native->interrupts++;
-    pin_change();
+    pin_changes_on_change(hal_time(), PINC);
   }
-  if (port == &hal_native_port_d) {
-    stamp(bit);
+  if (port == &hal_native_port_d && (port_d_bits & bit) != 0) {
+    native->interrupts++;
+    light_on_change(hal_time());
   }
-  if (pin == PIN_PING) {
-    native_ping_edge(high);
+  if (pin == CAPTURE_PIN) {
+    native_capture_edge(high);
   }
 }
 
@@ -136,7 +93,9 @@ bool native_level(uint8_t pin) { return (*port_of(pin) & bit_of(pin)) != 0; }
 
 void hal_native_toggle(uint8_t pin) { hal_native_write(pin, !level_high[pin]); }
 
-void hal_pin_change_mask(uint8_t bits) { pin_change_bits = bits; }
+void hal_watch_port_c(uint8_t bits) { port_c_bits = bits; }
+
+void hal_watch_port_d(uint8_t bits) { port_d_bits = bits; }
 
 /* ---- time ---- */
 
@@ -191,7 +150,7 @@ static void begin(uint8_t cause) {
   native_two_wire_reset();
   memset(level_high, 0, sizeof level_high);
   memset(is_output, 0, sizeof is_output);
-  pin_change_bits = stamp_bits = 0;
+  port_c_bits = port_d_bits = 0;
   for (uint8_t pin = 0; pin < NATIVE_PINS; pin++) {
     show(pin); /* a reset releases every pin */
     settle(pin);
@@ -252,11 +211,11 @@ static void run_event(native_event event, uint64_t until) {
     case EVENT_EDGE:
       native_next[EVENT_EDGE] = NATIVE_NEVER;
       native->interrupts++;
-      hal_native_edge();
+      servo_on_edge();
       break;
     case EVENT_SLOT:
       native->interrupts++;
-      hal_native_slot();
+      schedule_on_slot();
       poll_firmware();
       break;
     case EVENT_ROOM:
@@ -298,35 +257,13 @@ static void run(uint64_t until) {
 
 /* ---- the machine's owner ---- */
 
-static jmp_buf owner_waits;
-
-static void end_run(const char *sentence) {
-  memcpy(native->fault, sentence, strlen(sentence) + 1u);
-  longjmp(owner_waits, 1);
-}
-
-/* The firmware runs from here on, until leave(). */
-#define ENTER() (native_bound_broken = end_run, setjmp(owner_waits) == 0)
-
-static void leave(void) { native_bound_broken = NULL; }
-
 static void start(native_machine *owner, uint8_t cause) {
   native = owner;
-  if (ENTER()) {
-    begin(cause);
-  }
-  leave();
-}
-
-static void advance(uint64_t until) {
-  if (ENTER()) {
-    run(until);
-  }
-  leave();
+  begin(cause);
 }
 
 NATIVE_EXPORT const native_api *firmware_board_api(void);
 const native_api *firmware_board_api(void) {
-  static const native_api api = {NATIVE_API_VERSION, PIN_MAP_NAME, start, advance};
+  static const native_api api = {NATIVE_API_VERSION, PIN_MAP_NAME, start, run};
   return &api;
 }

@@ -13,14 +13,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define NATIVE_API_VERSION 4u
+#define NATIVE_API_VERSION 5u
 #define NATIVE_PINS 20u
 #define NATIVE_BAUD 500000u     /* of the board until the program selects another */
 #define NATIVE_BYTE_CYCLES 320u /* 10 bits of it */
 #define NATIVE_EEPROM_SIZE 1024u
 #define NATIVE_EEPROM_CYCLES 54400u /* a write: 3.4 ms (data sheet of the ATmega328P, table 8-1) */
 #define NATIVE_NOINIT_SIZE 32u
-#define NATIVE_FAULT_SIZE 256u
 #define NATIVE_NEVER UINT64_MAX
 #define NATIVE_SUPPLY 128u /* not a channel: the voltage of the supply */
 
@@ -82,10 +81,6 @@ struct native_machine {
 
   /* Voltage at analog channel 0..5, or of the supply (NATIVE_SUPPLY); NULL: 0 V and the nominal 5 V. */
   double (*analog)(native_machine *self, uint64_t cycle, uint8_t channel);
-
-  /* Not empty: why the program cannot go on, one sentence. start() or advance() has returned early; neither may be called
-   * again. */
-  char fault[NATIVE_FAULT_SIZE];
 };
 
 typedef struct {

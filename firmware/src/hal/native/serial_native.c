@@ -2,20 +2,19 @@
 #include "hal/hal.h"
 #include "hal/native/events.h"
 
-#define RECEIVE_RING 256u
+#define RECEIVE_RING 128u
 #define SEND_RING 128u
 
 static uint8_t receive_ring[RECEIVE_RING];
 static uint16_t receive_first, receive_count;
-static bool overrun;
+static bool stopped; /* the ring was full */
 static bool zero_received;
-static uint8_t to_send[SEND_RING]; /* from hal_serial_place() on */
-static uint64_t sender_free;       /* cycle at which the last queued byte has left */
+static uint64_t sender_free; /* cycle at which the last queued byte has left */
 
 void native_serial_reset(void) {
   native->baud = NATIVE_BAUD;
   receive_first = receive_count = 0;
-  overrun = zero_received = false;
+  stopped = zero_received = false;
 }
 
 void hal_start_serial(uint16_t baud) {
@@ -33,19 +32,19 @@ bool hal_serial_receive(uint8_t *byte) {
   return true;
 }
 
-uint8_t hal_serial_due(void) { return zero_received || receive_count >= RECEIVE_RING / 4u; }
+uint8_t hal_serial_due(void) { return zero_received || receive_count >= RECEIVE_RING / 2u || stopped; }
 
 void hal_serial_seen(void) { zero_received = false; }
 
 void hal_serial_again(void) { zero_received = true; }
 
-bool hal_serial_received(void) { return receive_count != 0; }
+bool hal_serial_waiting(void) { return receive_count != 0; }
 
-bool hal_serial_overrun(void) {
-  const bool lost = overrun;
-  overrun = false;
-  return lost;
-}
+bool hal_serial_stopped(void) { return stopped; }
+
+void hal_serial_resume(void) { stopped = false; }
+
+bool hal_serial_overrun(void) { return false; }
 
 bool hal_serial_room(uint8_t count) {
   /* Bytes not yet wholly sent stand in the ring, but for the one being shifted out. */
@@ -57,10 +56,6 @@ bool hal_serial_room(uint8_t count) {
   native_next[EVENT_ROOM] = sender_free - (SEND_RING - (uint64_t)count + 1u) * byte_cycles + 1u;
   return false;
 }
-
-uint8_t *hal_serial_place(void) { return to_send; }
-
-void hal_serial_queue(uint8_t count) { hal_serial_send(to_send, count); }
 
 void hal_serial_send(const uint8_t *bytes, uint8_t count) {
   const uint64_t start = sender_free > native->now ? sender_free : native->now;
@@ -77,11 +72,14 @@ void native_byte_arrived(void) {
     native->framing_errors++; /* a byte is read all the same; the frame's checksum refuses it */
     byte.byte = native_garbled(byte.byte);
   }
-  if (receive_count == RECEIVE_RING - 1u) {
-    overrun = true;
+  if (stopped) {
+    return;
+  }
+  zero_received = zero_received || byte.byte == 0;
+  if (receive_count == HAL_RECEIVE_MAX) {
+    stopped = true;
   } else {
     receive_ring[(receive_first + receive_count) % RECEIVE_RING] = byte.byte;
     receive_count++;
-    zero_received = zero_received || byte.byte == 0;
   }
 }

@@ -1,8 +1,8 @@
 /* two_wire_native.c: the ATmega328P's two-wire unit as master (data sheet, 22), in steps of half a clock of 100 kHz: the data
  * line changes while the clock is low and is read when it has been high. A clock that a device holds low is waited for. */
 #include "hal/hal.h"
+#include "hal/interrupts.h"
 #include "hal/native/events.h"
-#include "pins.h"
 
 #define HALF_CLOCK 80u /* cycles: 5 us */
 #define BITS 9u        /* of a byte and its acknowledgement */
@@ -18,9 +18,6 @@ static bool answered;    /* the byte sent */
 static bool addressing;  /* the byte sent is the first after a start */
 static bool reading;     /* its lowest bit said so */
 static bool owns_bus;    /* between a start and a stop */
-
-/* For programs that have no bus. */
-__attribute__((weak)) HAL_INTERRUPT_TWO_WIRE {}
 
 static void data_line(bool low) { native_pull(PIN_COMPASS_SDA, low); }
 
@@ -78,7 +75,7 @@ static void done(uint8_t with) {
   status = with;
   rest();
   native->interrupts++;
-  hal_native_two_wire();
+  two_wire_on_step();
 }
 
 /* A start: both lines high, the data line falls, then the clock. It waits until the bus is free. */

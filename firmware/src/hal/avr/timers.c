@@ -1,0 +1,31 @@
+/* timers.c: Timer1, which is the board's time, and the Ping's trigger. */
+#include "hal/hal.h"
+
+#if F_CPU != 16000000UL
+#error "the board runs at 16 MHz"
+#endif
+
+void hal_start_timers(void) {
+  PCICR = _BV(PCIE1) | _BV(PCIE2);
+  SMCR = _BV(SE); /* idle: timers and UART go on */
+  TCCR1A = 0;
+  TCCR1B = 0;
+  TCNT1 = 0;
+  hal_slot_arm(HAL_SLOT_CYCLES);
+  TIFR1 = _BV(OCF1B);
+  TIMSK1 = _BV(OCIE1B);
+  TCCR1B = _BV(CS10);
+  sei();
+}
+
+/* The pulse may be longer by the interrupts in it; the sensor answers 750 us after its end. */
+void hal_ping_trigger(void) {
+#ifdef PIN_PING
+  HAL_PIN_LOW(PING);
+  HAL_PIN_OUTPUT(PING);
+  HAL_PIN_HIGH(PING);
+  __builtin_avr_delay_cycles(5u * HAL_CYCLES_PER_US);
+  HAL_PIN_LOW(PING);
+  HAL_PIN_INPUT(PING);
+#endif
+}

@@ -1,0 +1,123 @@
+/* parameters.c: see parameters.h. Ranges and defaults are in flash, the values in 16 bits each. */
+#include "parameters.h"
+
+#include <string.h>
+
+#include "generated/values.h"
+#include "hal/hal.h"
+
+typedef struct {
+  uint16_t minimum; /* as the values are kept; of an i16 it is negative, of a u16 below 32768, which tells them apart */
+  uint16_t span;    /* from minimum to maximum */
+} parameter_range;
+
+#define RANGE(name, type, minimum, maximum, initial) \
+  [PARAMETER_##name] = {(uint16_t)(minimum), (uint16_t)((maximum) - (minimum))},
+HAL_TABLE parameter_range ranges[PARAMETER_COUNT] = {PARAMETER_LIST(RANGE)};
+#undef RANGE
+
+#define INITIAL(name, type, minimum, maximum, initial) [PARAMETER_##name] = (uint16_t)(initial),
+HAL_TABLE uint16_t initials[PARAMETER_COUNT] = {PARAMETER_LIST(INITIAL)};
+#undef INITIAL
+
+/* Rates that the line can have, in counts of the parameter. */
+HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
+#define BAUD_RATES (sizeof baud_rates / sizeof *baud_rates)
+
+#define LIMIT_MIN_u16 0
+#define LIMIT_MIN_MAX_u16 INT16_MAX
+#define LIMIT_MAX_u16 UINT16_MAX
+#define LIMIT_MIN_i16 INT16_MIN
+#define LIMIT_MIN_MAX_i16 (-1)
+#define LIMIT_MAX_i16 INT16_MAX
+#define WITHIN(name, type, minimum, maximum, initial)                                                                 \
+  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);                              \
+  _Static_assert((minimum) >= LIMIT_MIN_##type && (minimum) <= LIMIT_MIN_MAX_##type && (maximum) <= LIMIT_MAX_##type, \
+                 "type of " #name);
+PARAMETER_LIST(WITHIN)
+#undef WITHIN
+_Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a device without pins");
+
+static uint16_t values[PARAMETER_COUNT];
+static bool has_host_come; /* since the start */
+
+static __attribute__((noinline)) parameter_range range_of(uint8_t parameter) {
+  return (parameter_range){hal_table_word(&ranges[parameter].minimum), hal_table_word(&ranges[parameter].span)};
+}
+
+static int32_t meant(uint16_t kept, parameter_range range) {
+  return (int16_t)range.minimum < 0 ? (int32_t)(int16_t)kept : (int32_t)kept;
+}
+
+/* Only devices that the pin map has can be switched on. */
+static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUILT) == 0; }
+
+static bool is_baud_rate(uint16_t value) {
+  for (uint8_t i = 0; i < BAUD_RATES; i++) {
+    if (value == hal_table_word(&baud_rates[i])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* A value as it is kept: counted from the minimum, modulo 65536, none outside is within the span. */
+static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) {
+  if ((uint16_t)(kept - range.minimum) > range.span) {
+    return false;
+  }
+  switch (parameter) {
+    case PARAMETER_DEVICES:
+      return are_devices(kept);
+    case PARAMETER_BAUD_RATE:
+      return is_baud_rate(kept);
+    default:
+      return true;
+  }
+}
+
+void parameters_reset(void) {
+  hal_table_copy(values, initials, sizeof values);
+  has_host_come = false;
+}
+
+uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
+
+int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
+
+__attribute__((noinline)) int32_t parameters_get(uint8_t parameter) {
+  return parameter < PARAMETER_COUNT ? meant(values[parameter], range_of(parameter)) : 0;
+}
+
+uint8_t parameters_set(uint8_t parameter, int32_t value) {
+  if (parameter >= PARAMETER_COUNT) {
+    return ANSWER_STATUS_UNKNOWN_PARAMETER;
+  }
+  const parameter_range range = range_of(parameter);
+  const uint16_t kept = (uint16_t)value;
+  if (meant(kept, range) != value || !is_allowed(parameter, kept, range)) {
+    return ANSWER_STATUS_OUT_OF_RANGE;
+  }
+  values[parameter] = kept;
+  return ANSWER_STATUS_OK;
+}
+
+bool parameters_device_on(uint16_t device) { return (values[PARAMETER_DEVICES] & device) != 0; }
+
+bool parameters_device_in_use(uint16_t device) {
+  return parameters_device_on(device) && (has_host_come || values[PARAMETER_FALLBACK_AT_START] != 0);
+}
+
+void parameters_host_has_come(void) { has_host_come = true; }
+
+const uint16_t *parameters_values(void) { return values; }
+
+bool parameters_restore(const uint16_t *kept) {
+  for (uint8_t parameter = 0; parameter < PARAMETER_COUNT; parameter++) {
+    if (!is_allowed(parameter, kept[parameter], range_of(parameter))) {
+      return false;
+    }
+  }
+  memcpy(values, kept, sizeof values);
+  return true;
+}

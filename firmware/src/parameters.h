@@ -1,0 +1,47 @@
+/* parameters.h: what can be set at run time; names, types, ranges and defaults come from messages.toml and the robot's
+ * description (generated/parameters.h). A value lasts until the next reset, unless it is saved (storage.h). Units: counts
+ * of the parameter's scale. */
+#ifndef PARAMETERS_H
+#define PARAMETERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "generated/parameters.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* All values to their defaults. */
+void parameters_reset(void);
+
+/* The value in force of a parameter of that type. Cheap; `parameter` must be one. */
+uint16_t parameters_u16(uint8_t parameter);
+int16_t parameters_i16(uint8_t parameter);
+
+/* The value in force of a parameter of any type; 0 for a number that is no parameter. */
+int32_t parameters_get(uint8_t parameter);
+
+/* Returns an ANSWER_STATUS_...; the value changes only on ANSWER_STATUS_OK. */
+uint8_t parameters_set(uint8_t parameter, int32_t value);
+
+/* Whether a device (DEVICES_... bit) is switched on. */
+bool parameters_device_on(uint16_t device);
+
+/* Whether it may also drive its pins: not before a host has opened a session, as what is wired to the board may be something
+ * else; or the board's own brain may begin by itself. */
+bool parameters_device_in_use(uint16_t device);
+void parameters_host_has_come(void);
+
+/* All values as they are kept, PARAMETER_COUNT of them: an i16 in two's complement. */
+const uint16_t *parameters_values(void);
+
+/* Puts PARAMETER_COUNT such values in force, if each is within its range; otherwise none, and returns false. */
+bool parameters_restore(const uint16_t *kept);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,178 @@
+"""The board's own brain in its world: it wanders while the host is silent, and gives way when it speaks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boebot.link import messages
+from boebot.link.messages import EventKind, Status
+from boebot.robots import load_robot
+from hil_tests.circle import arena_of, circle
+from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
+from sim_bridge.arena import load_arena
+
+pytestmark = pytest.mark.emulated
+
+LEFT, RIGHT = 13, 12
+AFTER_MS = 400
+START = (-0.9, -0.8, 0.4)  # in the room
+SLOW_US = 75  # three eighths of the full signal
+AFTER_S, WAITS_S = AFTER_MS / 1000, 0.5
+FORWARD = ((1500 + SLOW_US) * CYCLES_PER_US, (1500 - SLOW_US) * CYCLES_PER_US)
+SPEED_M_S = 0.1  # about: the servos' curve and the pack's voltage say more
+DEVICES = sum(bit for bit, device in messages.DEVICE_OF_BIT.items() if load_robot("boebot").has(device))
+
+
+def be_silent(rig: Rig, seconds: float) -> None:
+    rig.alive = rig.acknowledges = False
+    rig.listen(seconds)
+
+
+def switch_on(rig: Rig, after_ms: int = AFTER_MS) -> None:
+    rig.set("fallback_after", after_ms)
+
+
+def speak(rig: Rig) -> messages.Telemetry:
+    rig.alive = rig.acknowledges = True
+    rig.listen(0.1)
+    return rig.telemetry[-1]
+
+
+def told(rig: Rig) -> list[EventKind]:
+    """What a new session is told of, in its order."""
+    rig.events.clear()
+    rig.acknowledges = True
+    rig.start(arm=False)
+    for _ in range(20):
+        rig.listen(TICK_S)
+    return [EventKind(kind) for _, kind in sorted({event.number: event.kind for event in rig.events}.items())]
+
+
+# ---- what it does ----------------------------------------------------------------------------------------------------
+
+
+def test_it_wanders_through_the_room_and_touches_nothing(board_url: str) -> None:
+    """The IR pairs see each wall before a whisker or the body touches it; nothing there is low or dark."""
+    with circle(board_url, load_arena("room"), pose=START) as rig:
+        switch_on(rig)
+        begun = rig.robot.body().distance
+        be_silent(rig, 60.0)
+        assert rig.robot.contacts == 0
+        assert rig.robot.body().distance - begun > 0.5 * 60 * SPEED_M_S, "half of the time, at least, it drives ahead"
+        assert rig.pulses(LEFT)[-1, 0] > rig.board.cycle - 2 * FRAME_CYCLES, "and does so to the end"
+
+
+def test_with_whiskers_alone_it_pushes_against_nothing(board_url: str) -> None:
+    """Its whiskers tell what is ahead; behind it is blind, and goes back for half a second at most. So it is never in
+    contact for a second without getting anywhere. It may slide along a wall, beside its whiskers."""
+    with circle(board_url, load_arena("room"), pose=START) as rig:
+        rig.set("devices", DEVICES & ~messages.Devices.INFRARED)
+        switch_on(rig)
+        be_silent(rig, 0.0)
+        steps = []
+        for _ in range(600):
+            rig.listen(0.1)
+            body = rig.robot.body()
+            steps.append((body.x, body.y, float(body.touching)))
+        x, y, touching = np.array(steps).T
+        moved = np.hypot(x[10:] - x[:-10], y[10:] - y[:-10])
+        always = np.convolve(touching, np.ones(11), "valid") > 10
+        assert not np.any(always & (moved < 0.02)), "it pushes"
+        assert touching.mean() < 0.1
+        assert rig.robot.body().distance > 0.5 * 60 * SPEED_M_S
+
+
+def pulses_of_a_run(url: str, pose: tuple[float, float, float], seconds: float) -> list[np.ndarray]:
+    """Of each wheel: starts, from the left one's first, and widths."""
+    with circle(url, load_arena("room"), pose=pose) as rig:
+        switch_on(rig)
+        be_silent(rig, seconds)
+        wheels = [rig.pulses(pin) for pin in (LEFT, RIGHT)]
+    return [pulses - np.array([wheels[0][0, 0], 0]) for pulses in wheels]
+
+
+def test_native_and_avr_board_give_the_same_pulses() -> None:
+    """For 15 s with two walls. Not for ever: the pulses are equal to 1 us, until a reading comes out differently."""
+    native, avr = (pulses_of_a_run(url, (0.0, 0.9, 1.2), 15.0) for url in ("native", "avr"))
+    for ours, theirs in zip(native, avr, strict=True):
+        assert ours.shape == theirs.shape and len(ours) > 650
+        assert np.abs(ours - theirs).max() <= CYCLES_PER_US
+    right = native[1]
+    turns = right[:, 1] > 1500 * CYCLES_PER_US  # to the right
+    assert np.count_nonzero(np.diff(turns.astype(int)) == 1) >= 2
+
+
+# ---- when it drives --------------------------------------------------------------------------------------------------
+
+
+def test_the_dead_mans_stop_comes_first_and_the_host_is_told_of_both(board_url: str) -> None:
+    """The time to live is longer than the silence after which the fallback would take over."""
+    with circle(board_url, arena_of()) as rig:
+        switch_on(rig, 100)
+        rig.drive(0.5, 0.5, 300)
+        begun = rig.board.cycle
+        be_silent(rig, 0.9)
+        starts, widths = rig.pulses(LEFT).T
+        ends = np.flatnonzero(np.diff(starts) > FRAME_CYCLES + CYCLES_PER_US)
+        assert len(ends) == 1 and np.abs(widths[: ends[0] + 1] - 1600 * CYCLES_PER_US).max() <= CYCLES_PER_US
+        assert 0.27 < (starts[ends[0]] - begun) / CYCLES_PER_S < 0.33
+        assert WAITS_S <= np.diff(starts)[ends[0]] / CYCLES_PER_S < WAITS_S + 0.06
+        assert rig.telemetry[-1].status & Status.FALLBACK
+        assert told(rig) == [EventKind.DEAD_MAN, EventKind.FALLBACK, EventKind.LATCH, EventKind.FALLBACK]
+
+
+def test_the_host_has_the_motors_back_when_it_speaks(board_url: str) -> None:
+    """In its session it need not arm; after the session's end it must."""
+    with circle(board_url, arena_of()) as rig:
+        switch_on(rig)
+        be_silent(rig, AFTER_S + WAITS_S + 0.1)
+        now = rig.telemetry[-1]
+        assert now.status & Status.FALLBACK and (now.pulse_left, now.pulse_right) == FORWARD
+        now = speak(rig)
+        assert now.status & (Status.FALLBACK | Status.LATCHED) == 0 and (now.pulse_left, now.pulse_right) == (0, 0)
+        rig.drive_for(1.0, 1.0, 0.1)
+        assert rig.latest().pulse_left == 1700 * CYCLES_PER_US
+        be_silent(rig, 3.0)
+        assert rig.robot.body().speed > 0.8 * SPEED_M_S, "it drives on when the session has ended"
+        rig.start(arm=False)
+        rig.drive_for(1.0, 1.0, 0.3)
+        assert rig.latest().latch == messages.Latch.SESSION_ENDED and rig.latest().pulse_left == 0
+        assert rig.robot.body().speed < 0.01
+
+
+@pytest.mark.parametrize("how", ["stop", "close", "low supply"])
+def test_what_has_stopped_the_robot_keeps_the_fallback_off_until_a_host_arms(board_url: str, how: str) -> None:
+    with circle(board_url, arena_of()) as rig:
+        switch_on(rig)
+        be_silent(rig, AFTER_S + WAITS_S + 0.1)
+        assert rig.robot.body().speed > 0.5 * SPEED_M_S
+        if how == "stop":
+            rig.stop()
+        elif how == "close":
+            rig.send(messages.Close(rig.seed))
+        else:
+            rig.board.supply(3.5)
+            rig.listen(0.2)
+            rig.board.supply(None)
+        be_silent(rig, 3.0)
+        still = rig.robot.body().x
+        be_silent(rig, 3.0)
+        assert rig.robot.body().x == still
+        rig.start()
+        be_silent(rig, AFTER_S + WAITS_S + 1.0)
+        assert rig.robot.body().x != still
+
+
+@pytest.mark.parametrize("at_start", [False, True])
+def test_after_a_reset_it_drives_only_if_it_was_told_to_and_nothing_was_wrong(board_url: str, at_start: bool) -> None:
+    with circle(board_url, arena_of()) as rig:
+        switch_on(rig)
+        rig.set("fallback_at_start", int(at_start))
+        assert rig.request(messages.SaveParameters, within_s=1.0).status == messages.AnswerStatus.OK
+        for cause in ("watchdog", "brown_out", "external", "power"):
+            rig.board.reset(cause)
+            x = rig.robot.body().x
+            be_silent(rig, 2.0)
+            goes = at_start and cause in ("external", "power")
+            assert (rig.robot.body().x > x + 0.05) == goes, cause

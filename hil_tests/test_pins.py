@@ -1,0 +1,104 @@
+"""What the board does to its pins: none floats, a device that is off drives none, lines of servos are low early."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boebot import resources
+from boebot.link import messages
+from boebot.robots import ContinuousServo, Uart, load_robot
+from hil_tests.bootloader import with_bootloader
+from hil_tests.minimal_host import CYCLES_PER_S, MinimalHost, power_on
+from sim_bridge.boards.board import Level, ResetCause
+
+pytestmark = pytest.mark.emulated
+
+PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+DRIVEN = {Level.LOW, Level.HIGH}
+SERVOS = (13, 12)
+
+
+def device_pins(pin_map: str) -> dict[str, list[int]]:
+    """The pins of each device of a map but servos of wheels and the serial line, which are always in use."""
+    devices = load_robot(pin_map).device.items()
+    return {name: sorted(d.pins().values()) for name, d in devices if not isinstance(d, ContinuousServo | Uart)}
+
+
+def levels(host: MinimalHost, seconds: float) -> dict[int, set[Level]]:
+    """What the board does to each pin within that time."""
+    host.board.edges()
+    seen = {pin: {host.board.output(pin)} for pin in range(20)}
+    host.listen(seconds)
+    for edge in host.board.log():
+        seen[edge.pin].add(edge.level)
+    return seen
+
+
+@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("pin_map", PIN_MAPS)
+def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
+    host = MinimalHost(power_on(kind, pin_map))
+    host.open()
+    assert host.ask(messages.SetParameter, messages.PARAMETERS["devices"].id, 0).status == messages.AnswerStatus.OK
+    host.listen(0.1)
+    seen = levels(host, 0.5)
+    for device, pins in device_pins(pin_map).items():
+        for pin in pins:
+            assert seen[pin] == {Level.PULLED_UP}, device
+
+
+@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("pin_map", PIN_MAPS)
+def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
+    """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
+    host = MinimalHost(power_on(kind, pin_map))
+    host.open()
+    built = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
+    host.ask(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
+    host.listen(0.1)
+    measured = {"ping", "light_left", "light_right", "battery", "analog_infrared"}
+    seen = levels(host, 0.5)
+    for device, pins in device_pins(pin_map).items():
+        for pin in pins:
+            assert device in measured or Level.RELEASED not in seen[pin], device
+
+
+@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("pin_map", PIN_MAPS)
+def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
+    """Who knows what is wired to the board before it was told?"""
+    host = MinimalHost(power_on(kind, pin_map))
+    seen = levels(host, 1.5)
+    for device, pins in device_pins(pin_map).items():
+        for pin in pins:
+            assert not seen[pin] & DRIVEN, device
+
+
+# ---- from a reset on -------------------------------------------------------------------------------------------------
+
+
+def low_after_ms(image: Path) -> float:
+    """From the reset until the servos' lines are low, where they stay."""
+    board = power_on("avr", image=str(image))
+    board.run(2 * CYCLES_PER_S)
+    board.edges()
+    start = board.now
+    board.reset(ResetCause.POWER)
+    board.run(2 * CYCLES_PER_S)
+    log = board.edges()
+    of_servos = log[np.isin(log["pin"], SERVOS) & (log["cycle"] > start + 10)]  # without those of the reset itself
+    assert of_servos["level"].tolist() == [Level.LOW, Level.LOW]
+    return float(of_servos["cycle"].max() - start) / CYCLES_PER_S * 1e3
+
+
+@pytest.mark.parametrize("pin_map", PIN_MAPS)
+def test_servo_lines_are_low_within_milliseconds(pin_map: str) -> None:
+    assert low_after_ms(resources.folder("images") / f"{pin_map}.elf") < 5.0
+
+
+def test_behind_a_bootloader_too(tmp_path: Path) -> None:
+    """Which starts the program at once when the power comes; after an external reset it waits a second for another."""
+    assert low_after_ms(with_bootloader(resources.folder("images") / "shieldbot.elf", tmp_path)) < 5.0

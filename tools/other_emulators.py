@@ -1,0 +1,108 @@
+"""The firmware's images in emulators of other authors: each says hello and answers `identify`, and no more is asked.
+
+`python -m tools.other_emulators [IMAGE.elf ...]`; `make soak` does it with all images. QEMU 7.2 (Debian:
+qemu-system-misc) has no Timer2, pin changes, EEPROM, converter or watchdog, and its SLEEP never ends; avr8js has no
+input capture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import select
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+from pathlib import Path
+
+from boebot.link import frame, messages
+from hil_tests.calibration.avr8js import FOLDER, find_tool
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = [
+    ROOT / "build" / "images" / f"{name}.elf" for name in ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+]
+AVR8JS = Path(__file__).with_name("avr8js_serial.js")
+QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]
+WAIT_S = 30.0
+HELLOS = 2  # before it is asked: the first comes at the start, the next one from the main loop
+
+
+class SilentError(Exception):
+    """The image did not say what it should; the text says what was heard."""
+
+
+def command(emulator: str, elf: Path, binary: Path) -> list[str]:
+    """Runs the image with its serial line at the command's input and output."""
+    if emulator == "qemu":
+        return [*QEMU, str(elf)]
+    return [find_tool("node") or "node", str(AVR8JS), str(FOLDER), str(binary)]
+
+
+def identity(line: list[str]) -> messages.Identity:
+    """What the image says of itself.
+
+    Raises:
+        SilentError: no hello, or no identity.
+        OSError: the emulator is not there.
+    """
+    decoder, hellos = frame.Decoder(), 0
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            end = time.monotonic() + WAIT_S
+            while select.select([process.stdout], [], [], max(0.0, end - time.monotonic()))[0]:
+                data = os.read(process.stdout.fileno(), 4096)
+                if not data:
+                    break
+                for number, _, payload in decoder.feed(data):
+                    if number == messages.Identity.ID:
+                        return messages.Identity.unpack(payload)
+                    hellos += number == messages.Hello.ID
+                    if hellos == HELLOS:
+                        process.stdin.write(frame.encode(messages.Identify.ID, 0, b""))
+                        process.stdin.flush()
+        finally:
+            process.kill()
+    raise SilentError(f"no identity within {WAIT_S:g} s, after {hellos} hellos")
+
+
+def check(emulator: str, elf: Path) -> str:
+    """One line about the answer.
+
+    Raises:
+        SilentError: no answer, or another image's.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        binary = Path(folder, "image.bin")
+        subprocess.run(["avr-objcopy", "-O", "binary", str(elf), str(binary)], check=True)
+        begun = time.monotonic()
+        told = identity(command(emulator, elf, binary))
+        size, crc = binary.stat().st_size, zlib.crc32(binary.read_bytes())
+    if (told.image_size, told.image_hash) != (size, crc):
+        raise SilentError(f"it says {told.image_size} B, {told.image_hash:08x}; the image has {size} B, {crc:08x}")
+    took = time.monotonic() - begun
+    return f"{told.pin_map.rstrip(bytes(1)).decode()}, {size:,} B, CRC-32 {crc:08x}, after {took:.1f} s"
+
+
+def main() -> int:
+    """Asks each image in each emulator."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.other_emulators", description=(__doc__ or "").splitlines()[0]
+    )
+    parser.add_argument("images", nargs="*", type=Path, default=IMAGES, metavar="IMAGE.elf")
+    failed = 0
+    for elf in parser.parse_args().images:
+        for emulator in ("qemu", "avr8js"):
+            try:
+                said = check(emulator, elf)
+            except (SilentError, OSError, subprocess.CalledProcessError) as error:
+                said, failed = f"FAILED: {error}", 1
+            print(f"{elf.name} in {emulator}: {said}")
+    return failed
+
+
+if __name__ == "__main__":
+    sys.exit(main())
