@@ -19,6 +19,7 @@ from boebot.timing.budget import Report
 from sim_bridge.timing.measure import measure
 from tools import timing_page
 from tools.timing_page import Reports
+from tools.timing_promises import PROMISES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "timing.md"
@@ -30,17 +31,21 @@ COLOURS = {to_rgb(colour) for colour in ("#d55e00", "#0072b2")}  # interrupts an
 
 
 @pytest.fixture(scope="module")
-def now() -> dict[str, Reports]:
-    """Of every image as it is today, nothing measured."""
-    return {name: timing_page.reports(name) for name in timing_page.gate().PIN_MAPS}
+def now() -> Reports:
+    """Of the image whose tick is drawn, as it is today, nothing measured: the others are printed with it."""
+    return timing_page.reports(timing_page.DRAWN)
 
 
 @pytest.fixture(scope="module")
-def again(now: dict[str, Reports]) -> Report:
-    """What the emulator says today of one scenario of the image whose tick is drawn."""
+def again(now: Reports) -> Report:
+    """What the emulator says today of one scenario of it."""
     name = timing_page.DRAWN
     measured = measure(timing_page.elf(name), load_robot(name), LOAD, timing_page.SECONDS, timing_page.SEED)
-    return replace(now[name][LOAD], measured=measured)
+    return replace(now[LOAD], measured=measured)
+
+
+def section_of(name: str) -> str:
+    return PAGE.read_text(encoding="utf-8").split(f"## {name}.elf\n")[1].split("\n## ")[0].strip()
 
 
 def cells(line: str) -> list[str]:
@@ -55,17 +60,23 @@ def differ(shown: str, now: str) -> bool:
     return any(NUMBER.fullmatch(a or "") is None if b == timing_page.UNMEASURED else a != b for a, b in pairs)
 
 
-def test_bounds_and_sizes_on_the_page_are_those_of_the_images(now: dict[str, Reports]) -> None:
-    shown = PAGE.read_text(encoding="utf-8").splitlines()
-    lines = timing_page.page(now, str(PICTURE)).splitlines()
+def test_bounds_and_sizes_on_the_page_are_those_of_the_image(now: Reports) -> None:
+    shown = section_of(timing_page.DRAWN).splitlines()
+    lines = timing_page.image_section(timing_page.DRAWN, now).strip().splitlines()[2:]
     different = [f"{a!r}, now {b!r}" for a, b in zip(shown, lines, strict=False) if differ(a, b)]
     assert len(shown) == len(lines) and not different, f"{RENEW}\n" + "\n".join(different[:10])
+
+
+def test_promises_on_the_page_are_those_that_are_held() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for promise in PROMISES:
+        assert f"| `{promise.load}` | {promise.what} | {timing_page.limit(promise)} |" in text, RENEW
 
 
 def test_what_was_measured_is_measured_again(again: Report) -> None:
     """Of one load; a run is a function of image, scenario and seed."""
     expected = [cells(line) for line in timing_page.sums({LOAD: again}).splitlines()]
-    section = PAGE.read_text(encoding="utf-8").split(f"## {timing_page.DRAWN}.elf\n")[1].split("\n## ")[0]
+    section = section_of(timing_page.DRAWN)
     table = section[section.index("| of a tick ") :].split("\n\n")[0]
     shown = [cells(line) for line in table.splitlines()]
     column = shown[0].index(LOAD)
@@ -89,7 +100,7 @@ def test_picture_is_of_the_tick_that_is_measured_today(again: Report) -> None:
 def test_nothing_on_the_page_took_longer_than_its_bound() -> None:
     """A task or an interrupt; the larger where loads differ."""
     blocks = [block for block in PAGE.read_text(encoding="utf-8").split("\n\n") if " | bound | emulator | " in block]
-    assert len(blocks) == 2 * len(timing_page.gate().PIN_MAPS)
+    assert len(blocks) == 2 * len(timing_page.IMAGES)
     for row in (cells(line) for block in blocks for line in block.splitlines()[2:]):
         bound = max(int(number) for number in row[1].replace(",", "").split(" / "))
         assert row[2] == "–" or 0 < int(row[2].replace(",", "")) <= bound, row
