@@ -91,6 +91,26 @@ def test_line_that_spoils_bytes_is_not_taken_for_another_rate(spoilt: float) -> 
     assert opened == lines or (spoilt == 0.05 and opened >= lines / 2)
 
 
+class LateHello(Port):
+    """A board that starts slowly: 0.2 s of silence, then its hello in pieces of 8 bytes."""
+
+    _waiting = b""
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        pieces = super().read_stamped(wait_s if not self._waiting else 0.001, quiet_s)
+        if self.now() < 0.2:
+            return []
+        self._waiting += b"".join(data for _, data in pieces)
+        data, self._waiting = self._waiting[:8], self._waiting[8:]
+        return [(self.now(), data)]
+
+
+def test_hello_that_is_not_yet_whole_is_waited_for() -> None:
+    port = LateHello(Peer(), 500_000)
+    Link(port).open()
+    assert port.tried == [500_000]
+
+
 class Sketch(Port):
     """Other firmware: says something readable, at its own rate."""
 

@@ -123,7 +123,7 @@ class BaudSearch:
         self._next = 0
         # silence is waited for at the rate that was asked for, as long as the others leave time
         self._change_s = max(self.end_s - len(others) * _LISTEN_S - _LOOK_S, now + _LISTEN_S)
-        self._began_s = now
+        self._first_byte_s: float | None = None  # when the first came at this rate
 
     @property
     def changed(self) -> bool:
@@ -134,7 +134,9 @@ class BaudSearch:
         """The rate to change to, or None: stay."""
         if not self._order or heard.frames:
             return None
-        garbage = heard.bytes_here > 0 and now_s - self._began_s >= _LISTEN_S
+        if self._first_byte_s is None and heard.bytes_here > 0:
+            self._first_byte_s = now_s  # perhaps the beginning of a hello
+        garbage = self._first_byte_s is not None and now_s - self._first_byte_s >= _LISTEN_S
         if now_s < self._change_s and not garbage:
             return None
         heard.rate_changes(self.baud)
@@ -142,7 +144,7 @@ class BaudSearch:
         self._next += 1
         if self._next == len(self._order):
             self._order = [*self._order, self.asked] if self.asked is not None else self._order
-        self._began_s = now_s
+        self._first_byte_s = None
         self._change_s = now_s + _LISTEN_S
         return self.baud
 
