@@ -149,8 +149,9 @@ static void trigger(void) {
   since_trigger = 0;
   noise_left = NOISE_MAX;
   is_held_low = false;
-  hal_ping_trigger();
-  HAL_ATOMIC {
+  hal_ping_raise();
+  HAL_ATOMIC { /* the sensor counts from the pulse's end, and so does HOLD_OFF: no interrupt in between */
+    hal_ping_release();
     triggered_cycles = schedule_now();
     triggered = (uint16_t)triggered_cycles;
     trigger_slot = schedule_slot;

@@ -122,8 +122,10 @@ enum { HAL_TONE_BY_8 = 2, HAL_TONE_BY_64, HAL_TONE_BY_256, HAL_TONE_BY_1024 };
 void hal_tone_start(uint8_t clock, uint8_t count);
 void hal_tone_stop(void);
 
-/* Gives the pin named PING, if there is one, a pulse of 5 us and leaves it an input; hal_capture_start() comes next. */
-void hal_ping_trigger(void);
+/* The trigger's pulse on the pin named PING, if there is one: raise returns 5 us after the rise, release ends the pulse and
+ * leaves the pin an input; hal_capture_start() comes next. */
+void hal_ping_raise(void);
+void hal_ping_release(void);
 
 /* The analog converter: joins it to channel 0..5 (A0..A5) or to the chip's bandgap, converts (104 us, the first time 200);
  * the last complete result is voltage * 1024 / supply, rounded down, at most 1023. Nothing is joined while it is busy. */

@@ -18,13 +18,18 @@ void hal_start_timers(void) {
   sei();
 }
 
-/* The pulse may be longer by the interrupts in it; the sensor answers 750 us after its end. */
-void hal_ping_trigger(void) {
+/* The sensor wants 2 us at least; interrupts may make the pulse longer. */
+void hal_ping_raise(void) {
 #ifdef PIN_PING
   HAL_PIN_LOW(PING);
   HAL_PIN_OUTPUT(PING);
   HAL_PIN_HIGH(PING);
   __builtin_avr_delay_cycles(5u * HAL_CYCLES_PER_US);
+#endif
+}
+
+void hal_ping_release(void) {
+#ifdef PIN_PING
   HAL_PIN_LOW(PING);
   HAL_PIN_INPUT(PING);
 #endif

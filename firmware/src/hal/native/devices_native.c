@@ -47,12 +47,17 @@ void native_carrier_toggle(void) {
 
 /* ---- Ping ---- */
 
-void hal_ping_trigger(void) {
+void hal_ping_raise(void) {
 #ifdef PIN_PING
   HAL_PIN_LOW(PING);
   HAL_PIN_OUTPUT(PING);
   HAL_PIN_HIGH(PING);
   native->now += PING_TRIGGER_CYCLES;
+#endif
+}
+
+void hal_ping_release(void) {
+#ifdef PIN_PING
   HAL_PIN_LOW(PING);
   HAL_PIN_INPUT(PING);
 #endif
