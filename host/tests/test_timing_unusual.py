@@ -198,6 +198,7 @@ def test_constants_that_are_not_all_there_or_contradict_are_refused(
         ("slot 12 40 1000 40000", "slot 12 40001 1000 40000", "row 'slot' .* budget of 40001 cycles .* due each 40000"),
         ("first 1 0 150", "first 1 0 40001", "row 'first' .* budget of 40001 cycles .* due each 40000"),
         ("second 4 1 300", "second 4 1 160001", "row 'second' .* budget of 160001 cycles .* due each 160000"),
+        ("slot 12 40 1000", "first 12 40 1000", "its timing table has two rows of the name 'first'; expected one"),
         ("ping 18500 5 20000", "ping 18500 5 18499", "row 'ping' .* reading of 18500 us is at most 18499 us old"),
     ],
 )

@@ -68,8 +68,9 @@ def table_of(path: Path, data: bytes) -> Table:
         TimingError: a row is none, or contradicts itself or another.
     """
     rows = [_row(path, text) for text in data.split(b"\0") if text]
-    names = [(type(row), row.name) for row in rows]
-    double = next((name for kind, name in names if names.count((kind, name)) > 1), None)
+    # a sensor may be named as the task that reads it
+    names = [(isinstance(row, SensorRow), row.name) for row in rows]
+    double = next((name for sensor, name in names if names.count((sensor, name)) > 1), None)
     if double is not None:
         raise TimingError(f"{path}: its timing table has two rows of the name {double!r}; expected one")
     cycle = math.lcm(*(row.period for row in rows if isinstance(row, TaskRow)))

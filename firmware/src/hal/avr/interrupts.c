@@ -14,7 +14,7 @@ enum {
 #include "tasks.def"
 };
 IS_VECTOR(changes, PCINT1_vect);
-IS_VECTOR(light, PCINT2_vect);
+IS_VECTOR(light_edge, PCINT2_vect);
 IS_VECTOR(watchdog, WDT_vect);
 IS_VECTOR(carrier, TIMER2_COMPA_vect);
 IS_VECTOR(capture, TIMER1_CAPT_vect);
