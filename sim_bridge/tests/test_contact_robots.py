@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sim_bridge._core import ffi, lib
@@ -57,6 +57,7 @@ def test_momentum_is_kept_on_ice(
     b.place(other_pose[0] + 0.13, other_pose[1], other_pose[2], *other_motion)
     for robot in (a, b):
         robot.state.slipping = 1
+    assume(overlap(a, b) < 1e-6)  # a run refuses robots that begin in each other
     world = World([a, b])
     before = world.momentum()
     for _ in range(40):

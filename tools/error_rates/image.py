@@ -2,7 +2,7 @@
 
 What is sent are clock probes: the board answers each one that it accepts, with the probe's token, so the answers say
 which frames it accepted. It counts the accepted ones as well (the message `counters`): one that was accepted but not
-answered would show there. The decoder in C gets the same bytes, and must count the same good and bad frames.
+answered would show there. The decoder in C gets all that the board gets, and must count the same good and bad frames.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 from boebot.link import messages
+from boebot.link.frame import NO_SESSION
 from sim_bridge.boards import avr
 from tools.error_rates.library import ROOT, ffi, library, new
 from tools.error_rates.streams import FAULTS, Tally, seed_of
@@ -33,6 +34,7 @@ class Image:
         self._access = self._board.access()
         self._host, self._reference = library("host"), library("board")
         self._receiver = self._host.c_decoder_new(HANDSHAKE_SEED)
+        self._twin = self._reference.c_decoder_new(NO_SESSION)
         self._found = new("c_decoder_message[]", 4096)
         self._tokens: list[int] = []
         self._kept_alive = 0
@@ -44,6 +46,7 @@ class Image:
 
     def __exit__(self, *_: object) -> None:
         self._host.c_decoder_free(self._receiver)
+        self._reference.c_decoder_free(self._twin)
         self._access.close()
         self._board.close()
 
@@ -54,7 +57,17 @@ class Image:
         payload = message.pack()
         self._sequence = (self._sequence + 1) & 0xFF
         size = self._host.c_decoder_encode(wire, message.ID, self._sequence, payload, len(payload), seed)
-        self._access.send(ffi().buffer(wire, size)[:])
+        self._give(ffi().buffer(wire, size)[:], self._access.now)
+
+    def _give(self, data: bytes, at: int) -> None:
+        """The same bytes to the board, from cycle `at` on, and to the decoder in C."""
+        self._access.send(data, at=at)
+        self._reference.c_decoder_feed(self._twin, data, len(data), ffi().NULL, 0)
+
+    def _expected(self) -> tuple[int, int]:
+        """Good and bad frames by the decoder in C, without those that keep the session open."""
+        lib = self._reference
+        return lib.c_decoder_good(self._twin) - self._kept_alive, lib.c_decoder_bad(self._twin)
 
     def _messages(self) -> Iterator[messages.Message]:
         """What the board has sent since the last call."""
@@ -80,6 +93,7 @@ class Image:
         for _ in range(10):
             if self._hello().session == seed:
                 self._host.c_decoder_seed(self._receiver, seed)
+                self._reference.c_decoder_seed(self._twin, seed)
                 return seed
         raise AssertionError("the board has opened no session")
 
@@ -132,22 +146,20 @@ class Image:
         """Some rounds, judged; returns the counts after them."""
         lib = self._reference
         sent = [new("channel_round *") for _ in range(rounds)]
-        reference = lib.c_decoder_new(self.seed)
+        expected_before = self._expected()
         self._tokens = []
         at = self._access.now
         for number, spoilt in enumerate(sent):
             lib.channel_send(line, fault, spoilt)
             data = ffi().buffer(spoilt.wire, spoilt.size)[:]
-            lib.c_decoder_feed(reference, data, len(data), ffi().NULL, 0)
-            self._access.send(data, at=at)
+            self._give(data, at)
             at += max(spoilt.size, ROUND_BYTES) * BYTE_CYCLES
             if number % STEP == STEP - 1:
                 self._advance(at)
         self._advance(at)
         after = self._settle()
         good, bad, overrun = ((new - old) & 0xFFFF for new, old in zip(after, before, strict=True))
-        expected = (lib.c_decoder_good(reference), lib.c_decoder_bad(reference))
-        lib.c_decoder_free(reference)
+        expected = tuple((new - old) & 0xFFFF for new, old in zip(self._expected(), expected_before, strict=True))
         if overrun:
             raise AssertionError("the board has lost received bytes: the line was too busy")
         if (good, bad) != expected:
