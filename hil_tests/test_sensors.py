@@ -28,6 +28,14 @@ def test_edges_are_counted_and_timed(rig: Rig) -> None:
     assert abs(frames[-1].edge_period_right * unit - 8000) <= 2 * unit
 
 
+@pytest.mark.parametrize("robot", ["boebot", "shieldbot", "shieldbot-quad"])
+def test_wheels_at_rest_count_nothing_from_power_on(board_url: str, robot: str) -> None:
+    with Rig.open(board_url, robot=robot) as rig:
+        rig.start()
+        seen = rig.latest()
+        assert (seen.encoder_left, seen.encoder_right) == (0, 0)
+
+
 def test_edge_period_is_forgotten_after_half_a_second(rig: Rig) -> None:
     rig.board.square_wave(16, period=2 * CYCLES_PER_S // 500, seconds=0.1)
     rig.listen(0.1)

@@ -140,6 +140,10 @@ static void poll_firmware(void) {
 
 static void begin(uint8_t cause) {
   reset_cause = cause;
+  while (native->next_edge <= native->now) { /* who drives a pin from the power-on does so before the program looks */
+    const uint8_t pin = native->next_edge_pin;
+    native->outside[pin] = native_take_edge(native).level;
+  }
   hal_native_port_b = hal_native_port_c = hal_native_port_d = 0;
   for (int event = 0; event < EVENTS; event++) {
     native_next[event] = NATIVE_NEVER;
