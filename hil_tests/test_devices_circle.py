@@ -284,6 +284,20 @@ def test_a_stop_silences_the_buzzer(board_url: str) -> None:
         assert rig.robot.tones()["duration"] == pytest.approx([0.3], abs=0.03)
 
 
+def test_a_low_supply_silences_the_buzzer_once_and_a_warning_may_sound(board_url: str) -> None:
+    with circle(board_url, arena_of()) as rig:
+        rig.send(messages.Buzzer(1000, 200, 1))
+        rig.listen(0.1)
+        rig.board.supply(3.5)
+        rig.listen(0.3)
+        assert rig.latest().latch == messages.Latch.SUPPLY_LOW
+        rig.send(messages.Buzzer(2000, 20, 2))
+        rig.listen(0.4)
+        tones = rig.robot.tones()
+        assert tones["frequency"] == pytest.approx([1000, 2000], rel=0.01)
+        assert tones["duration"][0] < 0.3 and tones["duration"][1] == pytest.approx(0.2, abs=0.02)
+
+
 # ---- infra-red -------------------------------------------------------------------------------------------------------
 
 

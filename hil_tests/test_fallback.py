@@ -16,6 +16,7 @@ pytestmark = pytest.mark.emulated
 
 LEFT, RIGHT = 13, 12
 AFTER_MS = 400
+WHISKER = 5
 START = (-0.9, -0.8, 0.4)  # in the room
 SLOW_US = 75  # three eighths of the full signal
 AFTER_S, WAITS_S = AFTER_MS / 1000, 0.5
@@ -81,6 +82,16 @@ def test_with_whiskers_alone_it_pushes_against_nothing(board_url: str) -> None:
         assert not np.any(always & (moved < 0.02)), "it pushes"
         assert touching.mean() < 0.1
         assert rig.robot.body().distance > 0.5 * 60 * SPEED_M_S
+
+
+def test_it_waits_first_whatever_is_touched(board_url: str) -> None:
+    with circle(board_url, arena_of()) as rig:
+        rig.board.press_whisker(WHISKER, True)
+        switch_on(rig)
+        be_silent(rig, AFTER_S + 0.8 * WAITS_S)
+        assert rig.telemetry[-1].status & Status.FALLBACK and len(rig.pulses(LEFT)) == 0
+        be_silent(rig, 0.4 * WAITS_S)
+        assert rig.telemetry[-1].pulse_left == (1500 - SLOW_US) * CYCLES_PER_US, "it goes back"
 
 
 def pulses_of_a_run(url: str, pose: tuple[float, float, float], seconds: float) -> list[np.ndarray]:

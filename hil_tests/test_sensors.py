@@ -28,6 +28,13 @@ def test_edges_are_counted_and_timed(rig: Rig) -> None:
     assert abs(frames[-1].edge_period_right * unit - 8000) <= 2 * unit
 
 
+def test_sensors_go_on_when_parameters_are_reset(rig: Rig) -> None:
+    assert rig.request(messages.ResetParameters).status == messages.AnswerStatus.OK
+    rig.listen(0.3)
+    seen = rig.latest()
+    assert seen.ping_age < 10 and seen.infrared_age < 10
+
+
 @pytest.mark.parametrize("robot", ["boebot", "shieldbot", "shieldbot-quad"])
 def test_wheels_at_rest_count_nothing_from_power_on(board_url: str, robot: str) -> None:
     with Rig.open(board_url, robot=robot) as rig:

@@ -33,6 +33,10 @@ def _tick(report: Report) -> int | None:
     return None if report.responses is None else report.responses.tick
 
 
+def _infrared(report: Report) -> float | None:
+    return None if report.responses is None else _percent(report.responses.pieces["infrared"])
+
+
 def _lost(measured: Measurement | None, *kinds: str) -> int | None:
     return None if measured is None else sum(measured.losses[kind] for kind in kinds)
 
@@ -44,6 +48,7 @@ PROMISES = (
     Promise("figures", "bytes and edges lost, emulator", "", 0, lambda r: _lost(r.own, "bytes", "frames", "edges")),
     Promise("figures", "the tick's tasks, bound to longest measured", "", 1.5, lambda r: r.ratio),
     Promise("overload", "response of the tick, bound", "%", 100, lambda r: _percent(_tick(r))),
+    Promise("overload", "response of the IR pairs' task, bound: bursts begin at 50 %", "%", 50, _infrared),
     Promise(
         "overload", "ticks missed, resets, emulator", "", 0, lambda r: _lost(r.own, "ticks", "late_ticks", "resets")
     ),

@@ -34,19 +34,22 @@ static void connect(bool connected) {
   }
 }
 
-/* The fastest clock in which half a period is 255 counts at most. */
+#define RATE(divisor) (16000000ul / (divisor))                            /* of the tone's clock, Hz */
+#define LOWEST(divisor) ((uint16_t)(RATE(divisor) / (2ul * 256ul) + 1ul)) /* Hz: half a period is 255 counts at most */
+
+/* The fastest clock that can be counted in 8 bits. */
 static void sound(uint16_t frequency) {
   uint8_t clock = HAL_TONE_BY_8;
-  uint32_t rate = 2000000ul; /* of the clock, Hz */
-  if (frequency <= 122u) {
+  uint32_t rate = RATE(8);
+  if (frequency < LOWEST(256)) {
     clock = HAL_TONE_BY_1024;
-    rate = 15625ul;
-  } else if (frequency <= 488u) {
+    rate = RATE(1024);
+  } else if (frequency < LOWEST(64)) {
     clock = HAL_TONE_BY_256;
-    rate = 62500ul;
-  } else if (frequency <= 3906u) {
+    rate = RATE(256);
+  } else if (frequency < LOWEST(8)) {
     clock = HAL_TONE_BY_64;
-    rate = 250000ul;
+    rate = RATE(64);
   }
   connect(true);
   hal_tone_start(clock, (uint8_t)(rate / (2ul * frequency)));

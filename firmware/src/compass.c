@@ -46,10 +46,10 @@ void compass_start(void) {
   forget(COMPASS_STATUS_OFF);
 }
 
-static int16_t word(const uint8_t *bytes) { return (int16_t)(uint16_t)((uint16_t)bytes[0] << 8 | bytes[1]); }
+static int16_t word(const volatile uint8_t *bytes) { return (int16_t)(uint16_t)((uint16_t)bytes[0] << 8 | bytes[1]); }
 
 static void take(void) {
-  const uint8_t *bytes = two_wire_bytes();
+  const volatile uint8_t *bytes = two_wire_bytes();
   own.reading.x = word(bytes);
   own.reading.z = word(bytes + 2);
   own.reading.y = word(bytes + 4);

@@ -151,11 +151,11 @@ void encoder_start(void) {
 static uint16_t period_of(uint16_t gap) { return gap == 0 ? 1u : gap >= PERIOD_LONGEST ? 0u : gap; }
 
 /* Makes the reading of a wheel from the tick that ends. */
-static void close_tick(wheel *w, bool deaf) {
+static void close_tick(wheel *w, bool not_listening) {
   w->reading.count += w->steps;
   w->steps = 0;
-  w->reading.masked = deaf;
-  if (deaf || time_lost) {
+  w->reading.masked = not_listening;
+  if (not_listening || time_lost) {
     w->reading.period = 0;
     w->silence = SILENT_TICKS; /* what was missed says nothing about the time to the next edge */
   } else if (w->edges != 0) {

@@ -3,8 +3,9 @@
  * One line per wheel counts up whatever the direction; two lines (ENCODER_LINES 2) count down when the wheel turns
  * backward. Forward is A leading B: (A, B) runs 00, 10, 11, 01. The pin map says which it is.
  *
- * A sensor may bounce: an edge that comes sooner after the line's last one than the parameter encoder_gap does not count, nor
- * does one that only brings the line back to where it was. Speed is the time between edges that count.
+ * A sensor may bounce. With one line, an edge sooner than the parameter encoder_gap after the wheel's last one does not count,
+ * nor does one that only brings the line back to where it was. With two lines every edge counts, as the steps of a bounce
+ * cancel; an edge sooner than encoder_gap only gives no period. Speed is the time between edges that give one.
  * A line that fires more often in a tick than the parameter encoder_limit allows, or that is found to be noise
  * (pin_changes.h), is masked until the next tick. What it did meanwhile is not known: it gives no period, neither then nor
  * across the gap. */

@@ -102,7 +102,7 @@ static void choose_state(void) {
   count_blocked(touched != 0 || seen != 0);
   if (blocked == BLOCKED_TIME) {
     begin(WAIT, WAIT_TIME, 0, 0);
-  } else if (newly_touched || (touched != 0 && state == WANDER)) {
+  } else if (state != WAIT && (newly_touched || (touched != 0 && state == WANDER))) {
     touched_side = touched;
     begin(BACK, BACK_TIME, -SLOW, -SLOW);
   } else if (seen != 0 && state == WANDER) {
@@ -133,7 +133,7 @@ static bool host_is_silent(void) {
   return after != 0 && silence >= after;
 }
 
-static bool has_eyes(void) {
+static bool senses_obstacles(void) {
   if (parameters_device_on(DEVICES_INFRARED)) {
     return infrared_age() <= INFRARED_AGE_MAX && parameters_u16(PARAMETER_INFRARED_PERIOD) <= INFRARED_AGE_MAX;
   }
@@ -164,7 +164,7 @@ void fallback_host_spoke(void) {
 /* In every tick. */
 void fallback_task(void) {
   silence = (uint16_t)(silence <= UINT16_MAX - TICK_MS ? silence + TICK_MS : UINT16_MAX);
-  const bool may_drive = host_is_silent() && has_eyes() && safety_accept_fallback();
+  const bool may_drive = host_is_silent() && senses_obstacles() && safety_accept_fallback();
   if (may_drive && drives) {
     choose_state();
     move();

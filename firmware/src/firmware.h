@@ -8,8 +8,6 @@
 extern "C" {
 #endif
 
-#define FIRMWARE_VERSION "0.1.0"
-
 /* Brings up board, devices and link, says hello, and starts the slots. */
 void firmware_start(void);
 

@@ -19,10 +19,10 @@ static const uint8_t half_periods[BANDS] = {211, 205, 200, 195, 190};
 
 typedef struct {
   /* Shared with the interrupts; single bytes. */
-  volatile bool armed;   /* this tick shall have bursts */
-  volatile bool started; /* it has them, or had them: until the next tick's task has looked */
-  volatile uint8_t band; /* their frequency; changed between ticks with bursts only */
-  volatile uint8_t dark; /* receivers that saw nothing before the burst of their side; INFRARED_... bits */
+  volatile bool armed;          /* this tick shall have bursts */
+  volatile bool started;        /* it has them, or had them: until the next tick's task has looked */
+  volatile uint8_t band;        /* their frequency; changed between ticks with bursts only */
+  volatile uint8_t saw_nothing; /* receivers that saw nothing before the burst of their side; INFRARED_... bits */
 
   /* Main loop only. */
   uint8_t reading;
@@ -59,7 +59,7 @@ void infrared_start(void) {
 }
 
 /* The receivers whose output is high, INFRARED_... bits: they see nothing. */
-static uint8_t dark(void) {
+static uint8_t saw_nothing(void) {
   return (uint8_t)((HAL_PIN_READ(INFRARED_LEFT_RECEIVER) != 0 ? INFRARED_LEFT : 0u) |
                    (HAL_PIN_READ(INFRARED_RIGHT_RECEIVER) != 0 ? INFRARED_RIGHT : 0u));
 }
@@ -71,7 +71,7 @@ void infrared_begin(uint8_t side) {
   }
   if (own.started) {
     const uint8_t own_bit = side == LEFT ? INFRARED_LEFT : INFRARED_RIGHT;
-    own.dark = (uint8_t)((own.dark & (uint8_t)~own_bit) | (dark() & own_bit));
+    own.saw_nothing = (uint8_t)((own.saw_nothing & (uint8_t)~own_bit) | (saw_nothing() & own_bit));
     hal_burst_start(side, half_periods[own.band], BURST_TOGGLES);
   }
 }
@@ -79,7 +79,7 @@ void infrared_begin(uint8_t side) {
 static uint8_t seen(void) {
   const uint8_t bits =
       (uint8_t)((hal_burst_seen(LEFT) ? INFRARED_LEFT : 0u) | (hal_burst_seen(RIGHT) ? INFRARED_RIGHT : 0u));
-  return bits & own.dark;
+  return bits & own.saw_nothing;
 }
 
 /* What a tick's bursts found: at 38 kHz the reading, in a sweep a part of the zones as well. */

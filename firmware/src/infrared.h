@@ -1,7 +1,6 @@
-/* infrared.h: the two IR pairs. Every infrared_period ticks each LED gives a 1 ms burst of 38 kHz, left in the third
- * slot of the tick and right in the fourth; at its end the receiver is sampled: its output is low when an object
- * reflects the burst. A receiver that was low before the burst
- * is stuck, or sees somebody else's light: it shows no object.
+/* infrared.h: the two IR pairs. Every infrared_period ticks each LED gives a 1 ms burst of 38 kHz, left in the third slot of
+ * the tick and right in the fourth; at its end the receiver is sampled: its output is low when an object reflects the burst.
+ * A receiver that was low before the burst is stuck, or sees another light: it shows no object.
  *
  * With the parameter infrared_sweep on, the bursts of four more ticks follow at 39, 40, 41 and 42 kHz, at which the receiver
  * is less and less sensitive: the nearer the object, the more of the five show it. Their number is the zone, 0 to 5. */

@@ -19,14 +19,15 @@ _Static_assert(PIN_LIGHT_LEFT >= 14, "the left light sensor's edge is stamped wi
 _Static_assert(PIN_LIGHT_RIGHT < 8, "the right light sensor's edge is stamped by port D");
 
 enum { CHARGE = 7, RELEASE = 0, COLLECT = 6 }; /* slots of a servo frame */
-_Static_assert((COLLECT - RELEASE) * (uint32_t)HAL_SLOT_CYCLES >= (LIGHT_LONGEST + 1000u) * (uint32_t)HAL_CYCLES_PER_US,
-               "time to decay, however late in its slot the release");
+_Static_assert(
+    (COLLECT - RELEASE) * (uint32_t)HAL_SLOT_CYCLES >= (LIGHT_LONGEST + 1000u) * (uint32_t)HAL_CYCLES_PER_US,
+    "the longest decay ends before the slot that collects, if the release is at most 1 ms late; else slot 7 collects");
 
 #define AGE_NEVER 255u
 
 static enum { IDLE, CHARGING, DECAYING } state;
-static uint32_t released[SIDES]; /* schedule_now() */
-static uint32_t edge[SIDES];     /* the same of the fall */
+static uint32_t released[SIDES];      /* schedule_now() */
+static volatile uint32_t edge[SIDES]; /* the same of the fall */
 static volatile bool has_fallen[SIDES];
 static uint16_t readings[SIDES];
 static uint8_t age;
@@ -129,6 +130,11 @@ static bool must_wait(void) {
 #endif
 }
 
+/* A line that is still high may fall until the longest decay is over. */
+static bool is_too_early(void) {
+  return schedule_now() - released[RIGHT] < LIGHT_LONGEST * (uint32_t)HAL_CYCLES_PER_US;
+}
+
 static void collect(void) {
 #ifdef PIN_LIGHT_LEFT
   readings[LEFT] = decay_time(LEFT, HAL_PIN_READ(LIGHT_LEFT));
@@ -151,13 +157,13 @@ void light_task(void) {
     readings[LEFT] = readings[RIGHT] = 0;
     age = AGE_NEVER;
   } else if (slot == CHARGE) {
-    if (state == DECAYING) { /* had to wait; no longer, the line may be one that never was high */
+    if (state == DECAYING && !is_too_early()) { /* had to wait; no longer, the line may be one that never was high */
       collect();
     }
     charge();
   } else if (slot == RELEASE && state == CHARGING) {
     release();
-  } else if (slot == COLLECT && state == DECAYING && !must_wait()) {
+  } else if (slot == COLLECT && state == DECAYING && !must_wait() && !is_too_early()) {
     collect();
   }
 }

@@ -3,7 +3,7 @@
  * shorter. Both sides at once, once in each servo frame (20 ms): charged in its last slot, let go in its first.
  *
  * Nothing waits for the edge: the left line's is stamped with the changes of port C (pin_changes.h), the right one's by the
- * pin change of port D. */
+ * pin change of port D. On a map with the left sensor on pin 8 the timer captures its edge. */
 #ifndef LIGHT_H
 #define LIGHT_H
 

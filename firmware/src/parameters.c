@@ -45,7 +45,8 @@ static __attribute__((noinline)) parameter_range range_of(uint8_t parameter) {
   return (parameter_range){hal_table_word(&ranges[parameter].minimum), hal_table_word(&ranges[parameter].span)};
 }
 
-static int32_t meant(uint16_t kept, parameter_range range) {
+/* The number that is stored in 16 bits. */
+static int32_t decoded(uint16_t kept, parameter_range range) {
   return (int16_t)range.minimum < 0 ? (int32_t)(int16_t)kept : (int32_t)kept;
 }
 
@@ -61,7 +62,7 @@ static bool is_baud_rate(uint16_t value) {
   return false;
 }
 
-/* A value as it is kept: counted from the minimum, modulo 65536, none outside is within the span. */
+/* Modulo 65536, only an allowed value is within the span, counted from the minimum. */
 static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) {
   if ((uint16_t)(kept - range.minimum) > range.span) {
     return false;
@@ -76,17 +77,19 @@ static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) 
   }
 }
 
-void parameters_reset(void) {
-  hal_table_copy(values, initials, sizeof values);
+void parameters_start(void) {
   has_host_come = false;
+  parameters_reset();
 }
+
+void parameters_reset(void) { hal_table_copy(values, initials, sizeof values); }
 
 uint16_t parameters_u16(uint8_t parameter) { return values[parameter]; }
 
 int16_t parameters_i16(uint8_t parameter) { return (int16_t)values[parameter]; }
 
 __attribute__((noinline)) int32_t parameters_get(uint8_t parameter) {
-  return parameter < PARAMETER_COUNT ? meant(values[parameter], range_of(parameter)) : 0;
+  return parameter < PARAMETER_COUNT ? decoded(values[parameter], range_of(parameter)) : 0;
 }
 
 uint8_t parameters_set(uint8_t parameter, int32_t value) {
@@ -95,7 +98,7 @@ uint8_t parameters_set(uint8_t parameter, int32_t value) {
   }
   const parameter_range range = range_of(parameter);
   const uint16_t kept = (uint16_t)value;
-  if (meant(kept, range) != value || !is_allowed(parameter, kept, range)) {
+  if (decoded(kept, range) != value || !is_allowed(parameter, kept, range)) {
     return ANSWER_STATUS_OUT_OF_RANGE;
   }
   values[parameter] = kept;

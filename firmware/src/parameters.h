@@ -13,6 +13,9 @@
 extern "C" {
 #endif
 
+/* At start: defaults, and no host has come. */
+void parameters_start(void);
+
 /* All values to their defaults. */
 void parameters_reset(void);
 

@@ -10,10 +10,12 @@
 #include "tasks.h"
 
 #define RING 64u
-#define DUE 8u /* changes */
-#define CLOSE 256u
-#define STORM 5u       /* changes in a row, each but the first close to the one before */
-#define UNSEEN_MAX 40u /* in a slot: of four lines at 4 kHz, two and two at once, 20 are seen with another one */
+#define DUE 8u     /* changes */
+#define CLOSE 256u /* cycles, 16 us: changes nearer than that are close; a bounce of 20 us is not */
+#define STORM 5u   /* changes in a row, each but the first close to the one before */
+/* Interrupts in a slot that find no pin changed; more are noise. Four lines of 4,000 edges/s make 40 edges in a slot; in pairs,
+ * 20 interrupts find nothing new. */
+#define UNSEEN_MAX 40u
 
 _Static_assert(RING == CONSTANT_changes_ring && DUE == CONSTANT_changes_due, "constants of tasks.def");
 

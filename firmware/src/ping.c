@@ -14,7 +14,8 @@
 #define AGE_NEVER 255u
 #define AGE_UNIT 256u /* cycles; a tick has TICK_UNITS of them, so that 16 bits are divided */
 #define TICK_UNITS ((uint16_t)(HAL_SLOT_CYCLES * (uint32_t)SCHEDULE_SLOTS_PER_TICK / AGE_UNIT))
-/* The sensor raises the line 750 us after the trigger; an edge well before or after that is noise. */
+/* The sensor raises the line 750 us after the trigger (its manual gives no tolerance). An edge more than 2 % sooner, or more
+ * than twice as late, is noise: a board that hears noise for an echo is worse than one that hears none. */
 #define HOLD_OFF_MIN (735u * HAL_CYCLES_PER_US)
 #define HOLD_OFF_MAX (1500u * HAL_CYCLES_PER_US)
 #define NOISE_MAX 10u   /* such edges: then no other is waited for */
@@ -24,10 +25,10 @@
 /* Shared with the capture's interrupt, which only stamps; the stamps are settled when the state is ENDED or CUT. */
 enum { IDLE, RISING, FALLING, ENDED, CUT }; /* what is awaited; CUT: the pulse had ended before that was awaited */
 static volatile uint8_t state;
-static uint16_t triggered, rise, fall;  /* hal_time() */
-static uint8_t trigger_slot, rise_slot; /* schedule_slot then */
-static uint32_t fall_slot_cycles;       /* schedule_slot_cycles then */
-static uint8_t noise_left;              /* edges at other times than the sensor's that are still taken */
+static volatile uint16_t triggered, rise, fall;  /* hal_time() */
+static volatile uint8_t trigger_slot, rise_slot; /* schedule_slot then */
+static volatile uint32_t fall_slot_cycles;       /* schedule_slot_cycles then */
+static volatile uint8_t noise_left;              /* edges at other times than the sensor's that are still taken */
 
 static uint32_t triggered_cycles; /* schedule_now() */
 static uint8_t status;

@@ -7,7 +7,8 @@
  * or that ended before its end was looked for, is one of something too near.
  *
  * The board holds the line low between two measurements. While it awaits an echo the line is an input without pull-up, for no
- * data sheet says what the sensor does to it in the hold-off. */
+ * data sheet says what the sensor does to it in the hold-off; so the line of an absent Ping floats for 20 ms after each
+ * trigger. */
 #ifndef PING_H
 #define PING_H
 

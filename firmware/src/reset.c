@@ -30,6 +30,7 @@ static uint8_t cause; /* of a watchdog reset with the task */
 
 static reset_record *record(void) { return (reset_record *)hal_noinit(); }
 
+/* The constant makes a record of zeros a broken one. */
 static uint32_t check_of(const reset_record *of) { return of->count ^ ((uint32_t)MAGIC << 16 | MAGIC) ^ 0x5A0FF05Aul; }
 
 static bool is_whole(const reset_record *of) { return of->magic == MAGIC && of->check == check_of(of); }
@@ -74,10 +75,8 @@ _Static_assert(RESET_CAUSE_WATCHDOG_IN_WHISKER == RESET_CAUSE_WATCHDOG + 1u + TA
 
 void reset_note_running(uint8_t task) { record()->running = task; }
 
-uint8_t reset_running(void) { return record()->running; }
-
 /* A permutation of the numbers of 21 bits that leaves 0 where it is: an odd factor and a shifted exclusive-or can both be
- * undone. Close numbers come out far apart. */
+ * undone: the factor is odd, and otherwise any. Close numbers come out far apart. */
 static uint32_t mixed(uint32_t x) {
   for (uint8_t round = 0; round < 3u; round++) {
     x = x * 0x0B352Dul & NONCE_MASK;

@@ -16,13 +16,12 @@ extern "C" {
 /* First of all at start. */
 void reset_start(void);
 
-/* RESET_CAUSE_... of generated/messages.h. That of a watchdog reset is RESET_CAUSE_WATCHDOG or, where a task ran,
+/* RESET_CAUSE_... of generated/values.h. That of a watchdog reset is RESET_CAUSE_WATCHDOG or, where a task ran,
  * RESET_CAUSE_WATCHDOG_IN_... of that one, which are above it. */
 uint8_t reset_cause(void);
 
 /* 1 + the number of the task that runs from now on; 0: none. A reset leaves it alone. */
 void reset_note_running(uint8_t task);
-uint8_t reset_running(void);
 
 /* Draws a nonce: 21 bits, not 0, another one at each call, also after a reset. After storage_start(). */
 uint32_t reset_nonce(void);

@@ -160,8 +160,10 @@ void safety_task(void) {
   if ((uint16_t)((uint16_t)schedule_tick() - own.last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
     own.ticks_are_over = false;
   }
-  if (supply_low()) { /* ends a set-point too: nothing else is to be done then */
-    safety_latch(LATCH_SUPPLY_LOW);
+  if (supply_low()) {
+    if (own.latch == LATCH_NONE || own.fallback_allowed) { /* once: a tone that is asked for later may sound */
+      safety_latch(LATCH_SUPPLY_LOW);
+    }
     return;
   }
   if ((own.state & STATUS_MOTORS_ENABLED) == 0) {

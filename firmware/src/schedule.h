@@ -27,7 +27,8 @@ extern uint8_t schedule_next_slot;
 /* Slots that have begun and whose tasks have not run. */
 HAL_INLINE uint8_t schedule_waiting(void) { return (uint8_t)(schedule_slot + 1u - schedule_next_slot); }
 
-/* Runs the tasks of the next slot that has begun; one is waiting. */
+/* Runs the tasks of the next slot that has begun; one is waiting. (`noinline`, here and at what a poll is made of: a function
+ * by itself, so that `boebot timing` finds it by its name.) */
 void schedule_poll(void) __attribute__((noinline));
 
 /* In a task: the number of its slot within the servo frame, 0..7, and whether it is the first one of a tick. */

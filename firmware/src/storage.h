@@ -24,13 +24,13 @@ extern "C" {
 void storage_start(void);
 
 /* Puts what is saved in force, if there is a whole copy of this image's parameters within their ranges. At start, after
- * parameters_reset(). */
+ * parameters_start(). */
 void storage_load_parameters(void);
 
 /* Whether the parameters in force at start were those that were saved. */
 bool storage_parameters_loaded(void);
 
-/* Begins to save all parameters as they are now; another save under way begins again. Returns ANSWER_STATUS_OK, or
+/* Begins to save all parameters as they are now; a save under way is finished first. Returns ANSWER_STATUS_OK, or
  * ANSWER_STATUS_SUPPLY_LOW and does nothing. */
 uint8_t storage_save(void);
 

@@ -6,7 +6,8 @@
 #include "schedule.h"
 
 static uint16_t longest[TASKS];
-static uint32_t began; /* schedule_now() */
+static uint32_t began;  /* schedule_now() */
+static uint8_t running; /* the task that runs */
 
 void task_times_start(void) {
   for (uint8_t task = 0; task < TASKS; task++) {
@@ -15,13 +16,14 @@ void task_times_start(void) {
 }
 
 void task_begins(uint8_t task) {
+  running = task;
   reset_note_running((uint8_t)(task + 1u));
   began = schedule_now();
 }
 
 void task_has_ended(void) {
   const uint32_t took = schedule_now() - began;
-  uint16_t *const most = &longest[reset_running() - 1u];
+  uint16_t *const most = &longest[running];
   if (took > *most) {
     *most = took < TASK_TIME_LONGEST ? (uint16_t)took : TASK_TIME_LONGEST;
   }

@@ -4,10 +4,10 @@
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 
-/* Shared with the interrupt: what a transfer is to do is settled before it begins. */
-static uint8_t target; /* address << 1, and 1 while reading */
-static uint8_t to_write[TWO_WIRE_WRITE_MAX], write_count, written;
-static uint8_t to_read[TWO_WIRE_READ_MAX], read_count, has_read;
+/* Shared with the interrupt; written before a transfer begins, read after it has ended. */
+static volatile uint8_t target; /* address << 1, and 1 while reading */
+static volatile uint8_t to_write[TWO_WIRE_WRITE_MAX], write_count, written;
+static volatile uint8_t to_read[TWO_WIRE_READ_MAX], read_count, has_read;
 static volatile uint8_t result;
 
 void two_wire_start(void) {
@@ -35,7 +35,7 @@ void two_wire_begin(uint8_t address, const uint8_t *bytes, uint8_t writes, uint8
 
 two_wire_result two_wire_ended(void) { return (two_wire_result)result; }
 
-const uint8_t *two_wire_bytes(void) { return to_read; }
+const volatile uint8_t *two_wire_bytes(void) { return to_read; }
 
 static inline void end(two_wire_result how) {
   result = (uint8_t)how;

@@ -31,7 +31,7 @@ void two_wire_begin(uint8_t address, const uint8_t *bytes, uint8_t to_write, uin
 two_wire_result two_wire_ended(void);
 
 /* The bytes that it has read; while it is not busy. */
-const uint8_t *two_wire_bytes(void);
+const volatile uint8_t *two_wire_bytes(void);
 
 /* Switches the bus off and lets both lines go; a transfer under way has failed. */
 void two_wire_stop(void);

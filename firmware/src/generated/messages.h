@@ -231,7 +231,7 @@ typedef struct __attribute__((packed)) {
 #define MSG_TELEMETRY_LENGTH 39u
 typedef struct __attribute__((packed)) {
   uint32_t tick; /* control ticks since reset */
-  uint32_t time; /* us; board time at the start of this tick, since its clock started (some 0.15 s after reset); rolls over after 71.6 min */
+  uint32_t time; /* us; board time at the start of this tick, since its clock started (about 0.2 s after a reset); rolls over after 71.6 min */
   int32_t encoder_left; /* edges; edges since reset; signed only where the encoder knows direction */
   int32_t encoder_right; /* edges */
   uint16_t edge_period_left; /* 16 us; time between the last two edges; 0: none within 0.5 s */

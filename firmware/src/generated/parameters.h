@@ -27,7 +27,7 @@
 #define PARAMETER_TURRET_CENTRE 21u /* 0.0625 us: pulse at which the turret looks straight ahead */
 #define PARAMETER_TURRET_GAIN 22u /* 0.0625 us/rad: pulse for each radian of the turret to the left; negative for a servo that turns the other way */
 #define PARAMETER_START_BEEP 23u /* 0.01 s: length of the tone at each start, so that a reset is heard; 0: none */
-#define PARAMETER_ENCODER_GAP 24u /* us: shortest time between two edges of one encoder line that both count; 0: all count */
+#define PARAMETER_ENCODER_GAP 24u /* us: one line: an edge sooner after the last that counts does not count; two lines: it gives no period; 0: every edge counts */
 #define PARAMETER_FALLBACK_AFTER 25u /* ms: silence of the host after which the board's own brain takes over; 0: never */
 #define PARAMETER_FALLBACK_AT_START 26u /* flag: 1: the board's own brain may also take over after a reset, before any host has armed the motors; 0: not */
 #define PARAMETER_COUNT 27u

@@ -2,7 +2,7 @@
  *
  * Time is counted in CPU cycles of 16 MHz. hal_time() is a free-running count of 16 bits, which starts at 0 in
  * hal_start_timers(). What the firmware shares with its interrupts (interrupts.h) it reads and writes within
- * HAL_ATOMIC { ... }, the only way in which it switches interrupts off; single bytes need none.
+ * HAL_ATOMIC { ... }; single bytes need none. Only main() switches interrupts off otherwise, before it sleeps.
  *
  * Pins are named by device, as in the generated pins header: HAL_PIN_HIGH(SERVO_LEFT).
  *   HAL_PIN_OUTPUT HAL_PIN_INPUT HAL_PIN_PULL_UP      direction; INPUT leaves the pull-up off
@@ -47,7 +47,7 @@ uint8_t hal_reset_cause(void);
 #define HAL_NOINIT_SIZE 32u
 void *hal_noinit(void);
 
-/* A hash of memory that nobody has written since the start: what RAM held when the power came, if it just came. */
+/* A hash of the memory above the variables: what RAM held when the power came, if it just came. */
 uint32_t hal_memory_noise(void);
 
 /* The chip resets itself unless kicked every 120 ms: then reset_on_watchdog() runs, and 16 ms later comes the reset. */
@@ -67,8 +67,8 @@ uint32_t hal_image_hash(void);
  * void hal_slot_arm(uint16_t time): when the next slot begins.
  * void hal_edge_arm(uint16_t time): servo_on_edge() comes HAL_EDGE_LEAD cycles before `time`.
  * void hal_edge_disarm(void): it comes no more.
- * uint16_t hal_edge_wait(uint16_t time): in servo_on_edge(): returns at `time`, at most 8 cycles apart from one time to the
- *   next, and takes received bytes meanwhile; by how many cycles it was called too late, 0 if it was not.
+ * uint16_t hal_edge_wait(uint16_t time): in servo_on_edge(): returns up to 8 cycles after `time`, and takes received bytes
+ *   meanwhile. Its value: the cycles by which it was called too late, 0 if it was not.
  * void hal_capture_start(void), hal_capture_start_falling(void): ping_on_edge() comes with each rising edge of pin 8 from now
  *   on; with each falling one. On a map whose left light sensor is there light_on_left_fall() comes instead.
  * void hal_capture_falling(void): from now on with each falling edge. void hal_capture_stop(void): no more. */
@@ -87,11 +87,11 @@ void hal_watch_port_d(uint8_t bits);
 /* Opens the line at that rate (96 ... 10000, in 100 bit/s; as near as the clock allows), 8N1. Once, before the timers. */
 void hal_start_serial(uint16_t baud);
 
-/* A zero byte (the end of a frame) was received since the last hal_serial_seen(), half of the ring waits, or reception has
- * stopped. */
-uint8_t hal_serial_due(void); /* not 0: it is so */
-void hal_serial_seen(void);   /* zero bytes that wait now make it due no more */
-void hal_serial_again(void);  /* they do again */
+/* Not 0: the main loop should look. So it is after a zero byte (the end of a frame), while half of the ring waits, and when
+ * reception has stopped. */
+uint8_t hal_serial_due(void);
+void hal_serial_clear_due(void); /* zero bytes that were received until now are seen to */
+void hal_serial_set_due(void);   /* due until cleared */
 
 /* Takes the oldest byte that waits; false if none does. */
 bool hal_serial_receive(uint8_t *byte);

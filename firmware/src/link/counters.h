@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-/* Counted where it happens, modulo 65536; good, bad and resynchronised are the decoder's (link.h). */
+/* Counted where it happens, modulo 65536; good, bad, unknown and resynchronised are the decoder's (link.h). */
 extern msg_counters counters;
 
 void counters_start(void);

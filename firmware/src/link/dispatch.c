@@ -126,7 +126,8 @@ static void acknowledge(const uint8_t *payload) {
 /* Not in line: so the length of what each of them sends stays a constant, which the bound of a poll needs. */
 #define SENDS static __attribute__((noinline)) void
 
-/* The confirmation may be lost for want of room: the host asks again. Stopping waits for nothing. */
+/* A stop needs no room: its confirmation may be lost, and the host asks again. It waits only behind a request that waits for
+ * room (link.h). */
 SENDS stop(const uint8_t *payload) {
   safety_latch(LATCH_STOP_COMMAND);
   const msg_stopped stopped = {.token = payload[0]};

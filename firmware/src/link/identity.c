@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "firmware.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/send.h"
@@ -13,6 +12,7 @@
 #include "reset.h"
 #include "schedule.h"
 #include "storage.h"
+#include "version.h"
 
 #if defined(__AVR__)
 #define COMPILER "avr-gcc " __VERSION__

@@ -65,10 +65,10 @@ static bool take_piece(void) {
 }
 
 bool link_take_frame(void) {
-  hal_serial_seen();
+  hal_serial_clear_due();
   const bool ended = take_piece();
   if (hal_serial_waiting() || hal_serial_stopped()) {
-    hal_serial_again();
+    hal_serial_set_due();
   }
   return ended && frame_decoder_accept(&decoder);
 }
@@ -85,7 +85,7 @@ void link_poll(void) {
     link_room = dispatch_room(id);
   }
   if (!hal_serial_room(link_room)) {
-    hal_serial_again(); /* waits: it stays due */
+    hal_serial_set_due(); /* waits: it stays due */
     return;
   }
   link_room = 0;

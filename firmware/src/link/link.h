@@ -32,7 +32,7 @@ extern uint8_t link_room; /* not 0: a message waits in the decoder for so many b
 /* Not 0: there is something for link_poll() to do. */
 uint8_t link_due(void);
 
-/* Frames accepted and refused, and times that a good one followed bad ones, into the counters. */
+/* Frames accepted, refused and of unknown messages, and times that a good one followed bad ones, into the counters. */
 void link_count(msg_counters *into);
 
 #ifdef __cplusplus

@@ -6,7 +6,7 @@
 #include "link/session.h"
 #include "schedule.h"
 
-#define BYTE_US 100000u /* at 100 bit/s: 10 bits */
+#define HALF_MS_PER_BYTE 200u /* 10 bits at 100 bit/s are 100 ms */
 
 static uint8_t next_sequence;
 static uint16_t baud_rate; /* 100 bit/s */
@@ -35,5 +35,5 @@ uint8_t send_ticks(uint16_t bytes) {
 }
 _Static_assert(SCHEDULE_TICK_RATE == 100u, "a tick's bits are the rate in 100 bit/s");
 
-uint16_t send_half_ms(uint8_t bytes) { return (uint16_t)(bytes * (uint16_t)(BYTE_US / 500u)) / baud_rate; }
-_Static_assert(UINT8_MAX *(BYTE_US / 500u) <= UINT16_MAX, "in 16 bits");
+uint16_t send_half_ms(uint8_t bytes) { return (uint16_t)(bytes * HALF_MS_PER_BYTE) / baud_rate; }
+_Static_assert(UINT8_MAX *HALF_MS_PER_BYTE <= UINT16_MAX, "in 16 bits");

@@ -100,7 +100,7 @@ void session_identify(void) { identify = true; }
 
 uint32_t session_seed(void) { return seed; }
 
-bool session_is_open(void) { return (uint8_t)(seed >> 24) == 0; /* seeds have 21 bits */ }
+bool session_is_open(void) { return seed != FRAME_NO_SESSION; }
 
 uint32_t session_board_nonce(void) { return board_nonce; }
 

@@ -757,7 +757,7 @@ class Stopped(_StoppedFields):
 
 class _TelemetryFields(NamedTuple):
     tick: int  # control ticks since reset
-    time: int  # us; board time at the start of this tick, since its clock started (some 0.15 s after reset); rolls over after 71.6 min
+    time: int  # us; board time at the start of this tick, since its clock started (about 0.2 s after a reset); rolls over after 71.6 min
     encoder_left: int  # edges; edges since reset; signed only where the encoder knows direction
     encoder_right: int  # edges
     edge_period_left: int  # 16 us; time between the last two edges; 0: none within 0.5 s
@@ -1117,7 +1117,7 @@ PARAMETERS: dict[str, ParameterSpec] = {
     "turret_centre": ParameterSpec(21, "us", 0.0625, 16000, 32000, "pulse at which the turret looks straight ahead", "turret.centre_us"),
     "turret_gain": ParameterSpec(22, "us/rad", 0.0625, -16000, 16000, "pulse for each radian of the turret to the left; negative for a servo that turns the other way", "turret.gain_us_per_rad"),
     "start_beep": ParameterSpec(23, "s", 0.01, 0, 100, "length of the tone at each start, so that a reset is heard; 0: none"),
-    "encoder_gap": ParameterSpec(24, "us", 1.0, 0, 65535, "shortest time between two edges of one encoder line that both count; 0: all count", "robot.encoder_gap_us"),
+    "encoder_gap": ParameterSpec(24, "us", 1.0, 0, 65535, "one line: an edge sooner after the last that counts does not count; two lines: it gives no period; 0: every edge counts", "robot.encoder_gap_us"),
     "fallback_after": ParameterSpec(25, "ms", 1.0, 0, 65535, "silence of the host after which the board's own brain takes over; 0: never"),
     "fallback_at_start": ParameterSpec(26, "flag", 1.0, 0, 1, "1: the board's own brain may also take over after a reset, before any host has armed the motors; 0: not"),
 }

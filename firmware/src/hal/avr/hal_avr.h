@@ -73,7 +73,7 @@ enum {
 #define INTERRUPT(name, vector, budget, latency, interval) HAL_LATENCY_##name = (latency),
 #include "tasks.def"
 };
-#define HAL_EDGE_PROLOGUE 110u
+#define HAL_EDGE_PROLOGUE 110u /* cycles of it, with the registers that are saved before */
 #define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
 #define HAL_EDGE_CLOSE 110u /* cycles before it from which nothing else is done: longer than a turn that takes a byte */
 _Static_assert(HAL_EDGE_CLOSE < 128u, "then the low byte of the count tells");
@@ -95,7 +95,7 @@ HAL_INLINE uint16_t hal_edge_wait(uint16_t time) {
   }
   while (left > HAL_EDGE_CLOSE) {
     LOOP_CYCLES(HAL_EDGE_LEAD - HAL_EDGE_CLOSE);
-    hal_serial_look();
+    hal_serial_take_waiting();
     left = (uint16_t)(time - TCNT1);
   }
   while ((int8_t)((uint8_t)time - TCNT1L) > 0) {

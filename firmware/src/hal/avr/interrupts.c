@@ -28,7 +28,7 @@ IS_VECTOR(two_wire, TWI_vect);
 ISR(PCINT1_vect) {
   const uint16_t time = TCNT1;
   pin_changes_on_change(time, PINC);
-  hal_serial_look();
+  hal_serial_take_waiting();
 }
 
 ISR(PCINT2_vect) { light_on_change(TCNT1); }
@@ -41,17 +41,17 @@ ISR(TIMER1_CAPT_vect) {
 #else
   ping_on_edge(ICR1);
 #endif
-  hal_serial_look();
+  hal_serial_take_waiting();
 }
 
 ISR(TIMER1_COMPA_vect) {
   servo_on_edge();
-  hal_serial_look();
+  hal_serial_take_waiting();
 }
 
 ISR(TIMER1_COMPB_vect) {
   schedule_on_slot();
-  hal_serial_look();
+  hal_serial_take_waiting();
 }
 
 ISR(TWI_vect) { two_wire_on_step(); }

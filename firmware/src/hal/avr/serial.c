@@ -34,9 +34,9 @@ uint8_t hal_serial_due(void) {
 
 bool hal_serial_waiting(void) { return serial_receive_head != serial_receive_tail; }
 
-void hal_serial_seen(void) { serial_due = 0; }
+void hal_serial_clear_due(void) { serial_due = 0; }
 
-void hal_serial_again(void) { serial_due = 1; }
+void hal_serial_set_due(void) { serial_due = 1; }
 
 bool hal_serial_receive(uint8_t *byte) {
   const uint8_t tail = serial_receive_tail;

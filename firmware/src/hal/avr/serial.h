@@ -37,7 +37,7 @@ static inline __attribute__((always_inline)) void serial_take(uint8_t status) {
 }
 
 /* Takes a byte if one waits and its interrupt is on. */
-static inline __attribute__((always_inline)) void hal_serial_look(void) {
+static inline __attribute__((always_inline)) void hal_serial_take_waiting(void) {
   const uint8_t status = UCSR0A;
   if ((status & _BV(RXC0)) != 0 && (UCSR0B & _BV(RXCIE0)) != 0) {
     serial_take(status);

@@ -34,9 +34,9 @@ bool hal_serial_receive(uint8_t *byte) {
 
 uint8_t hal_serial_due(void) { return zero_received || receive_count >= RECEIVE_RING / 2u || stopped; }
 
-void hal_serial_seen(void) { zero_received = false; }
+void hal_serial_clear_due(void) { zero_received = false; }
 
-void hal_serial_again(void) { zero_received = true; }
+void hal_serial_set_due(void) { zero_received = true; }
 
 bool hal_serial_waiting(void) { return receive_count != 0; }
 
