@@ -48,15 +48,6 @@ void robot_update_supply(robot *self) {
   c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
 }
 
-void sim_update_scene(sim *self) {
-  if (self->obstacles > 0) {
-    scene_moving(self->arena, (double)self->world / BOARD_CLOCK_HZ, self->dt, SCENE_FIRST_MOVER, self->movers);
-  }
-  mover *robots = self->movers + self->obstacles;
-  for (int i = 0; i < self->robot_count; i++) body_as_mover(self->robots[i]->body, &robots[i]);
-  self->seen = (scene){self->arena, self->movers, self->obstacles + (size_t)self->robot_count};
-}
-
 /* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
 static void exchange_light(sim *self) {
   for (int i = 0; i < self->robot_count; i++) {
@@ -79,35 +70,44 @@ static void exchange_light(sim *self) {
   }
 }
 
-/* Motors say their torque for the step that begins at `begin`. */
-static void prepare(robot *r, uint64_t begin) {
+/* Motors say their torque for the step that begins. */
+static void begin_step(void *owner, double torques[2]) {
+  robot *r = owner;
   chassis *c = &r->chassis;
   const body_state *s = &r->body->state;
-  c->since = begin;
+  c->since = r->sim->world_at;
   c->x = s->x;
   c->y = s->y;
   c->heading = s->heading;
-  c->at_charger = arena_is_at_charger(r->sim->arena, s->x, s->y);
+  c->at_charger = arena_is_at_charger(r->sim->world.arena, s->x, s->y);
   c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
   c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
-  if (r->vehicle != NULL) vehicle_prepare(r);
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     if (p->op->before_step != NULL) p->op->before_step(p);
   }
+  for (int side = 0; side < 2; side++) torques[side] = c->wheel[side].torque;
+  if (r->vehicle != NULL) VEHICLE_OPERATIONS.torques(r->vehicle->worlds, torques);
+}
+
+static void has_moved(void *owner) {
+  const robot *r = owner;
+  if (r->vehicle != NULL) VEHICLE_OPERATIONS.moved(r->vehicle->worlds);
 }
 
 /* Parts follow the body to the end of the step. */
-static void follow(robot *r, uint64_t end) {
+static void end_step(void *owner) {
+  robot *r = owner;
+  const uint64_t end = r->sim->world_at + r->sim->step_cycles;
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     if (p->op->step != NULL) p->op->step(p);
   }
   if (r->vehicle != NULL) {
-    vehicle_follow(r);
+    VEHICLE_OPERATIONS.sense(r->vehicle->worlds);
   } else {
     robot_update_supply(r);
-    brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->dt);
+    brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->world.dt);
     robot_step_waves(r, end + PART_GUARD);
   }
   if (!r->body->state.touching) return;
@@ -116,24 +116,17 @@ static void follow(robot *r, uint64_t end) {
   r->touched = 1;
 }
 
+const world_robot_operations ROBOT_OPERATIONS = {.torques = begin_step, .moved = has_moved, .sense = end_step};
+
 static void step_world(sim *self) {
-  if (self->record_cycles > 0 && self->world >= self->next_record) {
-    for (int i = 0; i < self->robot_count; i++) record(self->robots[i], self->world);
+  if (self->record_cycles > 0 && self->world_at >= self->next_record) {
+    for (int i = 0; i < self->robot_count; i++) record(self->robots[i], self->world_at);
     self->next_record += self->record_cycles;
   }
   if (self->robot_count > 1) exchange_light(self);
-  for (int i = 0; i < self->robot_count; i++) prepare(self->robots[i], self->world);
-  for (int i = 0; i < self->robot_count; i++) {
-    const chassis_wheel *wheel = self->robots[i]->chassis.wheel;
-    self->torques[i][SIM_LEFT] = wheel[SIM_LEFT].torque;
-    self->torques[i][SIM_RIGHT] = wheel[SIM_RIGHT].torque;
-  }
-  const scene obstacles = {self->arena, self->movers, self->obstacles};
-  body_step(self->bodies, (size_t)self->robot_count, &obstacles, self->torques, self->dt);
-  if (self->record_cycles > 0) sim_record_waits(self, self->world);
-  self->world += self->step_cycles;
-  sim_update_scene(self);
-  for (int i = 0; i < self->robot_count; i++) follow(self->robots[i], self->world);
+  world_step(&self->world);
+  if (self->record_cycles > 0) sim_record_waits(self, self->world_at);
+  self->world_at += self->step_cycles;
 }
 
 /* ---- running ------------------------------------------------------------------------------------------------------- */
@@ -153,7 +146,7 @@ static void take_bytes(robot *r) {
 
 /* Lines are looked at only at the ends of world steps and slices, counted from power-on: when a robot is heard does not
  * depend on how the others cut the run. */
-static int is_look(const sim *self) { return self->now == self->world || self->now % SLICE_CYCLES == 0; }
+static int is_look(const sim *self) { return self->now == self->world_at || self->now % SLICE_CYCLES == 0; }
 
 /* Bytes have come since somebody listens to the robot, and its line has been idle since. */
 static int message_waits(const robot *r, uint64_t now) {
@@ -175,7 +168,7 @@ static uint64_t next_slice(const sim *self, const robot *r) {
 
 /* Up to where boards run next. */
 static uint64_t next_target(const sim *self, uint64_t deadline) {
-  uint64_t target = self->world < deadline ? self->world : deadline;
+  uint64_t target = self->world_at < deadline ? self->world_at : deadline;
   for (int i = 0; i < self->robot_count; i++) {
     const uint64_t slice = next_slice(self, self->robots[i]);
     if (slice < target) target = slice;
@@ -185,7 +178,7 @@ static uint64_t next_target(const sim *self, uint64_t deadline) {
 
 int sim_run_until(sim *self, uint64_t deadline) {
   while (self->now < deadline) {
-    if (self->world <= self->now) step_world(self);
+    if (self->world_at <= self->now) step_world(self);
     const uint64_t target = next_target(self, deadline);
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];

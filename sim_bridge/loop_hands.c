@@ -9,14 +9,14 @@ static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
   if (r == NULL || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
-  if (!scene_is_free(&self->seen, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
+  if (!world_is_free(&self->world, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
   const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
   sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
   body_place(r->body, x, y, heading);
   r->chassis.x = x;
   r->chassis.y = y;
   r->chassis.heading = heading;
-  sim_update_scene(self);
+  world_update(&self->world);
   return SIM_OK;
 }
 
@@ -61,7 +61,7 @@ int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t 
   sim_note(self, number, INPUT_WAVE, words, 3, NULL, 0);
   take_pin(r, pin);
   if (i == r->waves) r->waves++;
-  const uint64_t start = self->world + PART_GUARD; /* edges up to there are queued already */
+  const uint64_t start = self->world_at + PART_GUARD; /* edges up to there are queued already */
   r->wave[i] = (wave){.pin = pin,
                       .level = r->chassis.driven[pin] == BOARD_HIGH,
                       .half = half_cycles,

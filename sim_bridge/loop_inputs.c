@@ -203,6 +203,6 @@ uint64_t sim_state_hash(const sim *self) {
     sum = noise_mix(sum ^ r->contacts);
     sum = r->vehicle != NULL ? noise_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
   }
-  for (size_t k = 0; k < self->obstacles; k++) sum = noise_mix(sum ^ input_of_double(self->movers[k].waited));
+  for (size_t k = 0; k < self->world.obstacles; k++) sum = noise_mix(sum ^ input_of_double(self->movers[k].waited));
   return sum;
 }

@@ -18,14 +18,12 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
   if (arena_moving_count(where) > SIM_OBSTACLES_MAXIMUM) return NULL;
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
-  self->arena = where;
   self->seed = seed;
   self->step_cycles = step_cycles;
   self->record_cycles = record_cycles;
   self->noise = noise;
-  self->dt = (double)step_cycles / BOARD_CLOCK_HZ;
-  self->obstacles = arena_moving_count(where);
-  sim_update_scene(self);
+  world_init(&self->world, where, (double)step_cycles / BOARD_CLOCK_HZ, self->movers);
+  self->world.robots = self->members;
   return self;
 }
 
@@ -73,7 +71,10 @@ static void insert(sim *self, robot *r) {
   int i = self->robot_count++;
   for (; i > 0 && self->robots[i - 1]->number > r->number; i--) self->robots[i] = self->robots[i - 1];
   self->robots[i] = r;
-  for (i = 0; i < self->robot_count; i++) self->bodies[i] = self->robots[i]->body;
+  for (i = 0; i < self->robot_count; i++) {
+    self->members[i] = (world_robot){.body = self->robots[i]->body, .op = &ROBOT_OPERATIONS, .owner = self->robots[i]};
+  }
+  self->world.count = (size_t)self->robot_count;
 }
 
 static part_place place_of(robot *r, uint32_t device) {
@@ -86,7 +87,7 @@ static part_place place_of(robot *r, uint32_t device) {
 int sim_has_room(const sim *self, int number, double reach, double x, double y, double heading) {
   if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
   if (self->now > 0 || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
-  return scene_is_free(&self->seen, x, y, reach, 0) ? SIM_OK : SIM_NOT_FREE;
+  return world_is_free(&self->world, x, y, reach, 0) ? SIM_OK : SIM_NOT_FREE;
 }
 
 robot *sim_new_robot(sim *self, int number, board *b) {
@@ -110,9 +111,9 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
   r->chassis = (chassis){
       .board = r->board,
       .body = r->body,
-      .around = &self->seen,
+      .around = &self->world.around,
       .self_id = r->body->id,
-      .since = self->world,
+      .since = self->world_at,
       .step_cycles = self->step_cycles,
       .x = x,
       .y = y,
@@ -125,7 +126,7 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
   };
   memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
   insert(self, r);
-  sim_update_scene(self);
+  world_update(&self->world);
   sim_sense_anew(self);
 }
 
@@ -204,7 +205,7 @@ int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_moto
   servo *s = new_part(r, sizeof *s);
   if (s == NULL) return SIM_NO_MEMORY;
   const part_place place = place_of(r, PART_SERVO_LEFT + (uint32_t)side);
-  servo_init(s, &place, pin, side, parameters, self->dt);
+  servo_init(s, &place, pin, side, parameters, self->world.dt);
   return join(r, &s->part);
 }
 

@@ -8,6 +8,7 @@
 #include "loop.h"
 #include "parts/part.h"
 #include "vehicles/vehicle.h"
+#include "world/world.h"
 
 #define WAVES_MAXIMUM 4
 #define SIM_NEVER UINT64_MAX
@@ -32,9 +33,8 @@ typedef struct {
   int number;
   board *board; /* NULL: it has none, and is a vehicle */
   body *body;
-  vehicles *vehicle;   /* one world, which is this simulation's; NULL: it has a board */
-  double speed_before; /* of a vehicle, when the step under way begins */
-  body own;            /* of a robot with a board */
+  vehicles *vehicle; /* one, in this simulation's world; NULL: it has a board */
+  body own;          /* of a robot with a board */
   chassis chassis;
   part **parts;
   int part_count;
@@ -61,25 +61,20 @@ typedef struct {
 } robot;
 
 struct sim {
-  arena *arena;
+  world world;
+  world_robot members[BODY_MAXIMUM]; /* of the world, by increasing number */
+  mover movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM];
   uint64_t seed;
   uint32_t step_cycles;
   uint32_t record_cycles;
   int noise;
-  double dt;
-  uint64_t now;   /* boards have run up to here */
-  uint64_t world; /* world and parts have run up to here */
+  uint64_t now;      /* boards have run up to here */
+  uint64_t world_at; /* world and parts have run up to here */
   uint64_t next_record;
   robot **robots; /* by increasing number */
   int robot_count;
-  body *bodies[BODY_MAXIMUM]; /* of the robots, in their order */
-  double torques[BODY_MAXIMUM][2];
-  mover
-      movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM]; /* obstacles on their way, then robots, as they stand at `world` */
-  size_t obstacles;
   mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
   buffer waits;  /* rows of sim_wait */
-  scene seen;    /* arena and all movers */
   buffer inputs; /* from outside, as loop_inputs.c notes them */
   int crashed;   /* 1: a board has */
 };
@@ -134,9 +129,8 @@ int sim_has_room(const sim *self, int number, double radius, double x, double y,
  * now. */
 void sim_sense_anew(sim *self);
 
-/* loop_vehicle.c: before and after the world's step, of a robot without a board. */
-void vehicle_prepare(robot *r);
-void vehicle_follow(robot *r);
+/* loop.c: what a robot does in a step of the world, with a board or without. */
+extern const world_robot_operations ROBOT_OPERATIONS;
 
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
@@ -148,11 +142,8 @@ uint64_t line_idle_cycles(uint32_t baud);
 /* The voltage of the rail as it is now goes to whoever runs on it. */
 void robot_update_supply(robot *self);
 
-/* loop_truth.c: how long movers waited in the world's step that began at `begin`, before the scene is updated. */
+/* loop_truth.c: how long movers waited in the world's step that began at `begin`. */
 void sim_record_waits(sim *self, uint64_t begin);
-
-/* Puts the robots into the scene as they stand now. */
-void sim_update_scene(sim *self);
 
 /* The id of a robot among the movers; never 0. */
 static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }

@@ -27,10 +27,10 @@ const sim_tone *sim_tones(const sim *self, int number, size_t *count) {
 }
 
 void sim_record_waits(sim *self, uint64_t begin) {
-  for (size_t k = 0; k < self->obstacles; k++) {
+  for (size_t k = 0; k < self->world.obstacles; k++) {
     const mover *m = &self->movers[k];
     mover_clock *clock = &self->clocks[k];
-    const double lost = m->waited > clock->waited ? self->dt - m->stops : 0.0;
+    const double lost = m->waited > clock->waited ? self->world.dt - m->stops : 0.0;
     const sim_wait row = {(double)begin / BOARD_CLOCK_HZ, (double)k, clock->waited};
     if (lost != clock->lost) buffer_append(&self->waits, &row, sizeof row);
     *clock = (mover_clock){.waited = m->waited, .lost = lost};
@@ -43,8 +43,8 @@ const sim_wait *sim_waits(const sim *self, size_t *count) {
 }
 
 const mover *sim_movers(const sim *self, size_t *count, double *time) {
-  *count = self->obstacles;
-  *time = (double)self->world / BOARD_CLOCK_HZ;
+  *count = self->world.obstacles;
+  *time = (double)self->world_at / BOARD_CLOCK_HZ;
   return self->movers;
 }
 

@@ -16,38 +16,23 @@ void sim_sense_anew(sim *self) {
 }
 
 int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x, double y, double heading) {
-  if (fabs(model->dt - self->dt) > 1e-12) return SIM_BAD_ARGUMENT;
+  if (fabs(model->dt - self->world.dt) > 1e-12) return SIM_BAD_ARGUMENT;
   const int room = sim_has_room(self, number, body_reach_of(&model->body), x, y, heading);
   if (room != SIM_OK) return room;
   vehicles *v = vehicles_new(model, 1, 0);
   if (v == NULL) return SIM_NO_MEMORY;
-  const int status = vehicles_place(v, 0, self->arena, self->seed, robot_mover_id(number), x, y, heading);
+  const int status = vehicles_place(v, 0, self->world.arena, self->seed, robot_mover_id(number), x, y, heading);
   robot *r = status == VEHICLE_OK ? sim_new_robot(self, number, NULL) : NULL;
   if (r == NULL) {
     vehicles_destroy(v);
     if (status == VEHICLE_NOT_FREE) return SIM_NOT_FREE;
     return status == VEHICLE_OK || status == VEHICLE_NO_MEMORY ? SIM_NO_MEMORY : SIM_BAD_ARGUMENT;
   }
-  v->worlds[0].shared = &self->seen;
+  v->worlds[0].in = &self->world;
   r->vehicle = v;
   r->body = &v->worlds[0].body;
   sim_insert(self, r, x, y, heading);
   return SIM_OK;
-}
-
-void vehicle_prepare(robot *r) {
-  double torque[2];
-  vehicles_sense(r->vehicle, 0); /* at the start: nobody may have asked yet */
-  vehicle_torques(r->vehicle, 0, torque);
-  r->chassis.wheel[SIM_LEFT].torque = torque[SIM_LEFT];
-  r->chassis.wheel[SIM_RIGHT].torque = torque[SIM_RIGHT];
-  r->speed_before = r->body->state.speed;
-}
-
-void vehicle_follow(robot *r) {
-  vehicle_moved(r->vehicle, 0, r->speed_before);
-  if (vehicles_check(r->vehicle, 0) != VEHICLE_RUNS) (void)vehicles_send(r->vehicle, 0, 0.0, 0.0);
-  vehicles_sense(r->vehicle, 0);
 }
 
 int sim_signals(sim *self, int number, double left, double right) {

@@ -180,9 +180,7 @@ void vehicle_sense(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
-  const scene around = vehicle_surroundings(w);
-  const sensing s = {
-      .all = self, .world = w, .from = vehicle_viewpoint(w, &around), .time = (double)w->state.step * m->dt};
+  const sensing s = {.all = self, .world = w, .from = vehicle_viewpoint(w), .time = (double)w->state.step * m->dt};
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
   noise_source noise = {.keyed = 1, .on = m->noise != 0};

@@ -14,9 +14,9 @@ void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint 
 void vehicle_sensors_start(vehicles *self, size_t i);
 
 /* Where its body is, and what is around it. */
-static inline viewpoint vehicle_viewpoint(const vehicle *self, const scene *around) {
+static inline viewpoint vehicle_viewpoint(const vehicle *self) {
   const body_state *b = &self->body.state;
-  return (viewpoint){.around = around,
+  return (viewpoint){.around = &self->in->around,
                      .x = b->x,
                      .y = b->y,
                      .heading = b->heading,

@@ -132,13 +132,11 @@ static void walk_brain(stream *s, unsigned char *memory, size_t size) {
   }
 }
 
-static size_t moving_count(const vehicle *w) { return vehicle_scene(w).movers_count; }
-
 static void walk(stream *s, vehicles *all, size_t i) {
   const vehicle_model *m = all->model;
   walk_body(s, &all->worlds[i].body.state);
   walk_state(s, &all->worlds[i].state);
-  for (size_t k = 0; k < moving_count(&all->worlds[i]); k++) walk_mover(s, &all->worlds[i].movers[k]);
+  for (size_t k = 0; k < all->worlds[i].own.obstacles; k++) walk_mover(s, &all->worlds[i].own.movers[k]);
   for (size_t k = 0; k < m->sensors_count; k++) walk_sensor(s, &m->sensors[k], &all->slots[i * m->sensors_count + k]);
   for (size_t k = 0; k < m->readings; k++) number(s, &all->readings[i * m->readings + k], DBL_MAX);
   walk_brain(s, all->brains + i * all->state_size, all->state_size);
@@ -171,7 +169,7 @@ void vehicles_save(const vehicles *self, size_t i, void *bytes) {
   walk(&s, (vehicles *)self, i); /* changes nothing */
   put(bytes, 0, VERSION);
   put(bytes, 1, vehicle_model_print(self->model));
-  put(bytes, 2, self->worlds[i].where != NULL ? arena_print(self->worlds[i].where) : 0);
+  put(bytes, 2, self->worlds[i].in != NULL ? arena_print(self->worlds[i].in->arena) : 0);
   put(bytes, 3, self->state_size);
   put(bytes, 4, checksum(rest, 8 * s.count));
 }
@@ -182,7 +180,7 @@ static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t si
   const unsigned char *rest = bytes + 8 * HEADING_WORDS;
   if (get(bytes, 4) != checksum(rest, size - 8 * HEADING_WORDS)) return VEHICLE_BAD_SNAPSHOT;
   if (get(bytes, 1) != vehicle_model_print(self->model)) return VEHICLE_OTHER_MODEL;
-  if (get(bytes, 2) != arena_print(self->worlds[i].where)) return VEHICLE_OTHER_ARENA;
+  if (get(bytes, 2) != arena_print(self->worlds[i].in->arena)) return VEHICLE_OTHER_ARENA;
   if (get(bytes, 3) != self->state_size) return VEHICLE_OTHER_MEMORY;
   if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
   stream s = {.mode = CHECK, .good = 1, .in = rest};
@@ -191,12 +189,13 @@ static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t si
 }
 
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
-  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
   const int status = check(self, i, bytes, size);
   if (status != VEHICLE_OK) return status;
   vehicle *w = &self->worlds[i];
   stream s = {.mode = READ, .in = (const unsigned char *)bytes + 8 * HEADING_WORDS};
   walk(&s, self, i);
+  w->own.steps = w->state.step;
   w->body.id = w->state.id;
   const body_state saved = w->body.state;
   body_place(&w->body, saved.x, saved.y, saved.heading); /* forgets what was near */

@@ -32,7 +32,7 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
 
 /* Frees what a world has of its own. */
 static void leave(vehicle *w) {
-  free(w->movers);
+  free(w->own.movers);
   laser_destroy(w->laser);
   memset(w, 0, sizeof *w);
 }
@@ -59,11 +59,11 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
   if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
-  scene_moving(where, 0.0, m->dt, SCENE_FIRST_MOVER, movers);
+  world own;
+  world_init(&own, where, m->dt, movers);
   body at;
   body_init(&at, &m->body, m->reach);
-  const scene around = {.arena = where, .movers = movers, .movers_count = moving};
-  if (!scene_is_free(&around, x, y, at.body_reach, id)) {
+  if (!world_is_free(&own, x, y, at.body_reach, id)) {
     free(movers);
     return VEHICLE_NOT_FREE;
   }
@@ -73,11 +73,15 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
     return VEHICLE_NO_MEMORY;
   }
   leave(w);
-  w->movers = movers;
+  w->all = self;
+  w->own = own;
+  w->in = &w->own;
+  w->member = (world_robot){.body = &w->body, .op = &VEHICLE_OPERATIONS, .owner = w};
+  w->own.robots = &w->member;
+  w->own.count = 1;
   w->laser = eye;
   memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
   memset(self->brains + i * self->state_size, 0, self->state_size);
-  w->where = where;
   w->state.seed = seed;
   w->state.id = id;
   w->state.energy = 1.0;
@@ -93,7 +97,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
 }
 
 int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
-  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
   if (!(fabs(speed) < SPEED_LIMIT) || !(fabs(turn_rate) < TURN_LIMIT)) return VEHICLE_BAD_NUMBER;
   body *b = &self->worlds[i].body;
   b->state.speed = speed;
@@ -147,35 +151,40 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
 }
 
-void vehicle_torques(vehicles *self, size_t i, double out[2]) { torques(self->model, &self->worlds[i], out); }
+static size_t index_of(const vehicle *w) { return (size_t)(w - w->all->worlds); }
 
-void vehicle_moved(vehicles *self, size_t i, double speed) {
-  vehicle *w = &self->worlds[i];
-  w->state.acceleration = (w->body.state.speed - speed) / self->model->dt;
-  w->state.step++;
+static void begin_step(void *owner, double out[2]) {
+  vehicle *w = owner;
+  vehicle_sense(w->all, index_of(w)); /* in a world of several nobody may have asked yet */
+  if (w->state.flag != VEHICLE_RUNS) (void)vehicles_send(w->all, index_of(w), 0.0, 0.0);
+  w->speed_before = w->body.state.speed;
+  torques(w->all->model, w, out);
 }
 
-void vehicles_move(vehicles *self, size_t i) {
-  vehicle *w = &self->worlds[i];
-  double torque[2];
-  const double before = w->body.state.speed;
-  torques(self->model, w, torque);
-  const scene around = vehicle_scene(w);
-  body_advance(&w->body, &around, torque[0], torque[1], self->model->dt);
-  vehicle_moved(self, i, before);
+void vehicle_moved(vehicle *self) {
+  self->state.acceleration = (self->body.state.speed - self->speed_before) / self->all->model->dt;
+  self->state.step++;
 }
 
-void vehicles_update_arena(vehicles *self, size_t i) {
-  vehicle *w = &self->worlds[i];
-  const double dt = self->model->dt;
-  if (w->movers != NULL) scene_moving(w->where, (double)w->state.step * dt, dt, SCENE_FIRST_MOVER, w->movers);
+static void has_moved(void *owner) { vehicle_moved(owner); }
+
+static void end_step(void *owner) {
+  vehicle *w = owner;
+  (void)vehicles_check(w->all, index_of(w));
+  vehicle_sense(w->all, index_of(w));
 }
+
+const world_robot_operations VEHICLE_OPERATIONS = {.torques = begin_step, .moved = has_moved, .sense = end_step};
+
+void vehicles_move(vehicles *self, size_t i) { world_move(&self->worlds[i].own); }
+
+void vehicles_update_arena(vehicles *self, size_t i) { world_update(&self->worlds[i].own); }
 
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
   const body_state *b = &self->worlds[i].body.state;
-  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].where, b->x, b->y);
+  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].in->arena, b->x, b->y);
   if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
   if (m->ends_at_collision && self->worlds[i].body.state.touching) {
     s->flag = VEHICLE_COLLIDED;
@@ -186,17 +195,12 @@ int vehicles_check(vehicles *self, size_t i) {
 }
 
 /* From motor signals that were sent to the next readings. */
-static void finish_step(vehicles *self, size_t i) {
-  vehicles_move(self, i);
-  vehicles_update_arena(self, i);
-  vehicles_check(self, i);
-  vehicle_sense(self, i);
-}
+static void finish_step(vehicles *self, size_t i) { world_step(&self->worlds[i].own); }
 
 static int ready(const vehicles *self, size_t first, size_t count) {
   if (first > self->count || count > self->count - first) return 0;
   for (size_t i = first; i < first + count; i++) {
-    if (self->worlds[i].where == NULL) return 0;
+    if (self->worlds[i].in == NULL) return 0;
   }
   return 1;
 }
@@ -204,7 +208,7 @@ static int ready(const vehicles *self, size_t first, size_t count) {
 /* ---- stepping ----------------------------------------------------------------------------------------------------- */
 
 int vehicles_step_one(vehicles *self, size_t i, double left, double right) {
-  if (i >= self->count || self->worlds[i].where == NULL) return VEHICLE_NOT_PLACED;
+  if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
   const int status = vehicles_send(self, i, left, right);
   if (status != VEHICLE_OK) return status;
   if (self->worlds[i].state.flag == VEHICLE_RUNS) finish_step(self, i);
@@ -314,9 +318,9 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
 
 const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
-  const scene own = vehicle_scene(&self->worlds[i]);
-  *count = own.movers_count;
-  return own.movers;
+  const world *own = &self->worlds[i].own;
+  *count = own->obstacles;
+  return own->movers;
 }
 
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }

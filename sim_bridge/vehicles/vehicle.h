@@ -10,6 +10,7 @@
 #define VEHICLES_VEHICLE_H
 
 #include "../world/numbers.h"
+#include "../world/world.h"
 #include "model.h"
 
 /* python: begin */
@@ -119,30 +120,23 @@ typedef struct {
 } vehicle_state;
 
 typedef struct {
-  const arena *where;
+  vehicles *all;
+  const world *in;     /* the world that it is in; NULL: none yet */
+  world own;           /* its own, if that is it: with this vehicle alone */
+  world_robot member;  /* of it */
   laser *laser;        /* NULL: the model has none */
-  mover *movers;       /* as many as the arena has moving shapes */
   double hold;         /* of the DC motors' friction, see motor_dc.h */
-  const scene *shared; /* what is around it in a world that is not its own alone; NULL: in its own */
+  double speed_before; /* when the step under way began, m/s */
   body body;
   vehicle_state state;
 } vehicle;
 
-static inline scene vehicle_scene(const vehicle *self) {
-  return (scene){.arena = self->where,
-                 .movers = self->movers,
-                 .movers_count = self->movers == NULL ? 0 : arena_moving_count(self->where)};
-}
+/* What a vehicle does in a step of the world that it is in; the owner is a `vehicle`. A vehicle whose run has ended gets no
+ * signals any more. */
+extern const world_robot_operations VEHICLE_OPERATIONS;
 
-/* What its sensors meet. */
-static inline scene vehicle_surroundings(const vehicle *self) {
-  return self->shared != NULL ? *self->shared : vehicle_scene(self);
-}
-
-/* For a world that somebody else moves: the wheels' torques for the next step, and what is to be done when the body, which
- * went at `speed` before, has made it. */
-void vehicle_torques(vehicles *self, size_t i, double out[2]);
-void vehicle_moved(vehicles *self, size_t i, double speed);
+/* A part of it: the step that the body has made is counted. */
+void vehicle_moved(vehicle *self);
 
 struct vehicles {
   const vehicle_model *model;

@@ -32,33 +32,34 @@ LANES_INLINE void dc_torques_inline(const vehicle_model *m, vehicle *const world
 LANES_FUNCTION(static, dc_torques, (const vehicle_model *m, vehicle *const worlds[], double left[], double right[]),
                (m, worlds, left, right))
 
-static void torques(vehicles *self, const size_t row[], vehicle *const worlds[], double left[], double right[]) {
+static void torques(const vehicles *self, vehicle *const worlds[], double left[], double right[]) {
   if (self->model->drive == DRIVE_DC && !self->model->full) {
     dc_torques(self->model, worlds, left, right);
     return;
   }
   for (size_t k = 0; k < ROW; k++) {
     double torque[2];
-    vehicle_torques(self, row[k], torque);
+    VEHICLE_OPERATIONS.torques(worlds[k], torque);
     left[k] = torque[0];
     right[k] = torque[1];
   }
 }
 
 static void move(vehicles *self, const size_t row[], vehicle *const worlds[]) {
-  double left[ROW], right[ROW], before[ROW];
+  double left[ROW], right[ROW];
   scene around[ROW];
   body *bodies[ROW];
   for (size_t k = 0; k < ROW; k++) {
-    before[k] = worlds[k]->body.state.speed;
-    around[k] = vehicle_scene(worlds[k]);
+    worlds[k]->speed_before = worlds[k]->body.state.speed;
+    around[k] = world_obstacles(&worlds[k]->own);
     bodies[k] = &worlds[k]->body;
   }
-  torques(self, row, worlds, left, right);
+  torques(self, worlds, left, right);
   body_advance_row(bodies, around, left, right, self->model->dt);
   for (size_t k = 0; k < ROW; k++) {
-    vehicle_moved(self, row[k], before[k]);
-    vehicles_update_arena(self, row[k]);
+    worlds[k]->own.steps++;
+    vehicle_moved(worlds[k]);
+    world_update(&worlds[k]->own);
     vehicles_check(self, row[k]);
   }
 }
@@ -188,13 +189,11 @@ LANES_FUNCTION(static, read_odometers, (const sensing_row *s, const vehicle_sens
 static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
   const vehicle_model *m = self->model;
   sensing_row s;
-  scene around[ROW];
   s.all = self;
   s.row = row;
   s.worlds = worlds;
   for (size_t k = 0; k < ROW; k++) {
-    around[k] = vehicle_surroundings(worlds[k]);
-    s.from[k] = vehicle_viewpoint(worlds[k], &around[k]);
+    s.from[k] = vehicle_viewpoint(worlds[k]);
     s.slots[k] = &self->slots[row[k] * m->sensors_count];
     s.readings[k] = &self->readings[row[k] * m->readings];
   }

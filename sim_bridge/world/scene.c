@@ -150,6 +150,7 @@ void scene_moving(const arena *where, double time, double dt, uint32_t first_id,
         .id = first_id + (uint32_t)i,
         .waited = waited,
         .waits = out[i].waits,
+        .stops = out[i].stops,
     };
     number_sincos(at.heading, &out[i].sine, &out[i].cosine);
   }

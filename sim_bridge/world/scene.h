@@ -53,7 +53,7 @@ double scene_ray(const scene *self, double x, double y, double cosine, double si
 void scene_fan_movers(const scene *self, const fan_question *question, uint32_t self_id);
 
 /* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. Their
- * velocities are those that take them evenly to where their paths lead within `dt`. `waited` and `waits` of each are kept:
+ * velocities are those that take them evenly to where their paths lead within `dt`. `waited`, `waits` and `stops` of each are kept:
  * 0 for one whose path was never held up. */
 void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out);
 
