@@ -125,7 +125,7 @@ static vehicle_model *model(void) {
 
 /* ---- what has to hold --------------------------------------------------------------------------------------------- */
 
-static int placed(const vehicles *all, size_t i) { return all->worlds[i].where != NULL; }
+static int placed(const vehicles *all, size_t i) { return all->worlds[i].in != NULL; }
 
 static void check_world(vehicles *all, size_t i) {
   double pose[3];
