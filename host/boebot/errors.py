@@ -2,6 +2,21 @@
 
 from __future__ import annotations
 
+import unicodedata
+
+_CONTROL = {"Cc", "Cf", "Cs", "Co", "Zl", "Zp"}  # Unicode's categories: control, format, surrogate, private, separators
+
+
+def printable(text: str) -> str:
+    """Text for a terminal: control characters, which may come from files, boards and exceptions, as escapes such as
+    \\x1b; ends of lines stay."""
+    if text.isprintable():
+        return text
+    return "".join(
+        char.encode("unicode_escape").decode() if unicodedata.category(char) in _CONTROL and char != "\n" else char
+        for char in text
+    )
+
 
 class BoebotError(Exception):
     """Something the user can mend. Its text is one sentence: what is wrong, where, what was expected."""

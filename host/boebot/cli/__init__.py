@@ -12,7 +12,7 @@ import sys
 import time
 from typing import NoReturn
 
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, printable
 from boebot.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
@@ -83,7 +83,7 @@ def _say(sentence: str, error: BaseException) -> None:
     """The sentence, and what else went wrong, on standard error; the terminal may have gone."""
     with contextlib.suppress(OSError, ValueError):
         for text in (sentence, *getattr(error, "__notes__", ())):
-            print(f"boebot: {text}", file=sys.stderr)
+            print(f"boebot: {printable(text)}", file=sys.stderr)
 
 
 def _ask_again(ignored: sys.UnraisableHookArgs) -> None:

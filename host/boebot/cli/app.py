@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import experiment, info, link, new, options, parameters, run, serve, teleop, timing
+from boebot.cli import experiment, info, link, new, options, output, parameters, run, serve, teleop, timing
 from boebot.link import messages, mismatch
 
 app = typer.Typer(
@@ -37,7 +37,7 @@ def _version(wanted: bool) -> None:
             installed = version("boebot")
         except PackageNotFoundError:
             installed = "not installed"
-        print(
+        output.line(
             f"boebot {installed} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
             f"Python {sys.version.split()[0]})"
         )

@@ -67,7 +67,7 @@ def _end(result: RunResult | TogetherResult, show: Callable[[], None], out: Path
             assert out is not None
             here = [path.name for path in files if path.parent == out]
             folders = sorted({f"{path.relative_to(out).parts[0]}/" for path in files if path.parent != out})
-            print(f"files in {out}: {', '.join(here + folders)}")
+            output.line(f"files in {out}: {', '.join(here + folders)}")
     interrupted = isinstance(result.error, KeyboardInterrupt)
     first = InterruptedRunError("interrupted") if interrupted else result.error
     if first is not None:

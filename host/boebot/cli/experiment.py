@@ -94,14 +94,13 @@ def _list(experiments: Sequence[Experiment], as_json: bool) -> None:
         output.print_json({"experiments": [{key: getattr(one, key) for key in fields} for one in experiments]})
         return
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     rows = Table("name", "", "title", "robot", "section", box=box.SIMPLE_HEAD, pad_edge=False)
     rows.columns[0].no_wrap = rows.columns[1].no_wrap = True
     for one in experiments:
         rows.add_row(one.name, "slow" if one.slow else "", one.title, one.robot, one.section)
-    Console().print(rows)
+    output.console().print(rows)
 
 
 def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_json: bool) -> None:
@@ -140,7 +139,8 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
         _print(experiments, verdicts)
         if files:
             few = len(verdicts) == 1
-            print(f"files in {out}: {', '.join(path.name for path in files)}" if few else f"all figures: {files[0]}")
+            names = ", ".join(path.name for path in files)
+            output.line(f"files in {out}: {names}" if few else f"all figures: {files[0]}")
     outside = [verdict.name for verdict in verdicts if not verdict.is_met]
     if outside:
         which = f"{len(outside)} of {len(verdicts)} experiments are" if len(verdicts) > 1 else "the experiment is"
@@ -150,11 +150,10 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
 def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> None:
     """A table for each."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    console = Console(highlight=False)
+    console = output.console()
     colours = {"met": "green", "missed": "bold red", "failed": "bold red"}
     for one, verdict in zip(experiments, verdicts, strict=True):
         console.print(

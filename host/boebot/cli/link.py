@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -40,7 +39,7 @@ def link(
         if once:
             seconds = min(seconds, _PERIOD_S)
         if json:
-            _watch(watched, seconds, lambda look: print(json_module.dumps(look), flush=True), once)
+            _watch(watched, seconds, lambda look: output.print_json(look, indent=None), once)
         else:
             _show_table(watched, seconds, once)
         watched.close()
@@ -112,15 +111,14 @@ def _ms(seconds: float | None) -> float | None:
 
 def _show_table(watched: Link, seconds: float, once: bool) -> None:
     """The same as a table that stays in its place."""
-    from rich.console import Console
     from rich.live import Live
 
-    console = Console()
+    console = output.console()
     if once or not console.is_terminal:
         _watch(watched, seconds, lambda seen: console.print(_table(seen)), once)
         return
     with Live(console=console, auto_refresh=False) as live:
-        _watch(watched, seconds, lambda seen: live.update(_table(seen), refresh=True), once)
+        _watch(watched, seconds, lambda seen: live.update(output.Escaped(_table(seen)), refresh=True), once)
 
 
 def _table(seen: dict[str, Any]) -> Any:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from boebot.brains import bundled
+from boebot.cli import output
 from boebot.errors import BrainError
 
 FIRST_BRAIN = '''"""{name}: backs away from what its whiskers touch and turns away from what infra-red sees.
@@ -107,4 +108,4 @@ def new(
         raise BrainError(f"{path} exists already; it was left as it is") from None
     except OSError as error:
         raise BrainError(f"{path} cannot be written: {error.strerror}") from None
-    print(f"wrote {path}; now: boebot run {path} --out {stem}")
+    output.line(f"wrote {path}; now: boebot run {path} --out {stem}")

@@ -1,4 +1,8 @@
-"""How sub-commands print: tables for people, JSON for programs, a progress bar for runs that take longer than 2 s."""
+"""How sub-commands print: tables for people, JSON for programs, a progress bar for runs that take longer than 2 s.
+
+All that they print goes through `line`, `say`, `print_json` or a `console`: names and errors come from files, boards
+and brains, and a control character in them would be an order to the terminal.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,16 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TextIO
 
 from boebot import figures
 from boebot.driving import Progress
+from boebot.errors import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions
+    from rich.segment import Segment
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of
@@ -22,21 +32,50 @@ _INDENT = 4  # of a sentence below its row
 _SENTENCE_LEAST = 40  # columns that a sentence beside its row wants
 
 
+def line(text: str = "", file: TextIO | None = None) -> None:
+    """A line for people, at once; on standard output if no file is given."""
+    print(printable(text), file=file, flush=True)
+
+
 def say(sentence: str) -> None:
     """What a user should know, on standard error."""
-    print(f"boebot: {sentence}", file=sys.stderr, flush=True)
+    line(f"boebot: {sentence}", sys.stderr)
 
 
-def print_json(values: Mapping[str, Any]) -> None:
+def console(stderr: bool = False) -> Console:
+    """What tables and bars are printed on: it highlights nothing by itself, and text is never mark-up."""
+    from rich.console import Console, ConsoleRenderable, RenderHook
+
+    class Printable(RenderHook):
+        def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+            return [Escaped(one) for one in renderables]
+
+    made = Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+    made.push_render_hook(Printable())
+    return made
+
+
+@dataclass(frozen=True, slots=True)
+class Escaped:
+    """What rich prints, its text through `printable`. A `console` does so by itself, a `rich.live.Live` on it not."""
+
+    inside: Any
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.inside, options):
+            yield Segment(text if control else printable(text), style, control)
+
+
+def print_json(values: Mapping[str, Any], indent: int | None = 1) -> None:
     """One JSON object on standard output, at once: a program may be waiting for it."""
-    print(json.dumps(values, indent=1), flush=True)
+    line(json.dumps(values, indent=indent))
 
 
 def print_table(values: Mapping[str, Any]) -> None:
     """Names, values and units as a table on standard output; what is not known is left out."""
-    from rich.console import Console
-
-    Console().print(table(values))
+    console().print(table(values))
 
 
 def table(values: Mapping[str, Any]) -> Any:
@@ -57,33 +96,32 @@ def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table with a header; the second column holds numbers, the last one sentences. Where the terminal is too narrow
     for those beside the rest, each stands below its row."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    screen = console()
     widths = [max(len(row[index]) for row in (header, *rows)) for index in range(len(header) - 1)]
-    beside = console.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
+    beside = screen.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
     if beside:
         printed = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for index, title in enumerate(header):
             printed.add_column(title, justify="right" if index == 1 else "left", no_wrap=index < len(widths))
         for row in rows:
             printed.add_row(*row)
-        console.print(printed)
+        screen.print(printed)
         return
 
-    def line(cells: Sequence[str]) -> str:
-        placed = (
+    def placed(cells: Sequence[str]) -> str:
+        padded = (
             cell.rjust(width) if index == 1 else cell.ljust(width)
             for index, (cell, width) in enumerate(zip(cells, widths, strict=False))
         )
-        return (" " * _GAP).join(placed).rstrip()
+        return (" " * _GAP).join(padded).rstrip()
 
-    console.print(line(header), style="bold", highlight=False)
+    screen.print(placed(header), style="bold")
     for row in rows:
-        console.print(line(row), highlight=False)
-        for part in textwrap.wrap(row[-1], max(console.width - _INDENT, _SENTENCE_LEAST)):
-            console.print(" " * _INDENT + part, style="dim", highlight=False)
+        screen.print(placed(row))
+        for part in textwrap.wrap(row[-1], max(screen.width - _INDENT, _SENTENCE_LEAST)):
+            screen.print(" " * _INDENT + part, style="dim")
 
 
 @contextlib.contextmanager
@@ -92,18 +130,17 @@ def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
     if not sys.stderr.isatty():
         yield lambda _: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     bar = Progress(
-        TextColumn(title),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.completed:.0f} s" if math.isinf(seconds) else "{task.completed:.0f} of {task.total:g} s"),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=console(stderr=True),
         transient=True,
     )
-    task = bar.add_task("run", total=None if math.isinf(seconds) else seconds)
+    task = bar.add_task(printable(title), total=None if math.isinf(seconds) else seconds)
     begun = time.monotonic()
     shown = False
 
@@ -128,13 +165,12 @@ def share_bars(names: Sequence[str]) -> Iterator[Callable[[Mapping[str, float]],
     if not sys.stderr.isatty():
         yield lambda _: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    bars = Progress(*columns, console=Console(stderr=True), transient=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    bars = Progress(*columns, console=console(stderr=True), transient=True)
     overall = bars.add_task(f"{len(names)} experiments", total=len(names), visible=len(names) > 1)
-    tasks = {name: bars.add_task(name, total=1.0, visible=False, start=False) for name in names}
+    tasks = {name: bars.add_task(printable(name), total=1.0, visible=False, start=False) for name in names}
     done = dict.fromkeys(names, 0.0)
     timer = threading.Timer(BAR_AFTER_S, bars.start)
     timer.daemon = True
@@ -171,7 +207,7 @@ def step_watch(progress: Progress) -> Iterator[Progress]:
         while not ended.wait(0.1):
             if time.monotonic() - called_at > STEP_S:
                 sentence = f"the brain has been in its step for {STEP_S:g} s; Ctrl-C ends it"
-                print(f"boebot: {sentence}", file=sys.stderr, flush=True)
+                say(sentence)
                 return
 
     threading.Thread(target=watch, daemon=True).start()

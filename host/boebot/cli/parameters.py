@@ -88,7 +88,7 @@ def _show(name: str, value: float, as_json: bool) -> None:
     if as_json:
         output.print_json(described(name, value))
     else:
-        print(f"{name} = {value:.9g} {parameter_spec(name).unit}")
+        output.line(f"{name} = {value:.9g} {parameter_spec(name).unit}")
 
 
 @app.command("list")
@@ -114,7 +114,7 @@ def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", 
             for row in rows
         ],
     )
-    print("in force at start: those that were saved" if saved else "in force at start: the image's defaults")
+    output.line("in force at start: those that were saved" if saved else "in force at start: the image's defaults")
 
 
 @app.command()
@@ -158,7 +158,7 @@ def save_all(on: options.On = "native", robot: options.RobotName = "shieldbot", 
     if json:
         output.print_json({"saved": True})
     else:
-        print("all parameters are saved")
+        output.line("all parameters are saved")
 
 
 @app.command("reset")
@@ -173,5 +173,5 @@ def reset_all(
     if json:
         output.print_json({"reset": True, "saved": save})
     else:
-        print(f"all parameters are reset{' and saved' if save else ''}")
+        output.line(f"all parameters are reset{' and saved' if save else ''}")
     _tell_how_long("the reset of the parameters lasts", on, save)

@@ -46,8 +46,8 @@ def serve(
         if json:
             output.print_json({"url": url, "board": on, "robot": request.robot.name})
         else:
-            print(f"{request.robot.name} on {on} is at {url}")
-            print(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C", flush=True)
+            output.line(f"{request.robot.name} on {on} is at {url}")
+            output.line(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C")
 
     with contextlib.suppress(KeyboardInterrupt):
         find_server()(on, request, tcp=tcp, announce=announce, running=lambda: True)

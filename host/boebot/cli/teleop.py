@@ -16,7 +16,7 @@ from typing import Annotated, TextIO
 import typer
 
 from boebot import report
-from boebot.cli import options
+from boebot.cli import options, output
 from boebot.cli.ending import end
 from boebot.errors import BoebotError
 from boebot.robot import Robot
@@ -114,7 +114,7 @@ def teleop(
     if out is not None:
         report.make_folder(out)
     screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
-    print(HELP, file=screen, flush=True)
+    output.line(HELP, screen)
     with raw_keyboard() as read_keys:
         brain = Keyboard(read_keys, functools.partial(_show, screen))
         result = execute(
@@ -128,7 +128,7 @@ def teleop(
             without=options.names(without),
         )
     with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
-        print(file=screen, flush=True)
+        output.line(file=screen)
     end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)
 
 

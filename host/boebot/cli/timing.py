@@ -139,7 +139,7 @@ class Answer:
         if self.jitter is not None:
             timing_tables.show_jitter(self.jitter)
         if self.files:
-            print(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
+            output.line(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
 
 
 def _answer(

@@ -26,7 +26,7 @@ _BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
 
 def show_report(report: Report) -> None:
     """Two tables, the sums, and what is broken."""
-    console = Console(highlight=False)
+    console = output.console()
     console.print(Text.assemble((Path(report.path).name, "bold"), f"  under the load {report.load.name!r}"))
     console.print(Text(report.load.says, style=_ASIDE))
     measured, board = report.measured is not None, any(row.board is not None for row in report.rows)
@@ -125,14 +125,14 @@ def show_path(path: WorstPath) -> None:
     for row in path.rows:
         passes = ", ".join(f"{passes:,}" for passes in row.passes)
         shown.add_row(row.function, row.line or _UNKNOWN, f"{row.cycles:,}", f"{row.runs:,}", passes)
-    console = Console(highlight=False)
+    console = output.console()
     console.print(Text(f"the worst path of {path.kind} {path.name}: {path.cycles:,} cycles", style="bold"))
     console.print(shown)
 
 
 def show_verdict(verdict: Verdict) -> None:
     """The events of a time step, and the answer."""
-    console = Console(highlight=False)
+    console = output.console()
     if verdict.events:
         shown = _table(f"{verdict.robot}, one step")
         for title in ("takes (ms)", "ends (ms)", "own period (ms)"):
@@ -150,7 +150,7 @@ def show_jitter(report: JitterReport) -> None:
     """A table of distributions for each load; what broke its limit, and what was lost."""
     from boebot.timing.distributions import rows
 
-    console = Console(highlight=False)
+    console = output.console()
     for load in dict.fromkeys(one.load for one in report.distributions):
         found = [one for one in report.distributions if one.load == load]
         head, *cells = ((row[0], *row[2:-1]) for row in rows(found))
