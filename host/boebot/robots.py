@@ -8,6 +8,7 @@ keys' names; lengths are in the robot's frame, x forward, y left, origin at the 
 from __future__ import annotations
 
 import math
+import reprlib
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -330,9 +331,9 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     if base_name is None:
         return table
     if not isinstance(base_name, str):
-        raise RobotError(f"{path.name}: extends: expected the name of a robot, got {base_name!r}")
+        raise RobotError(f"{path.name}: extends: expected the name of a robot, got {reprlib.repr(base_name)}")
     if not (isinstance(removed, list) and all(isinstance(name, str) for name in removed)):
-        raise RobotError(f"{path.name}: remove: expected a list of devices, got {removed!r}")
+        raise RobotError(f"{path.name}: remove: expected a list of devices, got {reprlib.repr(removed)}")
     base_path = toml_files.find("robots", base_name, RobotError)
     if base_path in seen:
         raise RobotError(f"{path.name} extends itself by way of {base_name!r}")

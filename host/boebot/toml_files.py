@@ -17,13 +17,13 @@ from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from boebot import resources, toml_numbers
-from boebot.errors import BoebotError
-from boebot.toml_lines import line_of, lines_of
+from boebot import resources, toml_limits, toml_numbers
+from boebot.errors import BoebotError, printable
+from boebot.toml_limits import SIZE_MAXIMUM
+from boebot.toml_lines import line_of
 
 _T = TypeVar("_T")
 
-SIZE_MAXIMUM = 8_000_000  # bytes of a file
 LARGE = 50_000  # from here on it is worth while to read rows of points by themselves ...
 SLOW = 2_000_000  # ... and from here on it takes seconds, and somebody waits
 
@@ -78,8 +78,10 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         if size > SIZE_MAXIMUM:
             raise error(f"{path.name} has {size:,} bytes; expected at most {SIZE_MAXIMUM:,}")
         if size > SLOW:
-            print(f"reading {path.name}, {size / 1e6:.1f} MB ...", file=sys.stderr)
+            print(f"reading {printable(path.name)}, {size / 1e6:.1f} MB ...", file=sys.stderr)
         text = path.read_text(encoding="utf-8-sig")  # some editors begin with a byte order mark
+        if fault := toml_limits.fault_of_text(text):
+            raise error(f"{path.name}{fault}")
         table = Table(toml_numbers.loads(text) if size > LARGE else tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
@@ -87,6 +89,8 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         raise error(f"{path.name} is nested too deeply; expected a flat description") from None
     except ValueError as cause:  # also a number of thousands of digits, which tomllib passes on
         raise error(_no_toml(path.name, text, cause)) from None
+    if fault := toml_limits.fault_of_table(table):
+        raise error(f"{path.name}{fault}")
     table.sources = ((path.name, text),)
     return table
 
@@ -95,7 +99,8 @@ def _no_toml(name: str, text: str, cause: ValueError) -> str:
     """The sentence about a text that tomllib refuses; in our words where its own say nothing to most people."""
     what = " ".join(str(cause).split())
     if not isinstance(cause, tomllib.TOMLDecodeError):
-        digits = re.search(rf"[0-9_]{{{sys.get_int_max_str_digits()},}}", text)
+        most = sys.get_int_max_str_digits()
+        digits = next((run for run in re.finditer("[0-9_]+", text) if len(run[0]) >= most), None)
         line = text.count("\n", 0, digits.start()) + 1 if digits else 1
         return (
             f"{name}:{line}: a number has {len(digits[0]) if digits else 'too many'} digits; expected a finite number"
@@ -120,10 +125,11 @@ def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) 
 def where(table: dict[str, Any], file: str, place: str) -> str:
     """The file, with the line of the place if the table was read from it: "room.toml:12"."""
     sources = table.sources if isinstance(table, Table) and place else ()
-    for name, text in sources:
-        if place in (lines := lines_of(text)):
-            return f"{name}:{lines[place]}"
-    return f"{file}:{line_of(sources[0][1], place)}" if sources else file
+    found = [(name, *line_of(text, place)) for name, text in sources]
+    for name, line, is_exact in found:
+        if is_exact:
+            return f"{name}:{line}"
+    return f"{file}:{found[0][1]}" if found else file
 
 
 def table_at(table: dict[str, Any], place: str) -> dict[str, Any]:
@@ -185,7 +191,7 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
             return fault
     choices = _choices(kind)
     if choices and value not in choices:
-        return Fault(key, f"{key} is {value!r}; expected one of {', '.join(map(str, choices))}")
+        return Fault(key, f"{key} is {reprlib.repr(value)}; expected one of {', '.join(map(str, choices))}")
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as cause:
@@ -204,7 +210,9 @@ def _union_fault(value: Any, choices: tuple[Any, ...], key: str) -> Fault | None
     field = choices[0].__struct_config__.tag_field
     tag = value.get(field)
     if not isinstance(tag, str) or tag not in by_tag:
-        return Fault(_below(key, field), f"{at}{field} is {tag!r}; expected one of {', '.join(sorted(by_tag))}")
+        return Fault(
+            _below(key, field), f"{at}{field} is {reprlib.repr(tag)}; expected one of {', '.join(sorted(by_tag))}"
+        )
     return _fault({name: entry for name, entry in value.items() if name != field}, by_tag[tag], key)
 
 

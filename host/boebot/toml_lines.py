@@ -21,23 +21,24 @@ _STRINGS = (
 )
 
 
-def lines_of(text: str) -> dict[str, int]:
-    """Line numbers, from 1, by place: "a.b[2].c" for the key c in the third table of the array a.b. "" is line 1."""
-    scan = _Scan(text)
+def line_of(text: str, place: str) -> tuple[int, bool]:
+    """The line, from 1, of a place such as "a.b[2].c", the key c in the third table of the array a.b.
+
+    Where the text does not have it: the line of the innermost table or array around it, and False.
+    """
+    scan = _Scan(text, place)
     scan.run()
-    return scan.lines
-
-
-def line_of(text: str, place: str) -> int:
-    """The line of a place, or of the innermost table or array around it that the text names."""
-    lines = lines_of(text)
-    while place not in lines:
-        place = place[: max(place.rfind("."), place.rfind("["), 0)]
-    return lines[place]
+    around = place
+    while around not in scan.lines:
+        around = around[: max(around.rfind("."), around.rfind("["), 0)]
+    return scan.lines[around], around == place
 
 
 class _Scan:
-    def __init__(self, text: str) -> None:
+    """Keeps the lines of a place and of all around it; "" is line 1."""
+
+    def __init__(self, text: str, wanted: str) -> None:
+        self._wanted = wanted
         self.text = text.replace("\r\n", "\n") + "\n"
         self.at = 0
         self.lines: dict[str, int] = {"": 1}
@@ -140,7 +141,8 @@ class _Scan:
         return place
 
     def _note(self, place: str, at: int) -> None:
-        self.lines.setdefault(place, bisect_right(self._breaks, at - 1) + 1)
+        if self._wanted.startswith(place):
+            self.lines.setdefault(place, bisect_right(self._breaks, at - 1) + 1)
 
     def _skip(self, pattern: re.Pattern[str]) -> None:
         if match := pattern.match(self.text, self.at):

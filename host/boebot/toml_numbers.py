@@ -13,9 +13,13 @@ import tomllib
 from typing import Any
 
 _NUMBER = r"-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
-_SPACE = r"[ \t\n]*"
+_SPACE = r"[ \t\n]*+"  # possessive: what does not match ends in a time that grows with the text, not with its square
 _PAIR = rf"\[{_SPACE}{_NUMBER}{_SPACE},{_SPACE}{_NUMBER}{_SPACE}\]"
-_PASSED_OVER = r'"""(?:[^\\]|\\.)*?"{3,5}' + r"|'''.*?'{3,5}" + r'|"(?:[^"\\\n]|\\.)*"' + r"|'[^'\n]*'|#[^\n]*"
+# Strings and comments; one without an end goes up to the end of the text or line.
+_PASSED_OVER = (
+    r'"""(?:[^"\\]++|\\.|"(?!""))*"{0,5}' + r"|'''(?:[^']++|'(?!''))*'{0,5}"
+    r'|"(?:[^"\\\n]++|\\.)*"?' + r"|'[^'\n]*'?|#[^\n]*"
+)
 _PAIRS = re.compile(
     rf"(?:{_PASSED_OVER})|(?P<key>=[ \t]*)(?P<rows>\[{_SPACE}{_PAIR}(?:{_SPACE},{_SPACE}{_PAIR})*)"
     rf"{_SPACE},?{_SPACE}\]",
@@ -25,9 +29,7 @@ _PAIRS = re.compile(
 
 def loads(text: str) -> dict[str, Any]:
     """What tomllib.loads gives. Raises what that raises."""
-    mark = "0.5e-31"
-    while mark in text:
-        mark += "9"
+    mark = max(re.findall(r"0\.5e-319*", text), key=len, default="0.5e-31") + "9"
     rows: dict[str, list[Any]] = {}
 
     def taken(match: re.Match[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from hypothesis import strategies as st
 from boebot import toml_files
 from boebot.errors import RobotError
 from boebot.robots import load_robot
-from boebot.toml_lines import line_of, lines_of
+from boebot.toml_limits import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
+from boebot.toml_lines import line_of
 
 LAYOUT = '''# a comment with [brackets] and "quotes"
 title = "a ] string } with # signs"   # line 2
@@ -57,11 +59,10 @@ def test_every_key_is_found_in_its_line() -> None:
         "part[0].hole[0].edge.z": 21, "part[1]": 22, "part[1].hole[1].x": 25, "part[1].screw[0].x": 27,
         "part[1].screw[1].x": 29, "a.d.last": 31,
     }  # fmt: skip
-    found = lines_of(LAYOUT)
-    assert {place: found.get(place) for place in wanted} == wanted
-    assert lines_of(LAYOUT.replace("\n", "\r\n")) == found
-    assert line_of(LAYOUT, "a.b.nothing[3].there") == 10
-    assert line_of(LAYOUT, "nothing") == 1
+    for text in (LAYOUT, LAYOUT.replace("\n", "\r\n")):
+        assert {place: line_of(text, place) for place in wanted} == {place: (n, True) for place, n in wanted.items()}
+    assert line_of(LAYOUT, "a.b.nothing[3].there") == (10, False)
+    assert line_of(LAYOUT, "nothing") == (1, False)
 
 
 def places(value: Any, place: str) -> set[str]:
@@ -98,7 +99,8 @@ def test_the_scan_sees_what_tomllib_sees(pieces: list[str]) -> None:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return
-    assert set(lines_of(text)) == places(table, "")
+    there = places(table, "")
+    assert {place for place in there | {"b", "a.c", "c[9]", "m[2]"} if line_of(text, place)[1]} == there
 
 
 class Screw(msgspec.Struct, forbid_unknown_fields=True):
@@ -156,9 +158,49 @@ def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
 
 def test_a_file_too_large_is_not_read(tmp_path: Path) -> None:
     file = tmp_path / "it.toml"
-    file.write_text("#" * (toml_files.SIZE_MAXIMUM + 1))
+    file.write_text("#" * (SIZE_MAXIMUM + 1))
     with pytest.raises(RobotError, match=r"it\.toml has 8,000,001 bytes; expected at most 8,000,000"):
         toml_files.read(file, RobotError)
+
+
+DEEP = "[" * DEPTH_MAXIMUM + "]" * DEPTH_MAXIMUM
+HOSTILE = {  # texts that took minutes, or ended in a traceback
+    ".".join("a" * 1000) + " = 1": ":1: a key has 1,000 parts; expected at most 16",
+    "\n[" + " . ".join(["a", '"b.c"', "'d'"] * 30_000) + "]": ":2: a key has 90,000 parts; expected at most 16",
+    "\n".join(f"[{'.'.join('a' * n)}]" for n in range(1, 18)): ":17: a key has 17 parts; expected at most 16",
+    f"x = {DEEP}": " is nested too deeply; expected at most 16 tables and arrays inside one another",
+    f"{'a' * 7_000_000} = 1": ": a key has 7,000,000 characters; expected at most 100",
+    f"x = [{{ '{'a' * 101}' = 1 }}]": ": a key has 101 characters; expected at most 100",
+    f"x = ['{'a' * 1001}']": ": a text has 1,001 characters; expected at most 1,000",
+    "x = 0.5e-31" + "9" * 1_000_000: ":1: there is no key 'x' here",
+    "x = [[1, 2]" + " " * 1_000_000 + "y": " is no valid TOML: ",
+    '\\"""x\n' * 100_000: " is no valid TOML: ",
+    "x = '''\n" + "''x\n" * 100_000: " is no valid TOML: ",
+    "x = " + "a" * 1_000_000: " is no valid TOML: ",
+    "x = [" + "1," * 100_000 + "]\npart = 1": ":1: there is no key 'x' here",
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_a_hostile_text_ends_soon_in_a_sentence(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "it.toml"
+    file.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(RobotError) as caught:
+        toml_files.convert(toml_files.read(file, RobotError), Whole, file.name, RobotError)
+    assert time.process_time() - begun < 5
+    assert str(caught.value).startswith(f"it.toml{HOSTILE[text]}"), str(caught.value)[:300]
+    assert len(str(caught.value)) < 300
+
+
+def test_a_file_at_the_limits_is_read(tmp_path: Path) -> None:
+    key = ".".join("a" * (DEPTH_MAXIMUM - 1))
+    text = f"{key} = '{'t' * TEXT_MAXIMUM}' # {'a.' * 99}\n{'k' * KEY_MAXIMUM} = {DEEP[1:-1]}\n"
+    text += "x = [1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5]\n"
+    text += f"y = 'not.a.key{'.x' * 99}'\n"
+    file = tmp_path / "it.toml"
+    file.write_text(text)
+    assert toml_files.read(file, RobotError) == tomllib.loads(text)
 
 
 def test_a_robot_that_extends_another_names_the_right_file_and_line(tmp_path: Path) -> None:
