@@ -84,6 +84,46 @@ def test_steps_beyond_those_kept_are_not_below_them(tmp_path: Path) -> None:
     assert times[2 * KEPT] == 2 * times[KEPT] and times[KEPT + 1] == times[KEPT] + times[1]
 
 
+def test_ways_that_break_off_are_worked_out_once(tmp_path: Path) -> None:
+    source = VECTORS + "main: cli\n sei\n nop\n cli\n nop\n nop\n nop\n sei\n nop\n rjmp main\n __vector_1: reti"
+    found = Steps(Blocked(assembled(tmp_path, source)))
+
+    def plainly(steps: int, jumps: int) -> int:
+        if jumps == 0:
+            return found.most(steps)
+        return max(found.most(n) + plainly(steps - n, jumps - 1) for n in range(steps + 1))
+
+    for jumps in range(4):
+        assert [found.most(steps, jumps) for steps in range(8)] == [plainly(steps, jumps) for steps in range(8)]
+    assert found.most(2 * KEPT + 1, 10**6) == (2 * KEPT + 1) * found.most(1)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "1: push r0\n rjmp 1b",
+        " ".join(f"sbrs r20, {bit % 8}\n in r{bit}, 0x3f\n" for bit in range(17)) + " sei\n rjmp main",
+    ],
+    ids=["a push in a loop without end", "copies of the flag that double at each branch"],
+)
+def test_states_without_end_are_refused(tmp_path: Path, body: str) -> None:
+    program = assembled(tmp_path, VECTORS + f"main: cli\n {body}\n __vector_1: reti")
+    for judge in (lambda: Steps(Blocked(program)), lambda: Blocked(program).image()):
+        with pytest.raises(TimingError, match=r"\(in main\): there are more than 100,000 states of the interrupt flag"):
+            judge()
+
+
+def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
+    def chained(count: int) -> str:
+        calls = "".join(f" f{i}: rcall f{i + 1}\n ret\n" for i in range(1, count))
+        return VECTORS + f"main: rcall f1\n 1: rjmp 1b\n{calls} f{count}: cli\n sei\n ret\n __vector_1: reti"
+
+    assert Blocked(assembled(tmp_path, chained(50))).image().cycles > 0
+    for count in (60, 1500):
+        with pytest.raises(TimingError, match="calls go deeper than 60 functions; expected no deeper call"):
+            assembled(tmp_path, chained(count))
+
+
 def test_stretch_that_ends_in_another_function_makes_every_step_the_longest(tmp_path: Path) -> None:
     source = VECTORS + "main: rcall f\n nop\n sei\n nop\n nop\n rjmp main\n f: cli\n ret\n __vector_1: reti"
     found = Steps(Blocked(assembled(tmp_path, source)))

@@ -11,7 +11,7 @@ all, is in latency.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from dataclasses import dataclass, field
 
 from boebot.errors import TimingError
@@ -23,6 +23,7 @@ from boebot.timing.stack import VECTORS
 from boebot.timing.wcet import WorstCase
 
 ENTRY = 4  # cycles from acceptance to the vector's jump
+STATES_MAXIMUM = 100_000  # of a function: (block, instruction, state); the kit's have 1,284 at most
 WAKE = 4  # cycles from a request in sleep to its acceptance
 
 
@@ -218,6 +219,7 @@ class Blocked:
                 left = frozenset(header for header in ahead if to[0] in around[header] and to[:2] != (header, 0))
                 ways[place].append(Way(place, (to, left), cycles))
                 work.append((to, left))
+            self._bounded(ways, flow.entry[0])
         counted = {place: marks[place[0][0]] for place in ways if place[0][1] == 0 and place[0][0] in marks}
         walk = longest(Graph(first, ways, lambda place: self.program.where(place[0][0]), counted))
         return None if walk is None else walk.cycles
@@ -258,7 +260,16 @@ class Blocked:
                 if to not in seen:
                     seen.add(to)
                     work.append(to)
+            self._bounded(seen, function.entry)
         return flow
+
+    def _bounded(self, found: Sized, entry: int) -> None:
+        """Refuses what is built so that its states double at every branch, or never end."""
+        if len(found) > STATES_MAXIMUM:
+            raise TimingError(
+                f"{self.program.where(entry)}: there are more than {STATES_MAXIMUM:,} states of the interrupt flag and "
+                "its copies; expected a function that restores the flag which it saved"
+            )
 
     def _step(self, function: Function, node: Node, flow: Flow) -> list[Node]:
         """Adds the ways out of a node to the flow; the nodes that they lead to."""

@@ -32,6 +32,7 @@ from boebot.timing.registers import CALL_CLOBBERED, REGISTERS, written
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
+CALLS_MAXIMUM = 60  # functions that call one another; each has two bytes at least on a stack of less than 2,048
 CORE = {0x5D: "the stack pointer", 0x5E: "the stack pointer", 0x5F: "SREG"}  # data addresses
 
 
@@ -48,13 +49,29 @@ def program_of(image: Image) -> Program:
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
         program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
+    depths: dict[int, int] = {}
     for entry in list(program.functions):
+        _check_depth(program, entry, 1, depths)
         _note_clobbers(program, entry)
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:
             program.by_name.setdefault(symbol.name, symbol.address)
     return program
+
+
+def _check_depth(program: Program, entry: int, above: int, depths: dict[int, int]) -> int:
+    """The calls below a function, with itself, the deepest; one that calls itself counts once."""
+    if entry not in depths:
+        depths[entry] = 0  # while it is worked out
+        callees = {callee for block in program.functions[entry].blocks.values() for callee in block.calls}
+        below = (_check_depth(program, callee, above + 1, depths) for callee in callees if above < CALLS_MAXIMUM)
+        depths[entry] = 1 + max(below, default=len(callees) and CALLS_MAXIMUM)
+    if above + depths[entry] - 1 > CALLS_MAXIMUM:
+        raise TimingError(
+            f"{program.where(entry)}: calls go deeper than {CALLS_MAXIMUM} functions; expected no deeper call"
+        )
+    return depths[entry]
 
 
 def _note_clobbers(program: Program, entry: int) -> frozenset[int]:

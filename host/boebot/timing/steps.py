@@ -80,6 +80,7 @@ class Steps:
         self._places: dict[_Place, int] = {}
         self._ways: list[list[tuple[int, tuple[int, ...]]]] = []  # of each place: cycles, and where that may lead
         self._most = [0]
+        self._by_jumps: list[list[int]] = []  # of each number of jumps the longest times of 0 to KEPT steps
         self._look()
         self._number()
         steps = [cycles for ways in self._ways for cycles, _ in ways]
@@ -93,10 +94,20 @@ class Steps:
         if steps > KEPT:
             return steps // KEPT * self.most(KEPT, jumps) + self.most(steps % KEPT, jumps)
         if jumps:
-            return max(self.most(n) + self.most(steps - n, jumps - 1) for n in range(steps + 1))
+            return self._broken(steps, jumps)
         while len(self._most) <= steps:
             self._most.append(max(LONGEST_INSTRUCTION, self._most[-1], self._recurrence.one_more()))
         return self._most[steps]
+
+    def _broken(self, steps: int, jumps: int) -> int:
+        """The longest time of up to KEPT steps on a way that breaks off; more breaks than steps gain nothing."""
+        rows = self._by_jumps
+        if not rows:
+            rows.append([self.most(n) for n in range(KEPT + 1)])
+        while len(rows) <= min(jumps, KEPT):
+            fewer = rows[-1]
+            rows.append([max(rows[0][k] + fewer[n - k] for k in range(n + 1)) for n in range(KEPT + 1)])
+        return rows[min(jumps, KEPT)][steps]
 
     # ---- all functions that steps can be in ----
 
