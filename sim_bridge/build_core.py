@@ -89,8 +89,6 @@ SOURCES = [
     "logs.c",
     "loop*.c",
 ]
-# No fused multiply-add: the same bits on every machine. BOEBOT_NATIVE=1 builds for the machine at hand instead: faster,
-# and runs are equal only on machines of its kind.
 WINDOWS = sys.platform == "win32"
 WHOLE_PROGRAM = "-flto=auto"
 
@@ -119,9 +117,8 @@ INSIDE = [
     "-fno-trapping-math",
     *([WHOLE_PROGRAM] if links_whole_program() else []),
 ]
-COMPILE_PORTABLE = ["/O2", "/fp:precise"] if WINDOWS else [*INSIDE, "-O2", "-ffp-contract=off"]
-COMPILE_NATIVE = ["/O2"] if WINDOWS else [*INSIDE, "-O3", "-march=native", "-ffp-contract=fast"]
-COMPILE = COMPILE_NATIVE if os.environ.get("BOEBOT_NATIVE") == "1" else COMPILE_PORTABLE
+# No fused multiply-add: the same bits on every machine.
+COMPILE = ["/O2", "/fp:precise"] if WINDOWS else [*INSIDE, "-O2", "-ffp-contract=off"]
 LIBRARIES = [] if WINDOWS or sys.platform == "darwin" else ["-ldl"]
 LINK = [*([] if WINDOWS else COMPILE), *LIBRARIES]  # code is made when linking, and by the same rules
 

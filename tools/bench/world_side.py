@@ -1,21 +1,18 @@
-"""A process that measures worlds of one build on demand: `python -m tools.bench.world_side [EXTENSION]`.
+"""A process that measures worlds on demand: `python -m tools.bench.world_side`.
 
 Each line on standard input is a question in JSON, such as {"what": "compiled", "edges": 48}; each line on standard
-output its answer, {"value": ...} or {"error": ...}. Worlds are made once and go on where they were, so that questions
-to several builds can take turns and share what else happens on the machine. Rates are by the processor's time, where
-one thread works.
+output its answer, {"value": ...} or {"error": ...}. Worlds are made once and go on where they were. Rates are by the
+processor's time, where one thread works.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
-import importlib.util
 import json
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,15 +22,6 @@ if TYPE_CHECKING:
     from sim_bridge.vehicle import Vehicle
 
 TAKES = 0.2  # s that a measurement takes, about
-
-
-def use(extension: Path) -> None:
-    """That file is `sim_bridge._core` from now on."""
-    spec = importlib.util.spec_from_file_location("sim_bridge._core", extension)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    sys.modules["sim_bridge._core"] = module
 
 
 class MallocInfo(ctypes.Structure):
@@ -155,8 +143,6 @@ QUESTIONS: dict[str, Callable[..., float]] = {
 
 
 def main() -> None:
-    if len(sys.argv) > 1:
-        use(Path(sys.argv[1]))
     for line in sys.stdin:
         question = json.loads(line)
         try:

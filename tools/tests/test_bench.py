@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from tools.bench import builds, report, scene
+from tools.bench import report, scene
 from tools.bench.figures import Figure, Peer, figure
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -99,9 +99,7 @@ def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
     assert len(set(names)) == len(names) > 50
     lasers = json.loads(run("--list", "--json", "--only", "laser of 683", "--only", "no such thing").stdout)
     assert [row["name"] for row in lasers] == [name for name in names if "laser of 683" in name]
-    assert {(row["target"], row["unit"]) for row in lasers} == {
-        (target, "rays/s") for target in (100e6, 200e6, 20e6, 30e6)
-    }
+    assert {(row["target"], row["unit"]) for row in lasers} == {(target, "rays/s") for target in (100e6, 20e6)}
     (wandering,) = json.loads(run("--list", "--json", "--only", "native board and world, wander").stdout)
     assert wandering["target"] == 300 and wandering["better"] == "more"
 
@@ -161,11 +159,3 @@ def test_the_scene_has_as_many_edges_and_the_robots_start_in_free_space(edges: i
         for a in (-0.5, 0.5, 1.5):
             for b in (-0.5, 0.5, 1.5):
                 assert math.dist((a, b), (x, y)) > scene.RADIUS + 2 * scene.PILLAR
-
-
-def test_numbers_by_the_c_library_fit_the_header() -> None:
-    """The freed build is made by the bench only."""
-    includes = [f"-I{ROOT / folder}" for folder in ("sim_bridge", "firmware/src")]
-    command = ["cc", "-std=gnu11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *includes, str(builds.LIBM)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
