@@ -29,7 +29,6 @@ SERVO_LEFT, SERVO_RIGHT, WHISKER_LEFT = 13, 12, 5
 
 HANDSHAKE_SEED = 0x155555
 VERSION = 3 * 16  # 3.0
-MASK_21 = 0x1FFFFF
 
 # Messages to the board: id and layout (PROTOCOL.md, "Messages"), all little-endian.
 OPEN, IDENTIFY, DESCRIBE, STOP, CLOSE = 0x01, 0x02, 0x03, 0x08, 0x09

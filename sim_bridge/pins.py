@@ -82,17 +82,13 @@ class BoardPins(BoardMemory):
         self._check(lib.sim_hold_whisker(self._handle, self._number, pin, held), f"whisker on pin {pin}")
 
     def answer_ping(self, echo_us: float | None) -> None:
-        """Every trigger is answered by a pulse of that length (us), or by none at all; see `ask_world`."""
+        """Every trigger is answered by a pulse of that length (us), or by none at all."""
         echo = -2
         if echo_us is not None:
             echo = round(
                 number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US) * CLOCK_HZ / 1e6
             )
         self._check(lib.sim_answer_ping(self._handle, self._number, echo), "Ping")
-
-    def ask_world(self) -> None:
-        """The Ping measures distances again."""
-        self._check(lib.sim_answer_ping(self._handle, self._number, -1), "Ping")
 
     def unplug(self, device: str) -> None:
         """Pulls the plug of a device of the robot's description: it hears and drives nothing."""

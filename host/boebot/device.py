@@ -6,8 +6,6 @@ from typing import ClassVar
 
 import msgspec
 
-PIN_COUNT = 20  # Arduino numbers: 0..13, A0..A5 = 14..19
-
 
 def pin_number(pin: int | str) -> int:
     """The Arduino number 0..19 of a pin written as 0..13 or "A0".."A5".

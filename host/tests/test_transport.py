@@ -20,7 +20,7 @@ from boebot.link.ports import descriptor
 from boebot.link.ports.descriptor import HAS_THREAD, DescriptorTransport
 from boebot.link.ports.serial_port import SerialTransport
 from boebot.link.ports.tcp import SocketTransport
-from boebot.link.transport import BaudSelectable, Stamping, stamped
+from boebot.link.transport import BaudSelectable, Stamping
 from lines import Line, line
 
 pytestmark = [
@@ -302,41 +302,6 @@ def test_switch_interval_is_short_while_a_port_is_open_and_then_as_before() -> N
             assert sys.getswitchinterval() == pytest.approx(0.002), "somebody else's wish is kept"
     finally:
         sys.setswitchinterval(before)
-
-
-class Plain:
-    """An in-process transport without stamps of its own."""
-
-    name = "plain"
-    realtime = False
-
-    def __init__(self, data: bytes) -> None:
-        self.data = data
-        self.asked: list[tuple[float, float]] = []
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        self.asked.append((wait_s, quiet_s))
-        return self.data
-
-    def write(self, data: bytes) -> None:
-        raise AssertionError("nothing is written")
-
-    def now(self) -> float:
-        return 12.5
-
-    def close(self) -> None:
-        pass
-
-
-def test_transport_without_stamps_is_stamped_now(board: Line) -> None:
-    plain = Plain(b"abc")
-    assert stamped(plain, 0.2, 0.1) == [(12.5, b"abc")]
-    assert plain.asked == [(0.2, 0.1)]
-    assert stamped(Plain(b""), 0.2) == []
-    transport = SerialTransport(board.path)
-    board.send(b"x")
-    assert [data for _, data in stamped(transport, 1.0)] == [b"x"]
-    transport.close()
 
 
 def test_opening_that_takes_too_long_is_given_up_and_cleaned_up_later() -> None:

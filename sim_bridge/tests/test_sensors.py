@@ -108,14 +108,6 @@ def test_e13_saturation_and_range() -> None:
     assert lib.infrared_proximity_read(sensor, View(wall(1e-9)).c, source(False)) == 1.0
 
 
-def test_inverse_of_the_centre_ray() -> None:
-    sensor = proximity(beam=beam())
-    for distance in (0.19, 0.3, 0.9):
-        reading = lib.infrared_proximity_read(sensor, View(wall(distance)).c, source(False))
-        assert lib.infrared_proximity_inverse(sensor, reading) == pytest.approx(distance, rel=1e-9)
-    assert lib.infrared_proximity_inverse(sensor, 0.1) == -1.0 and lib.infrared_proximity_inverse(sensor, 1.0) == -1.0
-
-
 def test_noise_of_a_reading_is_that_of_3_1_and_clamped() -> None:
     sensor, noise = proximity(sigma=0.01), source()
     view = View(wall(0.30))
@@ -224,7 +216,6 @@ def sharp(**changes: Any) -> Any:
 def test_sharp_characteristic_and_fold_back() -> None:
     for cm in (10, 20, 40, 80):
         assert lib.sharp_infrared_volts(cm / 100) == pytest.approx(33.9 / (cm + 4.74), rel=1e-12)
-        assert lib.sharp_infrared_distance(33.9 / (cm + 4.74)) == pytest.approx(cm / 100, rel=1e-12)
     near = [lib.sharp_infrared_volts(d) for d in (0.0, 0.02, 0.05, 0.0999)]
     assert near == sorted(near) and near[-1] == pytest.approx(lib.sharp_infrared_volts(0.1), rel=1e-2)
     state = ffi.new("sharp_infrared_state *")

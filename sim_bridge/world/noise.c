@@ -83,10 +83,6 @@ uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
   return noise_mix(noise_key(seed, robot, device) ^ step);
 }
 
-double noise_uniform(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
-  return noise_unit(noise_bits(seed, robot, device, step));
-}
-
 double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
   return noise_normal_of(noise_bits(seed, robot, device, step));
 }

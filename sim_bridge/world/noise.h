@@ -15,9 +15,6 @@
 /* 64 well-mixed bits. */
 uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step);
 
-/* Uniform in [0, 1). */
-double noise_uniform(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step);
-
 /* Normal with mean 0 and standard deviation 1. */
 double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step);
 

@@ -42,8 +42,6 @@ scan_fan *scan_fan_new(double first, double last, size_t count) {
 
 void scan_fan_destroy(scan_fan *self) { free(self); }
 
-size_t scan_fan_count(const scan_fan *self) { return self->count; }
-
 void scan_fan_use_wide(scan_fan *self, int wide) { self->kernels = wide ? kernels() : &scan_kernels_any; }
 
 /* Corners in a row, every `stride` numbers, and where the sensor is in their frame. */

@@ -21,7 +21,6 @@ typedef struct scan_fan scan_fan;
  * NULL without memory, with less than 2 beams, or with such angles. A fan serves one thread at a time. */
 scan_fan *scan_fan_new(double first, double last, size_t count);
 void scan_fan_destroy(scan_fan *self);
-size_t scan_fan_count(const scan_fan *self);
 
 /* Whether the widest registers of the processor are used, as they are from the start. The distances are the same. */
 void scan_fan_use_wide(scan_fan *self, int wide);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,8 +121,6 @@ class Experiment:
     """takes more than some two seconds"""
     run: Callable[[int, Progress], Outcome]
     """with a seed"""
-    topic: str = field(default="")
-    """the file that it stands in"""
 
     @property
     def section(self) -> str:
@@ -158,7 +156,6 @@ def experiment(
             criterion=criterion,
             slow=slow,
             run=run,
-            topic=run.__module__.rpartition(".")[2],
         )
         return run
 

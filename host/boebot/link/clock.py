@@ -84,11 +84,6 @@ class BoardClock:
         return 1.0 / (1.0 + self._slope) - 1.0 if self._known else 0.0
 
     @property
-    def drift_bound(self) -> float:
-        """Error bound of `drift`."""
-        return self._slope_bound if self._known else DRIFT_LIMIT
-
-    @property
     def offset(self) -> float:
         """Host time of board time 0 by the newest estimate (s)."""
         return self._middle - self._at_s * (1.0 + self._slope) if self._known else 0.0

@@ -80,11 +80,3 @@ class CountsOverruns(Protocol):
     @property
     def overruns(self) -> int:
         """How many since it was opened, as far as the operating system counts them."""
-
-
-def stamped(transport: Transport, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
-    """What arrived at any transport, in stamped pieces; where nobody stamped it, the stamp is now."""
-    if isinstance(transport, Stamping):
-        return transport.read_stamped(wait_s, quiet_s)
-    data = transport.read(wait_s, quiet_s)
-    return [(transport.now(), data)] if data else []

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 CYCLES_PER_US = 16.0
 CYCLES_PER_TICK = 160_000.0
-JITTER_GROUP = "boebot.timing"  # of entry points; the one named "jitter" is a MeasureJitter
 
 
 @dataclass(frozen=True, slots=True)

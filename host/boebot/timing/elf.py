@@ -59,7 +59,6 @@ class Image:
     symbols: tuple[Symbol, ...]  # those of flash, by address
     flash_bytes: int  # written to flash: code, constants, initial values of variables
     ram_bytes: int  # of all variables
-    ram_end: int  # first address behind the last variable
     stack_start: int  # first value of the stack pointer
     lines: dict[int, str] = field(default_factory=dict)
     table: Table = field(default_factory=Table)
@@ -93,7 +92,6 @@ def _image(path: Path, elf: ELFFile) -> Image:
     if elf["e_type"] != "ET_EXEC":
         raise TimingError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
     code, written = _flash(path, elf)
-    ram = _ram(elf)
     symbols, stack_start = _symbols(elf)
     return Image(
         path=str(path),
@@ -102,8 +100,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         executable=_executable(elf, len(code)),
         symbols=symbols,
         flash_bytes=written,
-        ram_bytes=sum(size for _, size in ram),
-        ram_end=max((start + size for start, size in ram), default=RAM_START) - DATA_SPACE,
+        ram_bytes=_ram(elf),
         stack_start=stack_start,
         lines=_lines(elf, len(code)),
         table=table_of(path, _section(path, elf, SECTION)),
@@ -141,13 +138,13 @@ def _flash(path: Path, elf: ELFFile) -> tuple[bytes, int]:
     return bytes(flash[:end]), written
 
 
-def _ram(elf: ELFFile) -> list[tuple[int, int]]:
-    """(start, size) of the sections in RAM."""
-    return [
-        (section["sh_addr"], section["sh_size"])
+def _ram(elf: ELFFile) -> int:
+    """Bytes of the sections in RAM."""
+    return sum(
+        section["sh_size"]
         for section in elf.iter_sections()
         if section["sh_flags"] & ALLOCATED and RAM_START <= section["sh_addr"] < RAM_END
-    ]
+    )
 
 
 def _executable(elf: ELFFile, end: int) -> tuple[range, ...]:

@@ -65,8 +65,3 @@ double infrared_proximity_read(const infrared_proximity *self, const viewpoint *
   }
   return infrared_proximity_finish(self, sum, noise);
 }
-
-double infrared_proximity_inverse(const infrared_proximity *self, double reading) {
-  if (!(reading > self->c2 && reading < 1.0)) return -1.0;
-  return sqrt(self->c1[0] / (reading - self->c2));
-}

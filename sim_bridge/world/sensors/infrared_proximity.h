@@ -31,9 +31,6 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
 
 /* S in [0, 1]. */
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise);
-
-/* Distance for which a centre ray alone reads `reading`: sqrt(c1 / (S - c2)), -1 unless c2 < S < 1. */
-double infrared_proximity_inverse(const infrared_proximity *self, double reading);
 /* python: end */
 
 /* The same in parts, for readings of many sensors at once, all without `reflectance`: the question that arena_fans is to

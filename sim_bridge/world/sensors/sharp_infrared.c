@@ -24,8 +24,6 @@ double sharp_infrared_volts(double distance) {
   return cm >= FOLD_CM ? beyond_fold(cm) : beyond_fold(FOLD_CM) * cm / FOLD_CM; /* the way back: a line (chosen) */
 }
 
-double sharp_infrared_distance(double volts) { return 0.01 * (33.9 / volts - 4.74); }
-
 static double measure(const sharp_infrared *self, const viewpoint *from, noise_source *noise) {
   const beam_origin at = beam_from(&self->beam, from);
   double nearest = -1.0;

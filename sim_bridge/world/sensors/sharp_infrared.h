@@ -36,9 +36,6 @@ int sharp_infrared_init(sharp_infrared *self, const sharp_infrared_parameters *p
 /* The characteristic: volts at d metres, d >= 0. */
 double sharp_infrared_volts(double distance);
 
-/* Its inverse on the branch beyond 0.10 m: metres at that voltage > 0. */
-double sharp_infrared_distance(double volts);
-
 /* Voltage at the output at `time` s, which does not go back. */
 double sharp_infrared_read(const sharp_infrared *self, sharp_infrared_state *state, const viewpoint *from, double time,
                            noise_source *noise);
