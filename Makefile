@@ -75,6 +75,7 @@ soak: experiments
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
 	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.other_emulators
+	@$(PYTHON_VENV) -m pytest -q -m soak
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000

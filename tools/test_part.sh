@@ -8,7 +8,12 @@ part=$1
 shift
 log=build/test-$part.log units=build/test-units.log
 
-of_folder() { build/venv/bin/python -m pytest "$part" -m "not wall_clock" "$@"; }
+of_folder() { build/venv/bin/python -m pytest "$part" -m "not wall_clock and not soak" "$@"; }
+
+# Those of the simulator run under sanitizers; here are the rest, and those with random input, which get more of it.
+of_simulator() {
+  build/venv/bin/python -m pytest "$part" -m "(unsanitized or hypothesis) and not wall_clock and not soak" "$@"
+}
 
 run() {
   case $part in
@@ -17,6 +22,7 @@ run() {
       tools/pio test -e native_sanitized -e native_quad -e native_boebot >"$units" 2>&1 || { cat "$units" && return 1; }
       grep ' test cases: ' "$units" && of_folder "$@"
       ;;
+    sim_bridge) of_simulator "$@" ;;
     *) of_folder "$@" ;;
   esac
 }

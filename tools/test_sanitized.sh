@@ -22,12 +22,10 @@ asan=$(cc -print-file-name=libasan.so)
 ubsan=$(cc -print-file-name=libubsan.so)
 # Python itself leaves memory to the end of the process, and must use malloc for its objects to be watched.
 # A report names the four innermost calls that allocated: more of them, noted at each of Python's allocations, take long.
-# Left out: pages and a schema that only Python makes or reads, programs that the test itself compiles, counts of threads and
-# memory that sanitizers add to, waits for the wall clock, and long runs for statistics whose code others run as well.
+# Left out: what is marked so (pyproject.toml), and waits for the wall clock.
 echo "Simulator under sanitizers"
 root=$PWD
 cd build/sanitized/lib
 LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0:malloc_context_size=4 PYTHONMALLOC=malloc BOEBOT_SANITIZED=1 \
   "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" sim_bridge/tests \
-  -k "not schema_and_page and not example_of_the_reference and not every_compiler and not threads_end and not ctrl_c \
-      and not averaging and not continuous_mode and not served and not do_not_depend_on_steps and not the_example and not dropped_are_freed"
+  -m "not unsanitized and not soak and not wall_clock"

@@ -202,6 +202,7 @@ def test_moving_shapes_are_where_their_path_says() -> None:
     assert np.hypot(*(ball - (-0.8, 0.7)).T) == pytest.approx(np.full(48, 0.08))
 
 
+@pytest.mark.unsanitized
 def test_schema_and_page_are_fresh() -> None:
     """`python -m sim_bridge.arena_reference` renews them."""
     assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == arena_reference.schema()

@@ -467,6 +467,7 @@ def test_busy_run_is_busy(one_piece: tuple[list[Edge], list[SentByte], dict[str,
     assert min(gaps(edge.cycle for edge in edges)) >= 0
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("step", [1, 7, 100, 1000, 16_000, 65_537])
 def test_runs_do_not_depend_on_steps(step: int, one_piece: tuple[list[Edge], list[SentByte], dict[str, int]]) -> None:
     edges, sent, counters = busy_run(step)

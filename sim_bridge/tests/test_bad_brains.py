@@ -315,6 +315,7 @@ def test_bad_brain_at_the_command_line(
     assert stood_still == [True]
 
 
+@pytest.mark.unsanitized
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_ctrl_c_ends_a_brain_that_hangs(tmp_path: Path) -> None:
     path, begun = tmp_path / "bad.py", tmp_path / "begun"

@@ -203,6 +203,7 @@ def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:
     return subprocess.run([str(program), *body], check=True, capture_output=True, text=True).stdout.split()
 
 
+@pytest.mark.soak
 def test_every_compiler_gives_the_same_bits(tmp_path: Path) -> None:
     builds: list[tuple[str, ...]] = [(c, o) for c in ("gcc", "clang") if shutil.which(c) for o in ("-O0", "-O2")]
     builds += [(c, o, "-DWORLD_PLAIN_LANES") for c, o in builds if o == "-O2"]  # without AVX2

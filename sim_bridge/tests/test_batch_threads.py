@@ -66,6 +66,7 @@ def ctrl_c(seconds: float = 0.3) -> Iterator[list[float]]:
         signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.unsanitized
 def test_threads_end_with_close_with_the_block_and_with_the_batch() -> None:
     before = threads_now()
     signals = np.full((8, 2), 0.3)
@@ -101,6 +102,7 @@ def test_a_process_with_an_open_batch_ends() -> None:
     assert done.stdout == "done\n" and done.stderr == ""
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("way", ["step", "run"])
 def test_ctrl_c_ends_a_long_call_and_the_batch_goes_on(threads: int, way: str) -> None:
@@ -137,6 +139,7 @@ def test_portions_change_no_bit() -> None:
     assert whole.hashes().tolist() == single.hashes().tolist()
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("staged", [False, True])
 def test_ctrl_c_ends_a_vehicles_run_after_whole_steps(staged: bool) -> None:
     vehicle, same = (Vehicle(arsim(ends_at_collision=False), load_arena("arsim"), seed=3) for _ in range(2))

@@ -181,6 +181,7 @@ def angular(tmp_path: Path) -> Path:
     return tmp_path / "angular.toml"
 
 
+@pytest.mark.unsanitized
 def test_the_example_of_the_reference_is_a_robot(angular: Path) -> None:
     """A chassis of 136 mm by 80 mm, mirror-symmetric, within the published 90 to 119 mm, the wheels within it."""
     body = load_robot(angular).body
@@ -202,6 +203,7 @@ def ahead(robot: boebot.Robot) -> None:
     robot.drive(1.0, 0.97)
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("arena", ["maze", "room"])
 @pytest.mark.parametrize("brain", ["wander", blindly, ahead])
 def test_the_example_drives_and_gets_into_nothing(angular: Path, brain: Any, arena: str) -> None:

@@ -151,6 +151,7 @@ def test_a_single_measurement_takes_6_ms_and_then_it_rests() -> None:
     assert master.field() == x
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize(("setting", "hertz"), list(enumerate([0.75, 1.5, 3.0, 7.5, 15.0, 30.0, 75.0])))
 def test_continuous_mode_has_the_rate_that_was_set(setting: int, hertz: float) -> None:
     """The robot is turned a little between two readings: what they read changes with each measurement only. One that
@@ -234,6 +235,7 @@ def test_iron_and_mounting() -> None:
     assert math.atan2(-y, x) == pytest.approx(0.3, abs=0.005)
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize(("average", "samples"), [(0, 1), (1, 2), (2, 4), (3, 8)])
 def test_averaging_lowers_the_noise(average: int, samples: int) -> None:
     master = Master(noise=True, sigma=0.05)

@@ -126,6 +126,7 @@ def test_client_that_does_not_read_stops_nobody() -> None:
         client.close()
 
 
+@pytest.mark.unsanitized
 def test_what_cannot_be_served_is_told() -> None:
     with served(0) as url:
         taken = int(url.rpartition(":")[2])

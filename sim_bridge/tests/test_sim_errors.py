@@ -82,6 +82,7 @@ def test_a_simulation_is_not_copied(how: Callable[[Sim], Sim]) -> None:
     refused(lambda: how(built()), r"cannot be copied; expected save\(\) and restore\(\)")
 
 
+@pytest.mark.unsanitized
 def test_boards_that_are_dropped_are_freed() -> None:
     """Alone, in a simulation, and with one that is part of a cycle of references."""
 
@@ -99,6 +100,7 @@ def test_boards_that_are_dropped_are_freed() -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000, "kB; a board has 270"
 
 
+@pytest.mark.unsanitized
 def test_a_long_run_hears_ctrl_c() -> None:
     sim = built()
     timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))

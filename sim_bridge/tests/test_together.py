@@ -227,6 +227,7 @@ def test_interrupt_in_a_brain_stops_all() -> None:
     assert all(isinstance(robot.error, KeyboardInterrupt) and stopped(robot) for robot in result.robots)
 
 
+@pytest.mark.unsanitized
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 @pytest.mark.parametrize("after_s", [0.0, 0.7])
 def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) -> None:
