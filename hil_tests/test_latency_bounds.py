@@ -9,7 +9,7 @@ from boebot import resources, robots
 from boebot.timing.graph import load_program
 from boebot.timing.loads import ENCODERS, LOADS, RECEIVE, TICK
 from boebot.timing.program import Program
-from boebot.timing.taken import DATA
+from boebot.timing.receive_times import DATA
 from sim_bridge.timing.measure import run
 
 pytestmark = pytest.mark.emulated

@@ -1,5 +1,5 @@
 /* loop_state.h: what the files of the loop know of a simulation: loop.c runs it, loop_join.c builds it, loop_truth.c reads
- * it, loop_hands.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again,
+ * it, loop_interventions.c lays a test's hands on it, loop_inputs.c notes what comes from outside and plays it again,
  * loop_vehicle.c has the robots without boards.
  */
 #ifndef LOOP_STATE_H

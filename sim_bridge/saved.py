@@ -32,7 +32,7 @@ class SavedRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     number: int
     name: str
     built: str
-    """print of its description, start and imperfections"""
+    """fingerprint of its description, start and imperfections"""
     firmware: str
     """SHA-256 of the firmware; empty for a robot without a board"""
     waiting: int
@@ -51,11 +51,11 @@ class Heading(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     record: bool
     step_cycles: int
     arena: str
-    arena_print: str
+    arena_fingerprint: str
     robots: list[SavedRobot]
 
 
-def print_of(*parts: Any) -> str:
+def fingerprint_of(*parts: Any) -> str:
     """A number that two descriptions share only if they are equal."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
@@ -95,7 +95,7 @@ def check_alike(saved: Heading, here: Heading) -> None:
     Raises:
         SavedStateError: one sentence names the first difference.
     """
-    if saved.arena_print != here.arena_print:
+    if saved.arena_fingerprint != here.arena_fingerprint:
         raise SavedStateError(_another("arena", saved.arena, here.arena))
     for what in ("seed", "noise", "record", "step_cycles"):
         if getattr(saved, what) != getattr(here, what):

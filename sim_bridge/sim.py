@@ -20,11 +20,11 @@ from sim_bridge.arguments import point, shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.floor_plan import Lateness
-from sim_bridge.joining import done, join
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.outline import collision_outline
 from sim_bridge.sim_robot import PORTION_CYCLES, SimRobot
 from sim_bridge.vehicle import VehicleModel
+from sim_bridge.wiring import done, join
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
@@ -371,12 +371,12 @@ class Sim:
             record=self._record,
             step_cycles=self._step_cycles,
             arena=self.arena.name,
-            arena_print=saved.print_of(self.arena.description),
+            arena_fingerprint=saved.fingerprint_of(self.arena.description),
             robots=[
                 saved.SavedRobot(
                     number=number,
                     name=member.description.name,
-                    built=saved.print_of(member.description, member.pose, member.without),
+                    built=saved.fingerprint_of(member.description, member.pose, member.without),
                     firmware="" if member.board is None else member.board.firmware,
                     waiting=lib.sim_waiting(self.handle, number),
                 )

@@ -1,9 +1,9 @@
 """Runs several robots in one simulated world: `boebot.run_together(...)`, and `boebot run` with several of them.
 
 Each has its own brain and seed, and a board or none, and they sense and bump each other. Brains step here, in the
-caller's thread; each robot is driven by a strand (boebot.driving.strand) that pauses while it waits. One clock turns
-them all: when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant go on
-in the order of their numbers. The run of each is then a function of what its own robot meets.
+caller's thread; each robot is driven by a thread that pauses while it waits (boebot.driving.pausable_thread). One clock
+turns them all: when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant
+go on in the order of their numbers. The run of each is then a function of what its own robot meets.
 
 An error in one ends the run: all motors are stopped, and the error says which robot it was.
 """
@@ -19,7 +19,7 @@ from boebot import interrupts
 from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, default_board, open_together
 from boebot.brains import LoadedBrain
 from boebot.driving import PROGRESS_S, Driver, Progress, Task
-from boebot.driving.strand import PAUSED, Strand
+from boebot.driving.pausable_thread import PAUSED, PausableThread
 from boebot.errors import BoebotError, BrainError
 from boebot.result import RunResult, TogetherResult
 from boebot.runner import driver_of, keep, with_times
@@ -28,7 +28,7 @@ from boebot.tasks import Member, Terms, expect, task_of
 
 __all__ = ["Member", "StoppedError", "execute_together", "run_together"]
 
-_STEP = "step"  # what a strand says when the brain is to step
+_STEP = "step"  # what a thread says when the brain is to step
 
 
 class StoppedError(BoebotError):
@@ -152,7 +152,7 @@ def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
 
 
 class _Robot:
-    """One robot of a run: its driver on a strand, and its brain."""
+    """One robot of a run: its driver on a thread, and its brain."""
 
     def __init__(self, session: BoardSession | VehicleSession, task: Task, number: int) -> None:
         self.number = number
@@ -164,15 +164,15 @@ class _Robot:
         self.time_s = 0.0
         self._times = StepTimes()
         self._session = session
-        self.strand = Strand(self._work, f"robot {number}")
+        self.thread = PausableThread(self._work, f"robot {number}")
 
     def _work(self) -> None:
-        """What the strand does: the whole run, from the robot made ready to the motors stopped."""
+        """What the thread does: the whole run, from the robot made ready to the motors stopped."""
         self.driver = driver = driver_of(self._session, self.task)
         try:
             driver.begin()
             for self.time_s in driver.steps():
-                self.strand.pause(_STEP)
+                self.thread.pause(_STEP)
         except BoebotError as error:
             self.error = self.error or error
         finally:
@@ -186,7 +186,7 @@ class _Robot:
         Raises:
             BrainError: an error in the brain.
         """
-        said = self.strand.resume(error)
+        said = self.thread.resume(error)
         while said == _STEP:
             assert self.driver is not None
             try:
@@ -195,12 +195,12 @@ class _Robot:
             except BaseException as caught:
                 self.error = caught
                 raise
-            said = self.strand.resume()
+            said = self.thread.resume()
 
     @property
     def failure(self) -> BaseException | None:
         """Why it ended before its time."""
-        return self.error or self.strand.error
+        return self.error or self.thread.error
 
 
 class _Run:
@@ -214,7 +214,7 @@ class _Run:
         ]
         self._progress = progress
         self._next_progress = 0.0
-        world.on_wait(lambda index: self._robots[index].strand.pause(PAUSED))
+        world.on_wait(lambda index: self._robots[index].thread.pause(PAUSED))
 
     def run(self) -> TogetherResult:
         """The whole run, from the first hello to the last stop."""
@@ -240,7 +240,7 @@ class _Run:
         while True:
             for robot in awake:
                 self._turn(robot, watch)
-            if all(robot.strand.is_done for robot in self._robots):
+            if all(robot.thread.is_done for robot in self._robots):
                 return
             awake = [self._robots[index] for index in self._world.advance()]
             self._report()
@@ -264,15 +264,15 @@ class _Run:
         stop = StoppedError(f"the run has ended: {why}")
         for robot in self._robots:
             if not robot.is_ending:
-                robot.strand.resume(stop)
+                robot.thread.resume(stop)
         try:
-            while not all(robot.strand.is_done for robot in self._robots):
+            while not all(robot.thread.is_done for robot in self._robots):
                 for index in self._world.advance():
-                    self._robots[index].strand.resume()
+                    self._robots[index].thread.resume()
         except BoebotError as broken:  # no time passes any more: nothing moves either
-            while not all(robot.strand.is_done for robot in self._robots):
+            while not all(robot.thread.is_done for robot in self._robots):
                 for robot in self._robots:
-                    robot.strand.resume(broken)
+                    robot.thread.resume(broken)
 
     def _result(self, error: BaseException | None, elapsed_s: float) -> TogetherResult:
         """Raises the error of a run that never began."""

@@ -18,9 +18,9 @@ from boebot.timing.blocked import ENTRY, Blocked
 from boebot.timing.latency import HORIZON, Latencies
 from boebot.timing.loads import ENCODERS, RECEIVE
 from boebot.timing.program import Instruction, Program
+from boebot.timing.receive_times import DATA, LOAD, STATUS, Taken
 from boebot.timing.response import Source
 from boebot.timing.steps import Steps
-from boebot.timing.taken import DATA, LOAD, STATUS, Taken
 from boebot.timing.wcet import WorstCase
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_18\n.global __vector_19\n"

@@ -166,6 +166,6 @@ struct vehicle_model {
 };
 
 /* A hash of all parameters: equal for two models only if their worlds go on alike from the same state. */
-uint64_t vehicle_model_print(const vehicle_model *self);
+uint64_t vehicle_model_fingerprint(const vehicle_model *self);
 
 #endif

@@ -168,8 +168,8 @@ void vehicles_save(const vehicles *self, size_t i, void *bytes) {
   stream s = {.mode = WRITE, .out = rest};
   walk(&s, (vehicles *)self, i); /* changes nothing */
   put(bytes, 0, VERSION);
-  put(bytes, 1, vehicle_model_print(self->model));
-  put(bytes, 2, self->worlds[i].in != NULL ? arena_print(self->worlds[i].in->arena) : 0);
+  put(bytes, 1, vehicle_model_fingerprint(self->model));
+  put(bytes, 2, self->worlds[i].in != NULL ? arena_fingerprint(self->worlds[i].in->arena) : 0);
   put(bytes, 3, self->state_size);
   put(bytes, 4, checksum(rest, 8 * s.count));
 }
@@ -179,8 +179,8 @@ static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t si
   if (size < 8 * HEADING_WORDS || size % 8 != 0 || get(bytes, 0) != VERSION) return VEHICLE_BAD_SNAPSHOT;
   const unsigned char *rest = bytes + 8 * HEADING_WORDS;
   if (get(bytes, 4) != checksum(rest, size - 8 * HEADING_WORDS)) return VEHICLE_BAD_SNAPSHOT;
-  if (get(bytes, 1) != vehicle_model_print(self->model)) return VEHICLE_OTHER_MODEL;
-  if (get(bytes, 2) != arena_print(self->worlds[i].in->arena)) return VEHICLE_OTHER_ARENA;
+  if (get(bytes, 1) != vehicle_model_fingerprint(self->model)) return VEHICLE_OTHER_MODEL;
+  if (get(bytes, 2) != arena_fingerprint(self->worlds[i].in->arena)) return VEHICLE_OTHER_ARENA;
   if (get(bytes, 3) != self->state_size) return VEHICLE_OTHER_MEMORY;
   if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
   stream s = {.mode = CHECK, .good = 1, .in = rest};

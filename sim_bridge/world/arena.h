@@ -86,7 +86,7 @@ void arena_build(arena *self);
 void arena_use_index(arena *self, int choice);
 
 /* Equal for two arenas, once built, only if the same things stand in them, added in the same order; names do not count. */
-uint64_t arena_print(const arena *self);
+uint64_t arena_fingerprint(const arena *self);
 
 size_t arena_edge_count(const arena *self);
 size_t arena_disc_count(const arena *self);

@@ -29,8 +29,8 @@ from boebot.timing.loads import ENCODERS, RECEIVE, SEND, SENT_WHILE_BUSY, Load
 from boebot.timing.loops import Loop, natural_loops, reverse_postorder
 from boebot.timing.paths import Graph, Way, longest
 from boebot.timing.program import Block, Function, Program, TaskRow
+from boebot.timing.receive_times import Taken
 from boebot.timing.response import Piece, Schedule, Source
-from boebot.timing.taken import Taken
 from boebot.timing.wcet import Bound, WorstCase
 
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"

@@ -32,10 +32,10 @@ from collections.abc import Mapping, Sequence
 from boebot.errors import TimingError
 from boebot.timing.blocked import Blocked
 from boebot.timing.loads import APART, NEVER_NEAR, RECEIVE, densest
+from boebot.timing.receive_times import Taken
 from boebot.timing.received import Line, Other, longest_wait
 from boebot.timing.response import Source
 from boebot.timing.steps import Steps
-from boebot.timing.taken import Taken
 
 HORIZON = 1 << 20  # cycles, 65 ms: who waits longer waits for ever
 

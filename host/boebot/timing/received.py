@@ -1,4 +1,5 @@
-"""The longest time that a received byte waits in the UART, where others than its own interrupt take it too (taken.py).
+"""The longest time that a received byte waits in the UART, where other interrupts may take it, too
+(receive_times.py).
 
 Bytes queue in the receiver, so they are looked at in their order (after R. Davis, A. Burns, R. Bril, J. Lukkien,
 "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007)).
@@ -24,8 +25,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
+from boebot.timing.receive_times import Taken
 from boebot.timing.response import Source
-from boebot.timing.taken import Taken
 
 QUEUE_MOST = 16  # bytes without a moment at which none waits: more are overload
 WAIT_MOST = 1 << 12  # cycles without such a moment, likewise

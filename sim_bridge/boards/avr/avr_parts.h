@@ -3,7 +3,7 @@
  * simavr (sim_core.c) executes the less common instructions and keeps the data space. Everything that has to do with
  * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
  * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
- * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_dog.c),
+ * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
  * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
@@ -457,7 +457,7 @@ void converter_init(avr_board *b);
 void converter_reset(avr_board *b);
 void converter_due(avr_board *b, uint64_t cycle);
 
-/* avr_dog.c */
+/* avr_watchdog.c */
 void watchdog_init(avr_board *b);
 void watchdog_reset(avr_board *b, uint64_t cycle);
 void watchdog_due(avr_board *b, uint64_t cycle);

@@ -119,7 +119,7 @@ double table_noise_read(const table_noise *self, double distance, double angle, 
   return near + (far - near) * along;
 }
 
-uint64_t table_noise_print(const table_noise *self) {
+uint64_t table_noise_fingerprint(const table_noise *self) {
   const size_t bins = (size_t)self->rows * (size_t)self->columns;
   uint64_t sum = hash_numbers(0, self->distances, (size_t)self->rows);
   sum = hash_numbers(sum, self->angles, (size_t)self->columns);

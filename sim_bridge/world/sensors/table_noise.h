@@ -24,6 +24,6 @@ double table_noise_read(const table_noise *self, double distance, double angle, 
 /* python: end */
 
 /* A hash of all bins and samples. */
-uint64_t table_noise_print(const table_noise *self);
+uint64_t table_noise_fingerprint(const table_noise *self);
 
 #endif

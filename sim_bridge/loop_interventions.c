@@ -1,4 +1,4 @@
-/* loop_hands.c: see loop.h. Here: what a test does to a simulation, past its parts; all of it is noted. */
+/* loop_interventions.c: see loop.h. Here: what a test does to a simulation, past its parts; all of it is noted. */
 #include <math.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-"""A strand runs a stretch at a time, hears what is thrown, and Ctrl-C waits for the end of its stretch."""
+"""A pausable thread runs a stretch at a time, hears what is thrown, and Ctrl-C waits for the end of its stretch."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from boebot.driving.strand import DONE, PAUSED, Strand
+from boebot.driving.pausable_thread import DONE, PAUSED, PausableThread
 from boebot.errors import BoardError
 
 
@@ -18,37 +18,37 @@ def test_stretches_alternate_with_whoever_resumes() -> None:
     def work() -> None:
         for number in range(3):
             heard.append(number)
-            strand.pause(f"after {number}")
+            thread.pause(f"after {number}")
 
-    strand = Strand(work, "test")
-    assert heard == [] and not strand.is_done
+    thread = PausableThread(work, "test")
+    assert heard == [] and not thread.is_done
     for number in range(3):
-        assert strand.resume() == f"after {number}"
+        assert thread.resume() == f"after {number}"
         heard.append("between")
-    assert strand.resume() == DONE and strand.is_done and strand.error is None
+    assert thread.resume() == DONE and thread.is_done and thread.error is None
     assert heard == [0, "between", 1, "between", 2, "between"]
-    assert strand.resume() == DONE
+    assert thread.resume() == DONE
 
 
-def test_strands_never_run_at_the_same_time() -> None:
+def test_threads_never_run_at_the_same_time() -> None:
     inside = 0
     most = 0
 
-    def work(strand: Strand) -> None:
+    def work(thread: PausableThread) -> None:
         nonlocal inside, most
         for _ in range(20):
             inside += 1
             most = max(most, inside)
             time.sleep(1e-4)
             inside -= 1
-            strand.pause()
+            thread.pause()
 
-    strands: list[Strand] = []
+    threads: list[PausableThread] = []
     for index in range(4):
-        strands.append(Strand(lambda index=index: work(strands[index]), f"test {index}"))  # type: ignore[misc]
-    while not all(strand.is_done for strand in strands):
-        for strand in strands:
-            strand.resume()
+        threads.append(PausableThread(lambda index=index: work(threads[index]), f"test {index}"))  # type: ignore[misc]
+    while not all(thread.is_done for thread in threads):
+        for thread in threads:
+            thread.resume()
     assert most == 1
 
 
@@ -57,24 +57,24 @@ def test_error_is_thrown_where_it_paused() -> None:
 
     def work() -> None:
         try:
-            strand.pause()
+            thread.pause()
         except BoardError as error:
             caught.append(str(error))
-        strand.pause("cleared up")
+        thread.pause("cleared up")
         raise ValueError("of its own")
 
-    strand = Strand(work, "test")
-    assert strand.resume() == PAUSED
-    assert strand.resume(BoardError("gone")) == "cleared up"
+    thread = PausableThread(work, "test")
+    assert thread.resume() == PAUSED
+    assert thread.resume(BoardError("gone")) == "cleared up"
     assert caught == ["gone"]
-    assert strand.resume() == DONE
-    assert isinstance(strand.error, ValueError)
+    assert thread.resume() == DONE
+    assert isinstance(thread.error, ValueError)
 
 
 def test_error_before_its_first_stretch_keeps_it_from_running() -> None:
-    strand = Strand(lambda: pytest.fail("it ran"), "test")
-    assert strand.resume(BoardError("gone")) == DONE
-    assert isinstance(strand.error, BoardError)
+    thread = PausableThread(lambda: pytest.fail("it ran"), "test")
+    assert thread.resume(BoardError("gone")) == DONE
+    assert isinstance(thread.error, BoardError)
 
 
 def test_interrupt_waits_for_the_end_of_the_stretch() -> None:
@@ -84,16 +84,16 @@ def test_interrupt_waits_for_the_end_of_the_stretch() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
         time.sleep(0.1)
         done.append("whole stretch")
-        strand.pause()
+        thread.pause()
         done.append("next")
 
-    strand = Strand(work, "test")
+    thread = PausableThread(work, "test")
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            strand.resume()
+            thread.resume()
     finally:
         signal.signal(signal.SIGINT, before)
-    assert done == ["whole stretch"] and strand.said == PAUSED
-    assert strand.resume() == DONE
+    assert done == ["whole stretch"] and thread.said == PAUSED
+    assert thread.resume() == DONE
     assert done == ["whole stretch", "next"]

@@ -1,14 +1,14 @@
-/* arena_print.c: what tells an arena from another one, see arena_print in arena.h: a hash of all that a world can meet in
+/* arena_fingerprint.c: what tells an arena from another one, see arena_fingerprint in arena.h: a hash of all that a world can meet in
  * it. */
 #include "arena_data.h"
 #include "hash.h"
 
-static uint64_t print_surface(uint64_t sum, const arena_surface *s) {
+static uint64_t hash_surface(uint64_t sum, const arena_surface *s) {
   return HASH_NUMBERS(sum, s->height, s->infrared_reflectance, s->sound_reflectance);
 }
 
-static uint64_t print_shape(uint64_t sum, const arena *self, const arena_shape *shape) {
-  sum = print_surface(hash_word(hash_word(sum, (uint64_t)shape->kind), shape->count), &shape->surface);
+static uint64_t hash_shape(uint64_t sum, const arena *self, const arena_shape *shape) {
+  sum = hash_surface(hash_word(hash_word(sum, (uint64_t)shape->kind), shape->count), &shape->surface);
   if (shape->kind == ARENA_DISC) {
     const arena_disc *d = &self->disc[shape->first];
     return HASH_NUMBERS(sum, d->x, d->y, d->radius);
@@ -20,8 +20,8 @@ static uint64_t print_shape(uint64_t sum, const arena *self, const arena_shape *
   return sum;
 }
 
-static uint64_t print_moving(uint64_t sum, const arena_moving *m) {
-  sum = HASH_NUMBERS(print_surface(sum, &m->surface), m->radius);
+static uint64_t hash_moving(uint64_t sum, const arena_moving *m) {
+  sum = HASH_NUMBERS(hash_surface(sum, &m->surface), m->radius);
   sum = hash_numbers(sum, m->outline, 2 * m->corners);
   sum = hash_word(hash_word(sum, (uint64_t)m->path.repeat), m->path.count);
   for (size_t i = 0; i < m->path.count; i++) {
@@ -31,9 +31,9 @@ static uint64_t print_moving(uint64_t sum, const arena_moving *m) {
   return sum;
 }
 
-uint64_t arena_reckon_print(const arena *self) {
+uint64_t arena_compute_fingerprint(const arena *self) {
   uint64_t sum = hash_word(self->shape_count, self->patch_count);
-  for (size_t i = 0; i < self->shape_count; i++) sum = print_shape(sum, self, &self->shape[i]);
+  for (size_t i = 0; i < self->shape_count; i++) sum = hash_shape(sum, self, &self->shape[i]);
   for (size_t i = 0; i < self->patch_count; i++) {
     const arena_patch *p = &self->patch[i];
     sum = HASH_NUMBERS(hash_numbers(sum, p->xy, 2 * p->count), p->grip);
@@ -44,7 +44,7 @@ uint64_t arena_reckon_print(const arena *self) {
     sum = HASH_NUMBERS(sum, l->x, l->y, l->height, l->power);
   }
   sum = hash_word(sum, self->moving_count);
-  for (size_t i = 0; i < self->moving_count; i++) sum = print_moving(sum, &self->moving[i]);
+  for (size_t i = 0; i < self->moving_count; i++) sum = hash_moving(sum, &self->moving[i]);
   const arena_charger *c = &self->charger;
   return self->has_charger ? HASH_NUMBERS(sum, c->x, c->y, c->radius) : sum;
 }

@@ -1,8 +1,8 @@
 """A function that runs a stretch at a time: until it pauses, and on when it is resumed.
 
-The link's conversations (opening, requests, stopping) wait inside their calls, so each robot's driver needs a stack of
-its own to wait on while others go on: here it is a thread's. But never do two stretches run at the same time: who
-resumes a strand waits until it pauses, so that nothing depends on the machine's scheduling.
+The link's conversations (opening, requests, stopping) wait inside their calls, so each robot's driver needs a stack to
+wait on while others go on: a thread's. But two stretches never run at the same time: who resumes a thread waits until
+it pauses, so that nothing depends on the machine's scheduling.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ PAUSED: Final = "paused"
 DONE: Final = "done"
 
 
-class Strand:
-    """One function with a stack of its own.
+class PausableThread:
+    """One function, with its stack.
 
     Attributes:
         said: what it paused with, or DONE.
@@ -82,6 +82,6 @@ class Strand:
         try:
             self._await_turn()
             self._work()
-        except BaseException as error:  # whoever resumes the strand hears of it
+        except BaseException as error:  # whoever resumes the thread hears of it
             self.error = error
         self._give_back(DONE)

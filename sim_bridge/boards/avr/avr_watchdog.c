@@ -1,4 +1,4 @@
-/* avr_dog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact. In the
+/* avr_watchdog.c: the watchdog timer (11.8): 2048 << WDP cycles of its own 128 kHz oscillator, taken to be exact. In the
  * interrupt and system reset mode (WDE and WDIE) the first time-out asks for the interrupt, whose execution clears WDIE;
  * the next one resets, whether the interrupt was executed or not (table 11-1). Of each reset it keeps where the program was:
  * when the interrupt was executed, or else at the reset.
