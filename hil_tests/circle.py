@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from boebot.robots import RobotDescription, load_robot
+from boebot.description.robots import RobotDescription, load_robot
 from hil_tests.rig import Rig
 from sim_bridge.arena import Arena, ArenaDescription
 from sim_bridge.arena_description import Disc, Light, Patch, Polygon

@@ -7,7 +7,7 @@ It has the face of a board session, so that a Rig speaks with the board as with 
 
 from __future__ import annotations
 
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards import avr

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from boebot.boards import BoardRequest, BoardSession, open_board
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import frame, messages
-from boebot.robots import RobotDescription, load_robot
 
 _M = TypeVar("_M")  # a message
 

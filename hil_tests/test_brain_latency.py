@@ -8,10 +8,10 @@ import pytest
 
 from boebot.boards import BoardRequest, open_board
 from boebot.brains import LoadedBrain
-from boebot.driving import Task
-from boebot.driving.board import BoardDriver
+from boebot.description.robots import load_robot
 from boebot.robot import Robot
-from boebot.robots import load_robot
+from boebot.running.board_driver import BoardDriver
+from boebot.running.driver import Task
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from sim_bridge.timing.latency_limits import WHISKER
 from sim_bridge.timing.loads import TICK_CYCLES

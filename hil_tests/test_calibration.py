@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from boebot.boards import BoardRequest
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.robots import load_robot
 from hil_tests.calibration import __main__ as command
 from hil_tests.calibration import avr8js, board, emulator, table
 from hil_tests.calibration.emulator import Measured

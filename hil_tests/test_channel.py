@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import pytest
 
 from boebot.boards import BoardRequest, BoardSession, open_board
+from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.session import Link
-from boebot.robots import load_robot
 
 pytestmark = pytest.mark.emulated
 

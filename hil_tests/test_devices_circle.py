@@ -11,11 +11,11 @@ import math
 import numpy as np
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.devices.analog_infrared import AnalogInfraredReader
 from boebot.devices.compass import CompassReader
 from boebot.link import messages
 from boebot.link.messages import CompassStatus
-from boebot.robots import load_robot
 from hil_tests.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from sim_bridge import imperfections

@@ -11,9 +11,9 @@ import math
 import numpy as np
 import pytest
 
+from boebot.description.robots import RobotDescription, Supply, load_robot
 from boebot.devices.battery import BatteryReader
 from boebot.link import messages
-from boebot.robots import RobotDescription, Supply, load_robot
 from hil_tests.circle import CircleRig, arena_of, circle, robot_of
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from sim_bridge import imperfections

@@ -16,8 +16,8 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.cli import main
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.robots import load_robot
 from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.symbols import entry_of, find_symbol
 from sim_bridge.timing.measure import run

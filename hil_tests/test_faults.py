@@ -12,9 +12,9 @@ from elftools.elf.sections import SymbolTableSection
 
 from boebot import resources
 from boebot.boards import BoardRequest, open_board
+from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot.link import messages
-from boebot.robots import load_robot
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 pytestmark = pytest.mark.emulated

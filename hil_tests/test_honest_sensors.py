@@ -8,9 +8,9 @@ import itertools
 import msgspec
 import pytest
 
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.link.messages import PingStatus
-from boebot.robots import RobotDescription, load_robot
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 pytestmark = pytest.mark.emulated

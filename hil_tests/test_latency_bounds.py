@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boebot import resources, robots
+from boebot import resources
+from boebot.description import robots
 from boebot.timing.graph import load_program
 from boebot.timing.loads import ENCODERS, LOADS, RECEIVE, TICK
 from boebot.timing.program import Program

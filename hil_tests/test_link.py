@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.link import frame, messages
-from boebot.robots import load_robot
 from hil_tests.rig import Rig
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from boebot import resources
+from boebot.description.robots import ContinuousServo, Uart, load_robot
 from boebot.link import messages
-from boebot.robots import ContinuousServo, Uart, load_robot
 from hil_tests.bootloader import with_bootloader
 from hil_tests.minimal_host import CYCLES_PER_S, MinimalHost, power_on
 from sim_bridge.boards.board import Level, ResetCause

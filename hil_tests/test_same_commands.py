@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import boebot
-from boebot.compare import command_difference, telemetry_difference
 from boebot.experiments.same_commands import BRAINS, disagreements
+from boebot.record.compare import command_difference, telemetry_difference
 
 pytestmark = pytest.mark.emulated
 

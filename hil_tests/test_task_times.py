@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from boebot.boards import BoardRequest, open_board
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.session import Link
-from boebot.robots import load_robot
 from hil_tests.minimal_host import TICK_S, MinimalHost, power_on
 from hil_tests.rig import CYCLES_PER_US
 from hil_tests.test_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted

@@ -30,7 +30,7 @@ import can_database  # noqa: E402
 import reference_frame  # noqa: E402
 import schema  # noqa: E402
 
-from boebot.robots import RobotDescription, load_robot, robot_names  # noqa: E402
+from boebot.description.robots import RobotDescription, load_robot, robot_names  # noqa: E402
 
 DIRECTIONS = ("to_board", "to_host")
 STATUS_NOTE = "Made by protocol/generate.py; do not edit."

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot import toml_files
+from boebot.description import toml_files
 from boebot.errors import ArenaError
 from sim_bridge import arguments
 from sim_bridge._core import ffi, lib

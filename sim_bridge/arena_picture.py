@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from boebot.errors import BoebotError
-from boebot.report import style
-from boebot.report.arena_drawing import draw_arena, frame
-from boebot.report.scene import plan_bounds
+from boebot.view import style
+from boebot.view.arena_drawing import draw_arena, frame
+from boebot.view.scene import plan_bounds
 from sim_bridge.arena import Arena, load_arena
 from sim_bridge.floor_plan import floor_plan, path_end
 

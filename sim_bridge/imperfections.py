@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from boebot import robots
+from boebot.description import robots
 from sim_bridge import switches
 from sim_bridge._core import ffi, lib
 

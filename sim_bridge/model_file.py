@@ -1,7 +1,7 @@
 """Models of vehicles from robots' files: what `boebot run --robot arsim` drives, and what scripts drive by themselves.
 
 protocol/robots/arsim.toml is the one source of the notes' default robot; `arsim()` builds it. Keys and defaults of the
-devices are those of boebot.vehicle_devices.
+devices are those of boebot.devices.vehicle_devices.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Any, Final
 
 import msgspec
 
-from boebot import robots, vehicle_devices
+from boebot.description import robots
+from boebot.devices import vehicle_devices
 from boebot.errors import RobotError
 from sim_bridge import imperfections
 from sim_bridge.arguments import shown

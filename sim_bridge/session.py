@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from boebot import robots
 from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession, WatchdogReset
+from boebot.description import robots
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets

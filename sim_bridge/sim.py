@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from boebot import robots
+from boebot.description import robots
 from boebot.errors import ArenaError, BoardError
 from sim_bridge import arguments, imperfections, saved, switches
 from sim_bridge._core import ffi, lib

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot import robots
+from boebot.description import robots
 from boebot.errors import BoardError, BrainError
 from sim_bridge._core import ffi, lib
 from sim_bridge.arguments import shown, whole

@@ -2,7 +2,7 @@
 
 The one table behind `boebot run --without`, `BoardRequest.without` and docs/reference/imperfections.md. A parameter in
 capitals is one of sim_bridge.imperfections, `supply.key` stands in the robot's file, `Type.key` is a key of a device
-of boebot.vehicle_devices. Its value here is the neutral one: with it the model is the ideal closed form.
+of boebot.devices.vehicle_devices. Its value here is the neutral one: with it the model is the ideal closed form.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Any
 
 import msgspec
 
-from boebot import robots, vehicle_devices
+from boebot.description import robots
+from boebot.devices import vehicle_devices
 from boebot.errors import BoardError
 
 

@@ -15,10 +15,10 @@ from matplotlib.transforms import Affine2D
 
 from boebot.errors import BoebotError
 from boebot.geometry import way_out
-from boebot.report import style
-from boebot.report.arena_drawing import draw_arena, frame
-from boebot.report.robot_drawing import body_patch
-from boebot.report.scene import plan_bounds
+from boebot.view import style
+from boebot.view.arena_drawing import draw_arena, frame
+from boebot.view.robot_drawing import body_patch
+from boebot.view.scene import plan_bounds
 from sim_bridge._core import ffi, lib
 from sim_bridge.floor_plan import floor_plan, moving_solids, poses_of
 from sim_bridge.vehicle import Vehicle

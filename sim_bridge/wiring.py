@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from boebot import robots
+from boebot.description import robots
 from boebot.errors import BoardError
 from sim_bridge import imperfections
 from sim_bridge._core import lib

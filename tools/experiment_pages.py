@@ -21,8 +21,8 @@ from PIL import Image
 
 from boebot.cli.output import share_bars
 from boebot.experiments import Experiment, Measured, Outcome, all_experiments, running
-from boebot.report import experiment_files
-from boebot.report.experiment_files import stem
+from boebot.view import experiment_files
+from boebot.view.experiment_files import stem
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "experiments"
 LIST = "README.md"

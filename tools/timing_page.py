@@ -15,8 +15,8 @@ from pathlib import Path
 from rich.progress import track
 
 from boebot import resources
-from boebot.robots import load_robot
-from boebot.tasks import DEFAULT_PERIOD
+from boebot.description.robots import load_robot
+from boebot.running.tasks import DEFAULT_PERIOD
 from boebot.timing import diagram, realisable
 from boebot.timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove_all
 from boebot.timing.loads import LOADS

@@ -10,8 +10,8 @@ import msgspec
 import pytest
 
 import boebot
-from boebot import vehicle_devices
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
+from boebot.devices import vehicle_devices
 from sim_bridge import imperfections
 from sim_bridge.switches import SWITCHES
 

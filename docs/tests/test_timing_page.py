@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
 from boebot.timing import diagram
 from boebot.timing.budget import Report
 from sim_bridge.timing.measure import measure

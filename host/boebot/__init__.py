@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from boebot import boards
+    from boebot.description.robots import load_robot
     from boebot.errors import BoebotError
-    from boebot.result import RunResult, TogetherResult
+    from boebot.record.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
-    from boebot.robots import load_robot
-    from boebot.runner import run
-    from boebot.tasks import Member
-    from boebot.together import run_together
+    from boebot.running.runner import run
+    from boebot.running.tasks import Member
+    from boebot.running.together import run_together
 
 __all__ = [
     "BoebotError",
@@ -41,14 +41,14 @@ __all__ = [
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
-    "Member": "tasks",
+    "Member": "running.tasks",
     "Observation": "robot",
     "Robot": "robot",
-    "RunResult": "result",
-    "load_robot": "robots",
-    "TogetherResult": "result",
-    "run": "runner",
-    "run_together": "together",
+    "RunResult": "record.result",
+    "load_robot": "description.robots",
+    "TogetherResult": "record.result",
+    "run": "running.runner",
+    "run_together": "running.together",
 }
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from boebot.robots import RobotDescription
+    from boebot.description.robots import RobotDescription
 
     Floats = NDArray[np.float64]
 

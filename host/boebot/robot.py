@@ -22,20 +22,20 @@ from boebot.devices.battery import Battery
 from boebot.devices.buzzer import Buzzer
 from boebot.devices.compass import Compass
 from boebot.devices.encoder import Encoder
+from boebot.devices.equipment import Dimensions
+from boebot.devices.equipment import Equipment as Equipment
 from boebot.devices.infrared import Infrared, InfraredZone
 from boebot.devices.light import Light
 from boebot.devices.ping import Ping
+from boebot.devices.readings import Heading, OdometerPose, Proximity, Reading, Readings, Scan
 from boebot.devices.servo import Servo
 from boebot.devices.told import NOTHING_TOLD, Told
 from boebot.devices.turret import Turret
 from boebot.devices.whisker import Whisker
-from boebot.equipment import Dimensions
-from boebot.equipment import Equipment as Equipment
 from boebot.errors import BrainError
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import Status, Telemetry
 from boebot.link.messages import Turret as TurretMessage
-from boebot.readings import Heading, OdometerPose, Proximity, Reading, Readings, Scan
 
 SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol carries
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from boebot import cli
-from boebot.interrupts import SIGNALS
+from boebot.running.interrupts import SIGNALS
 
 
 def boebot(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

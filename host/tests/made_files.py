@@ -11,7 +11,7 @@ ONE = "E57"
 
 def few(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
     """All files of `ONE`; of others, which would only take longer, the data."""
-    from boebot.report import experiment_files  # here: `fatal` shall not wait for it
+    from boebot.view import experiment_files  # here: `fatal` shall not wait for it
 
     if experiment.name == ONE:
         return experiment_files.files(experiment, outcome, seed)

@@ -26,13 +26,13 @@ import numpy as np
 from channel import Channel
 
 from boebot.boards import Truth, WatchdogReset
+from boebot.description.board_parameters import parameters_of
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
 from boebot.floor_plan import FloorPlan, Solid
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch, Status
-from boebot.parameters import parameters_of
-from boebot.robots import RobotDescription, load_robot
 
 TICK_S = 0.01
 BYTE_S = 2e-5  # 500,000 baud

@@ -5,12 +5,12 @@ from __future__ import annotations
 import msgspec
 
 from boebot.brain import Brain, MotorBehavior, Process
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.readings import Readings
 from boebot.devices.told import NOTHING_TOLD
+from boebot.devices.vehicle_devices import Energy, Phototransistor
 from boebot.link import messages
-from boebot.readings import Readings
 from boebot.robot import Command, Equipment, Observation, Robot
-from boebot.robots import RobotDescription, load_robot
-from boebot.vehicle_devices import Energy, Phototransistor
 
 SHIELDBOT = load_robot("shieldbot")
 TICK_S = 0.01

@@ -9,8 +9,8 @@ import pytest
 
 from boebot import boards
 from boebot.boards import BoardRequest, board_kinds, is_live, open_board, open_port
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.robots import load_robot
 from lines import line
 
 REQUEST = BoardRequest(robot=load_robot("shieldbot"))

@@ -15,11 +15,11 @@ from steps import Stepped
 
 import boebot
 from boebot.brain import Brain, BrainStep, CognitiveProcess, MotorBehavior, StateVariable, Switch, Utility
-from boebot.brain_record import BrainRecord
 from boebot.errors import BrainError
-from boebot.report import style, utility_panel
-from boebot.result import RunResult
+from boebot.record.brain_record import BrainRecord
+from boebot.record.result import RunResult
 from boebot.robot import Robot
+from boebot.view import style, utility_panel
 
 PULSE = (2.0, 4.0)  # s; when z is 1
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from boebot import cli, runner
+from boebot import cli
 from boebot.boards import BoardRequest, board_kinds, imperfections
 from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
@@ -24,6 +24,7 @@ from boebot.cli import teleop
 from boebot.link import messages
 from boebot.link.session import Link
 from boebot.robot import Robot
+from boebot.running import runner
 from command import boebot, heed_signals
 from peer import InProcess, Peer, Pty, pty
 
@@ -380,7 +381,7 @@ def fails(*_: object) -> None:
     raise RuntimeError("no ink\nat all")
 
 
-@pytest.mark.parametrize("writer", ["boebot.report.picture.write", "boebot.report.replay.write"])
+@pytest.mark.parametrize("writer", ["boebot.view.picture.write", "boebot.view.replay.write"])
 def test_picture_that_fails_costs_no_other_file(
     peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writer: str
 ) -> None:
@@ -410,7 +411,7 @@ def test_error_of_the_brain_comes_before_that_of_its_files(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("boebot.report.tables.write_run", full)
+    monkeypatch.setattr("boebot.view.tables.write_run", full)
     brain = tmp_path / "wrong.py"
     brain.write_text(f"def step(robot):\n    {line}\n")
     got, out, err = boebot(capsys, "run", str(brain), "--out", str(tmp_path / "out"))

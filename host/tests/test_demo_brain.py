@@ -7,9 +7,9 @@ import pytest
 
 import boebot
 from boebot.brain import Brain
-from boebot.brain_record import BrainRecord
 from boebot.brains import load_brain
-from boebot.result import RunResult
+from boebot.record.brain_record import BrainRecord
+from boebot.record.result import RunResult
 
 
 @pytest.fixture(scope="module")

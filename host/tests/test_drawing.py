@@ -18,15 +18,15 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import boebot
-from boebot import runner
 from boebot.boards import Truth
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
 from boebot.geometry import way_out
-from boebot.report import picture, scene, sensors, style
-from boebot.report.arena_drawing import draw_arena, frame, ghost_times, legend_entries
-from boebot.report.robot_drawing import draw_robot
-from boebot.result import RunResult
-from boebot.robots import RobotDescription, load_robot
+from boebot.record.result import RunResult
+from boebot.running import runner
+from boebot.view import picture, scene, sensors, style
+from boebot.view.arena_drawing import draw_arena, frame, ghost_times, legend_entries
+from boebot.view.robot_drawing import draw_robot
 from peer import InProcess, Peer
 
 numbers = st.floats(-3, 3)

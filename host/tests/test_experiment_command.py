@@ -26,7 +26,7 @@ from boebot.cli import output
 from boebot.errors import BoebotError
 from boebot.experiments import Experiment, Measured, Outcome, all_experiments, running
 from boebot.experiments.experiment import Progress, about, exactly
-from boebot.report import experiment_files
+from boebot.view import experiment_files
 from command import boebot, heed_signals
 
 QUICK = ("E29", "E57", "E58")  # of no robot, some milliseconds each

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from boebot.description.robots import load_robot
 from boebot.experiments import Outcome, all_experiments
-from boebot.report.experiment_files import stem
-from boebot.robots import load_robot
+from boebot.view.experiment_files import stem
 from tools import experiment_pages
 
 EXPERIMENTS = all_experiments()

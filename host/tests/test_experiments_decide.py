@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 import boebot
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
-from boebot.compare import command_difference, replayed, telemetry_difference
 from boebot.experiments import Outcome, all_experiments, animals, contract, evolution, paradigms, stentor
 from boebot.experiments import utility_functions as functions
 from boebot.experiments.same_commands import composed, disagreements
+from boebot.record.compare import command_difference, replayed, telemetry_difference
 
 CHEAP = ("E59", "E60", "E61", "E62", "E63", "E64", "E66", "dose-response", "isocline", "robot-economics")
 
@@ -40,7 +40,7 @@ def test_criteria_are_met(name: str) -> None:
         ("E62", functions, "WEIGHT", 1.8),
         ("E63", functions, "KICK", 2.8),
         ("E64", functions, "TAU", 0.35),
-        ("E66", contract, "ALLOWED", ("builtins", "boebot.robot", "boebot.equipment")),
+        ("E66", contract, "ALLOWED", ("builtins", "boebot.robot", "boebot.devices.equipment")),
         ("isocline", animals, "USE", 0.05),
         ("robot-economics", evolution, "DRAIN", 0.025),
     ],

@@ -10,12 +10,12 @@ from boebot.behaviors import FollowWall, Stop
 from boebot.behaviors.follow_wall import LOOK_RAD, SETTLING_S
 from boebot.brain import Brain, StateVariable, Utility
 from boebot.cognition import near, nearness_ahead
+from boebot.description.robots import PositionServo
 from boebot.devices import turret as turret_device
 from boebot.devices.ping import speed_of_sound
 from boebot.devices.told import NOTHING_TOLD, Told
 from boebot.link import messages
 from boebot.link.messages import PingStatus
-from boebot.robots import PositionServo
 
 
 def position_servo() -> PositionServo:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from boebot import hangs
 from boebot.boards import WatchdogReset
+from boebot.running import hangs
 
 
 def reset(number: int, address: int, place: str = "") -> WatchdogReset:

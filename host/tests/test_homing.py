@@ -19,11 +19,11 @@ from boebot.behaviors.homing import corner, leg_length
 from boebot.brain import Brain, MotorBehavior
 from boebot.brain.composition import load
 from boebot.cognition import Odometry, PathIntegration, SunCompass, sun_azimuth, wrapped
-from boebot.equipment import Equipment
+from boebot.description.robots import load_robot
+from boebot.devices.equipment import Equipment
+from boebot.devices.readings import Readings
 from boebot.errors import BrainError
-from boebot.readings import Readings
 from boebot.robot import Observation, Robot
-from boebot.robots import load_robot
 
 ARSIM = load_robot("arsim")
 LAYOUT = {"odometer": slice(0, 3), "compass": slice(3, 4)}

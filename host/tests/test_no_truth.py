@@ -46,7 +46,7 @@ def test_what_brains_are_made_of_loads_no_simulator_and_nothing_that_holds_truth
 
 
 def test_the_test_of_imports_sees_what_it_looks_for() -> None:
-    found = loaded(*ROOMS, "boebot.driving")
+    found = loaded(*ROOMS, "boebot.running")
     assert "boebot.boards" in [name for name in found if is_within(name, FORBIDDEN)]
 
 
@@ -84,7 +84,7 @@ def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     assert truth is not None and len(truth.time), "there was a truth to find"
     assert [one for one in met if one.is_foreign] == []
     kinds = {one.kind for one in met}
-    assert {"boebot.robot.Robot", "boebot.robot.Observation", "boebot.equipment.Equipment"} <= kinds
+    assert {"boebot.robot.Robot", "boebot.robot.Observation", "boebot.devices.equipment.Equipment"} <= kinds
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ import pytest
 from steps import FULL, LAYOUT, QUAD, VEHICLE
 
 import boebot
+from boebot.description.robots import RobotDescription
+from boebot.devices.equipment import Equipment
+from boebot.devices.readings import Readings
 from boebot.devices.told import NOTHING_TOLD
-from boebot.equipment import Equipment
 from boebot.link import messages
-from boebot.readings import Readings
 from boebot.robot import Command, Observation
-from boebot.robots import RobotDescription
 
 LIBRARY = Path(boebot.__file__).parent
 NOTHING = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))

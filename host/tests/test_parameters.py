@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from boebot.description.board_parameters import adapted, configure, parameters_of
+from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.session import Link
-from boebot.parameters import adapted, configure, parameters_of
-from boebot.robots import load_robot
 from peer import InProcess, Peer, name_of
 
 

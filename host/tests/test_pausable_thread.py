@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from boebot.driving.pausable_thread import DONE, PAUSED, PausableThread
 from boebot.errors import BoardError
+from boebot.running.pausable_thread import DONE, PAUSED, PausableThread
 
 
 def test_stretches_alternate_with_whoever_resumes() -> None:

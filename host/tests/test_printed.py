@@ -14,9 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boebot import cli, runner
+from boebot import cli
 from boebot.cli import output
 from boebot.errors import printable
+from boebot.running import runner
 from command import boebot
 from peer import InProcess, Peer
 

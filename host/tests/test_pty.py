@@ -17,7 +17,7 @@ from boebot.errors import BoardError
 from boebot.link.ports.serial_port import SerialTransport
 from boebot.link.session import Link
 from boebot.robot import Robot
-from boebot.runner import execute
+from boebot.running.runner import execute
 from lines import line
 from peer import Peer, Pty, pty
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.description.robots import load_robot
+from boebot.devices.readings import Readings, ages
 from boebot.errors import BrainError, RobotError
-from boebot.readings import Readings, ages
+from boebot.record.series import touch_indices
 from boebot.robot import Equipment, Observation, Robot
-from boebot.robots import load_robot
-from boebot.series import touch_indices
 
 ARSIM = load_robot("arsim")
 LAYOUT = {

@@ -13,8 +13,8 @@ import pytest
 
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
-from boebot.report import replay, style
-from boebot.result import RunResult
+from boebot.record.result import RunResult
+from boebot.view import replay, style
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 pytestmark = pytest.mark.skipif(NODE is None, reason="runs the page's script with node, which is not installed")

@@ -16,12 +16,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import boebot
-from boebot import runner
-from boebot.driving import board
 from boebot.errors import BoebotError
 from boebot.link import frame, messages
-from boebot.report import picture, replay, scene
-from boebot.result import RunResult
+from boebot.record.result import RunResult
+from boebot.running import board_driver as board
+from boebot.running import runner
+from boebot.view import picture, replay, scene
 from peer import InProcess, Peer
 
 

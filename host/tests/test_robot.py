@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.description.robots import load_robot
 from boebot.devices.ping import speed_of_sound
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.messages import PingStatus
 from boebot.robot import Command, Equipment, Observation, Robot
-from boebot.robots import load_robot
 
 SHIELDBOT = load_robot("shieldbot")
 TICK_S = 0.01

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot import runner
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.robots import load_robot
+from boebot.running import runner
 from peer import InProcess, Peer
 
 
@@ -143,7 +143,7 @@ def test_error_of_the_brain_is_not_hidden_by_that_of_its_files(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("boebot.report.tables.write_run", full)
+    monkeypatch.setattr("boebot.view.tables.write_run", full)
     with pytest.raises(BrainError, match="division") as caught:
         boebot.run(fails_after(0.5, ZeroDivisionError("division")), seconds=10, out=tmp_path)
     assert "No space left on device" in caught.value.__notes__[0]

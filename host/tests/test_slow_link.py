@@ -15,19 +15,19 @@ from channel import Channel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boebot import runner
+from boebot.description.board_parameters import parameters_of
+from boebot.description.robots import load_robot
+from boebot.devices.equipment import slow_readers
 from boebot.devices.freshness import message_ticks
 from boebot.devices.told import NOTHING_TOLD, told
-from boebot.devices_series import DevicesSeries
-from boebot.equipment import slow_readers
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.session import Link
 from boebot.link.wanted import Wanted
-from boebot.parameters import parameters_of
-from boebot.result import RunResult
+from boebot.record.devices_series import DevicesSeries
+from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
-from boebot.robots import load_robot
+from boebot.running import runner
 from peer import FIELD_COUNTS, InProcess, Peer
 
 BOEBOT, BASIC, SHIELDBOT = (load_robot(name) for name in ("boebot", "shieldbot-basic", "shieldbot"))

@@ -13,12 +13,12 @@ import pytest
 
 from boebot.boards import BoardRequest, board_kinds, open_board
 from boebot.brains import LoadedBrain
-from boebot.driving import Task
-from boebot.driving.board import BoardDriver
-from boebot.result import RunResult
+from boebot.description.robots import load_robot
+from boebot.record.result import RunResult
 from boebot.robot import Observation, Robot
-from boebot.robots import load_robot
-from boebot.runner import execute
+from boebot.running.board_driver import BoardDriver
+from boebot.running.driver import Task
+from boebot.running.runner import execute
 
 pytestmark = pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
 

@@ -14,8 +14,8 @@ import pytest
 from timing_program import build
 
 from boebot.cli import timing, timing_tables
+from boebot.description.robots import load_robot
 from boebot.errors import BoebotError, TimingError
-from boebot.robots import load_robot
 from boebot.timing import budget, diagram, loads, realisable
 from boebot.timing.graph import load_program
 from boebot.timing.measured import Measurement, Moment, Spans, Worst, merged

@@ -9,9 +9,10 @@ import msgspec
 import pytest
 
 import boebot
-from boebot import Member, runner
+from boebot import Member
+from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
-from boebot.robots import RobotDescription, load_robot, robot_names
+from boebot.running import runner
 from boebot.timing import realisable
 from boebot.timing.program import SensorRow, Table, TaskRow
 from boebot.timing.realisable import BoardTimes, NotRealisableError, judge, telemetry_ticks
@@ -288,7 +289,7 @@ def test_command_refuses_and_the_record_of_a_forced_run_says_so(
 def test_steps_longer_than_the_period_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a clock of the test's own: each third step takes 30 ms, the others 5."""
     now = [0.0]
-    monkeypatch.setattr("boebot.stepping.wall.perf_counter", lambda: now[0])
+    monkeypatch.setattr("boebot.running.stepping.wall.perf_counter", lambda: now[0])
 
     def step(robot: boebot.Robot) -> None:
         now[0] += 0.03 if robot.tick % 6 == 0 else 0.005

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boebot import toml_files
+from boebot.description import toml_files
+from boebot.description.robots import load_robot
+from boebot.description.toml_limits import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
+from boebot.description.toml_lines import line_of
 from boebot.errors import RobotError
-from boebot.robots import load_robot
-from boebot.toml_limits import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
-from boebot.toml_lines import line_of
 
 LAYOUT = '''# a comment with [brackets] and "quotes"
 title = "a ] string } with # signs"   # line 2

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boebot import resources, toml_files, toml_numbers
+from boebot import resources
+from boebot.description import toml_files, toml_numbers
 from boebot.errors import ArenaError
 
 TEXTS = [path.read_text(encoding="utf-8") for path in sorted(resources.folder("arenas").glob("*.toml"))]

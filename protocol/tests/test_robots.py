@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from boebot.description.robots import QuadratureEncoder, load_robot, pin_name, pin_number, robot_names
 from boebot.errors import RobotError
-from boebot.robots import QuadratureEncoder, load_robot, pin_name, pin_number, robot_names
 
 
 def variant(tmp_path: Path, text: str) -> Path:

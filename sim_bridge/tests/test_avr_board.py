@@ -71,7 +71,7 @@ def test_session_that_nobody_closes(tmp_path: Path) -> None:
     image.write_bytes(assemble("main: rjmp main"))
     program = f"""
 from boebot.boards import BoardRequest
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
 from sim_bridge.session import open_avr
 session = open_avr(BoardRequest(robot=load_robot("shieldbot"), image={str(image)!r}))
 session.transport.read(0.1)

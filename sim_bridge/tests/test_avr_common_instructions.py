@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.robots import load_robot
 from boebot.timing.instructions import decode
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image

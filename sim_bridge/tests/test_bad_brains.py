@@ -23,12 +23,13 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot import cli, runner
+from boebot import cli
 from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.errors import BoebotError, BrainError
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.runner import execute
+from boebot.running import runner
+from boebot.running.runner import execute
 from sim_bridge.direct import DirectSession
 from sim_bridge.session import SimSession
 
@@ -91,7 +92,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         return session
 
     for kind in ("picture", "replay"):  # tested elsewhere, and they take long
-        monkeypatch.setattr(f"boebot.report.{kind}.write", lambda result, path: path)
+        monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path)
     monkeypatch.setattr(runner, "open_board", board)
     monkeypatch.setattr(runner, "open_vehicle", vehicle)
     return told
@@ -357,7 +358,7 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """What runs are held to in place of the machine's."""
     clock = Clock()
-    for name in ("boebot.driving.board.wall", "boebot.driving.direct.wall", "sim_bridge.opening.time"):
+    for name in ("boebot.running.board_driver.wall", "boebot.running.direct_driver.wall", "sim_bridge.opening.time"):
         monkeypatch.setattr(name, clock)
     return clock
 

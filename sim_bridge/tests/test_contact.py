@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of

@@ -14,11 +14,11 @@ import pytest
 
 import boebot
 from boebot.boards import BoardRequest, open_board, open_vehicle
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.vehicle_devices import Accelerometer, HeadingCompass, InfraredProximity, Laser, TouchWhisker
 from boebot.errors import BoardError, BrainError
 from boebot.robot import Observation, Robot
-from boebot.robots import RobotDescription, load_robot
-from boebot.runner import execute
-from boebot.vehicle_devices import Accelerometer, HeadingCompass, InfraredProximity, Laser, TouchWhisker
+from boebot.running.runner import execute
 
 ARSIM = load_robot("arsim")
 

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from boebot.boards import BoardRequest, open_board, open_vehicle
+from boebot.description.robots import load_robot
 from boebot.floor_plan import Solid
-from boebot.robots import load_robot
 from sim_bridge.arena import Arena, ArenaDescription, load_arena
 from sim_bridge.arena_description import Disc, Moving, Polygon, Wall, Waypoint
 from sim_bridge.floor_plan import SAMPLES_MAXIMUM, floor_plan, path_end

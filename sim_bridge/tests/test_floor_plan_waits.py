@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.boards import Truth
+from boebot.description.robots import load_robot
 from boebot.floor_plan import Moving, Solid
-from boebot.robots import load_robot
 from sim_bridge import arena_description
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena

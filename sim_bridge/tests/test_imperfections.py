@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boebot import robots
+from boebot.description import robots
 from boebot.errors import RobotError
-from boebot.runner import execute
+from boebot.running.runner import execute
 from sim_bridge import imperfections
 from sim_bridge._core import ffi
 from sim_bridge.imperfections import Draw

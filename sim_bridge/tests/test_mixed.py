@@ -17,10 +17,10 @@ import pytest
 
 import boebot
 from boebot import Member
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.robots import load_robot
 from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library

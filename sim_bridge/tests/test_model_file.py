@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import boebot
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from boebot.robots import load_robot
 from sim_bridge.arena import load_arena
 from sim_bridge.model import beam
 from sim_bridge.model_file import ARSIM_BODY, arsim, vehicle_model

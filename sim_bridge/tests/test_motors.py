@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from boebot.robots import load_robot
+from boebot.description.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body

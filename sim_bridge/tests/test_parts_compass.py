@@ -308,7 +308,7 @@ def test_the_chip_of_the_emulated_board_reads_it(heading: float) -> None:
         image = Path(folder, "program.elf")
         image.write_bytes(assemble(MACROS + PROGRAM))
         board = avr_board(image)
-    from boebot.robots import load_robot
+    from boebot.description.robots import load_robot
 
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)
     robot = sim.add(board, load_robot("shieldbot"), pose=(0, 0, heading))

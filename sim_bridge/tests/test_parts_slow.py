@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boebot import robots
+from boebot.description import robots
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena

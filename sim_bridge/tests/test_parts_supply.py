@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from boebot.robots import load_robot
 from sim_bridge import imperfections
 from sim_bridge._core import lib
 from sim_bridge.boards.board import CLOCK_HZ

@@ -8,9 +8,9 @@ import math
 import msgspec
 import pytest
 
-from boebot import robots
+from boebot.description import robots
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
-from boebot.robots import load_robot
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription
 from sim_bridge.arena_description import Moving, Waypoint

@@ -20,11 +20,11 @@ import boebot
 from boebot import Member
 from boebot.boards import BoardRequest
 from boebot.brains import load_brain
+from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.session import Link
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.robots import load_robot
 from sim_bridge import opening
 from sim_bridge import session as sessions
 from sim_bridge.arena import Arena, load_arena
@@ -264,7 +264,7 @@ def test_wrong_inputs_are_refused_whatever_they_are(payload: bytes, cycle: int, 
 
 def test_what_was_built_otherwise_is_refused_by_name() -> None:
     _, data = saved_one()
-    other = boebot.robots.load_robot("shieldbot-basic")
+    other = boebot.description.robots.load_robot("shieldbot-basic")
     cases: list[tuple[Sim, str]] = [
         (sim_of(arena=arena_of()), "arena 'room'.*'test'"),
         (sim_of(seed=4), "seed 3.* 4"),

@@ -13,10 +13,10 @@ import pytest
 import serial
 
 from boebot.boards import BoardRequest, open_port
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.transport import Transport
-from boebot.robots import load_robot
 from sim_bridge.serve import serve
 
 PORTS = [0] + ([None] if os.name == "posix" else [])

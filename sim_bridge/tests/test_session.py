@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from boebot.boards import BoardRequest
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.link.session import Link
-from boebot.robots import load_robot
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.session import SimSession, open_native
 

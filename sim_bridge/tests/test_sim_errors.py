@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoebotError
-from boebot.robots import load_robot
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.emulated import EmulatedBoard, native_board, native_library
 from sim_bridge.pins import BoardPins

@@ -13,13 +13,22 @@ import msgspec
 import pytest
 
 import boebot
-from boebot import Member, robots
+from boebot import Member
 from boebot.boards import BoardRequest, imperfections, open_board
+from boebot.description import robots
+from boebot.description.robots import load_robot
+from boebot.devices.vehicle_devices import (
+    Accelerometer,
+    DcMotor,
+    Energy,
+    InfraredProximity,
+    Laser,
+    Phototransistor,
+    Sonar,
+)
 from boebot.errors import BoardError, BoebotError
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.robots import load_robot
-from boebot.vehicle_devices import Accelerometer, DcMotor, Energy, InfraredProximity, Laser, Phototransistor, Sonar
 from sim_bridge import imperfections as parts
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription

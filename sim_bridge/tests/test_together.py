@@ -17,16 +17,17 @@ from pathlib import Path
 import pytest
 
 import boebot
-from boebot import Member, together
+from boebot import Member
 from boebot.boards import BoardRequest, SharedWorld, open_together
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
-from boebot.report import style
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.robots import load_robot
-from boebot.together import StoppedError, execute_together
+from boebot.running import together
+from boebot.running.together import StoppedError, execute_together
+from boebot.view import style
 from sim_bridge.arena import load_arena
 from sim_bridge.places import places_of
 from sim_bridge.session import SimSession

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, RobotError
-from boebot.robots import load_robot
 from sim_bridge.arena import load_arena
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.parameters import keys_of

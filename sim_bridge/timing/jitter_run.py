@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
-from boebot.robots import RobotDescription, load_robot
 from sim_bridge.boards.board import Level
 from sim_bridge.timing.line import Line
 from sim_bridge.timing.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise

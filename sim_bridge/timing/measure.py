@@ -14,10 +14,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from boebot import robots
+from boebot.description import robots
+from boebot.description.robots import RobotDescription
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.robots import RobotDescription
 from boebot.timing.elf import read_image
 from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.boards import avr

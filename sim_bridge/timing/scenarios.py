@@ -15,9 +15,9 @@ from dataclasses import dataclass, fields
 from itertools import count
 from math import gcd, prod
 
-from boebot import robots
+from boebot.description import robots
+from boebot.description.robots import RobotDescription
 from boebot.link import frame, messages
-from boebot.robots import RobotDescription
 from sim_bridge.timing.line import BYTE_CYCLES, Line
 from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
 from sim_bridge.timing.traffic import EachTick, FullLine

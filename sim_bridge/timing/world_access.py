@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 from numpy.typing import NDArray
 
-from boebot.robots import RobotDescription
+from boebot.description.robots import RobotDescription
 from sim_bridge.arena import load_arena
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import Level

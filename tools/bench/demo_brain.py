@@ -8,9 +8,9 @@ from typing import Any
 from unittest import mock
 
 from boebot.brains import load_brain
-from boebot.result import RunResult
+from boebot.record.result import RunResult
 from boebot.robot import Robot
-from boebot.runner import execute
+from boebot.running.runner import execute
 from sim_bridge.sim_robot import SimRobot
 from tools.bench.figures import figure
 

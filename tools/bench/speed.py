@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 from boebot.boards import BoardRequest, open_board
-from boebot.robots import load_robot
-from boebot.runner import execute
+from boebot.description.robots import load_robot
+from boebot.running.runner import execute
 from tools.bench import peers
 from tools.bench.figures import Peer, figure
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 import time
 
+from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
-from boebot.robots import load_robot
 from boebot.timing import budget, loads
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.timing.loads import Bench

@@ -36,11 +36,11 @@ from typing import Any
 
 import msgspec
 
-from boebot import toml_files
 from boebot.brain.brain import Brain
 from boebot.brain.process import Process, snake_case
 from boebot.brain.utility import Utility
 from boebot.brain.variables import StateVariable
+from boebot.description import toml_files
 from boebot.errors import BrainError
 from boebot.robot import Robot
 

@@ -13,7 +13,7 @@ import time
 from typing import NoReturn
 
 from boebot.errors import BoebotError, printable
-from boebot.interrupts import SIGNALS
+from boebot.running.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
 _ASK_AGAIN_S = 0.02

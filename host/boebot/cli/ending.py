@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from boebot import interrupts
 from boebot.cli import output
 from boebot.errors import BoebotError
-from boebot.report import IncompleteError
-from boebot.result import RunResult, TogetherResult
+from boebot.record.result import RunResult, TogetherResult
+from boebot.running import interrupts
+from boebot.view import IncompleteError
 
 HEADER = ("robot", "distance (m)", "contacts", "whisker touches", "late steps", "resets", "brain")
 

@@ -109,11 +109,11 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     Raises:
         BoebotError: some are outside their criteria, or the files cannot be written.
     """
-    from boebot import report
+    from boebot import view
     from boebot.experiments import running
-    from boebot.report import experiment_files, experiment_page
+    from boebot.view import experiment_files, experiment_page
 
-    report.make_folder(out)
+    view.make_folder(out)
     by_name: dict[str, Verdict] = {}
     files: list[Path] = []
     with (

@@ -9,10 +9,10 @@ import typer
 
 from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch, reset_cause
 from boebot.link.session import Link, text
-from boebot.robots import load_robot
 
 
 def info(

@@ -9,10 +9,10 @@ import typer
 
 from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
+from boebot.description.robots import load_robot
 from boebot.link import reset_cause
 from boebot.link.session import Link, text
 from boebot.link.transport import BaudSelectable
-from boebot.robots import load_robot
 
 _PERIOD_S = 1.0
 _WAIT_S = 0.05

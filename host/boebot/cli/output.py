@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
-from boebot import figures
-from boebot.driving import Progress
 from boebot.errors import printable
+from boebot.record import figures
+from boebot.running.driver import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions

@@ -11,9 +11,9 @@ import typer
 
 from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import options, output
+from boebot.description.robots import load_robot
 from boebot.link.parameter_values import parameter_counts, parameter_spec
 from boebot.link.session import Link
-from boebot.robots import load_robot
 
 app = typer.Typer(help="List, read, set, save and reset the board's parameters.", no_args_is_help=True)
 

@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from boebot import report
+from boebot import view
 from boebot.brains import bundled
 from boebot.cli import options, output
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
-from boebot.runner import execute
-from boebot.tasks import Member
-from boebot.together import execute_together
+from boebot.running.runner import execute
+from boebot.running.tasks import Member
+from boebot.running.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
 _HELP = f"""Let a brain drive a robot, and say what happened.
@@ -91,7 +91,7 @@ def run(
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     if out is not None:
-        report.make_folder(out)
+        view.make_folder(out)
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with (
         output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,

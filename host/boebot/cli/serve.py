@@ -10,8 +10,8 @@ import typer
 
 from boebot.boards import BoardRequest, board_kinds, check_board, find_server
 from boebot.cli import options, output
+from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.robots import load_robot
 
 
 def serve(

@@ -15,12 +15,12 @@ from typing import Annotated, TextIO
 
 import typer
 
-from boebot import report
+from boebot import view
 from boebot.cli import options, output
 from boebot.cli.ending import end
 from boebot.errors import BoebotError
 from boebot.robot import Robot
-from boebot.runner import execute
+from boebot.running.runner import execute
 
 HOLD_S = 0.6  # a key counts as held so long: terminals begin to repeat it after half a second
 TURN = 0.35
@@ -112,7 +112,7 @@ def teleop(
     if not sys.stdin.isatty():
         raise BoebotError("teleop needs a keyboard, but its input is not a terminal")
     if out is not None:
-        report.make_folder(out)
+        view.make_folder(out)
     screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
     output.line(HELP, screen)
     with raw_keyboard() as read_keys:

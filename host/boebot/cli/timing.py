@@ -15,7 +15,7 @@ from boebot.cli import options, output, timing_board, timing_tables
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
-    from boebot.robots import RobotDescription
+    from boebot.description.robots import RobotDescription
     from boebot.timing.budget import Report
     from boebot.timing.realisable import Verdict
 
@@ -157,10 +157,11 @@ def _answer(
     jitter: bool,
     out: Path | None,
 ) -> Answer:
+    from boebot import view
+
     """Raises BoebotError where what was asked for is none."""
-    from boebot import report as files
-    from boebot.robots import load_robot
-    from boebot.tasks import DEFAULT_PERIOD
+    from boebot.description.robots import load_robot
+    from boebot.running.tasks import DEFAULT_PERIOD
     from boebot.timing import budget, loads, realisable
 
     if not _SHORTEST_S <= seconds <= _LONGEST_S:
@@ -170,7 +171,7 @@ def _answer(
     description = load_robot(robot)
     asked = loads.load_named(load)
     if out is not None:
-        files.make_folder(out)
+        view.make_folder(out)
     image = _image(elf, description)
     found = None
     if image is not None:
@@ -193,7 +194,7 @@ def _answer(
 
 def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
     """The worst path of a task or an interrupt. Raises BoebotError where there is none."""
-    from boebot.robots import load_robot
+    from boebot.description.robots import load_robot
     from boebot.timing.graph import load_program
     from boebot.timing.worst_path import worst_path
 
@@ -240,7 +241,7 @@ def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, se
     if brain is None:
         return (step_ms or 0.0) / 1000, None
     from boebot.brains import load_brain
-    from boebot.runner import execute
+    from boebot.running.runner import execute
 
     own_period = load_brain(brain).period
     if step_ms is not None:
@@ -264,7 +265,7 @@ def _board_times(report: Report) -> Any:
 def _write(answer: Answer, out: Path) -> list[Path]:
     import json
 
-    from boebot.report.experiment_files import write
+    from boebot.view.experiment_files import write
 
     found: dict[str, bytes] = {}
     if answer.report is not None:

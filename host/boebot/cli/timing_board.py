@@ -12,8 +12,8 @@ from boebot.cli import output
 from boebot.errors import TimingError
 
 if TYPE_CHECKING:
+    from boebot.description.robots import RobotDescription
     from boebot.link import messages
-    from boebot.robots import RobotDescription
 
 
 def maxima(

@@ -35,16 +35,11 @@ ROOMS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.brains"
 FORBIDDEN = (
     "sim_bridge",
     "boebot.boards",
-    "boebot.driving",
     "boebot.experiments",
     "boebot.floor_plan",
     "boebot.record",
-    "boebot.report",
-    "boebot.result",
-    "boebot.runner",
-    "boebot.series",
-    "boebot.tasks",
-    "boebot.together",
+    "boebot.running",
+    "boebot.view",
     "boebot.link.session",
     "boebot.link.transport",
     "boebot.link.traffic",
@@ -57,8 +52,8 @@ ALLOWED = (
     "types",
     "functools",
     "boebot.robot",
-    "boebot.equipment",
-    "boebot.readings",
+    "boebot.devices.equipment",
+    "boebot.devices.readings",
     "boebot.devices",
     "boebot.link.messages",
 )
@@ -201,7 +196,7 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         walker = Walker(0.5)
         boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
         counts[robot] = _by_module(walker.met)
-        devices = {one.kind for one in walker.met if is_within(one.kind, ("boebot.devices", "boebot.readings"))}
+        devices = {one.kind for one in walker.met if is_within(one.kind, ("boebot.devices", "boebot.devices.readings"))}
         measured += [
             # kinds: of objects themselves there are some more where the interpreter has run other things before
             Measured(f"{robot}: kinds of objects that can be reached", len({one.kind for one in walker.met}), least=10),

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from boebot import run
 from boebot.behaviors import Stop
 from boebot.brain import Action, Brain, FixedActionPattern
+from boebot.description.robots import load_robot
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 from boebot.experiments.trials import true_pose
 from boebot.experiments.variants import arena_file
-from boebot.robots import load_robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.result import RunResult
+    from boebot.record.result import RunResult
     from boebot.robot import Robot
 
 PERIOD = 0.02  # s

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from boebot.description.robots import RobotDescription
     from boebot.robot import Robot
-    from boebot.robots import RobotDescription
 
 PERIOD = 0.02  # s
 SIGNAL = 0.9  # motor signal out and home

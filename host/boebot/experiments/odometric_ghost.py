@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.cognition import Odometry
+from boebot.description.robots import Encoder
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot.experiments.trials import PER_SEED, end_of, start_of
 from boebot.experiments.variants import varied
-from boebot.robots import Encoder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -69,8 +69,8 @@ def _draw(trials: Sequence[Straight]) -> Draw:
     def draw(figure: Figure) -> None:
         from matplotlib.transforms import Affine2D
 
-        from boebot.report import style
-        from boebot.report.robot_drawing import body_patch, draw_robot
+        from boebot.view import style
+        from boebot.view.robot_drawing import body_patch, draw_robot
 
         axes = figure.subplots()
         first = trials[0]

@@ -25,14 +25,14 @@ from boebot.cognition import near, wrapped
 from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, exactly, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.variants import narrow_arsim
-from boebot.readings_series import ReadingsSeries
-from boebot.series import touch_indices
+from boebot.record.readings_series import ReadingsSeries
+from boebot.record.series import touch_indices
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from boebot.floor_plan import FloorPlan
-    from boebot.result import RunResult
+    from boebot.record.result import RunResult
     from boebot.robot import Command, Robot
 
 

@@ -18,10 +18,10 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Any
 
-from boebot import interrupts
 from boebot.errors import BoebotError
 from boebot.experiments import all_experiments
 from boebot.experiments.experiment import Experiment, Measured, Outcome
+from boebot.running import interrupts
 
 Files = Callable[[Experiment, Outcome, int], dict[str, bytes]]
 """Makes files of what came of an experiment with that seed: name -> content. A function of a module, for processes."""

@@ -19,13 +19,13 @@ import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.compare import Difference, command_difference, replayed, telemetry_difference
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, exactly, experiment
+from boebot.record.compare import Difference, command_difference, replayed, telemetry_difference
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.result import RunResult
+    from boebot.record.result import RunResult
 
 SECONDS = 20.0
 LOOKED_AT = ("infrared", "whiskers")  # what turns both brains aside

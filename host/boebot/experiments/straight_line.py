@@ -23,7 +23,7 @@ from boebot.experiments.trials import PER_SEED, Trial, try_once
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.robots import RobotDescription
+    from boebot.description.robots import RobotDescription
 
 AT_REST_S = 0.5  # without moving, at the end of a run
 

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from boebot.behaviors import StraightRun
-from boebot.equipment import Equipment
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment
 from boebot.experiments.straight_line import Straight, drive, runner
 from boebot.experiments.trials import PER_SEED
 from boebot.experiments.variants import varied
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot.robots import RobotDescription, load_robot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

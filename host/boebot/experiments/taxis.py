@@ -16,12 +16,12 @@ import numpy as np
 
 from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
+from boebot.description.robots import RobotDescription
+from boebot.devices.vehicle_devices import Phototransistor
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import PER_SEED, Trial, start_of, try_once
 from boebot.experiments.variants import arena_file, at_angle, varied
-from boebot.robots import RobotDescription
-from boebot.vehicle_devices import Phototransistor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,8 +125,8 @@ def _draw(done: Sequence[Trial], times: Sequence[float], straight: float) -> Dra
     def draw(figure: Figure) -> None:
         from matplotlib.patches import Circle
 
-        from boebot.report import style
-        from boebot.report.robot_drawing import draw_robot
+        from boebot.view import style
+        from boebot.view.robot_drawing import draw_robot
 
         left, right = figure.subplots(1, 2, width_ratios=(3, 2))
         floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))

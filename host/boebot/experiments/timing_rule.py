@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from boebot.description.robots import RobotDescription, load_robot
 from boebot.experiments.experiment import Outcome, Progress, about, exactly, experiment
-from boebot.robots import RobotDescription, load_robot
-from boebot.runner import run
+from boebot.running.runner import run
 from boebot.timing.realisable import NotRealisableError, Verdict, judge
 
 if TYPE_CHECKING:

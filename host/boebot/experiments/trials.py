@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.experiments.experiment import Floats
-from boebot.runner import run
-from boebot.series import Pose, truth_at
+from boebot.record.series import Pose, truth_at
+from boebot.running.runner import run
 
 if TYPE_CHECKING:
     from boebot.brain import Brain
+    from boebot.description.robots import RobotDescription
     from boebot.floor_plan import FloorPlan
-    from boebot.result import RunResult
-    from boebot.robots import RobotDescription
+    from boebot.record.result import RunResult
 
 PER_SEED = 1000
 """Trials of one experiment have the seeds from PER_SEED times the experiment's on."""

@@ -15,8 +15,8 @@ from typing import Any
 
 import msgspec
 
-from boebot.device import Device
-from boebot.robots import RobotDescription, load_robot
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.device import Device
 
 NARROW_RAD = 0.3324  # directions of IR sensors that also see what lies ahead; arsim's own ±0.7854 rad leave it out
 

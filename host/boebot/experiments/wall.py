@@ -10,16 +10,16 @@ import numpy as np
 from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
+from boebot.description.robots import RobotDescription
+from boebot.devices.vehicle_devices import InfraredProximity, RegulatedMotor
 from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.variants import arena_file, at_angle, varied
-from boebot.robots import RobotDescription
-from boebot.vehicle_devices import InfraredProximity, RegulatedMotor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.result import RunResult
+    from boebot.record.result import RunResult
 
 LENGTH, WIDTH = 3.0, 2.0  # of the room (m)
 ROOM = f"""

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.equipment import Equipment
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
 from boebot.experiments.paths import draw_paths, floor
 from boebot.experiments.trials import PER_SEED, Trial, end_of, start_of, try_once
 from boebot.experiments.variants import arena_file, narrow_arsim, scaled_arsim_arena
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot.robots import RobotDescription, load_robot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -234,8 +234,8 @@ def _avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
 
 def _draw_activity(axes: Axes, trial: Trial) -> None:
     """One path, with the behavior that drove."""
-    from boebot.report import style
-    from boebot.report.robot_drawing import draw_robot
+    from boebot.view import style
+    from boebot.view.robot_drawing import draw_robot
 
     floor(axes, trial.plan)
     avoids: NDArray[np.bool_] = trial.when_active("avoid")

@@ -14,11 +14,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boebot.report import style
 from boebot.timing.budget import Report
 from boebot.timing.costs import SLOT_BEGINS
 from boebot.timing.measured import Moment
 from boebot.timing.realisable import TICK_S, Event, Verdict, ms
+from boebot.view import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

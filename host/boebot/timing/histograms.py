@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from boebot.errors import BoebotError
-from boebot.report import style
+from boebot.view import style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from boebot import resources
-from boebot.driving import check_period, whole_ticks
-from boebot.driving.board import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
+from boebot.description.robots import RobotDescription, Uart
+from boebot.devices.vehicle_devices import Sensor
 from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.robots import RobotDescription, Uart
+from boebot.running.board_driver import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
+from boebot.running.driver import check_period, whole_ticks
 from boebot.timing.program import SensorRow, Table
 from boebot.timing.table import read_table
-from boebot.vehicle_devices import Sensor
 
 TICK_S = 0.01
 TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD

@@ -1,0 +1,89 @@
+"""Two runs of the same brain and seed, on an emulated and a real board or on two emulated ones: from where on they
+differ, and whether the brain is to blame.
+
+A brain is a function of its seed and of what it saw. So its commands may differ as soon as telemetry does, and not
+before (experiment E68); `replayed` goes further and asks a brain anew what it would have commanded on that telemetry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from boebot import brains
+from boebot.errors import BoebotError
+from boebot.link.messages import Telemetry
+from boebot.record.result import RunResult
+from boebot.robot import Command, Equipment, Observation, Robot
+
+NOT_SEEN = frozenset(("setpoint_sequence",))
+"""Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where two runs differ first."""
+
+    step: int
+    """of the brain, from 0"""
+    tick: int
+    """of the control ticks since the run began, in the first run"""
+    what: str
+    """"tick", a field of telemetry, or "command\""""
+    first: object
+    """there, in the first run"""
+    second: object
+    """and in the second"""
+
+    def __str__(self) -> str:
+        return f"step {self.step} (tick {self.tick}): {self.what} is {self.first} and {self.second}"
+
+
+def telemetry_difference(one: RunResult, other: RunResult, fields: tuple[str, ...] = ()) -> Difference | None:
+    """The first step at which the brains did not see the same: another tick, or other telemetry.
+
+    Args:
+        one, other: runs on boards.
+        fields: of telemetry, that count, with "tick"; (): all that a brain can see.
+
+    Raises:
+        BoebotError: a run without a board, which has no telemetry.
+    """
+    rows = [_seen(run) for run in (one, other)]
+    for step, (a, b) in enumerate(zip(*rows, strict=False)):
+        for name in a._fields:
+            if (name in fields or (not fields and name not in NOT_SEEN)) and getattr(a, name) != getattr(b, name):
+                return Difference(step, one.record.steps[step][0], name, getattr(a, name), getattr(b, name))
+    return None
+
+
+def command_difference(one: RunResult, other: RunResult) -> Difference | None:
+    """The first step at which the brains did not command the same."""
+    for step, (a, b) in enumerate(zip(one.record.steps, other.record.steps, strict=False)):
+        if a[1:] != b[1:]:
+            return Difference(step, a[0], "command", Command(*a[1:]), Command(*b[1:]))
+    return None
+
+
+def replayed(result: RunResult, brain: object) -> list[Command]:
+    """What a fresh brain commands, step by step, on the telemetry of a run: without board, link and world.
+
+    Raises:
+        BoebotError: a run without a board, or of a board with slow devices, whose messages have no step of their own.
+    """
+    if result.record.devices:
+        raise BoebotError(f"robot {result.robot.name!r} has slow devices; only telemetry can be replayed")
+    loaded = brains.load_brain(brain)
+    robot = Robot(result.robot.name, result.period, result.seed)
+    equipment = Equipment(result.robot, result.tick)
+    commands = []
+    for sample, (index, *_) in zip(_seen(result), result.record.steps, strict=True):
+        robot.observation = Observation(sample, equipment, time=result.record.times[index])
+        loaded.step(robot)
+        commands.append(robot.command)
+    return commands
+
+
+def _seen(run: RunResult) -> list[Telemetry]:
+    if run.layout is not None:
+        raise BoebotError(f"robot {run.robot.name!r} has no board, and no telemetry to compare")
+    return [Telemetry.unpack(run.record.telemetry[index]) for index, *_ in run.record.steps]

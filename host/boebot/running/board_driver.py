@@ -1,0 +1,419 @@
+"""Drives a robot over the link to its board, emulated or real.
+
+The brain's period is a whole number n of the board's control ticks; the brain steps on the first telemetry whose tick
+has reached the next multiple of n, and its command goes out at once. On a live board the newest telemetry counts. On a
+board in this process time stands still while the brain thinks; but where such a run is paced, a step that took longer
+than the period was late, as it would be on a live board: that time passes before its command goes out.
+
+A board that was reset, or that has not heard the host for too long, is configured and armed again, and the run goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time as wall
+from collections.abc import Iterator
+from struct import Struct
+
+from boebot.boards import BoardSession
+from boebot.description import robots
+from boebot.description.board_parameters import configure
+from boebot.devices import turret
+from boebot.devices.freshness import message_ticks
+from boebot.devices.told import NOTHING_TOLD, Told, told
+from boebot.errors import BoardError, BoebotError, ProtocolError
+from boebot.link import messages, reset_cause
+from boebot.link.delivery import LatchedAgainError, SessionLostError
+from boebot.link.session import Link, text
+from boebot.link.session import Telemetry as Received
+from boebot.record.brain_record import BrainRecord
+from boebot.record.record import Record
+from boebot.record.result import RunResult
+from boebot.robot import Equipment, Observation, Robot
+from boebot.running import hangs
+from boebot.running.driver import PROGRESS_S, Task, check_period, step_limit, whole_ticks
+from boebot.running.stepping import AT_LEISURE, StepLimit
+
+TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
+TIME_TO_LIVE_LIMIT_MS = 2000
+SILENCE_S = 3.0  # a board that says nothing for so long is lost; after a reset its boot loader waits for up to 2 s
+SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
+STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
+_READY_TRIES = 10  # sessions that may end, one after another, before the board is configured and armed
+_ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
+_PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
+_BYTES_TO_LIVE = 300
+# How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
+# all later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
+# idle; so it is taken when so many bytes of the telemetry are still to come, and ends with the last one.
+_LOOK_EARLY = 0.5
+_LOOK_EARLY_BYTES = 30
+_Telemetry = messages.Telemetry
+_LATCH = messages.Telemetry.OFFSETS["latch"]
+_UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
+_SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
+_TICK = Struct("<I")  # telemetry begins with it
+_NOT_YET = 1 << 32  # no tick is later
+
+
+def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
+    """The set-points' time to live (ms) at a brain period; at least `least_s`.
+
+    Raises:
+        BoebotError: the period is so long that the motors would stop between two steps.
+    """
+    check_period(period_s)
+    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
+    if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
+        raise BoebotError(
+            f"a brain period of {period_s * 1000:g} ms is too long; expected at most {TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
+        )
+    return time_to_live_ms
+
+
+class BoardDriver:
+    """Drives one robot over the link (see `boebot.running.driver.Driver`)."""
+
+    def __init__(self, session: BoardSession, task: Task) -> None:
+        """Opens the link, and finds out who is there; nothing moves yet.
+
+        Raises:
+            BoebotError: no board, or one that does not fit the robot.
+        """
+        self.session = session
+        self.task = task
+        request = task.request
+        self.link = Link(session.transport)
+        hello = self.link.open()
+        self.tick_s = 1.0 / hello.tick_rate
+        self.notices = self.link.notices
+        self.period_ticks = self._fitting_period(task.period_s, hello.telemetry_period)
+        self.telemetry_ticks = hello.telemetry_period
+        self.period_s = self.period_ticks * self.tick_s
+        self.time_to_live_ms = check_time_to_live(self.period_s, self._time_to_live_least())
+        self.step_limit = step_limit(task, self._limit())
+        self.identity = self.link.identity()
+        pin_map = text(self.identity.pin_map)
+        if pin_map != request.robot.pin_map:
+            raise ProtocolError(
+                f"the board at {session.transport.name} runs firmware for pin map {pin_map!r}, but robot "
+                f"{request.robot.name!r} needs {request.robot.pin_map!r}"
+            )
+        self.description = request.robot
+        self.equipment = Equipment(request.robot, self.tick_s)
+        self.robot = Robot(request.robot.name, self.period_s, task.brain_seed)
+        self.record = Record()
+        self.resets = 0
+        self.late_steps = 0
+        self.clock_offset_s = 0.0  # transport's clock at the run's time 0
+        self._session = 0  # of the link that was configured and armed
+        self._first_session = 0
+        self._armed_tick = -1
+        self._halted = False  # by the brain's emergency stop
+        self._told_payload: bytes | None = None
+        self._told = NOTHING_TOLD.devices  # that payload
+
+    def begin(self) -> None:
+        """Configures and arms the board."""
+        self._make_ready()
+        self._first_session = self._session
+        self._take_events()
+        self.link.forget_telemetry()
+
+    # ---- before the first step, and after each new session ---------------------------------------------------
+
+    def _fitting_period(self, period_s: float, telemetry_ticks: int) -> int:
+        """The brain's period in ticks, such that each step has telemetry of its own tick."""
+        ticks = whole_ticks(period_s, self.tick_s)
+        fitting = -(-ticks // telemetry_ticks) * telemetry_ticks
+        if fitting != ticks:
+            self.notices.append(
+                f"the brain steps every {fitting * self.tick_s * 1000:g} ms, not every {period_s * 1000:g} ms: "
+                f"the board sends telemetry every {telemetry_ticks * self.tick_s * 1000:g} ms"
+            )
+        return fitting
+
+    def _time_to_live_least(self) -> float:
+        return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.byte_s
+
+    def _limit(self) -> StepLimit:
+        """In real time the motors stop by the dead-man during a step that outlasts its set-points: that is an error of
+        the brain. Steps that are late by less are counted."""
+        if not (self.task.request.realtime or self.session.transport.realtime):
+            return AT_LEISURE
+        return StepLimit(
+            self.time_to_live_ms / 1000,
+            "the dead-man stops the motors then (step_timeout, --step-timeout: how long to wait all the same)",
+        )
+
+    def _make_ready(self) -> None:
+        """Configures and arms the board in the session that is open, or in the next one if that ends meanwhile.
+
+        Raises:
+            BoardError: each session ends meanwhile, or the board refuses something.
+        """
+        link = self.link
+        first = link.sessions
+        while self._session != link.sessions:
+            link.open()
+            if link.sessions - first >= _READY_TRIES:
+                raise self._never_ready()
+            session = link.sessions
+            try:
+                self.description = configure(link, self.task.request.robot)
+                self.equipment = self._equipment()
+                if not self._halted:
+                    self._arm()
+            except SessionLostError:
+                continue
+            self._session = session
+
+    def _never_ready(self) -> BoardError:
+        hello, where = self.link.hello, self.session.transport.name
+        why = ""
+        if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
+            why = f"; its last reset was by {reset_cause.hang_in_words(hello.reset_cause)}"
+        return BoardError(
+            f"the board at {where} ended {_READY_TRIES} sessions in a row before it was configured and armed{why}"
+        )
+
+    def _equipment(self) -> Equipment:
+        """The devices as the board has them; how often it tells of slow ones it says itself."""
+        equipment = Equipment(self.description, self.tick_s)
+        if not equipment.tells_slowly:
+            return equipment
+        period = int(self.link.get_parameter("devices_period"))
+        told_ticks = message_ticks(period, self.link.byte_s, self.tick_s)
+        return Equipment(self.description, self.tick_s, told_ticks=told_ticks)
+
+    def _arm(self) -> None:
+        for _ in range(_ARM_TRIES - 1):
+            with contextlib.suppress(LatchedAgainError):
+                self.link.arm()
+                break
+        else:
+            self.link.arm()
+        if self.link.latest is not None:
+            self._armed_tick = int.from_bytes(self.link.latest[:4], "little")
+
+    def _heed_emergency_stop(self) -> None:
+        """The brain has latched the motors off, or armed them again."""
+        if self.robot.latched and not self._halted:
+            self._halted = True
+            self.link.stop()
+        elif self._halted and not self.robot.latched:
+            with contextlib.suppress(SessionLostError):  # the new session is made ready in its turn
+                if self.link.is_open:
+                    self._arm()
+            self._halted = False
+
+    def _heed_slow_command(self) -> None:
+        """The brain has asked something of turret or buzzer."""
+        asked, self.robot.slow_command = self.robot.slow_command, None
+        assert asked is not None
+        if asked.turret is not None:
+            servo = self.description.device["turret"]
+            assert isinstance(servo, robots.PositionServo)
+            pulse = turret.pulse_of(asked.turret, servo.centre_us, servo.gain_us_per_rad)
+            self.link.want_turret(asked.turret, pulse)
+        if asked.tone is not None:
+            self.link.want_tone(asked.tone)
+
+    def _slow(self, tick: int) -> Told:
+        """What the slow devices said last, as of that tick."""
+        payload = self.link.latest_devices
+        if payload is None:
+            return NOTHING_TOLD
+        if payload is not self._told_payload:
+            self._told_payload, self._told = payload, messages.DevicesTelemetry.unpack(payload)
+            self._put_devices_aside()
+        return told(self._told, tick)
+
+    def _put_devices_aside(self) -> None:
+        row = len(self.record.times) - 1
+        if row >= 0:
+            self.record.devices += [(row, payload) for payload in self.link.fetch_devices()]
+
+    def _heed_latch(self, payload: bytes) -> None:
+        """The board has latched its motors off: a reason to end the run, unless a new session mends it.
+
+        Raises:
+            BoardError: the supply is low, or somebody else has stopped the robot.
+        """
+        telemetry, where = _Telemetry.unpack(payload), self.link.transport.name
+        if telemetry.latch == messages.Latch.SUPPLY_LOW:
+            raise BoardError(
+                f"the board at {where} has stopped its motors: its supply is low, {telemetry.supply / 1000:.2f} V; "
+                "charge or change the batteries"
+            )
+        if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
+            raise BoardError(f"the board at {where} has stopped its motors: a stop command came from elsewhere")
+
+    # ---- the run -----------------------------------------------------------------------------------------------------
+
+    def steps(self) -> Iterator[float]:
+        """See `boebot.running.driver.Driver`."""
+        link, robot, transport = self.link, self.robot, self.session.transport
+        poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK.unpack_from
+        make, waiting_events = _Telemetry._make, link.waiting_events
+        telemetry_log, times, steps = self.record.telemetry, self.record.times, self.record.steps
+        equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
+        paced = self.task.request.realtime and not transport.realtime
+        time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
+
+        period = self.telemetry_ticks
+        host_stamps = self.record.stamps
+        last = due = -1
+        time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
+        end_s = seconds - tick_s / 2
+        silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
+        on_time = not transport.realtime and link.line_s > 0
+        early_s = _LOOK_EARLY_BYTES * link.line_s if on_time else _LOOK_EARLY * tick_s
+        awaited = -1  # the tick that was looked for
+        started_s = heard_s = look_s = transport.now()
+        wait_until_s = heard_s + (period + 1) * tick_s
+        started = next_progress = wall.perf_counter()
+        meanwhile: list[Received] = []  # what came during a late step of a paced run
+        while True:
+            received = meanwhile + poll(look_s, wait_until_s)
+            meanwhile = []
+            now_s = link.polled_s
+            if link.sessions != self._session:
+                received = self._in_new_session(received)
+                equipment = self.equipment
+                now_s = transport.now()
+            restarted = link.board_resets != self.resets
+            if not received:
+                if now_s - heard_s > silence_s + period * tick_s:
+                    raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
+                look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s
+                continue
+            for payload, board_s, host_s, bound_s in received:  # noqa: B007
+                (tick,) = tick_of(payload)
+                if due < 0:
+                    due = tick + -tick % n
+                    time_zero = -due * tick_s
+                    self.clock_offset_s = host_s + (due - tick) * tick_s
+                elif restarted or tick <= last:  # the board was reset: its ticks begin afresh
+                    restarted = False
+                    due = tick + -tick % n
+                    time_zero = self._time_after_reset(times, host_s) - tick * tick_s
+                    self.resets = link.board_resets
+                last = tick
+                if tick >= due or times:
+                    time_s = tick * tick_s + time_zero
+                    telemetry_log.append(payload)
+                    times.append(time_s)
+                    host_stamps.append((host_s, bound_s))
+            if payload[_LATCH] and last > self._armed_tick:
+                self._heed_latch(payload)
+            if waiting_events:
+                self._take_events()
+            heard_s = now_s
+            if time_s >= end_s:
+                break
+            if last >= due:
+                if last - due >= n:
+                    self.late_steps += (last - due) // n
+                if paced:
+                    ahead = (heard_s - started_s) - (wall.perf_counter() - started)
+                    if ahead > 0:
+                        wall.sleep(ahead)
+                if progress is not None and wall.perf_counter() >= next_progress:
+                    next_progress = wall.perf_counter() + PROGRESS_S
+                    progress(time_s)
+                slow = self._slow(last) if equipment.tells_slowly else NOTHING_TOLD
+                sample = make(unpack(payload))
+                robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
+                shown = wall.perf_counter()
+                yield time_s
+                if paced and (took_s := wall.perf_counter() - shown) > self.period_s:
+                    meanwhile = poll(heard_s + took_s, heard_s + took_s)
+                if robot.latched or self._halted:
+                    self._heed_emergency_stop()
+                if robot.slow_command is not None:
+                    self._heed_slow_command()
+                kind, left, right = robot.command
+                if kind == "signal":
+                    link.send_signal(left, right, time_to_live_ms, last)
+                elif kind == "speed":
+                    link.send_speed(left, right, time_to_live_ms, last)
+                else:
+                    link.send_coast(time_to_live_ms, last)
+                steps.append((len(times) - 1, kind, left, right))
+                due = last - last % n + n
+            ahead_ticks = min(due - last, (seconds - time_s) / tick_s)
+            # looked for too early: it is about to come
+            look_s = heard_s if on_time and due == awaited else heard_s + ahead_ticks * tick_s - early_s
+            awaited = due
+            wait_until_s = heard_s + (ahead_ticks + period + 1) * tick_s
+
+    def _in_new_session(self, received: list[Received]) -> list[Received]:
+        """Makes the board ready again; returns the telemetry of the new session."""
+        self._armed_tick = _NOT_YET
+        self._make_ready()
+        if self._halted:
+            self._armed_tick = -1
+        return [*received, *self.link.fetch_telemetry()]
+
+    def _take_events(self) -> None:
+        """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
+        for event in self.link.events():
+            if not event.earlier or self.link.sessions != self._first_session:
+                self.record.events.append(event)
+            elif event.kind in _UNASKED or (event.kind, event.value) == _SUPPLY_LOW:
+                self.notices.append(
+                    f"before this run, by the clock of the board at {self.link.transport.name}: {event}"
+                )
+
+    def _time_after_reset(self, times: list[float], host_s: float) -> float:
+        """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
+        passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
+        return max(passed_s, times[-1] + self.tick_s) if times else 0.0
+
+    def end(self) -> None:
+        """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
+        dead-man."""
+        self._put_devices_aside()
+        with contextlib.suppress(BoebotError, KeyboardInterrupt):
+            self.link.stop_and_confirm(STOP_LIMIT_S)
+            self._take_events()
+            self.link.close()
+
+    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
+        """See `boebot.running.driver.Driver`."""
+        link, watchdog_resets = self.link, self.session.watchdog_resets()
+        self.notices += hangs.sentences(watchdog_resets)
+        return RunResult(
+            brain=self.task.brain.name,
+            robot=self.description,
+            board=self.task.on,
+            description=self.session.description,
+            arena=self.task.request.arena,
+            seed=self.task.brain_seed,
+            period=self.period_s,
+            tick=self.tick_s,
+            error=error,
+            record=self.record,
+            truth=self.session.truth(),
+            clock_offset=self.clock_offset_s,
+            steps=len(self.record.steps),
+            late_steps=self.late_steps,
+            odometry_source=self.task.brain.odometry,
+            resets=self.resets,
+            sessions_lost=link.sessions_lost,
+            lost_frames=link.decoder.lost,
+            bad_frames=link.decoder.bad,
+            run_time=self.record.times[-1] if self.record.times else 0.0,
+            wall_time=elapsed_s,
+            sent=link.sent,
+            received=link.received,
+            identity=self.identity,
+            link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
+            notices=self.notices,
+            watchdog_resets=watchdog_resets,
+            counters=dict(self.session.counters()),
+            without=self.task.request.without,
+            brain_record=BrainRecord.of(self.task.brain.brain, self.robot),
+        )

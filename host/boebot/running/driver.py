@@ -1,0 +1,103 @@
+"""What drives a robot in a run, behind one small interface: over the link to its board, or direct.
+
+A run is one loop (boebot.running.runner): each turn of `Driver.steps` shows the brain a new observation, the brain
+steps, and the next turn carries out its command. A brain cannot tell one driver from another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from boebot.boards import BoardRequest
+from boebot.brains import LoadedBrain
+from boebot.errors import BoebotError
+from boebot.record.result import RunResult
+from boebot.robot import Robot
+from boebot.running.stepping import AT_LEISURE, StepLimit
+
+Progress = Callable[[float], None]
+"""Called now and then with the seconds of the run that have passed."""
+
+PROGRESS_S = 0.1  # wall time between two reports of progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One run, as it was asked for."""
+
+    brain: LoadedBrain
+    request: BoardRequest
+    on: str
+    """the board, as the user named it"""
+    seconds: float
+    """may be infinite"""
+    period_s: float
+    progress: Progress | None = None
+    step_timeout_s: float | None = None
+    """how long a step of the brain may take by the wall clock; None: the driver's choice"""
+    brain_seed: int
+    """of the brain's chance"""
+    unrealisable: str | None = None
+    """why sensors, period and line do not go together in time, where the run was forced all the same"""
+
+
+class Driver(Protocol):
+    """Drives one robot through one run."""
+
+    @property
+    def robot(self) -> Robot:
+        """What the brain meets."""
+
+    @property
+    def step_limit(self) -> StepLimit:
+        """How long a step of the brain may take."""
+
+    def begin(self) -> None:
+        """Makes the robot ready to move.
+
+        Raises:
+            BoebotError: it cannot be.
+        """
+
+    def steps(self) -> Iterator[float]:
+        """One turn per step of the brain, until the run's time is up: gives the run's time (s) of the observation that
+        `robot` then shows. `robot.command` is carried out at the beginning of the next turn.
+
+        Raises:
+            BoebotError: the robot cannot go on.
+        """
+
+    def end(self) -> None:
+        """Stops the motors and lets go of the robot, whatever happened before."""
+
+    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
+        """What came of the run, which took so long by the wall clock; `error`: why it ended before its time."""
+
+
+def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:
+    """As the task says, or else."""
+    return otherwise if task.step_timeout_s is None else AT_LEISURE._replace(seconds=task.step_timeout_s)
+
+
+def check_period(period_s: float) -> None:
+    """Raises BoebotError where a brain's period is none."""
+    if not (period_s > 0 and math.isfinite(period_s)):
+        raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
+
+
+def whole_ticks(period_s: float, tick_s: float) -> int:
+    """A brain's period in ticks.
+
+    Raises:
+        BoebotError: it is none, or no whole number of them.
+    """
+    check_period(period_s)
+    ticks = round(period_s / tick_s)
+    if ticks < 1 or abs(ticks * tick_s - period_s) > 1e-6:
+        raise BoebotError(
+            f"a brain period of {period_s * 1000:g} ms does not fit; expected a multiple of {tick_s * 1000:g} ms"
+        )
+    return ticks

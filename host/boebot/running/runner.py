@@ -1,0 +1,206 @@
+"""Runs a brain on a robot: `boebot.run(...)` does from a script or a notebook what the command `boebot run` does.
+
+One loop serves every robot, with a board or without (boebot.running.driver). On a robot in this process time stands
+still while the brain thinks, so that a run is a function of brain, robot, arena and seed.
+
+However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes, a low supply, a stop from elsewhere),
+the motors are stopped and the record is complete up to there.
+"""
+
+from __future__ import annotations
+
+import time as wall
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar, cast
+
+from boebot import view
+from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
+from boebot.description.robots import RobotDescription
+from boebot.errors import BoebotError
+from boebot.record.result import RunResult, TogetherResult
+from boebot.running import hangs, interrupts
+from boebot.running.board_driver import BoardDriver
+from boebot.running.direct_driver import DirectDriver
+from boebot.running.driver import Driver, Progress, Task
+from boebot.running.stepping import StepTimes, StepWatch, step_once
+from boebot.running.tasks import Member, Terms, expect, task_of
+
+Result = TypeVar("Result", RunResult, TogetherResult)
+
+
+def run(
+    brain: object = "wander",
+    robot: str | Path | RobotDescription = "shieldbot",
+    arena: str | Path | None = None,
+    on: str | None = None,
+    seconds: float = 60.0,
+    seed: int = 1,
+    realtime: bool = False,
+    out: str | Path | None = None,
+    period: float | None = None,
+    progress: Progress | None = None,
+    without: Sequence[str] = (),
+    pose: tuple[float, float, float] | None = None,
+    step_timeout: float | None = None,
+    force_timing: bool = False,
+) -> RunResult:
+    """Runs a brain and returns what happened.
+
+    Args:
+        brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)`, or object
+            or class with `step(robot)`.
+        robot: bundled name, .toml file, or a description.
+        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
+        on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot
+            without a board. None: native or direct.
+        seconds: length of the run by the board's clock; may be infinite.
+        seed: of the brain's chance, and of the noise of the simulated world.
+        realtime: slow a simulated run down to the wall clock.
+        out: folder for run.csv, run.png, replay.html and the raw bytes.
+        period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05.
+        progress: called with the seconds that have passed, about ten times a second.
+        without: imperfections of a simulated robot that are switched off, such as ("slip", "bounce");
+            docs/reference/imperfections.md names them.
+        pose: where a simulated robot starts: x (m), y (m), heading (rad). None: where the arena says.
+        step_timeout: seconds by the wall clock after which a step of the brain that has not ended is an error, which
+            ends the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points,
+            after which its dead-man stops the motors.
+        force_timing: run it even if sensors, period and line are not realisable in time (boebot.timing.realisable);
+            the record then says so.
+
+    Raises:
+        BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
+            there or that vanishes. The record up to there is written to `out` all the same.
+        KeyboardInterrupt: Ctrl-C; motors stopped and record written.
+    """
+    return keep(
+        lambda: execute(
+            brain,
+            robot,
+            arena,
+            on,
+            seconds,
+            seed,
+            realtime,
+            period,
+            progress,
+            without,
+            pose,
+            step_timeout,
+            force_timing,
+        ),
+        out,
+    )
+
+
+def execute(
+    brain: object,
+    robot: str | Path | RobotDescription = "shieldbot",
+    arena: str | Path | None = None,
+    on: str | None = None,
+    seconds: float = 60.0,
+    seed: int = 1,
+    realtime: bool = False,
+    period: float | None = None,
+    progress: Progress | None = None,
+    without: Sequence[str] = (),
+    pose: tuple[float, float, float] | None = None,
+    step_timeout: float | None = None,
+    force_timing: bool = False,
+) -> RunResult:
+    """As `run`, but once the run has begun every end of it, even by an error, is a result: see
+    `RunResult.error`.
+
+    Raises:
+        BoebotError: the run could not begin.
+    """
+    terms = Terms(
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        progress=progress,
+        step_timeout=step_timeout,
+        force_timing=force_timing,
+    )
+    terms.check()
+    task = task_of(Member(brain=brain, robot=robot, pose=pose, period=period, without=without), terms)
+    task = replace(task, on=default_board([task.request.robot]) if on is None else on)
+    opening = open_board if task.request.robot.has_board else open_vehicle
+    session = opening(task.on, task.request)
+    try:
+        return _drive(driver_of(session, task), task)
+    finally:
+        session.close()
+
+
+def keep(work: Callable[[], Result], out: str | Path | None) -> Result:
+    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one.
+
+    Raises:
+        BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
+    """
+    if out is not None:
+        expect("out", out, "a folder or None", str, Path)
+        view.make_folder(Path(out))
+    result = work()
+    if out is not None:
+        try:
+            with interrupts.ignored():
+                result.save(out)
+        except BoebotError as unsaved:
+            if result.error is None:
+                raise
+            result.error.add_note(str(unsaved))
+    if result.error is not None:
+        raise result.error
+    return result
+
+
+def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
+    """Who drives that robot: over the link to its board, or direct.
+
+    Raises:
+        BoebotError: it cannot be driven so.
+    """
+    if task.request.robot.has_board:
+        board = cast(BoardSession, session)
+        try:
+            return BoardDriver(board, task)
+        except BoebotError as error:
+            for sentence in hangs.sentences(board.watchdog_resets()):
+                error.add_note(sentence)
+            raise
+    return DirectDriver(cast(VehicleSession, session), task)
+
+
+def _drive(driver: Driver, task: Task) -> RunResult:
+    """The whole run, from the robot made ready to its result."""
+    error: BaseException | None = None
+    times = StepTimes()
+    started = wall.perf_counter()
+    try:
+        driver.begin()
+        started = wall.perf_counter()
+        with StepWatch(driver.step_limit) as watch:
+            for _ in driver.steps():
+                step_once(driver.robot, task.brain, watch, times)
+    except (BoebotError, KeyboardInterrupt) as caught:
+        error = caught
+    finally:
+        elapsed_s = wall.perf_counter() - started
+        with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
+            driver.end()
+    return with_times(driver.result(error, elapsed_s), task, times)
+
+
+def with_times(result: RunResult, task: Task, times: StepTimes) -> RunResult:
+    """Its timing, into the record: how long its brain's steps took, and what of it was forced."""
+    result.longest_step, result.long_steps = times.longest, times.long
+    result.unrealisable = task.unrealisable
+    if task.unrealisable is not None:
+        result.notices.append(f"forced: {task.unrealisable}")
+    return result

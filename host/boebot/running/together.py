@@ -1,0 +1,286 @@
+"""Runs several robots in one simulated world: `boebot.run_together(...)`, and `boebot run` with several of them.
+
+Each has its own brain and seed, and a board or none, and they sense and bump each other. Brains step here, in the
+caller's thread; each robot is driven by a thread that pauses while it waits (boebot.running.pausable_thread). One clock
+turns them all: when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant
+go on in the order of their numbers. The run of each is then a function of what its own robot meets.
+
+An error in one ends the run: all motors are stopped, and the error says which robot it was.
+"""
+
+from __future__ import annotations
+
+import time as wall
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, default_board, open_together
+from boebot.brains import LoadedBrain
+from boebot.errors import BoebotError, BrainError
+from boebot.record.result import RunResult, TogetherResult
+from boebot.running import interrupts
+from boebot.running.driver import PROGRESS_S, Driver, Progress, Task
+from boebot.running.pausable_thread import PAUSED, PausableThread
+from boebot.running.runner import driver_of, keep, with_times
+from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
+from boebot.running.tasks import Member, Terms, expect, task_of
+
+__all__ = ["Member", "StoppedError", "execute_together", "run_together"]
+
+_STEP = "step"  # what a thread says when the brain is to step
+
+
+class StoppedError(BoebotError):
+    """Another robot's end has ended this one's run."""
+
+
+def run_together(
+    members: Sequence[Member],
+    arena: str | Path | None = None,
+    seconds: float = 60.0,
+    on: str | None = None,
+    seed: int = 1,
+    realtime: bool = False,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    step_timeout: float | None = None,
+    force_timing: bool = False,
+) -> TogetherResult:
+    """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
+
+        boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
+
+    Args:
+        members: the robots.
+        arena: bundled name or .toml file; None: the simulator's own choice.
+        seconds: length of the run by each robot's clock.
+        on: what the robots with boards run on: "native" or "avr"; "direct" where no robot has one. None: native or
+            direct.
+        seed: of the world's noise and of the robots' imperfections.
+        realtime: slow down to the wall clock.
+        step_timeout, force_timing: as for `boebot.run`.
+        out: folder for a picture and a page of all robots, and for a folder of files per robot.
+        progress: called with the seconds that have passed, about ten times a second.
+
+    Returns:
+        A result per robot, and what is common to them.
+
+    Raises:
+        BoebotError: whatever the user can mend: bad input, no free place, an error in a brain (with its robot and
+            place). The record up to there is written to `out` all the same.
+        KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
+    """
+    return keep(
+        lambda: execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout, force_timing), out
+    )
+
+
+def execute_together(
+    members: Sequence[Member],
+    arena: str | Path | None = None,
+    seconds: float = 60.0,
+    on: str | None = None,
+    seed: int = 1,
+    realtime: bool = False,
+    progress: Progress | None = None,
+    step_timeout: float | None = None,
+    force_timing: bool = False,
+) -> TogetherResult:
+    """As `run_together`, but once the run has begun every end of it, even by an error, is a result: see
+    `TogetherResult.error`.
+
+    Raises:
+        BoebotError: the run could not begin.
+    """
+    expect("members", members, "a list of boebot.Member", list, tuple)
+    terms = Terms(
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        progress=None,
+        step_timeout=step_timeout,
+        force_timing=force_timing,
+    )
+    terms.check()
+    if not members:
+        raise BoebotError("there is no robot to run; expected at least one Member")
+    tasks = []
+    for number, member in enumerate(members, 1):
+        expect("members", member, "a list of boebot.Member", Member)
+        try:
+            tasks.append(task_of(member, terms, number))
+        except BoebotError as error:
+            raise _of_robot(error, number, len(members)) from None
+    _check_own_brains([task.brain for task in tasks])
+    kind = default_board([task.request.robot for task in tasks]) if on is None else on
+    tasks = [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+    world = open_together(kind, [task.request for task in tasks])
+    try:
+        return _Run(world, tasks, progress).run()
+    finally:
+        world.close()
+
+
+def _check_own_brains(loaded: Sequence[LoadedBrain]) -> None:
+    """A brain of processes remembers one robot's run; so does each process.
+
+    Raises:
+        BrainError: two robots share one.
+    """
+    owner: dict[int, int] = {}
+    for number, brain in enumerate((one.brain for one in loaded), 1):
+        for process in () if brain is None else brain.processes:
+            first = owner.setdefault(id(process), number)
+            if first != number:
+                raise BrainError(
+                    f"robots {first} and {number} share the brain of {process.name!r}; expected a Brain of its own for "
+                    "each (a file, or a function that makes one, gives that)"
+                )
+
+
+def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
+    """The error, saying which robot it is about, where there are several."""
+    if count == 1 or not isinstance(error, BoebotError):
+        return error
+    told = type(error)(f"robot {number}: {error}")
+    for note in getattr(error, "__notes__", ()):
+        told.add_note(note)
+    return told
+
+
+class _Robot:
+    """One robot of a run: its driver on a thread, and its brain."""
+
+    def __init__(self, session: BoardSession | VehicleSession, task: Task, number: int) -> None:
+        self.number = number
+        self.task = task
+        self.driver: Driver | None = None
+        self.error: BaseException | None = None
+        self.result: RunResult | None = None
+        self.is_ending = False  # its motors are being stopped
+        self.time_s = 0.0
+        self._times = StepTimes()
+        self._session = session
+        self.thread = PausableThread(self._work, f"robot {number}")
+
+    def _work(self) -> None:
+        """What the thread does: the whole run, from the robot made ready to the motors stopped."""
+        self.driver = driver = driver_of(self._session, self.task)
+        try:
+            driver.begin()
+            for self.time_s in driver.steps():
+                self.thread.pause(_STEP)
+        except BoebotError as error:
+            self.error = self.error or error
+        finally:
+            self.is_ending = True
+            driver.end()
+            self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
+
+    def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
+        """Goes on until it waits for time to pass, or is done; the brain steps meanwhile.
+
+        Raises:
+            BrainError: an error in the brain.
+        """
+        said = self.thread.resume(error)
+        while said == _STEP:
+            assert self.driver is not None
+            try:
+                watch.limit = self.driver.step_limit
+                step_once(self.driver.robot, self.task.brain, watch, self._times)
+            except BaseException as caught:
+                self.error = caught
+                raise
+            said = self.thread.resume()
+
+    @property
+    def failure(self) -> BaseException | None:
+        """Why it ended before its time."""
+        return self.error or self.thread.error
+
+
+class _Run:
+    """All robots of a run, turned on one clock."""
+
+    def __init__(self, world: SharedWorld, tasks: Sequence[Task], progress: Progress | None) -> None:
+        self._world = world
+        self._robots = [
+            _Robot(session, task, number)
+            for number, (session, task) in enumerate(zip(world.sessions, tasks, strict=True), 1)
+        ]
+        self._progress = progress
+        self._next_progress = 0.0
+        world.on_wait(lambda index: self._robots[index].thread.pause(PAUSED))
+
+    def run(self) -> TogetherResult:
+        """The whole run, from the first hello to the last stop."""
+        started = wall.perf_counter()
+        error: BaseException | None = None
+        try:
+            with StepWatch(AT_LEISURE) as watch:
+                self._loop(watch)
+        except (BoebotError, KeyboardInterrupt) as caught:
+            error = caught
+        finally:
+            with interrupts.ignored():  # a second Ctrl-C must not keep motors running
+                self._stop_all(error)
+        return self._result(error, wall.perf_counter() - started)
+
+    def _loop(self, watch: StepWatch) -> None:
+        """Turns the clock until all are done.
+
+        Raises:
+            BoebotError: one of them ended before its time.
+        """
+        awake = self._robots
+        while True:
+            for robot in awake:
+                self._turn(robot, watch)
+            if all(robot.thread.is_done for robot in self._robots):
+                return
+            awake = [self._robots[index] for index in self._world.advance()]
+            self._report()
+
+    def _turn(self, robot: _Robot, watch: StepWatch) -> None:
+        try:
+            robot.turn(watch)
+        except BoebotError as error:
+            raise _of_robot(error, robot.number, len(self._robots)) from error
+        if (failure := robot.failure) is not None:
+            raise _of_robot(failure, robot.number, len(self._robots)) from failure
+
+    def _report(self) -> None:
+        if self._progress is not None and wall.perf_counter() >= self._next_progress:
+            self._next_progress = wall.perf_counter() + PROGRESS_S
+            self._progress(min(robot.time_s for robot in self._robots))
+
+    def _stop_all(self, error: BaseException | None) -> None:
+        """Tells every robot that still runs to end, and lets time pass until all of them have stopped."""
+        why = "Ctrl-C" if isinstance(error, KeyboardInterrupt) else str(error)
+        stop = StoppedError(f"the run has ended: {why}")
+        for robot in self._robots:
+            if not robot.is_ending:
+                robot.thread.resume(stop)
+        try:
+            while not all(robot.thread.is_done for robot in self._robots):
+                for index in self._world.advance():
+                    self._robots[index].thread.resume()
+        except BoebotError as broken:  # no time passes any more: nothing moves either
+            while not all(robot.thread.is_done for robot in self._robots):
+                for robot in self._robots:
+                    robot.thread.resume(broken)
+
+    def _result(self, error: BaseException | None, elapsed_s: float) -> TogetherResult:
+        """Raises the error of a run that never began."""
+        results: list[RunResult] = []
+        for robot in self._robots:
+            if (result := robot.result) is None:
+                raise error if error is not None else BoebotError(f"robot {robot.number} did not begin")
+            result.error = error if isinstance(error, KeyboardInterrupt) else robot.failure
+            result.wall_time = elapsed_s
+            results.append(result)
+        return TogetherResult(robots=results, error=error)

@@ -1,0 +1,149 @@
+"""run.png: the run seen from above. Arena, true path, odometric estimate, contacts, the robot at start and end with
+what its sensors look at. What the robot does not have is neither drawn nor named. Of a brain of processes, the path has
+the colour of the active motor behavior, and its utilities stand below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.transforms import Affine2D
+
+from boebot.view import scene, style, utility_panel
+from boebot.view.arena_drawing import draw_arena, legend_entries
+from boebot.view.robot_drawing import body_patch, draw_robot
+from boebot.view.sheet import Sheet, counted
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+    from boebot.description.robots import Body
+    from boebot.record.brain_record import BrainRecord
+    from boebot.record.result import RunResult
+    from boebot.record.series import Floats, Pose
+
+SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
+SPOT_M = 0.03  # a shorter stretch would hardly be seen
+
+
+def write(result: RunResult, path: Path) -> Path:
+    """Draws the run into a PNG file."""
+    view = scene.view(result)
+    low, high = scene.bounds(view)
+    record = result.brain_record if result.brain_record is not None and result.brain_record.steps else None
+    rows = utility_panel.legend_rows(record) if record is not None else 0
+    sheet = Sheet(low, high, _title(result, view), _caption(result, view), _legend(result, view), rows)
+    axes = sheet.axes
+    draw_arena(axes, view.plan)
+    if record is None:
+        _draw_path(axes, view.path, result.series.time)
+    else:
+        assert sheet.panel is not None
+        _draw_behaviors(axes, view.path, result.series.time, record)
+        with rc_context({"text.parse_math": False}):
+            utility_panel.draw(sheet.panel, record, result.run_time)
+    if view.estimate is not None:
+        axes.plot(view.estimate.x, view.estimate.y, color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
+        _draw_ghost(axes, result.robot.body, view.estimate)
+    draw_marks(axes, view)
+    for index, colour in ((0, style.START), (-1, style.END)):
+        turret = float(view.turret[index])
+        draw_robot(axes, result.robot, view.pose(index), colour, plan=view.plan, turret=turret)
+    return sheet.save(path)
+
+
+def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
+    """The path, its colour running with time."""
+    points = np.column_stack((path.x, path.y))
+    thin = max(1, len(points) // SEGMENTS_MAXIMUM)
+    points, time = points[::thin], time[::thin]
+    if len(points) < 2:
+        return
+    segments = np.stack((points[:-1], points[1:]), axis=1)
+    lines = LineCollection(list(segments), array=time[:-1], cmap=style.PATH, lw=2.2, zorder=7)
+    lines.set_clim(time[0], time[0] + (time[-1] - time[0]) / style.PATH_SHARE)
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+
+
+def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -> None:
+    """The path, each stretch in the colour of the motor behavior that was active; a turn on the spot as a dot."""
+    for behavior, begun, until in utility_panel.segments(record, float(time[-1])):
+        first, last = np.searchsorted(time, (begun, until))
+        there = slice(int(first), int(last) + 1)  # up to where the next one begins
+        x, y, colour = path.x[there], path.y[there], style.behavior(behavior)
+        axes.plot(x, y, color=colour, lw=2.4, solid_capstyle="round", zorder=7)
+        if len(x) and np.hypot(np.ptp(x), np.ptp(y)) < SPOT_M:
+            axes.plot(x[0], y[0], "o", ms=5.5, color=colour, mec=style.FLOOR, mew=0.6, zorder=8)
+
+
+def _draw_ghost(axes: Axes, body: Body, estimate: Pose) -> None:
+    """The odometric ghost: the robot where it believes to be at the end."""
+    x, y, heading = float(estimate.x[-1]), float(estimate.y[-1]), float(estimate.heading[-1])
+    on_axes = Affine2D().rotate(heading).translate(x, y) + axes.transData
+    look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.1, "ls": (0, (3, 2)), "zorder": 8}
+    axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=on_axes, **look))
+    axes.plot((0.0, body.front_m), (0.0, 0.0), color=style.ESTIMATE, lw=1.1, transform=on_axes, zorder=8)
+
+
+def draw_marks(axes: Axes, view: scene.View) -> None:
+    """Where a whisker was pressed (circles) and where the body touched something (crosses)."""
+    if len(view.touches):
+        axes.scatter(
+            view.touches[:, 0], view.touches[:, 1], s=30, marker="o", fc=style.FLOOR, ec=style.TOUCH, lw=1.6, zorder=9
+        )
+    if len(view.contacts):
+        axes.scatter(
+            view.contacts[:, 0], view.contacts[:, 1], s=46, marker="x", color=style.CONTACT, lw=1.9, zorder=9.5
+        )
+
+
+def _title(result: RunResult, view: scene.View) -> str:
+    where = f" in {view.plan.name}" if view.known else ""
+    return f"{result.brain} on {result.robot.name} ({result.board}){where}"
+
+
+def _caption(result: RunResult, view: scene.View) -> list[str]:
+    parts = [f"{result.run_time:.1f} s"]
+    if view.path_is_seen:
+        parts.append(f"{result.distance:.2f} m")
+    else:
+        parts.append("nobody knows where it went: it has nothing to measure its way with")
+    if view.known:
+        parts.append(counted(result.contacts, "contact", "contacts"))
+    if view.has_whiskers:
+        parts.append(counted(result.whisker_touches, "whisker touch", "whisker touches"))
+    if (error := result.odometry_error) is not None:
+        parts.append(f"odometry off by {error:.2f} m at the end")
+    parts.append(f"seed {result.seed}")
+    if result.without:
+        parts.append(f"without {counted(len(result.without), 'imperfection', 'imperfections')}")
+    if result.error is not None:
+        parts.append("ended early")
+    return parts
+
+
+def _legend(result: RunResult, view: scene.View) -> list[Artist]:
+    composed = result.brain_record is not None and result.brain_record.steps
+    colours = "coloured by behavior" if composed else "dark to light in time"
+    said = f"true path, {colours}" if view.known else f"path by odometry, {colours}"
+    entries: list[Artist] = []
+    if view.path_is_seen:
+        entries.append(Line2D([], [], color=style.behavior(0) if composed else "#3b8a8c", lw=2.4, label=said))
+    if view.estimate is not None:
+        entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate"))
+    for label, colour in (("start", style.START), ("end", style.END)):
+        entries.append(Line2D([], [], ls="", marker="o", mfc=style.BODY, mec=colour, mew=1.8, ms=8, label=label))
+    if len(view.touches):
+        entries.append(
+            Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
+        )
+    if len(view.contacts):
+        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="body contact"))
+    return entries + legend_entries(view.plan)

@@ -1,0 +1,202 @@
+"""replay.html: one page, offline, that plays and scrubs a run, of one robot or of several. The page itself is
+`replay_page.html` beside this file; the run's data are put into it as one JSON object with base64 arrays:
+
+format   number of the data's form, which page and data share
+plan     what stands and moves in the arena (boebot.floor_plan)
+runs     one per robot: title, table, paths, flags, readings, what the robot looks like; `mind`, what a brain of
+         processes did, or null: processes, utilities, the active motor behavior, the last switch to it
+
+Arrays are little-endian float32 (`flags` and `motor`: uint8), one entry per frame; those of `mind` one per step of the
+brain, fewer where there are very many.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boebot.description import robots
+from boebot.link.messages import Status
+from boebot.view import scene, sensors, style
+from boebot.view.utility_panel import shown_cognitive
+
+if TYPE_CHECKING:
+    from boebot.floor_plan import FloorPlan, Moving, Solid
+    from boebot.record.brain_record import BrainRecord
+    from boebot.record.result import RunResult
+    from boebot.record.series import Floats, Pose, Readout
+
+FORMAT = 4
+FRAMES_AT_MOST = 20_000
+STEPS_AT_MOST = 6_000  # of a brain of processes
+_PAGE = Path(__file__).with_name("replay_page.html")
+_PLACEHOLDER = "/*PAGE*/null"
+
+# bits of the page's `flags` array
+LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(8))
+
+
+def write(results: Sequence[RunResult], path: Path) -> Path:
+    """Writes the page of the robots of one run."""
+    views = [scene.view(result) for result in results]
+    low, high = scene.bounds(*views)
+    content = {
+        "format": FORMAT,
+        "plan": plan_data(views[0].plan),
+        "bounds": [*low.tolist(), *high.tolist()],
+        "runs": [
+            run_data(result, view) | {"colour": style.colour(number)}
+            for number, (result, view) in enumerate(zip(results, views, strict=True), 1)
+        ],
+    }
+    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    page = _PAGE.read_text(encoding="utf-8")
+    path.write_text(page.replace(_PLACEHOLDER, data), encoding="utf-8")
+    return path
+
+
+def plan_data(plan: FloorPlan) -> dict[str, Any]:
+    """The plan as the page has it (m, rad)."""
+    charger = plan.charger
+    return {
+        "solids": [_solid(solid) for solid in plan.solids],
+        "patches": [
+            {"points": _points(patch.corners), "grip": patch.grip, "rough": patch.grip > plan.grip}
+            for patch in plan.patches
+        ],
+        "lamps": [[lamp.x, lamp.y] for lamp in plan.lamps],
+        "charger": None if charger is None else [charger.x, charger.y, charger.radius],
+        "moving": [_moving(moving) for moving in plan.moving],
+    }
+
+
+def _solid(solid: Solid) -> dict[str, Any]:
+    return {
+        "kind": solid.kind,
+        "points": _points(solid.points),
+        "radius": solid.radius,
+        "low": solid.is_low,
+        "dull": solid.is_dull,
+        "remarks": ", ".join(solid.remarks),
+        "top": [float(value) for value in ((solid.box[0][0] + solid.box[1][0]) / 2, solid.box[1][1])],
+    }
+
+
+def _moving(moving: Moving) -> dict[str, Any]:
+    """`time` on the clock of the truth, which begins `begin` before a run's own."""
+    pose = [_array(row) for row in (moving.x, moving.y, moving.heading)]
+    return {"solid": _solid(moving.solid), "time": _array(moving.time), "pose": pose}
+
+
+def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
+    """What the page shows of one robot."""
+    series = result.series
+    thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
+    status = series.status
+    flags = (
+        series.left_whisker * LEFT_WHISKER
+        | series.right_whisker * RIGHT_WHISKER
+        | series.left_ir * LEFT_IR
+        | series.right_ir * RIGHT_IR
+        | _contact(result) * CONTACT
+        | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
+        | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
+        | ((status & int(Status.FALLBACK)) != 0) * FALLBACK
+    )
+    return {
+        "title": f"{result.brain} on {result.robot.name} ({result.board})",
+        "brain": result.brain,
+        "begin": result.clock_offset,
+        "known": view.known,
+        "table": result.table(),
+        "contacts": np.round(view.contacts, 4).tolist(),
+        "touches": np.round(view.touches, 4).tolist(),
+        "robot": _robot(result.robot),
+        "time": _array(series.time[thin]),
+        "path": _pose(view.path, thin),
+        "estimate": None if view.estimate is None else _pose(view.estimate, thin),
+        "turret": _array(view.turret[thin]),
+        "left": _array(series.left_signal[thin]),
+        "right": _array(series.right_signal[thin]),
+        "ping": _array(np.nan_to_num(series.ping_distance[thin], nan=-1.0)),
+        "mind": None if result.brain_record is None else _mind(result.brain_record),
+        "readings": [_reading(readout, thin) for readout in series.readouts()],
+        "flags": _flags(flags[thin]),
+    }
+
+
+def _mind(record: BrainRecord) -> dict[str, Any] | None:
+    """A brain of processes: of each kept step its utilities, the active behavior, and why it was switched to."""
+    if not record.steps:
+        return None
+    thin = slice(None, None, max(1, math.ceil(len(record.steps) / STEPS_AT_MOST)))
+    time, chosen = record.time[thin], [switch for switch in record.switches if switch.on in record.behaviors]
+    last = np.searchsorted([switch.time for switch in chosen], time, side="right") - 1
+    kept = np.unique(last)  # switches that no kept step tells of are left out
+    return {
+        "behaviors": [
+            {"name": name, "colour": style.behavior(index), "utility": _array(record.utility_of(name)[thin])}
+            for index, name in enumerate(record.behaviors)
+        ],
+        "cognitive": [
+            {"name": name, "utility": _array(record.utility_of(name)[thin])} for name in shown_cognitive(record)
+        ],
+        "time": _array(time),
+        "motor": _flags(record.motor[thin]),
+        "switches": [[round(chosen[index].time, 3), chosen[index].on, chosen[index].reason] for index in kept],
+    }
+
+
+def _flags(values: np.ndarray) -> str:
+    return base64.b64encode(values.astype(np.uint8).tobytes()).decode("ascii")
+
+
+def _reading(readout: Readout, thin: slice) -> dict[str, Any]:
+    return {
+        "name": readout.device.replace("_ir", "_IR").replace("_", " "),
+        "unit": readout.unit,
+        "digits": readout.digits,
+        "values": _array(readout.values[thin]),
+        "ages": _array(readout.ages[thin]),
+    }
+
+
+def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
+    """What the page needs to draw the robot (m, rad): its body, and what it has."""
+    return {
+        "radius": robot.body.radius_m,
+        "outline": _points(np.array(robot.body.outline_m).reshape(-1, 2)),  # none: the circle
+        "front": robot.body.front_m,
+        "track": robot.body.track_width_m,
+        "wheel": robot.body.wheel_radius_m,
+        "whiskers": {name: {"root": root, "tip": tip} for name, (root, tip) in sensors.whiskers(robot).items()},
+        "looks": [vars(look) for look in sensors.looks(robot)],
+    }
+
+
+def _contact(result: RunResult) -> np.ndarray:
+    """Whether the body touched something, at each tick."""
+    if result.truth is None or not len(result.truth.time):
+        return np.zeros(len(result.series), dtype=np.uint8)
+    moment = np.searchsorted(result.truth.time, result.series.time + result.clock_offset)
+    contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
+    return np.asarray(contact, dtype=np.uint8)
+
+
+def _pose(pose: Pose, thin: slice) -> list[str]:
+    return [_array(values[thin]) for values in (pose.x, pose.y, pose.heading)]
+
+
+def _points(points: Floats) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(points, 4).tolist()
+    return rounded
+
+
+def _array(values: Floats) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")

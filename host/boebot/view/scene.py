@@ -1,0 +1,116 @@
+"""What the pictures of a run show: the arena, the paths, and where something was touched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boebot.floor_plan import FloorPlan
+from boebot.record.series import touch_indices
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from boebot.record.result import RunResult
+    from boebot.record.series import Bools, Floats, Pose
+
+MARGIN = 0.03  # of the greater side
+OPEN_M = 0.3  # to see around a path in an open field, at least
+OPEN_ARENA_M = 1.0  # around what stands in an open field
+OPEN_SHARE = 0.15  # of the path's extent, to see around it
+SLIMMEST = 0.4  # shorter side by longer side of what is shown of an open field
+
+
+@dataclass(frozen=True)
+class View:
+    """A run seen from above; lengths in metres."""
+
+    known: bool
+    """The truth is known, and `path` is it; otherwise `path` is the odometric estimate."""
+    path: Pose
+    estimate: Pose | None
+    """None without the truth, which it is compared with, or without encoders or odometer."""
+    plan: FloorPlan
+    contacts: Floats
+    """Where the body came to touch something, shape (n, 2)."""
+    touches: Floats
+    """Where the robot was when a whisker was pressed, shape (n, 2)."""
+    turret: Floats
+    """Its angle (rad) at each tick; 0 without one, or while it is free."""
+    has_whiskers: bool
+    path_is_seen: bool
+    """Somebody knows where the robot went: the simulator, or its odometry."""
+
+    def pose(self, index: int) -> tuple[float, float, float]:
+        """Of the path at a tick."""
+        return float(self.path.x[index]), float(self.path.y[index]), float(self.path.heading[index])
+
+
+def view(result: RunResult) -> View:
+    """The run as the pictures show it."""
+    truth, series = result.truth, result.series
+    known = truth is not None and result.true_pose is not None
+    path = result.true_pose if result.true_pose is not None else result.odometry
+    contacts = np.empty((0, 2))
+    if truth is not None and known:
+        inside = truth.time >= result.clock_offset
+        begins = touch_indices(truth.time, truth.contact & inside)
+        contacts = np.column_stack((truth.x[begins], truth.y[begins]))
+    begins = _onset_indices(series.left_whisker | series.right_whisker)
+    touches = np.column_stack((path.x[begins], path.y[begins]))
+    degrees = next((row.values for row in series.readouts() if row.device == "turret"), np.zeros(len(series)))
+    return View(
+        known=known,
+        path=path,
+        estimate=result.odometry if known and result.has_odometry else None,
+        plan=truth.plan if truth is not None else FloorPlan(),
+        contacts=contacts,
+        touches=touches,
+        turret=np.nan_to_num(np.radians(degrees), nan=0.0),
+        has_whiskers=result.has_whiskers,
+        path_is_seen=known or result.has_odometry,
+    )
+
+
+def bounds(*views: View) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what there is to see, with a margin (m): the arena within its outlines; in
+    an open field what the robots went through."""
+    places = [place for shown in views for place in (shown.path, shown.estimate) if place is not None]
+    points = np.vstack([np.column_stack((place.x, place.y)) for place in places])
+    if any(shown.plan.outlines for shown in views):
+        low, high = plan_bounds(views[0].plan, [])
+        points = np.vstack([np.column_stack((shown.path.x, shown.path.y)) for shown in views])
+        return np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    low, high = points.min(axis=0), points.max(axis=0)
+    edge = max(OPEN_M, OPEN_SHARE * float((high - low).max()))
+    return _stout(low - edge, high + edge)
+
+
+def plan_bounds(plan: FloorPlan, places: Sequence[tuple[float, float]]) -> tuple[Floats, Floats]:
+    """Of an arena by itself and of some places in it: its outlines; in an open field all that stands there."""
+    solids = plan.outlines or [*plan.solids, *(moving.at(float(moving.time[0])) for moving in plan.moving)]
+    corners = [corner for solid in solids for corner in solid.box]
+    if not plan.outlines:
+        corners += [np.array(place) for place in places]
+        corners += [point for patch in plan.patches for point in patch.corners]
+        corners += [np.array((lamp.x, lamp.y)) for lamp in plan.lamps]
+        corners += [point for moving in plan.moving for point in np.column_stack((moving.x, moving.y))]
+    points = np.array(corners)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not plan.outlines:
+        return _stout(low - OPEN_ARENA_M, high + OPEN_ARENA_M)
+    edge = MARGIN * float((high - low).max())
+    return low - edge, high + edge
+
+
+def _stout(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """The box, made wider where it is too slim to look at."""
+    size = high - low
+    more = np.maximum(0.0, SLIMMEST * float(size.max()) - size) / 2
+    return low - more, high + more
+
+
+def _onset_indices(flags: Bools) -> np.ndarray:
+    return np.flatnonzero(flags & ~np.concatenate(([False], flags[:-1])))

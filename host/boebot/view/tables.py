@@ -1,0 +1,116 @@
+"""The record of a run as files for other programs: run.csv, brain.csv, summary.json, the raw bytes and their stamps."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from boebot.record.brain_record import BrainRecord
+    from boebot.record.result import RunResult
+
+FORMAT = 2  # of a run's files; CHANGELOG.md says what is new in each
+
+
+def columns(result: RunResult) -> dict[str, list[str]]:
+    """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
+    series = result.series
+    estimate = result.odometry
+    kinds, left, right = zip(*series.commands, strict=True) if len(series) else ((), (), ())
+    table: dict[str, list[str]] = {
+        "time_s": _cells(series.time, 4),
+        "tick": _cells(series.raw["tick"]),
+        **{name: _cells(values, digits) for name, (values, digits) in series.columns().items()},
+        "command": list(kinds),
+        "command_left": [f"{value:.4f}" for value in left],
+        "command_right": [f"{value:.4f}" for value in right],
+        "odometry_x_m": _cells(estimate.x, 5),
+        "odometry_y_m": _cells(estimate.y, 5),
+        "odometry_heading_rad": _cells(estimate.heading, 5),
+    }
+    true = result.true_pose
+    if true is not None and result.truth is not None:
+        moment = np.searchsorted(result.truth.time, series.time + result.clock_offset)
+        contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
+        table |= {
+            "true_x_m": _cells(true.x, 5),
+            "true_y_m": _cells(true.y, 5),
+            "true_heading_rad": _cells(true.heading, 5),
+            "contact": _cells(contact),
+        }
+    return table
+
+
+def write_run(result: RunResult, path: Path) -> Path:
+    """run.csv"""
+    table = columns(result)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    return path
+
+
+def brain_columns(record: BrainRecord) -> dict[str, list[str]]:
+    """The columns of brain.csv: heading -> cells, one per step of the brain."""
+    table = {"time_s": _cells(record.time, 4), "active": [step.motor for step in record.steps]}
+    table |= {f"z_{name}": _cells(record.values[:, k], 6) for k, name in enumerate(record.variables)}
+    table |= {f"u_{name}": _cells(record.utilities[:, i], 6) for i, name in enumerate(record.processes)}
+    table |= {f"gamma_{name}": _cells(record.gammas[:, i], 6) for i, name in enumerate(record.processes)}
+    table |= {f"active_{name}": _cells(record.active[:, record.processes.index(name)]) for name in record.cognitive}
+    return table
+
+
+def write_brain(record: BrainRecord, folder: Path) -> list[Path]:
+    """brain.csv and switches.csv"""
+    table = brain_columns(record)
+    steps, switches = folder / "brain.csv", folder / "switches.csv"
+    with steps.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+    with switches.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("time_s", "off", "on", "reason"))
+        writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in record.switches)
+    return [steps, switches]
+
+
+def write_summary(result: RunResult, path: Path) -> Path:
+    """summary.json"""
+    summary: dict[str, Any] = {"format": FORMAT} | result.table() | {"counters": result.counters}
+    summary["watchdog_resets"] = [
+        asdict(reset) | {"time_s": round(reset.time_s - result.clock_offset, 6)} for reset in result.watchdog_resets
+    ]
+    path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def write_wire(result: RunResult, folder: Path) -> list[Path]:
+    """to_board.bin and to_host.bin; wire.csv tells when which of their bytes were sent or read (transport's clock)."""
+    rows: list[tuple[float, str, int, int]] = []
+    for name, chunks in (("to_board", result.sent), ("to_host", result.received)):
+        (folder / f"{name}.bin").write_bytes(b"".join(data for _, data in chunks))
+        first = 0
+        for stamp, data in chunks:
+            rows.append((stamp, name, first, len(data)))
+            first += len(data)
+    rows.sort(key=lambda row: row[0])
+    with (folder / "wire.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("time_s", "file", "first_byte", "bytes"))
+        writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
+    return [folder / "to_board.bin", folder / "to_host.bin", folder / "wire.csv"]
+
+
+def _cells(values: Any, digits: int | None = None) -> list[str]:
+    """Array to text: numbers with so many digits, flags as 0 and 1, not-a-number as nothing."""
+    if digits is None:
+        return [str(int(value)) for value in values.tolist()]
+    form = f"%.{digits}f"
+    return ["" if value != value else form % value for value in values.tolist()]

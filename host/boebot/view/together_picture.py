@@ -1,0 +1,76 @@
+"""run.png of several robots: the arena from above, each robot's path in its own colour, touches and contacts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.lines import Line2D
+
+from boebot.view import scene, style
+from boebot.view.arena_drawing import draw_arena, legend_entries
+from boebot.view.picture import draw_marks
+from boebot.view.robot_drawing import draw_robot
+from boebot.view.sheet import Sheet, counted
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.artist import Artist
+
+    from boebot.record.result import RunResult, TogetherResult
+
+Shown = tuple[int, "RunResult", scene.View]
+
+
+def write(result: TogetherResult, path: Path) -> Path:
+    """Draws all robots of a run into a PNG file."""
+    shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(result.robots, 1) if robot.ticks]
+    plan = shown[0][2].plan
+    low, high = scene.bounds(*(view for _, _, view in shown))
+    sheet = Sheet(low, high, _title(result), _caption(result), _legend(shown))
+    axes = sheet.axes
+    draw_arena(axes, plan)
+    for number, robot, view in shown:
+        colour = style.colour(number)
+        axes.plot(view.path.x, view.path.y, color=colour, lw=1.9, ls=style.dashes(number), zorder=7)
+        axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
+        draw_marks(axes, view)
+        draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
+        axes.annotate(
+            str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
+            zorder=13,
+        )  # fmt: skip
+    return sheet.save(path)
+
+
+def _title(result: TogetherResult) -> str:
+    first = result.robots[0]
+    return f"{len(result.robots)} robots on {first.board} in {first.table()['arena']}"
+
+
+def _caption(result: TogetherResult) -> list[str]:
+    parts = [
+        f"{max(robot.run_time for robot in result.robots):.1f} s",
+        f"{sum(robot.distance for robot in result.robots):.2f} m in all",
+        counted(sum(robot.contacts for robot in result.robots), "contact", "contacts"),
+    ]
+    if result.error is not None:
+        parts.append("ended early")
+    return parts
+
+
+def _legend(shown: list[Shown]) -> list[Artist]:
+    entries: list[Artist] = [
+        Line2D(
+            [], [], color=style.colour(n), lw=2.2, ls=style.dashes(n), label=f"{n}: {robot.brain}, {robot.robot.name}"
+        )
+        for n, robot, _ in shown
+    ]
+    entries.append(Line2D([], [], ls="", marker="o", mfc=style.PAPER, mec=style.INK, mew=1.6, ms=6, label="start"))
+    if any(len(view.touches) for _, _, view in shown):
+        entries.append(
+            Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
+        )
+    if any(len(view.contacts) for _, _, view in shown):
+        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="body contact"))
+    return entries + legend_entries(shown[0][2].plan)
