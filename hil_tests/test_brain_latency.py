@@ -41,7 +41,7 @@ def test_a_touch_is_seen_by_the_brain_within_two_ticks_and_its_period(board_url:
             touches.append(touched)
         elif number % TOUCH_EVERY == RELEASE_AFTER:
             session.board.drive(WHISKER_PIN, 1)  # type: ignore[attr-defined]
-        elif robot.left_whisker.pressed and len(delays) < len(touches):
+        elif robot.whisker_left.pressed and len(delays) < len(touches):
             delays.append(now - touches[-1])
         steps.append(now)
         robot.drive(0.1, 0.1)

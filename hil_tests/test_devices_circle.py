@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from boebot.description.robots import load_robot
-from boebot.devices.analog_infrared import AnalogInfraredReader
-from boebot.devices.compass import CompassReader
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.compass import MagneticCompass
 from boebot.link import messages
 from boebot.link.messages import CompassStatus
 from hil_tests.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
 from hil_tests.rig import CYCLES_PER_S, TICK_S
+from reading import read
 from sim_bridge import imperfections
 from sim_bridge.arena_description import Light
 
@@ -40,18 +41,18 @@ def sharp_volts(distance: float) -> float:
 
 def test_analog_infrared_follows_its_curve_before_a_wall(board_url: str) -> None:
     with circle(board_url, arena_of(wall_at(2.0))) as rig:
-        reader = AnalogInfraredReader(TICK_S)
+        sharp = SharpSensor(pin="A2", position_m=(0, 0), heading_rad=0)
         for distance in (0.10, 0.15, 0.25, 0.40, 0.60, 0.75):
             rig.place(2.0 - SHARP_X - distance, 0.3)
             told = rig.devices(after_s=0.15)
             assert abs(told.analog_infrared - sharp_volts(distance) / SUPPLY_V * 1024) <= 1.5
-            seen = reader(told)
+            seen = read(sharp, "analog_infrared", told)
             step_m = 0.01 * 33.9 / sharp_volts(distance) ** 2 * (SUPPLY_V / 1024)  # of the converter
             assert seen.valid and seen.distance is not None
             # half a per cent of the supply is what the bandgap resolves
             assert abs(seen.distance - distance) <= 1.5 * step_m + 0.006 * (distance + 0.0474)
         rig.place(0.0, 0.3)
-        nothing = reader(rig.devices(after_s=0.15))
+        nothing = read(sharp, "analog_infrared", rig.devices(after_s=0.15))
         assert nothing.distance is None and nothing.valid
 
 
@@ -181,9 +182,9 @@ def wrapped(angle: float) -> float:
 def test_compass_gives_the_heading_of_the_placed_robot(board_url: str) -> None:
     """1,090 counts a gauss: 0.19 G along the floor is a circle of 207 counts, half a count of it 0.0035 rad."""
     with circle(board_url, arena_of()) as rig:
-        reader = CompassReader(TICK_S)
+        compass = MagneticCompass(sda_pin="A4", scl_pin="A5")
         for heading, told in zip(HEADINGS, fields_over_a_turn(rig), strict=True):
-            reading = reader(told)
+            reading = read(compass, "compass", told)
             assert reading.valid and reading.heading is not None
             assert abs(wrapped(reading.heading - heading)) <= 0.0036
             assert abs(told.compass_z + 0.45 * 1090) <= 1
@@ -200,9 +201,10 @@ def test_a_turn_finds_the_compass_of_this_unit(board_url: str, seed: int) -> Non
         told = fields_over_a_turn(rig)
         centre = float(np.mean([t.compass_x for t in told])), float(np.mean([t.compass_y for t in told]))
         assert abs(math.hypot(*centre) - iron * counts) <= 3
-        reader = CompassReader(TICK_S, offset=centre)
+        compass = MagneticCompass(sda_pin="A4", scl_pin="A5", offset_counts=centre)
         errors = []
-        for heading, reading in zip(HEADINGS, map(reader, told), strict=True):
+        for heading, message in zip(HEADINGS, told, strict=True):
+            reading = read(compass, "compass", message)
             assert reading.heading is not None
             errors.append(wrapped(reading.heading - heading))
         assert abs(np.mean(errors) - bias) <= 0.006

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from boebot.description.robots import RobotDescription, Supply, load_robot
-from boebot.devices.battery import BatteryReader
+from boebot.devices.battery import BatteryDivider
 from boebot.link import messages
 from hil_tests.circle import CircleRig, arena_of, circle, robot_of
 from hil_tests.rig import CYCLES_PER_S, TICK_S
+from reading import read
 from sim_bridge import imperfections
 from sim_bridge.arena_description import Patch
 
@@ -71,10 +72,10 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
     robot = load_robot("boebot")
     pack, drag = supply_of(robot), drag_of(robot)
     with circle(board_url, arena_of()) as rig:
-        reader = BatteryReader(2.0, TICK_S)
+        battery = BatteryDivider(pin="A0")
         idle = pack.full_v - pack.resistance_ohm * imperfections.BOARD_A
         assert idle == pytest.approx(5.3)
-        told = reader(rig.devices(after_s=0.3))
+        told = read(battery, "battery", rig.devices(after_s=0.3))
         assert told.valid and told.voltage == pytest.approx(idle, abs=0.035)  # bandgap and converter resolve that
         volts = idle
         for _ in range(20):
@@ -84,7 +85,7 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
             volts = pack.full_v - pack.resistance_ohm * amperes
         assert volts == pytest.approx(4.6, abs=0.05), "what was measured on a robot"
         rig.drive_for(1.0, 1.0, 2.0)
-        told = reader(rig.devices())
+        told = read(battery, "battery", rig.devices())
         assert told.voltage == pytest.approx(volts, abs=0.035)
         assert rig.robot.body().speed == pytest.approx(speed, rel=0.005)
         assert abs(rig.latest().supply - 1000 * volts) <= 25, "the board's rail is the pack"

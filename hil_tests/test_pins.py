@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from boebot import resources
-from boebot.description.robots import ContinuousServo, Uart, load_robot
+from boebot.description.robots import load_robot
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.uart import Uart
 from boebot.link import messages
 from hil_tests.bootloader import with_bootloader
 from hil_tests.minimal_host import CYCLES_PER_S, MinimalHost, power_on

@@ -11,6 +11,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from boebot.description import robots
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.infrared import InfraredPair
+from boebot.devices.light import LightSensor
+from boebot.devices.ping import PingSensor
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.turret import PositionServo
+from boebot.devices.whisker import WhiskerSwitch
 from sim_bridge import switches
 from sim_bridge._core import ffi, lib
 
@@ -156,7 +163,7 @@ def body_parameters(body: robots.Body, draw: Draw = AS_BUILT, outline: Any = ffi
     )
 
 
-def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int, draw: Draw) -> Any:
+def servo_parameters(servo: ContinuousServo, body: robots.Body, side: int, draw: Draw) -> Any:
     """The servo of `side` (0 left, 1 right) in C."""
     unit = 1.0 + draw["SERVO_TOP_SPREAD"] * draw(1 + side, 0)
     lean = 0.5 * draw["SERVO_ASYMMETRY"] * draw(1 + side, 1)
@@ -183,14 +190,14 @@ def servo_parameters(servo: robots.ContinuousServo, body: robots.Body, side: int
     )
 
 
-def whisker_parameters(whisker: robots.Whisker, draw: Draw = AS_BUILT) -> Any:
+def whisker_parameters(whisker: WhiskerSwitch, draw: Draw = AS_BUILT) -> Any:
     """The whisker in C."""
     return ffi.new(
         "whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_HEIGHT_M, draw["WHISKER_BOUNCE_S"]]
     )
 
 
-def infrared_parameters(pair: robots.InfraredPair, draw: Draw = AS_BUILT) -> Any:
+def infrared_parameters(pair: InfraredPair, draw: Draw = AS_BUILT) -> Any:
     """The IR pair in C."""
     return ffi.new(
         "infrared_pair_parameters *",
@@ -204,7 +211,7 @@ def infrared_parameters(pair: robots.InfraredPair, draw: Draw = AS_BUILT) -> Any
     )
 
 
-def ping_parameters(ping: robots.Ping, draw: Draw = AS_BUILT) -> Any:
+def ping_parameters(ping: PingSensor, draw: Draw = AS_BUILT) -> Any:
     """The Ping))) in C."""
     return ffi.new(
         "sonar_parameters *",
@@ -267,7 +274,7 @@ def encoder_parameters(edges_per_turn: int, draw: Draw = AS_BUILT) -> Any:
     )
 
 
-def analog_infrared_parameters(sharp: robots.AnalogInfrared, draw: Draw) -> Any:
+def analog_infrared_parameters(sharp: SharpSensor, draw: Draw) -> Any:
     """The Sharp sensor in C."""
     return ffi.new(
         "sharp_infrared_parameters *",
@@ -282,7 +289,7 @@ def analog_infrared_parameters(sharp: robots.AnalogInfrared, draw: Draw) -> Any:
     )
 
 
-def light_parameters(light: robots.LightSensor, side: int, draw: Draw) -> Any:
+def light_parameters(light: LightSensor, side: int, draw: Draw) -> Any:
     """The phototransistor of `side` (0 left, 1 right) in C."""
     x, y = light.position_m
     return ffi.new(
@@ -326,7 +333,7 @@ def compass_parameters(draw: Draw) -> Any:
     )
 
 
-def turret_parameters(turret: robots.PositionServo, draw: Draw) -> Any:
+def turret_parameters(turret: PositionServo, draw: Draw) -> Any:
     """The turret's servo in C: the notes' standard servo, with this unit's offset."""
     out = ffi.new("motor_position_parameters *")
     lib.motor_position_default(out)

@@ -14,7 +14,17 @@ from typing import Any, Final
 import msgspec
 
 from boebot.description import robots
-from boebot.devices import vehicle_devices
+from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.battery import Energy
+from boebot.devices.compass import HeadingCompass
+from boebot.devices.device import Device
+from boebot.devices.infrared import InfraredProximity
+from boebot.devices.laser import Laser
+from boebot.devices.light import Phototransistor
+from boebot.devices.motor import DcMotor, Motor, RegulatedMotor
+from boebot.devices.odometer import Odometer
+from boebot.devices.ping import Sonar
+from boebot.devices.whisker import TouchWhisker
 from boebot.errors import RobotError
 from sim_bridge import imperfections
 from sim_bridge.arguments import shown
@@ -55,7 +65,7 @@ def vehicle_model(
     model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
     _drive(model, described)
     for name, device in described.device.items():
-        if device.on and not isinstance(device, vehicle_devices.Motor):
+        if device.on and not isinstance(device, Motor):
             _add(model, name, device)
     return model
 
@@ -83,9 +93,9 @@ def _body(body: robots.Body) -> dict[str, Any]:
 
 def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
     match tuple(robot.device[f"motor_{side}"] for side in SIDES):
-        case (vehicle_devices.DcMotor() as left, vehicle_devices.DcMotor() as right):
+        case (DcMotor() as left, DcMotor() as right):
             model.dc_motors(_dc(left), _dc(right), full=left.full or right.full)
-        case (vehicle_devices.RegulatedMotor() as left, vehicle_devices.RegulatedMotor() as right):
+        case (RegulatedMotor() as left, RegulatedMotor() as right):
             most = robot.body.wheel_speed_maximum_m_s
             model.regulated_motors(_regulated(left, most), _regulated(right, most))
         case motors:
@@ -93,7 +103,7 @@ def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
             raise RobotError(f"robot {robot.name!r}: motors of types {kinds}; expected two of one type")
 
 
-def _dc(motor: vehicle_devices.DcMotor) -> dict[str, float]:
+def _dc(motor: DcMotor) -> dict[str, float]:
     return {
         "torque_constant": motor.torque_constant_n_m_a,
         "emf_constant": motor.emf_constant_v_s,
@@ -108,7 +118,7 @@ def _dc(motor: vehicle_devices.DcMotor) -> dict[str, float]:
     }
 
 
-def _regulated(motor: vehicle_devices.RegulatedMotor, most: float) -> dict[str, float]:
+def _regulated(motor: RegulatedMotor, most: float) -> dict[str, float]:
     return {
         "gain_n_s": motor.gain_n_s,
         "torque_maximum_n_m": motor.torque_maximum_n_m,
@@ -116,14 +126,14 @@ def _regulated(motor: vehicle_devices.RegulatedMotor, most: float) -> dict[str, 
     }
 
 
-def _look(device: vehicle_devices.InfraredProximity | vehicle_devices.Sonar) -> dict[str, float]:
+def _look(device: InfraredProximity | Sonar) -> dict[str, float]:
     return beam(*device.position_m, device.heading_rad, device.beam_rad, device.rays, device.height_m)
 
 
-def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
+def _add(model: VehicleModel, name: str, device: Device) -> None:
     """Adds a sensor or a battery."""
     match device:
-        case vehicle_devices.InfraredProximity():
+        case InfraredProximity():
             model.infrared_proximity(
                 name,
                 period=device.period_s,
@@ -133,7 +143,7 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 c2=device.c2,
                 sigma=device.sigma,
             )
-        case vehicle_devices.Sonar():
+        case Sonar():
             model.sonar(
                 name,
                 period=device.period_s,
@@ -143,7 +153,7 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 sigma=device.sigma,
                 miss=device.miss,
             )
-        case vehicle_devices.Laser():
+        case Laser():
             x, y = device.position_m
             model.laser(
                 name,
@@ -158,16 +168,16 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 range=device.range_m,
                 sigma=device.sigma,
             )
-        case vehicle_devices.Odometer():
+        case Odometer():
             model.odometer(
                 name,
                 sigma_step=device.sigma_step_m,
                 factor_left=device.factor_left,
                 factor_right=device.factor_right,
             )
-        case vehicle_devices.HeadingCompass():
+        case HeadingCompass():
             model.compass(name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
-        case vehicle_devices.Accelerometer():
+        case Accelerometer():
             model.accelerometer(
                 name,
                 period=device.period_s,
@@ -178,7 +188,7 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 sigma=device.sigma_m_s2,
                 bias=device.bias_m_s2,
             )
-        case vehicle_devices.Phototransistor():
+        case Phototransistor():
             x, y = device.position_m
             model.light(
                 name,
@@ -191,9 +201,9 @@ def _add(model: VehicleModel, name: str, device: robots.Device) -> None:
                 ambient=device.ambient,
                 sigma=device.sigma,
             )
-        case vehicle_devices.TouchWhisker():
+        case TouchWhisker():
             model.whisker(name, device.root_m, device.tip_m)
-        case vehicle_devices.Energy():
+        case Energy():
             model.battery(
                 name,
                 empty=device.empty_v,
@@ -242,7 +252,7 @@ def arsim(
         RobotError: a number outside its range.
     """
     device = dict(ARSIM.device)
-    sensors = {name: kind for name, kind in device.items() if isinstance(kind, vehicle_devices.InfraredProximity)}
+    sensors = {name: kind for name, kind in device.items() if isinstance(kind, InfraredProximity)}
     if infrared_rad is not None:
         sensors = _turned(next(iter(sensors.values())), infrared_rad)
     if rays is not None:
@@ -251,7 +261,7 @@ def arsim(
         device["odometer"] = msgspec.structs.replace(device["odometer"], sigma_step_m=odometer_sigma)
     if compass_sigma is not None:
         device["compass"] = msgspec.structs.replace(device["compass"], sigma_rad=compass_sigma)
-    others = {name: kind for name, kind in device.items() if not isinstance(kind, vehicle_devices.InfraredProximity)}
+    others = {name: kind for name, kind in device.items() if not isinstance(kind, InfraredProximity)}
     robot = msgspec.structs.replace(ARSIM, device=sensors | others)
     return vehicle_model(robot, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
 

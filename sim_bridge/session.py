@@ -13,6 +13,7 @@ from pathlib import Path
 
 from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession, WatchdogReset
 from boebot.description import robots
+from boebot.devices.uart import Uart
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets
@@ -185,4 +186,4 @@ open_avr = BoardKind("avr", avr_image, avr_board)
 def _baud(robot: robots.RobotDescription) -> int:
     """Of the robot's serial line."""
     uart = robot.device.get("uart")
-    return uart.baud if isinstance(uart, robots.Uart) else DEFAULT_BAUD
+    return uart.baud if isinstance(uart, Uart) else DEFAULT_BAUD

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from boebot.description import robots
-from boebot.devices import vehicle_devices
+from boebot.devices.device import VehicleDevice
 from boebot.errors import BoardError
 
 
@@ -135,7 +135,7 @@ def _keys(values: Mapping[str, float], owner: str) -> dict[str, float]:
 
 
 def _device(device: Any, values: Mapping[str, float]) -> Any:
-    if not isinstance(device, vehicle_devices.VehicleDevice):
+    if not isinstance(device, VehicleDevice):
         return device
     changes: dict[str, float] = {}
     for kind in type(device).__mro__:

@@ -5,6 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from boebot.description import robots
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.battery import BatteryDivider
+from boebot.devices.buzzer import PiezoBuzzer
+from boebot.devices.compass import MagneticCompass
+from boebot.devices.device import Device, pin_number
+from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
+from boebot.devices.infrared import InfraredPair
+from boebot.devices.light import LightSensor
+from boebot.devices.ping import PingSensor
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.turret import PositionServo
+from boebot.devices.whisker import WhiskerSwitch
 from boebot.errors import BoardError
 from sim_bridge import imperfections
 from sim_bridge._core import lib
@@ -28,7 +40,7 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
             _join_drive(handle, number, name, device, description.body, draw)
             _join_sensor(handle, number, name, device, draw)
     for device in description.device.values():
-        if isinstance(device, robots.PositionServo) and device.on:
+        if isinstance(device, PositionServo) and device.on:
             _mount(handle, number, device, description)
     for name, device in description.device.items():
         if device.on and not device.plugged:
@@ -55,14 +67,14 @@ def done(status: int, what: str) -> None:
 
 
 def _pin(pin: int | str) -> int:
-    return robots.pin_number(pin)
+    return pin_number(pin)
 
 
 def _join_supply(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
     """The pack, and where the board measures it."""
     if description.supply is None:
         return
-    gauges = [d for d in description.device.values() if isinstance(d, robots.Battery) and d.on]
+    gauges = [d for d in description.device.values() if isinstance(d, BatteryDivider) and d.on]
     channel = _pin(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
     ratio = gauges[0].ratio if gauges else 2.0
     battery = imperfections.battery_parameters(description.supply, ratio, draw)
@@ -74,52 +86,52 @@ def _side(name: str) -> int:
 
 
 def _join_drive(
-    handle: Any, number: int, name: str, device: robots.Device, body: robots.Body, draw: imperfections.Draw
+    handle: Any, number: int, name: str, device: Device, body: robots.Body, draw: imperfections.Draw
 ) -> None:
     side, what = _side(name), f"device {name!r}"
     match device:
-        case robots.ContinuousServo():
+        case ContinuousServo():
             servo = imperfections.servo_parameters(device, body, side, draw)
             done(lib.sim_add_servo(handle, number, side, _pin(device.pin), servo), what)
-        case robots.Encoder():
+        case SingleEncoder():
             encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
             done(lib.sim_add_encoder(handle, number, side, _pin(device.pin), NO_PIN, encoder), what)
-        case robots.QuadratureEncoder():
+        case QuadratureEncoder():
             encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
             done(lib.sim_add_encoder(handle, number, side, _pin(device.pin_a), _pin(device.pin_b), encoder), what)
-        case robots.PositionServo():
+        case PositionServo():
             x, y = device.position_m
             turret = imperfections.turret_parameters(device, draw)
             done(lib.sim_add_turret(handle, number, _pin(device.pin), x, y, turret), what)
-        case robots.Buzzer():
+        case PiezoBuzzer():
             done(lib.sim_add_buzzer(handle, number, _pin(device.pin)), what)
 
 
-def _join_sensor(handle: Any, number: int, name: str, device: robots.Device, draw: imperfections.Draw) -> None:
+def _join_sensor(handle: Any, number: int, name: str, device: Device, draw: imperfections.Draw) -> None:
     what = f"device {name!r}"
     match device:
-        case robots.Whisker():
+        case WhiskerSwitch():
             whisker = imperfections.whisker_parameters(device, draw)
             done(lib.sim_add_whisker(handle, number, _pin(device.pin), whisker), what)
-        case robots.InfraredPair():
+        case InfraredPair():
             pair = imperfections.infrared_parameters(device, draw)
             done(lib.sim_add_infrared(handle, number, _pin(device.led_pin), _pin(device.receiver_pin), pair), what)
-        case robots.Ping():
+        case PingSensor():
             ping = imperfections.ping_parameters(device, draw)
             done(lib.sim_add_ping(handle, number, _pin(device.pin), ping), what)
-        case robots.AnalogInfrared():
+        case SharpSensor():
             sharp = imperfections.analog_infrared_parameters(device, draw)
             done(lib.sim_add_analog_infrared(handle, number, _pin(device.pin) - FIRST_ANALOG_PIN, sharp), what)
-        case robots.LightSensor():
+        case LightSensor():
             light = imperfections.light_parameters(device, _side(name), draw)
             done(lib.sim_add_light_sensor(handle, number, _pin(device.pin), light), what)
-        case robots.Compass():
+        case MagneticCompass():
             compass = imperfections.compass_parameters(draw)
             done(lib.sim_add_compass(handle, number, _pin(device.sda_pin), _pin(device.scl_pin), compass), what)
 
 
-def _mount(handle: Any, number: int, turret: robots.PositionServo, description: robots.RobotDescription) -> None:
+def _mount(handle: Any, number: int, turret: PositionServo, description: robots.RobotDescription) -> None:
     """The Ping sits on the turret where there are both."""
     for device in description.device.values():
-        if isinstance(device, robots.Ping) and device.on:
+        if isinstance(device, PingSensor) and device.on:
             done(lib.sim_mount(handle, number, _pin(turret.pin), _pin(device.pin)), "the Ping on the turret")

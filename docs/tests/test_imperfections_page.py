@@ -11,7 +11,7 @@ import pytest
 
 import boebot
 from boebot.description.robots import load_robot
-from boebot.devices import vehicle_devices
+from boebot.devices.device import Sensor, VehicleDevice, kinds
 from sim_bridge import imperfections
 from sim_bridge.switches import SWITCHES
 
@@ -37,13 +37,16 @@ def rows() -> list[Row]:
     return found
 
 
+KINDS = {kind.__name__: kind for kind in (Sensor, *kinds())}
+
+
 def value(name: str) -> tuple[float, ...]:
     """Of a parameter in the code, as a tuple."""
     if name.startswith("supply."):
         return (float(getattr(load_robot("shieldbot").supply, name.removeprefix("supply."))),)
     if "." in name:
         struct, key = name.split(".")
-        fields = {field.name: field.default for field in msgspec.structs.fields(getattr(vehicle_devices, struct))}
+        fields = {field.name: field.default for field in msgspec.structs.fields(KINDS[struct])}
         return (float(fields[key]),)
     if hasattr(imperfections, name):
         found = getattr(imperfections, name)
@@ -69,8 +72,8 @@ def test_every_parameter_has_one_row() -> None:
     }
     noisy = {
         f"{struct.__name__}.{field.name}"
-        for struct in vars(vehicle_devices).values()
-        if isinstance(struct, type) and issubclass(struct, vehicle_devices.VehicleDevice)
+        for struct in KINDS.values()
+        if issubclass(struct, VehicleDevice)
         for field in msgspec.structs.fields(struct)
         if re.match("sigma|miss|bias", field.name)
     }

@@ -2,7 +2,7 @@
 the friendly face of both.
 
     def step(robot):
-        if robot.left_whisker.pressed:
+        if robot.whisker_left.pressed:
             robot.drive(-0.5, -0.2)
         else:
             robot.drive(0.5, 0.5)
@@ -14,24 +14,14 @@ way to the simulated world, to the board or to the link.
 from __future__ import annotations
 
 import random
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from boebot.devices import buzzer, turret
-from boebot.devices.analog_infrared import AnalogInfrared
-from boebot.devices.battery import Battery
-from boebot.devices.buzzer import Buzzer
-from boebot.devices.compass import Compass
-from boebot.devices.encoder import Encoder
+from boebot.devices.attributes import Attributes
 from boebot.devices.equipment import Dimensions
 from boebot.devices.equipment import Equipment as Equipment
-from boebot.devices.infrared import Infrared, InfraredZone
-from boebot.devices.light import Light
-from boebot.devices.ping import Ping
-from boebot.devices.readings import Heading, OdometerPose, Proximity, Reading, Readings, Scan
-from boebot.devices.servo import Servo
-from boebot.devices.told import NOTHING_TOLD, Told
-from boebot.devices.turret import Turret
-from boebot.devices.whisker import Whisker
+from boebot.devices.latest import NO_MESSAGES, Latest
+from boebot.devices.readings import Readings
 from boebot.errors import BrainError
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import Status, Telemetry
@@ -65,13 +55,7 @@ class SlowCommand(NamedTuple):
 NO_SLOW_COMMAND: Final = SlowCommand()
 
 
-class Observation(NamedTuple):
-    """What the robot's sensors said at one tick. It never changes; values are computed when they are looked
-    at.
-
-    Each device is a small view with its values in SI units, their `age` (s) and whether they are `valid`.
-    """
-
+class _Fields(NamedTuple):
     sample: Telemetry | Readings
     """What the devices said: a board's telemetry, or the readings of a robot without one."""
     equipment: Equipment
@@ -84,8 +68,18 @@ class Observation(NamedTuple):
     host_time_error: float = float("inf")
     """Error bound of `host_time` (s): the true instant lies within it, whatever the line's delays are, as long as the
     board's clock keeps its rate."""
-    slow: Told | Readings = NOTHING_TOLD
-    """What the slow devices said last; of a robot without a board the same as `sample`."""
+    slow: Latest | Readings = NO_MESSAGES
+    """The newest messages of the slow devices; of a robot without a board the same as `sample`."""
+
+
+class Observation(_Fields, Attributes):
+    """What the robot's sensors said at one tick. It never changes; values are computed when they are looked at.
+
+    Each device is an attribute by its name: a reading with its values in SI units, their `age` (s) and whether they are
+    `valid`.
+    """
+
+    __slots__ = ()
 
     @property
     def tick(self) -> int:
@@ -97,113 +91,16 @@ class Observation(NamedTuple):
         """State and faults of the board."""
         return Status(self.sample.status)
 
-    @property
-    def left_whisker(self) -> Whisker:
-        """Left whisker: `.pressed`."""
-        return self.equipment.left_whisker(self.sample)
+    if not TYPE_CHECKING:  # who knows the names of devices by boebot.devices.attributes
 
-    @property
-    def right_whisker(self) -> Whisker:
-        """Right whisker: `.pressed`."""
-        return self.equipment.right_whisker(self.sample)
-
-    @property
-    def left_ir(self) -> Infrared | Proximity:
-        """Left infra-red sensor: `.detected`; an analog one also says `.reading`."""
-        return self.equipment.left_ir(self.sample)
-
-    @property
-    def right_ir(self) -> Infrared | Proximity:
-        """Right infra-red sensor: `.detected`; an analog one also says `.reading`."""
-        return self.equipment.right_ir(self.sample)
-
-    @property
-    def ping(self) -> Ping:
-        """Ultrasonic range finder: `.distance` in metres, or None."""
-        return self.equipment.ping(self.sample)
-
-    @property
-    def left_encoder(self) -> Encoder:
-        """Left wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.equipment.left_encoder(self.sample)
-
-    @property
-    def right_encoder(self) -> Encoder:
-        """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        return self.equipment.right_encoder(self.sample)
-
-    @property
-    def left_servo(self) -> Servo:
-        """Left wheel's servo as driven now: `.pulse_us`, `.signal`."""
-        return self.equipment.left_servo(self.sample)
-
-    @property
-    def right_servo(self) -> Servo:
-        """Right wheel's servo as driven now: `.pulse_us`, `.signal`."""
-        return self.equipment.right_servo(self.sample)
-
-    @property
-    def odometer(self) -> OdometerPose:
-        """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
-        return self.equipment.odometer(self.sample)
-
-    @property
-    def laser(self) -> Scan:
-        """Laser range finder: `.distances` (m, -1: nothing), `.angles` (rad)."""
-        return self.equipment.laser(self.sample)
-
-    @property
-    def accelerometer(self) -> Reading:
-        """Acceleration along the heading: `.value` (m/s^2)."""
-        return self.equipment.accelerometer(self.sample)
-
-    @property
-    def left_light(self) -> Light:
-        """Left light sensor: `.brightness`, twice as much in twice the light; or None."""
-        return self.equipment.left_light(self.slow)
-
-    @property
-    def right_light(self) -> Light:
-        """Right light sensor: `.brightness`, twice as much in twice the light; or None."""
-        return self.equipment.right_light(self.slow)
-
-    @property
-    def compass(self) -> Compass | Heading:
-        """Compass: `.heading` (rad), or None."""
-        return self.equipment.compass(self.slow)
-
-    @property
-    def battery(self) -> Battery:
-        """Battery: `.voltage` (V), or None."""
-        return self.equipment.battery(self.slow)
-
-    @property
-    def analog_ir(self) -> AnalogInfrared:
-        """Analog infra-red sensor: `.distance` in metres, or None."""
-        return self.equipment.analog_ir(self.slow)
-
-    @property
-    def left_zone(self) -> InfraredZone:
-        """Left infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
-        return self.equipment.left_zone(self.slow)
-
-    @property
-    def right_zone(self) -> InfraredZone:
-        """Right infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
-        return self.equipment.right_zone(self.slow)
-
-    @property
-    def turret(self) -> Turret:
-        """Turret as driven now: `.angle` (rad, counter-clockwise from ahead), or None: free."""
-        return self.equipment.turret(self.slow)
-
-    @property
-    def buzzer(self) -> Buzzer:
-        """Buzzer: `.token` of the last tone that the board began."""
-        return self.equipment.buzzer(self.slow)
+        def __getattr__(self, name):
+            reader = self.equipment.readers.get(name)
+            if reader is None:
+                raise self.equipment.no_device(name)
+            return reader(self.sample, self.slow)
 
 
-class Robot:
+class Robot(Attributes):
     """The robot as a brain meets it: sensors to read, motors to drive, a clock and a seeded source of chance.
 
     The same object is handed to every step of a run; its sensors always show the newest observation.
@@ -256,122 +153,19 @@ class Robot:
 
     # ---- sensors -------------------------------------------------------------------------------------------
 
-    @property
-    def left_whisker(self) -> Whisker:
-        """Left whisker: `.pressed`."""
-        seen = self.observation
-        return seen.equipment.left_whisker(seen.sample)
+    if not TYPE_CHECKING:
 
-    @property
-    def right_whisker(self) -> Whisker:
-        """Right whisker: `.pressed`."""
-        seen = self.observation
-        return seen.equipment.right_whisker(seen.sample)
-
-    @property
-    def left_ir(self) -> Infrared | Proximity:
-        """Left infra-red sensor: `.detected`; an analog one also says `.reading`."""
-        seen = self.observation
-        return seen.equipment.left_ir(seen.sample)
-
-    @property
-    def right_ir(self) -> Infrared | Proximity:
-        """Right infra-red sensor: `.detected`; an analog one also says `.reading`."""
-        seen = self.observation
-        return seen.equipment.right_ir(seen.sample)
-
-    @property
-    def ping(self) -> Ping:
-        """Ultrasonic range finder: `.distance` in metres, or None."""
-        seen = self.observation
-        return seen.equipment.ping(seen.sample)
-
-    @property
-    def left_encoder(self) -> Encoder:
-        """Left wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        seen = self.observation
-        return seen.equipment.left_encoder(seen.sample)
-
-    @property
-    def right_encoder(self) -> Encoder:
-        """Right wheel's encoder: `.count`, `.distance` (m), `.speed` (m/s)."""
-        seen = self.observation
-        return seen.equipment.right_encoder(seen.sample)
-
-    @property
-    def odometer(self) -> OdometerPose:
-        """Pose by odometry: `.x`, `.y` (m), `.heading` (rad)."""
-        seen = self.observation
-        return seen.equipment.odometer(seen.sample)
-
-    @property
-    def laser(self) -> Scan:
-        """Laser range finder: `.distances` (m, -1: nothing), `.angles` (rad)."""
-        seen = self.observation
-        return seen.equipment.laser(seen.sample)
-
-    @property
-    def accelerometer(self) -> Reading:
-        """Acceleration along the heading: `.value` (m/s^2)."""
-        seen = self.observation
-        return seen.equipment.accelerometer(seen.sample)
-
-    @property
-    def left_light(self) -> Light:
-        """Left light sensor: `.brightness`, twice as much in twice the light; or None."""
-        seen = self.observation
-        return seen.equipment.left_light(seen.slow)
-
-    @property
-    def right_light(self) -> Light:
-        """Right light sensor: `.brightness`, twice as much in twice the light; or None."""
-        seen = self.observation
-        return seen.equipment.right_light(seen.slow)
-
-    @property
-    def compass(self) -> Compass | Heading:
-        """Compass: `.heading` (rad), or None."""
-        seen = self.observation
-        return seen.equipment.compass(seen.slow)
-
-    @property
-    def battery(self) -> Battery:
-        """Battery: `.voltage` (V), or None."""
-        seen = self.observation
-        return seen.equipment.battery(seen.slow)
-
-    @property
-    def analog_ir(self) -> AnalogInfrared:
-        """Analog infra-red sensor: `.distance` in metres, or None."""
-        seen = self.observation
-        return seen.equipment.analog_ir(seen.slow)
-
-    @property
-    def left_zone(self) -> InfraredZone:
-        """Left infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
-        seen = self.observation
-        return seen.equipment.left_zone(seen.slow)
-
-    @property
-    def right_zone(self) -> InfraredZone:
-        """Right infra-red pair's zone: `.zone`, 0 nothing to 5 nearest."""
-        seen = self.observation
-        return seen.equipment.right_zone(seen.slow)
-
-    @property
-    def turret(self) -> Turret:
-        """Turret as driven now: `.angle` (rad, counter-clockwise from ahead), or None: free."""
-        seen = self.observation
-        return seen.equipment.turret(seen.slow)
-
-    @property
-    def buzzer(self) -> Buzzer:
-        """Buzzer: `.token` of the last tone that the board began."""
-        seen = self.observation
-        return seen.equipment.buzzer(seen.slow)
+        def __getattr__(self, name):
+            if name == "observation":
+                raise AttributeError("the robot has not been observed yet")
+            seen = self.observation
+            reader = seen.equipment.readers.get(name)
+            if reader is None:
+                raise seen.equipment.no_device(name)
+            return reader(seen.sample, seen.slow)
 
     def has(self, name: str) -> bool:
-        """Whether the robot has that device ("ping", "left_ir"), or all of that group ("whiskers", "infrared")."""
+        """Whether the robot has that device ("ping"), or all of that group ("whiskers", "infrared")."""
         return self.observation.equipment.has(name)
 
     @property

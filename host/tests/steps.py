@@ -6,9 +6,10 @@ import msgspec
 
 from boebot.brain import Brain, MotorBehavior, Process
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.battery import Energy
+from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
+from boebot.devices.light import Phototransistor
 from boebot.devices.readings import Readings
-from boebot.devices.told import NOTHING_TOLD
-from boebot.devices.vehicle_devices import Energy, Phototransistor
 from boebot.link import messages
 from boebot.robot import Command, Equipment, Observation, Robot
 
@@ -60,11 +61,12 @@ class Stepped:
         """What the sensors say from now on: fields of telemetry, and of the slow devices'."""
         slow = {name: value for name, value in fields.items() if name in SLOW}
         fast = {name: value for name, value in fields.items() if name not in SLOW}
-        told = NOTHING_TOLD
+        latest = NO_MESSAGES
         if slow:
-            told = NOTHING_TOLD._replace(devices=NOTHING_TOLD.devices._replace(supply=5000, **slow), since=0)
+            kind = messages.DevicesTelemetry
+            latest = Latest({kind: without_readings(kind)._replace(supply=5000, tick=self.steps, **slow)}, self.steps)
         sample = NOTHING._replace(tick=self.steps, **fast)
-        self.robot.observation = Observation(sample, self._equipment, time=self.time, slow=told)
+        self.robot.observation = Observation(sample, self._equipment, time=self.time, slow=latest)
 
     @property
     def time(self) -> float:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import pytest
-from steps import SteppedVehicle
 
 from boebot.behaviors import Avoid, Stop
 from boebot.brain import Brain, StateVariable, Utility
 from boebot.cognition import near
 from boebot.errors import BrainError
 from boebot.robot import Command
+from steps import SteppedVehicle
 
 
 def signals(left: float, right: float) -> Command:

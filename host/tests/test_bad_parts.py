@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from steps import Stepped, alone
 
 from boebot.behaviors import (
     ChargeBattery,
@@ -29,6 +28,7 @@ from boebot.brain import Brain, CognitiveProcess, FixedActionPattern, MotorBehav
 from boebot.cognition import Drift, LightSense, Odometry, StuckDetector, near
 from boebot.errors import BrainError
 from boebot.robot import Robot
+from steps import Stepped, alone
 
 
 def variable(name: str, of_time: Callable[[float], float | None]) -> StateVariable:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from steps import FULL, Stepped, SteppedVehicle, alone
 
 from boebot.behaviors import (
     ChargeBattery,
@@ -32,6 +31,7 @@ from boebot.behaviors.withdraw import ReflexIntensity
 from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, Odometry
 from boebot.robot import Command
+from steps import FULL, Stepped, SteppedVehicle, alone
 
 REST = Utility(b=-0.5)  # below whatever is called
 

@@ -13,7 +13,6 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from steps import Stepped, alone
 
 from boebot.brain import (
     Brain,
@@ -31,6 +30,7 @@ from boebot.brain import (
 from boebot.brain.utility import Utilities
 from boebot.errors import BrainError
 from boebot.robot import Robot
+from steps import Stepped, alone
 
 numbers = st.floats(-10, 10)
 
@@ -365,7 +365,7 @@ def test_e34_a_fixed_action_pattern_runs_to_its_end_without_its_stimulus() -> No
     escape = FixedActionPattern(
         name="escape",
         actions=[(-0.5, -0.5, 0.4), (-0.7, 0.7, 0.6), (0.5, 0.5, 0.3)],
-        releaser=lambda robot: robot.left_whisker.pressed,
+        releaser=lambda robot: robot.whisker_left.pressed,
         refractory=1.0,
     )
     brain, stepped = Brain([Drive(signal=0.2, utility=Utility(b=0.5)), escape]), Stepped(0.05)

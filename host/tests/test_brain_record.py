@@ -11,7 +11,6 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-from steps import Stepped
 
 import boebot
 from boebot.brain import Brain, BrainStep, CognitiveProcess, MotorBehavior, StateVariable, Switch, Utility
@@ -20,6 +19,7 @@ from boebot.record.brain_record import BrainRecord
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.view import style, utility_panel
+from steps import Stepped
 
 PULSE = (2.0, 4.0)  # s; when z is 1
 

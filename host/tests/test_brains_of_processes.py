@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steps import Stepped
 
 import boebot
 from boebot import cli
@@ -27,6 +26,7 @@ from boebot.errors import BoebotError, BrainError
 from boebot.link import messages
 from boebot.record.result import RunResult
 from boebot.robot import Robot
+from steps import Stepped
 
 COMPOSED = """
 from boebot.behaviors import Avoid, Wander
@@ -211,7 +211,7 @@ def test_brain_that_needs_what_the_robot_lacks_is_refused_by_name(tmp_path: Path
                        "brain = Brain([Withdraw()])\n")  # fmt: skip
     elif kind == "toml":
         source = write(tmp_path, "[process.wander]\n[process.contact]\n", "mine.toml")
-    device = "compass and laser" if kind == "object" else "left_whisker and right_whisker"
+    device = "compass and laser" if kind == "object" else "whisker_left and whisker_right"
     robot = "shieldbot-basic" if kind == "object" else write(
         tmp_path, 'name = "bald"\nextends = "shieldbot"\nremove = ["whisker_left", "whisker_right"]\n', "bald.toml"
     )  # fmt: skip
@@ -274,7 +274,9 @@ def test_error_in_a_file_beside_the_brain_has_its_place_there(tmp_path: Path) ->
     write(tmp_path, "from boebot.brain import MotorBehavior\nclass Odd(MotorBehavior):\n    def step(self, robot):\n"
           "        robot.fly()\n", "odd_behavior.py")  # fmt: skip
     path = write(tmp_path, "from boebot.brain import Brain\nfrom odd_behavior import Odd\nbrain = Brain([Odd()])\n")
-    with pytest.raises(BrainError, match=r"odd_behavior\.py, line 4: process 'odd': AttributeError"):
+    with pytest.raises(
+        BrainError, match=r"odd_behavior\.py, line 4: process 'odd': robot 'arsim' has no attribute 'fly'"
+    ):
         boebot.run(path, robot="arsim", seconds=1)
 
 

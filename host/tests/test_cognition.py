@@ -8,7 +8,6 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steps import FULL, QUAD, Stepped, SteppedVehicle, alone
 
 from boebot.behaviors import Stop
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior
@@ -29,6 +28,7 @@ from boebot.cognition import (
 )
 from boebot.errors import BrainError
 from boebot.link.messages import CompassStatus, PingStatus
+from steps import FULL, QUAD, Stepped, SteppedVehicle, alone
 
 RADIUS = QUAD.body.wheel_radius_m
 TRACK = QUAD.body.track_width_m
@@ -51,7 +51,7 @@ class Driven(MotorBehavior):
 def test_midpoint_rule_comes_to_the_exact_arc_with_the_square_of_the_step() -> None:
     """A circle's arc: x = R sin φ, y = R (1 - cos φ). The rule's chord is the step s, not 2 (s/φ) sin(φ/2): its
     error is φ²/24 of the way, φ the angle of a step."""
-    edges_per_turn = QUAD.device["encoder_left"].edges_per_turn  # type: ignore[union-attr]
+    edges_per_turn = QUAD.device["encoder_left"].edges_per_turn  # type: ignore[attr-defined]
     edge = 2 * math.pi * RADIUS / edges_per_turn
     for left, right in ((20, 40), (40, 20), (-20, 40), (-30, -10)):
         odometry, stepped = Odometry(use="encoders"), Stepped(description=QUAD)
@@ -100,7 +100,7 @@ def test_encoder_counters_may_roll_over(start: int, moves: list[int]) -> None:
     for move in moves:
         count = (count + move + 2**31) % 2**32 - 2**31
         stepped.step(brain, encoder_left=count, encoder_right=count)
-    edge = 2 * math.pi * RADIUS / QUAD.device["encoder_left"].edges_per_turn  # type: ignore[union-attr]
+    edge = 2 * math.pi * RADIUS / QUAD.device["encoder_left"].edges_per_turn  # type: ignore[attr-defined]
     assert odometry.pose == pytest.approx((sum(moves) * edge, 0.0, 0.0), abs=1e-9)
 
 

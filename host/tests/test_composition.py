@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from steps import FULL, Stepped, SteppedVehicle
 
 from boebot.behaviors import Avoid, ChargeBattery, RunAndTumble, Wander
 from boebot.brain import Brain, Utility
@@ -13,6 +12,7 @@ from boebot.brain.composition import load, process_kinds
 from boebot.cognition import BatteryLevel, LightSense, near
 from boebot.errors import BrainError
 from boebot.robot import Robot
+from steps import FULL, Stepped, SteppedVehicle
 
 # what the kinds need beside their names
 REQUIRED = {

@@ -24,7 +24,7 @@ from boebot.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
 from boebot.geometry import way_out
 from boebot.record.result import RunResult
 from boebot.running import runner
-from boebot.view import picture, scene, sensors, style
+from boebot.view import picture, scene, style
 from boebot.view.arena_drawing import draw_arena, frame, ghost_times, legend_entries
 from boebot.view.robot_drawing import draw_robot
 from peer import InProcess, Peer
@@ -222,18 +222,18 @@ def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypa
 
 
 def test_pictures_show_the_sensors_that_are_on() -> None:
-    kinds = {
-        name: sorted((look.device, look.kind) for look in sensors.looks(load_robot(name)))
+    shown = {
+        name: sorted((device, type(shape).__name__) for device, shape in scene.shapes(load_robot(name)))
         for name in ("shieldbot", "shieldbot-basic", "boebot", "arsim")
     }
-    pair = [("infrared_left", "infrared"), ("infrared_right", "infrared")]
-    lights = [("light_left", "light"), ("light_right", "light")]
-    assert kinds["shieldbot"] == [*pair, ("ping", "sonar")]
-    assert kinds["shieldbot-basic"] == [*pair, *lights]
-    assert kinds["boebot"] == [("analog_infrared", "analog_infrared"), *pair, *lights, ("ping", "sonar")]
-    assert kinds["arsim"] == pair and sensors.whiskers(load_robot("arsim")) == {}
-    (ping,) = (look for look in sensors.looks(load_robot("boebot")) if look.device == "ping")
-    assert ping.axis is not None, "it turns with the turret"
+    pair = [("infrared_left", "Cone"), ("infrared_right", "Cone")]
+    lights = [("light_left", "Spot"), ("light_right", "Spot")]
+    whiskers = [("whisker_left", "Stroke"), ("whisker_right", "Stroke")]
+    assert shown["shieldbot"] == [*pair, ("ping", "Cone"), *whiskers]
+    assert shown["shieldbot-basic"] == [*pair, *lights, *whiskers]
+    turning = [("ping", "Cone"), ("turret", "Axis")]
+    assert shown["boebot"] == [("analog_infrared", "Ray"), *pair, *lights, *turning, *whiskers]
+    assert shown["arsim"] == pair
 
 
 OUTLINES = {"circle": [], "box": [(-0.08, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.08, 0.05)]}

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steps import FULL, Stepped
 from test_cognition import ANYTHING
 
 from boebot.behaviors import (
@@ -46,6 +45,7 @@ from boebot.cognition import (
     near,
 )
 from boebot.robot import Command, Robot
+from steps import FULL, Stepped
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def half(robot: Robot) -> float | None:
 
 
 def landmark(robot: Robot) -> float | None:
-    return float(robot.left_whisker.pressed and robot.right_whisker.pressed)
+    return float(robot.whisker_left.pressed and robot.whisker_right.pressed)
 
 
 CASES = {
@@ -75,7 +75,7 @@ CASES = {
     "kinesis": Case(lambda: Kinesis(stimulus=half, spread=20.0)),
     "klinotaxis": Case(Klinotaxis),
     "phototaxis": Case(lambda: Phototaxis(signal=1.0, gain=1.0)),
-    "run and tumble": Case(lambda: RunAndTumble(stimulus=lambda robot: robot.left_light.brightness)),
+    "run and tumble": Case(lambda: RunAndTumble(stimulus=lambda robot: robot.light_left.brightness)),
     "stop": Case(Stop),
     "straight run": Case(lambda: StraightRun(heading_gain=5.0), lambda: [Odometry()]),
     "wander": Case(Wander),

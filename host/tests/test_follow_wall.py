@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from steps import SHIELDBOT, Stepped
 
 from boebot.behaviors import FollowWall, Stop
 from boebot.behaviors.follow_wall import LOOK_RAD, SETTLING_S
 from boebot.brain import Brain, StateVariable, Utility
 from boebot.cognition import near, nearness_ahead
-from boebot.description.robots import PositionServo
 from boebot.devices import turret as turret_device
+from boebot.devices.latest import Latest, without_readings
 from boebot.devices.ping import speed_of_sound
-from boebot.devices.told import NOTHING_TOLD, Told
+from boebot.devices.turret import PositionServo
 from boebot.link import messages
 from boebot.link.messages import PingStatus
+from steps import SHIELDBOT, Stepped
 
 
 def position_servo() -> PositionServo:
@@ -40,11 +40,11 @@ class Followed(Stepped):
         """A step with a wall at that distance (m) before the Ping; the motor signals."""
         if turret is not None:
             message = turret_device.command(turret)
-            self.pulse = turret_device.pulse_of(message, TURRET.centre_us, TURRET.gain_us_per_rad)
+            self.pulse = TURRET.pulse_of(message)
         echo = 18500 if wall is None else round(2 * wall / speed_of_sound() * 1e6)
         self.see(ping_echo=echo, ping_status=PingStatus.OK, infrared=infrared)
-        devices = NOTHING_TOLD.devices._replace(turret_pulse=self.pulse)
-        self.robot.observation = self.robot.observation._replace(slow=Told(devices, 0))
+        devices = without_readings(messages.DevicesTelemetry)._replace(turret_pulse=self.pulse)
+        self.robot.observation = self.robot.observation._replace(slow=Latest({messages.DevicesTelemetry: devices}, 0))
         self.brain.step(self.robot)
         self.steps += 1
         return self.robot.command[1:]

@@ -92,8 +92,8 @@ def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     [
         lambda robot, truth: setattr(robot, "command", truth),
         lambda robot, truth: setattr(robot, "_seed", {"a": [(truth,)]}),
-        lambda robot, truth: setattr(robot.observation.equipment, "ping", lambda sample: truth),
-        lambda robot, truth: setattr(robot.observation.equipment, "ping", lambda sample, hidden=truth: None),
+        lambda robot, truth: robot.observation.equipment.readers.update(ping=lambda sample: truth),
+        lambda robot, truth: robot.observation.equipment.readers.update(ping=lambda sample, hidden=truth: None),
         lambda robot, truth: setattr(robot, "slow_command", truth.__class__.__eq__.__get__(truth)),
     ],
     ids=["attribute", "private container", "closure", "default", "bound method"],

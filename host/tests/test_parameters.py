@@ -49,8 +49,8 @@ def test_description_gives_way_to_what_the_board_has_saved() -> None:
     robot = load_robot("shieldbot")
     without_encoders = messages.Devices.SERVOS | messages.Devices.WHISKERS
     real = adapted(robot, {"servo_left_centre": 1512.25, "devices": float(without_encoders), "wheel_radius": 0.034})
-    assert real.device["servo_left"].centre_us == 1512.25  # type: ignore[union-attr]
-    assert real.device["servo_right"].centre_us == 1500.0  # type: ignore[union-attr]
+    assert real.device["servo_left"].centre_us == 1512.25  # type: ignore[attr-defined]
+    assert real.device["servo_right"].centre_us == 1500.0  # type: ignore[attr-defined]
     assert real.body.wheel_radius_m == 0.034 and real.body.track_width_m == robot.body.track_width_m
     assert [name for name in robot.device if robot.has(name) and not real.has(name)] == [
         "encoder_left", "encoder_right", "infrared_left", "infrared_right", "ping",

@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
+from boebot.devices.infrared import Infrared
+from boebot.devices.ping import Ping
 from boebot.devices.readings import Readings, ages
 from boebot.errors import BrainError, RobotError
 from boebot.record.series import touch_indices
@@ -35,8 +37,8 @@ def robot_reading(*values: float) -> Robot:
 @pytest.mark.parametrize(("reading", "detected"), [(0.0, False), (0.2999, False), (0.3, True), (1.0, True)])
 def test_infrared_reading_becomes_a_detection_at_its_threshold(reading: float, detected: bool) -> None:
     robot = robot_reading(reading, 0.1, 0, 0, 0, 0)
-    assert robot.left_ir == (detected, 0.0, True, reading)
-    assert not robot.right_ir.detected and robot.right_ir.valid and robot.right_ir.age == 0.0
+    assert robot.infrared_left == Infrared(detected, 0.0, True, None, reading)
+    assert not robot.infrared_right.detected and robot.infrared_right.valid and robot.infrared_right.age == 0.0
 
 
 def test_names_of_the_notes_sensors() -> None:
@@ -46,7 +48,39 @@ def test_names_of_the_notes_sensors() -> None:
     assert robot.tick == 7 and robot.has("infrared") and not robot.has("whiskers")
     with pytest.raises(BrainError, match="'arsim' has no ping"):
         _ = robot.ping
-    assert Equipment(ARSIM, 1.0).missing(["whiskers", "infrared"]) == ["left_whisker", "right_whisker"]
+    assert Equipment(ARSIM, 1.0).missing(["whiskers", "infrared"]) == ["whisker_left", "whisker_right"]
+
+
+def test_any_declared_name_is_read(tmp_path: Path) -> None:
+    text = "[device.sonar_behind]\ntype = 'sonar'\nposition_m = [-0.1, 0]\nheading_rad = 3.1"
+    description = load_robot(variant(tmp_path, text))
+    robot = Robot("variant", 0.05)
+    sample = Readings(7, 1, (0.25,), (0.5,))
+    equipment = Equipment(description, 0.01, {"sonar_behind": slice(0, 1)})
+    robot.observation = Observation(sample, equipment, 0.07, slow=sample)
+    assert robot.has("sonar_behind") and robot.device("sonar_behind", Ping).distance == 0.5
+    with pytest.raises(BrainError, match="device 'sonar_behind' gives Ping, not Infrared"):
+        robot.device("sonar_behind", Infrared)
+    assert not hasattr(robot, "sonar_ahead")
+
+
+@pytest.mark.parametrize(("old", "new"), [("left_ir", "infrared_left"), ("analog_ir", "analog_infrared")])
+def test_old_names_are_refused_with_the_new_one(tmp_path: Path, old: str, new: str) -> None:
+    robot = robot_reading(0, 0, 0, 0, 0, 0)
+    with pytest.raises(BrainError, match=f"no attribute '{old}'; it is called '{new}' now"):
+        getattr(robot, old)
+    with pytest.raises(BrainError, match=f"a brain cannot need '{old}'; it is called '{new}' now"):
+        robot.observation.equipment.missing([old])
+    text = f"[device.{old}]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.2, 0]"
+    with pytest.raises(RobotError, match=rf"variant\.toml:2: device\.{old}: a device cannot have this name; .*'{new}'"):
+        load_robot(variant(tmp_path, text))
+
+
+@pytest.mark.parametrize("name", ["drive", "time", "front-left", "_seed"])
+def test_names_that_a_brain_could_not_read_are_refused(tmp_path: Path, name: str) -> None:
+    text = f"[device.{name}]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.2, 0]"
+    with pytest.raises(RobotError, match=f"device.{name}: a device cannot have this name; expected a name that robot"):
+        load_robot(variant(tmp_path, text))
 
 
 @given(st.floats(0.011, 0.5), st.integers(0, 2000))

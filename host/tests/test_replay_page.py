@@ -85,17 +85,17 @@ def test_everything_that_stands_is_filled_by_its_kind(shown: list[dict[str, Any]
 
 
 def test_slow_devices_are_read_at_the_cursor(result: RunResult, shown: list[dict[str, Any]]) -> None:
-    devices = result.telemetry.devices
+    series = result.series
     for time, moment in zip(TIMES, shown, strict=True):
         index = int(np.searchsorted(result.series.time, time + 1e-9) - 1)
         table = {name: (value, age) for name, value, age in moment["readings"]}
         assert set(table) == {
-            "battery", "left light", "right light", "compass", "analog IR", "turret", "buzzer", "supply",
+            "battery", "light left", "light right", "compass", "analog infrared", "turret", "buzzer", "supply",
         }  # fmt: skip
-        battery, age = devices.values["battery"][index], devices.ages["battery"][index]
+        battery, age = series.number("battery")[index], series.number("battery", "age")[index]
         assert table["battery"] == (f"{battery:.2f} V", f"{age * 1000:.0f} ms")
-        assert table["left light"][0] == f"{devices.values['left_light'][index] * 1000:.3f} ms"
-        degrees = np.degrees(devices.values["compass"][index])
+        assert table["light left"][0] == f"{series.number('light_left')[index] * 1000:.3f} ms"
+        degrees = np.degrees(series.number("compass")[index])
         assert table["compass"][0] == ("–" if np.isnan(degrees) else f"{degrees:.1f} °".replace("-", "−"))
     assert {name: value for name, value, _ in shown[-1]["readings"]}["turret"] == "28.6 °", "0.5 rad"
 
@@ -109,7 +109,7 @@ def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path
     (moment,) = moments(arsim, tmp_path, 0.5)
     assert [device for device, _ in moment["lamps"]] == ["infrared_left", "infrared_right"]
     assert "pingRow" in moment["hidden"] and "estimateRow" not in moment["hidden"]
-    assert [row[0] for row in moment["readings"]] == ["left IR", "right IR", "compass"]
+    assert [row[0] for row in moment["readings"]] == ["infrared left", "infrared right", "compass"]
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
 
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
+from boebot.devices.infrared import Infrared
 from boebot.devices.ping import speed_of_sound
 from boebot.errors import BrainError
 from boebot.link import messages
@@ -33,21 +34,21 @@ def robot_seeing(observation: Observation, period: float = 0.05, seed: int = 1) 
 
 
 def test_whiskers() -> None:
-    assert observe(whiskers=messages.Whiskers.LEFT).left_whisker.pressed
-    assert not observe(whiskers=messages.Whiskers.LEFT).right_whisker.pressed
-    assert observe(whiskers=messages.Whiskers.RIGHT).right_whisker == (True, 0.0, True)
+    assert observe(whiskers=messages.Whiskers.LEFT).whisker_left.pressed
+    assert not observe(whiskers=messages.Whiskers.LEFT).whisker_right.pressed
+    assert observe(whiskers=messages.Whiskers.RIGHT).whisker_right == (True, 0.0, True)
 
 
 @pytest.mark.parametrize(("ticks", "age", "valid"), [(0, 0.0, True), (15, 0.15, True), (16, 0.16, False)])
 def test_infrared_ages(ticks: int, age: float, valid: bool) -> None:
     pair = observe(infrared=messages.Infrared.RIGHT, infrared_age=ticks)
-    assert pair.right_ir.detected and not pair.left_ir.detected
-    assert pair.left_ir.age == pytest.approx(age)
-    assert pair.left_ir.valid is valid
+    assert pair.infrared_right.detected and not pair.infrared_left.detected
+    assert pair.infrared_left.age == pytest.approx(age)
+    assert pair.infrared_left.valid is valid
 
 
 def test_infrared_never_read() -> None:
-    assert observe(infrared_age=255).left_ir == (False, math.inf, False)
+    assert observe(infrared_age=255).infrared_left == Infrared(False, math.inf, False)
 
 
 @given(st.floats(0.02, 3.0))
@@ -84,23 +85,23 @@ def test_encoder() -> None:
     status = messages.Status.ENCODER_RIGHT_MASKED
     seen = observe(encoder_left=64, encoder_right=-3, edge_period_left=1250, status=status)
     turn = 2 * math.pi * SHIELDBOT.body.wheel_radius_m
-    assert seen.left_encoder.count == 64
-    assert seen.left_encoder.distance == pytest.approx(turn)
-    assert seen.left_encoder.speed == pytest.approx(turn / 64 / 0.020)
-    assert not seen.left_encoder.directed and seen.left_encoder.valid
-    assert seen.right_encoder.speed == 0.0 and not seen.right_encoder.valid
+    assert seen.encoder_left.count == 64
+    assert seen.encoder_left.distance == pytest.approx(turn)
+    assert seen.encoder_left.speed == pytest.approx(turn / 64 / 0.020)
+    assert not seen.encoder_left.directed and seen.encoder_left.valid
+    assert seen.encoder_right.speed == 0.0 and not seen.encoder_right.valid
 
 
 def test_quadrature_encoder_knows_direction() -> None:
     quad = Equipment(load_robot("shieldbot-quad"), TICK_S)
-    assert Observation(NOTHING, quad, 0.0).left_encoder.directed
+    assert Observation(NOTHING, quad, 0.0).encoder_left.directed
 
 
 def test_servo_is_read_back() -> None:
     seen = observe(pulse_left=1600 * 16, pulse_right=1600 * 16)
-    assert (seen.left_servo.pulse_us, seen.left_servo.signal) == (1600.0, 0.5)
-    assert seen.right_servo.signal == -0.5, "the right servo is mounted mirrored"
-    assert observe().left_servo.pulse_us is None
+    assert (seen.servo_left.pulse_us, seen.servo_left.signal) == (1600.0, 0.5)
+    assert seen.servo_right.signal == -0.5, "the right servo is mounted mirrored"
+    assert observe().servo_left.pulse_us is None
 
 
 def without(*devices: str) -> Equipment:
@@ -113,11 +114,11 @@ def test_missing_device_is_refused_by_name() -> None:
     robot = robot_seeing(Observation(NOTHING, equipment, 0.0))
     with pytest.raises(BrainError, match="'shieldbot' has no ping"):
         _ = robot.ping
-    with pytest.raises(BrainError, match="has no left_encoder"):
-        _ = robot.left_encoder
-    assert robot.right_encoder.count == 0
-    assert equipment.missing(["whiskers", "ping", "encoders"]) == ["ping", "left_encoder"]
-    with pytest.raises(BrainError, match="cannot need 'sonar'; expected one of whiskers"):
+    with pytest.raises(BrainError, match="has no encoder_left"):
+        _ = robot.encoder_left
+    assert robot.encoder_right.count == 0
+    assert equipment.missing(["whiskers", "ping", "encoders"]) == ["ping", "encoder_left"]
+    with pytest.raises(BrainError, match="cannot need 'sonar'; expected one of encoders"):
         equipment.missing(["sonar"])
 
 
@@ -126,7 +127,7 @@ def test_observation_cannot_be_changed() -> None:
     with pytest.raises(AttributeError):
         seen.time = 2.0  # type: ignore[misc]
     with pytest.raises(AttributeError):
-        seen.left_encoder.count = 6  # type: ignore[misc]
+        seen.encoder_left.count = 6  # type: ignore[misc]
 
 
 def test_commands_hold_until_the_next() -> None:

@@ -309,7 +309,7 @@ def test_stop_of_a_brain_latches_nothing(session: InProcess) -> None:
             robot.drive(0.5, 0.5)
 
     result = boebot.run(stop_and_go, seconds=1)
-    pulses = result.telemetry.left_pulse_us
+    pulses = result.series.number("servo_left", "pulse")
     assert (pulses[35:60] == 0).all() and pulses[-1] == 1600
     assert not result.series.raw["latch"].any()
 
@@ -323,7 +323,7 @@ def test_emergency_stop_latches_until_the_brain_arms_again(session: InProcess) -
             robot.arm()
 
     result = boebot.run(panic, seconds=1.2)
-    latch, pulses = result.series.raw["latch"], result.telemetry.left_pulse_us
+    latch, pulses = result.series.raw["latch"], result.series.number("servo_left", "pulse")
     assert (latch[37:80] == messages.Latch.STOP_COMMAND).all() and (pulses[37:80] == 0).all()
     assert not latch[-20:].any() and pulses[-1] == 1600
 
@@ -368,8 +368,10 @@ def test_session_that_the_board_ends_is_opened_and_armed_again(session: InProces
     result = boebot.run(straight, seconds=2)
     assert (result.sessions_lost, result.resets) == (1, 0)
     assert result.run_time == pytest.approx(2.0)
-    assert result.telemetry.left_pulse_us[-1] == 1600
-    assert np.flatnonzero(result.telemetry.left_pulse_us == 0)[-1] < 70, "driving again within a tenth of a second"
+    assert result.series.number("servo_left", "pulse")[-1] == 1600
+    assert np.flatnonzero(result.series.number("servo_left", "pulse") == 0)[-1] < 70, (
+        "driving again within a tenth of a second"
+    )
 
 
 def test_dead_man_stop_that_came_with_the_end_of_the_session_is_counted(session: InProcess) -> None:
@@ -429,7 +431,7 @@ def test_parameters_saved_on_the_board_win(session: InProcess) -> None:
     result = boebot.run(straight, seconds=0.5)
     assert not any(isinstance(message, messages.SetParameter) for _, message in peer.carried_out)
     assert (result.robot.body.wheel_radius_m, result.robot.body.track_width_m) == (0.04, 0.12)
-    assert {result.robot.device[f"encoder_{side}"].edges_per_turn for side in ("left", "right")} == {32}  # type: ignore[union-attr]
+    assert {result.robot.device[f"encoder_{side}"].edges_per_turn for side in ("left", "right")} == {32}  # type: ignore[attr-defined]
 
 
 def test_observation_carries_board_and_host_time(session: InProcess) -> None:

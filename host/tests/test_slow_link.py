@@ -17,21 +17,26 @@ from hypothesis import strategies as st
 
 from boebot.description.board_parameters import parameters_of
 from boebot.description.robots import load_robot
-from boebot.devices.equipment import slow_readers
-from boebot.devices.freshness import message_ticks
-from boebot.devices.told import NOTHING_TOLD, told
+from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.session import Link
 from boebot.link.wanted import Wanted
-from boebot.record.devices_series import DevicesSeries
 from boebot.record.result import RunResult
+from boebot.record.telemetry_series import newest_messages
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import runner
+from boebot.running.board_driver import message_ticks
 from peer import FIELD_COUNTS, InProcess, Peer
 
 BOEBOT, BASIC, SHIELDBOT = (load_robot(name) for name in ("boebot", "shieldbot-basic", "shieldbot"))
 TICK_S = 0.01
+NOTHING = without_readings(messages.DevicesTelemetry)
+
+
+def latest(message: messages.DevicesTelemetry, tick: int) -> Latest:
+    """That message as an observation of `tick` has it."""
+    return Latest({messages.DevicesTelemetry: message}, tick)
 
 
 def run_on(
@@ -48,20 +53,20 @@ def test_brain_sees_what_the_board_told(monkeypatch: pytest.MonkeyPatch) -> None
     result = run_on(peer, lambda robot: seen.append(robot.observation), monkeypatch, seconds=1)
     assert result.error is None and len(seen) == 20
     last = seen[-1]
-    assert last.left_light.decay_time == pytest.approx(800e-6)
-    assert last.right_light.decay_time == pytest.approx(1600e-6)
-    assert last.left_light.brightness == pytest.approx(1250) and last.left_light.valid
+    assert last.light_left.decay_time == pytest.approx(800e-6)
+    assert last.light_right.decay_time == pytest.approx(1600e-6)
+    assert last.light_left.brightness == pytest.approx(1250) and last.light_left.valid
     assert last.battery.voltage == pytest.approx(2 * 3.6, abs=2 * 5.0 / 1024)
     assert last.compass.heading == pytest.approx(peer.heading, abs=1 / FIELD_COUNTS) and last.compass.valid
     assert last.turret.angle is None and last.turret.valid and last.buzzer.token == 0
-    assert not last.analog_ir.valid, "this board never measures it"
+    assert not last.analog_infrared.valid, "this board never measures it"
 
 
 def test_ages_count_on_between_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     peer = Peer(BASIC)
     ages: list[tuple[int, float]] = []
     peer.parameters[messages.PARAMETERS["devices_period"].id] = 50
-    run_on(peer, lambda robot: ages.append((robot.tick, robot.left_light.age)), monkeypatch, seconds=2, period=0.01)
+    run_on(peer, lambda robot: ages.append((robot.tick, robot.light_left.age)), monkeypatch, seconds=2, period=0.01)
     # Messages go out at every fiftieth tick, after telemetry: in their own tick they are still on the line.
     told_at = [(tick - 1) // 50 * 50 for tick, _ in ages]
     expected = [at % 4 * TICK_S + (tick - at) * TICK_S for (tick, _), at in zip(ages, told_at, strict=True)]
@@ -72,34 +77,33 @@ def test_ages_count_on_between_messages(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize(("tick", "since"), [(100, 0), (103, 3), (99, 0), (100 + 2**31 - 1, 2**31 - 1)])
 def test_ticks_since_a_message(tick: int, since: int) -> None:
-    message = NOTHING_TOLD.devices._replace(tick=100)
-    assert told(message, tick).since == since
-    assert told(message._replace(tick=2**32 - 2), 1).since == 3, "the count rolls over"
+    assert latest(NOTHING._replace(tick=100), tick).of(messages.DevicesTelemetry)[1] == since
+    rolled = latest(NOTHING._replace(tick=2**32 - 2), 1)
+    assert rolled.of(messages.DevicesTelemetry)[1] == 3, "the count rolls over"
 
 
 def test_old_readings_lose_their_validity_and_keep_their_value() -> None:
-    light = NOTHING_TOLD.devices._replace(light_left=500, light_right=500, light_age=1, tick=0)
-    equipment = Equipment(BASIC, TICK_S)
-    views = [equipment.left_light(told(light, tick)) for tick in (0, 5, 6, 400)]
+    message = NOTHING._replace(light_left=500, light_right=500, light_age=1, tick=0)
+    readers = Equipment(BASIC, TICK_S).readers
+    views = [readers["light_left"](None, latest(message, tick)) for tick in (0, 5, 6, 400)]
     assert [view.valid for view in views] == [True, True, False, False]
     assert [view.age for view in views] == pytest.approx([0.01, 0.06, 0.07, 4.01])
     assert all(view.decay_time == 500e-6 for view in views)
-    never = equipment.left_light(NOTHING_TOLD)
+    never = readers["light_left"](None, NO_MESSAGES)
     assert not never.valid and math.isinf(never.age) and never.brightness is None
-    buzzer = equipment.buzzer(NOTHING_TOLD)
+    buzzer = readers["buzzer"](None, NO_MESSAGES)
     assert not buzzer.valid and math.isinf(buzzer.age)
 
 
 def test_needs_groups_and_refusals() -> None:
-    slow = ["lights", "compass", "battery", "analog_ir", "turret", "buzzer"]
+    slow = ["lights", "compass", "battery", "analog_infrared", "turret", "buzzer"]
     assert Equipment(BOEBOT, TICK_S).missing(slow) == []
-    assert Equipment(BASIC, TICK_S).missing(slow) == ["compass", "battery", "analog_ir", "turret"]
-    assert Equipment(BOEBOT, TICK_S).missing(["zones"]) == ["left_zone", "right_zone"]
+    assert Equipment(BASIC, TICK_S).missing(slow) == ["compass", "battery", "analog_infrared", "turret"]
     robot = Robot("shieldbot", 0.05)
     robot.observation = Observation(
         messages.Telemetry(*(0,) * len(messages.Telemetry._fields)), Equipment(SHIELDBOT, TICK_S), 0.0
     )
-    for name in ("left_light", "compass", "battery", "analog_ir", "left_zone", "turret", "buzzer"):
+    for name in ("light_left", "compass", "battery", "analog_infrared", "turret", "buzzer"):
         with pytest.raises(BrainError, match=f"robot 'shieldbot' has no {name}"):
             getattr(robot, name)
     with pytest.raises(BrainError, match=r"turn_turret\(\): robot 'shieldbot' has no turret"):
@@ -116,9 +120,12 @@ def test_sweep_of_the_description_is_set_and_read(tmp_path: Path) -> None:
     path.write_text('extends = "shieldbot"\nname = "sweeping"\n[device.infrared]\nsweep = true\n')
     robot = load_robot(path)
     assert parameters_of(robot)["infrared_sweep"] == 1 and parameters_of(SHIELDBOT)["infrared_sweep"] == 0
-    message = NOTHING_TOLD.devices._replace(infrared_zone_left=3, infrared_zone_right=1, infrared_zone_age=2)
-    equipment = Equipment(robot, TICK_S)
-    assert equipment.left_zone(told(message, 1))[:1] == (3,) and equipment.right_zone(told(message, 1)).zone == 1
+    message = NOTHING._replace(infrared_zone_left=3, infrared_zone_right=1, infrared_zone_age=2)
+    telemetry = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
+    seen = Observation(telemetry, Equipment(robot, TICK_S), 0.0, slow=latest(message, 1))
+    assert (seen.infrared_left.zone, seen.infrared_right.zone) == (3, 1)
+    unswept = Observation(telemetry, Equipment(SHIELDBOT, TICK_S), 0.0, slow=latest(message, 1))
+    assert unswept.infrared_left.zone is None
 
 
 # ---- commands --------------------------------------------------------------------------------------------------------
@@ -217,10 +224,10 @@ def test_turret_turns_back_after_a_reset_and_no_tone_is_repeated(monkeypatch: py
     assert result.error is None and result.resets == 1
     assert peer.tones == [(440, 0.1)]
     assert seen[-1][1] == pytest.approx(0.8, abs=2e-4)
-    devices = result.telemetry.devices
-    assert len(devices.ages["turret"]) == result.ticks
-    assert np.nanmax(devices.ages["turret"]) < 0.08, "nothing of before the reset stands after it"
-    assert np.nanmin(devices.ages["turret"]) >= 0.0
+    ages = result.series.number("turret", "age")
+    assert len(ages) == result.ticks
+    assert np.nanmax(ages) < 0.08, "nothing of before the reset stands after it"
+    assert np.nanmin(ages) >= 0.0
 
 
 def test_stop_ends_what_is_wanted() -> None:
@@ -276,7 +283,7 @@ def test_arrays_have_the_newest_message_of_each_tick(data: st.DataObject) -> Non
     """Against the definition, over restarts of the board and the roll-over of its ticks."""
     ticks: list[int] = []
     starts: list[int] = []
-    told_at: list[tuple[int, bytes]] = []
+    told_at: list[tuple[int, messages.DevicesTelemetry]] = []
     expected: list[tuple[int, int] | None] = []  # (token, ticks since)
     for start in range(data.draw(st.integers(1, 3))):
         first = data.draw(st.sampled_from([5, 1000, 2**32 - 7]) if start == 0 else st.just(3))
@@ -287,18 +294,19 @@ def test_arrays_have_the_newest_message_of_each_tick(data: st.DataObject) -> Non
             at += gap
             if data.draw(st.booleans()):
                 newest = (len(told_at) % 200 + 1, at - data.draw(st.integers(0, gap - 1)))
-                message = NOTHING_TOLD.devices._replace(tick=(first + newest[1]) % 2**32, buzzer_token=newest[0])
-                told_at.append((len(ticks), message.pack()))
+                message = NOTHING._replace(tick=(first + newest[1]) % 2**32, buzzer_token=newest[0])
+                told_at.append((len(ticks), message))
             expected.append(None if newest is None else (newest[0], at - newest[1]))
             ticks.append((first + at) % 2**32)
             starts.append(start)
     restarted = np.diff(np.array(starts), prepend=0) > 0
-    series = DevicesSeries(told_at, np.array(ticks, dtype=np.uint32), restarted, slow_readers(BASIC, TICK_S), TICK_S)
-    for token, age, wanted in zip(series.values["buzzer"], series.ages["buzzer"], expected, strict=True):
+    rows, sent = [row for row, _ in told_at], [message for _, message in told_at]
+    newest_of, since = newest_messages(rows, sent, np.array(ticks, dtype=np.uint32), restarted)
+    for index, age, wanted in zip(newest_of, since, expected, strict=True):
         if wanted is None:
-            assert math.isnan(token) and math.isnan(age)
+            assert index == -1 and math.isnan(age)
         else:
-            assert token == wanted[0] and age == pytest.approx(wanted[1] * TICK_S)
+            assert (sent[index].buzzer_token, age) == wanted
 
 
 # ---- how long a reading is fresh -------------------------------------------------------------------------------------
@@ -321,7 +329,7 @@ def test_readings_stay_fresh_from_message_to_message(period: int, monkeypatch: p
     seen: list[tuple[float, bool]] = []
 
     def step(robot: Robot) -> None:
-        seen.append((robot.left_light.age, robot.left_light.valid))
+        seen.append((robot.light_left.age, robot.light_left.valid))
         if robot.time >= 1.0:
             peer.parameters[messages.PARAMETERS["devices"].id] = 0  # it says no more
 

@@ -74,7 +74,7 @@ def decay_time(pose: Pose, side: str) -> float:
 def test_light_sensors_near_a_lamp(robot: str, pose: Pose) -> None:
     seen, result = watch(robot, "showcase", pose, stay)
     assert result.error is None
-    for side, view in (("left", seen[-1].left_light), ("right", seen[-1].right_light)):
+    for side, view in (("left", seen[-1].light_left), ("right", seen[-1].light_right)):
         assert view.valid and view.age <= 0.06
         assert view.decay_time == pytest.approx(decay_time(pose, side), rel=0.02, abs=3e-6), side
 
@@ -82,7 +82,7 @@ def test_light_sensors_near_a_lamp(robot: str, pose: Pose) -> None:
 def test_screen_shades_the_lamp() -> None:
     """Between (-1.5, -1.0) and the lamp stands the showcase's screen: only the ambient light is left."""
     seen, _ = watch("shieldbot-basic", "showcase", (-1.5, -1.0, 0.3), stay)
-    for view in (seen[-1].left_light, seen[-1].right_light):
+    for view in (seen[-1].light_left, seen[-1].light_right):
         assert view.decay_time == pytest.approx(SCALE_S / AMBIENT, rel=0.01)
 
 
@@ -135,13 +135,13 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
     def step(robot: Robot) -> None:
         robot.drive(0.3, 0.25)
         names = used.setdefault(robot.name, set())
-        for name in ("lights", "compass", "battery", "analog_ir", "turret", "buzzer"):
+        for name in ("lights", "compass", "battery", "analog_infrared", "turret", "buzzer"):
             if robot.has(name):
                 names.add(name)
         if robot.time < 0.5:
             return
         if robot.has("lights"):
-            assert robot.left_light.valid and robot.left_light.brightness is not None
+            assert robot.light_left.valid and robot.light_left.brightness is not None
         if robot.has("compass"):
             assert robot.compass.valid and robot.compass.heading is not None
         if robot.has("battery"):
@@ -157,7 +157,7 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
     assert used == {
         "shieldbot-basic": {"lights", "buzzer"},
         "shieldbot": set(),
-        "boebot": {"lights", "compass", "battery", "analog_ir", "turret", "buzzer"},
+        "boebot": {"lights", "compass", "battery", "analog_infrared", "turret", "buzzer"},
         "arsim": {"compass"},
     }
     assert "light_left_s" in (tmp_path / "shieldbot-basic" / "run.csv").read_text().splitlines()[0]

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from boebot.description.robots import QuadratureEncoder, load_robot, pin_name, pin_number, robot_names
+from boebot.description.robots import load_robot, robot_names
+from boebot.devices.device import pin_name, pin_number
+from boebot.devices.encoder import QuadratureEncoder
 from boebot.errors import RobotError
 
 
@@ -102,9 +104,12 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
         (
             "[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
             "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5",
-            "ping and ping_rear cannot share pin 8",
+            "device.ping_rear is ping; expected the name ping, which the firmware knows",
         ),
-        ("remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6", "buzzer and horn cannot share Timer0"),
+        (
+            "remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6",
+            "device.horn is buzzer; expected the name buzzer",
+        ),
         ("[device.ping]\npin = 7", "ping.pin is pin 7, which cannot do that; expected 8"),
         ("[device.servo_left]\npin = 20", "there is no pin 20; expected 0..13 or 'A0'..'A5'"),
         (

@@ -15,7 +15,11 @@ import pytest
 import boebot
 from boebot.boards import BoardRequest, open_board, open_vehicle
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.devices.vehicle_devices import Accelerometer, HeadingCompass, InfraredProximity, Laser, TouchWhisker
+from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.compass import HeadingCompass
+from boebot.devices.infrared import InfraredProximity
+from boebot.devices.laser import Laser
+from boebot.devices.whisker import TouchWhisker
 from boebot.errors import BoardError, BrainError
 from boebot.robot import Observation, Robot
 from boebot.running.runner import execute
@@ -103,7 +107,7 @@ def test_every_sensor_of_the_vocabulary_is_seen_by_its_name() -> None:
     assert first.distances[0] == pytest.approx(1.8)
     assert [round(look.laser.age, 6) for look in seen[:5]] == [0.0, 0.03, 0.06, 0.09, 0.02]
     assert seen[1].laser.distances == first.distances, "held between two samples"
-    assert seen[1].accelerometer.value > 0.5 and not seen[0].left_whisker.pressed
+    assert seen[1].accelerometer.value > 0.5 and not seen[0].whisker_left.pressed
     assert seen[-1].compass.heading == 0.0
 
 

@@ -9,6 +9,10 @@ import numpy as np
 import pytest
 
 from boebot.description import robots
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.light import LightSensor
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.turret import PositionServo
 from boebot.errors import RobotError
 from boebot.running.runner import execute
 from sim_bridge import imperfections
@@ -24,8 +28,8 @@ def parts(draw: Draw) -> list[bytes]:
     servo = SHIELDBOT.device["servo_left"]
     turret = SHIELDBOT.device["turret"]
     light = SHIELDBOT.device["light_right"]
-    assert isinstance(servo, robots.ContinuousServo) and isinstance(turret, robots.PositionServo)
-    assert isinstance(light, robots.LightSensor) and isinstance(SHARP, robots.AnalogInfrared)
+    assert isinstance(servo, ContinuousServo) and isinstance(turret, PositionServo)
+    assert isinstance(light, LightSensor) and isinstance(SHARP, SharpSensor)
     made: list[Any] = [
         imperfections.servo_parameters(servo, SHIELDBOT.body, 0, draw),
         imperfections.analog_infrared_parameters(SHARP, draw),

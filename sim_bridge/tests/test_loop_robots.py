@@ -210,7 +210,8 @@ def lit(distance: float, heading: float, obstacle: bool = False) -> list[tuple[i
 
     def pose_of(x: float, y: float, looking: float) -> tuple[float, float, float]:
         """Of a robot whose left pair is at (x, y) and looks that way."""
-        from boebot.description.robots import InfraredPair, load_robot
+        from boebot.description.robots import load_robot
+        from boebot.devices.infrared import InfraredPair
 
         pair = load_robot("shieldbot").device["infrared_left"]
         assert isinstance(pair, InfraredPair)

@@ -30,7 +30,9 @@ def test_vehicle_is_the_run_of_boebot_run(source: str, seed: int) -> None:
     seen: list[tuple[float, ...]] = []
 
     def brain(robot: Any) -> None:
-        seen.append((robot.left_ir.reading, robot.right_ir.reading, robot.odometer.x, robot.compass.heading))
+        seen.append(
+            (robot.infrared_left.reading, robot.infrared_right.reading, robot.odometer.x, robot.compass.heading)
+        )
         robot.drive(*signals(robot.time))
 
     result = boebot.run(brain, robot="arsim", arena="arsim", seconds=5, seed=seed, period=0.01)

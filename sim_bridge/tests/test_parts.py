@@ -14,6 +14,9 @@ from hypothesis import strategies as st
 
 from boebot.description import robots
 from boebot.description.robots import load_robot
+from boebot.devices.battery import BatteryDivider
+from boebot.devices.infrared import InfraredPair
+from boebot.devices.servo import ContinuousServo
 from boebot.errors import BoardError
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
@@ -32,7 +35,7 @@ WHEEL = 0.0331
 def servo(**changes: float) -> Any:
     robot = load_robot("shieldbot")
     device = robot.device["servo_left"]
-    assert isinstance(device, robots.ContinuousServo)
+    assert isinstance(device, ContinuousServo)
     parameters = imperfections.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
     for key, value in changes.items():
         setattr(parameters, key, value)
@@ -135,7 +138,7 @@ def test_weak_supply_slows_the_servos() -> None:
 def test_units_differ_by_seed_and_keep_their_nature() -> None:
     robot = load_robot("shieldbot")
     device = robot.device["servo_left"]
-    assert isinstance(device, robots.ContinuousServo)
+    assert isinstance(device, ContinuousServo)
 
     def unit(seed: int, side: int) -> float:
         draw = imperfections.Draw(seed, noise=True)
@@ -290,7 +293,7 @@ def seen_from(distance: float, period: int = 421, cycles: int = 38, noise: bool 
     """A burst of the left LED with a wall across its beam at that distance from the pair."""
     robot = load_robot("shieldbot")
     pair = robot.device["infrared_left"]
-    assert isinstance(pair, robots.InfraredPair)
+    assert isinstance(pair, InfraredPair)
     x, y = pair.position_m
     wall_y = y + distance  # turned so that the pair looks along +y
     arena = arena_of([(-2, wall_y), (2, wall_y), (2, wall_y + 0.1), (-2, wall_y + 0.1)])
@@ -494,7 +497,7 @@ def test_pack_sags_under_load_and_the_regulator_holds() -> None:
 
 def test_voltage_at_the_analog_pin() -> None:
     robot = load_robot("shieldbot")
-    with_battery = {**robot.device, "battery": robots.Battery(pin="A0")}
+    with_battery = {**robot.device, "battery": BatteryDivider(pin="A0")}
     scene = scripted(robot=msgspec.structs.replace(robot, device=with_battery))
     assert lib.script_board_volts(scene.script, 0) == pytest.approx((7.75 - 0.6 * 0.08) / 2, abs=1e-3)
     assert lib.script_board_volts(scene.script, 1) == 0

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boebot.description import robots
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.light import LightSensor
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.arena import Arena
@@ -17,8 +18,8 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
-LIGHT_SENSOR = robots.LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
-SHARP = robots.AnalogInfrared(pin="A2", position_m=(0.06, 0.0), heading_rad=0.0)
+LIGHT_SENSOR = LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
+SHARP = SharpSensor(pin="A2", position_m=(0.06, 0.0), heading_rad=0.0)
 RELEASED = 2
 ON, OFF = imperfections.Draw(1, noise=True), imperfections.Draw(1, noise=False)
 

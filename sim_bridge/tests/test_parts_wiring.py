@@ -10,6 +10,13 @@ import pytest
 
 from boebot.description import robots
 from boebot.description.robots import load_robot
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.battery import BatteryDivider
+from boebot.devices.buzzer import PiezoBuzzer
+from boebot.devices.compass import MagneticCompass
+from boebot.devices.encoder import SingleEncoder
+from boebot.devices.light import LightSensor
+from boebot.devices.turret import PositionServo
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import lib
 from sim_bridge.arena import Arena, ArenaDescription
@@ -20,18 +27,18 @@ from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, square
 
 DEVICES: dict[str, robots.AnyDevice] = {
-    "turret": robots.PositionServo(pin=11, position_m=(0.045, 0.0)),
-    "compass": robots.Compass(sda_pin="A4", scl_pin="A5"),
-    "analog_infrared": robots.AnalogInfrared(pin="A2", position_m=(0.02, 0.0), heading_rad=0.3),
-    "battery": robots.Battery(pin="A0"),
-    "light_left": robots.LightSensor(pin=6, position_m=(0.05, 0.04), heading_rad=0.5),
-    "buzzer": robots.Buzzer(pin=4),
+    "turret": PositionServo(pin=11, position_m=(0.045, 0.0)),
+    "compass": MagneticCompass(sda_pin="A4", scl_pin="A5"),
+    "analog_infrared": SharpSensor(pin="A2", position_m=(0.02, 0.0), heading_rad=0.3),
+    "battery": BatteryDivider(pin="A0"),
+    "light_left": LightSensor(pin=6, position_m=(0.05, 0.04), heading_rad=0.5),
+    "buzzer": PiezoBuzzer(pin=4),
 }
 
 
 def equipped() -> robots.RobotDescription:
     robot = load_robot("shieldbot")
-    kept = {name: device for name, device in robot.device.items() if not isinstance(device, robots.Encoder)}
+    kept = {name: device for name, device in robot.device.items() if not isinstance(device, SingleEncoder)}
     return msgspec.structs.replace(robot, device={**kept, **DEVICES})
 
 
@@ -61,12 +68,12 @@ def test_each_device_sits_at_its_pins() -> None:
 @pytest.mark.parametrize(
     ("name", "device"),
     [
-        ("second_compass", robots.Compass(sda_pin="A4", scl_pin="A5")),
-        ("horn", robots.Buzzer(pin=4)),
-        ("light_right", robots.LightSensor(pin=8, position_m=(0.05, -0.04), heading_rad=-0.5)),
-        ("second_sharp", robots.AnalogInfrared(pin="A2", position_m=(0.0, 0.0), heading_rad=0.0)),
-        ("second_turret", robots.PositionServo(pin=13, position_m=(0.0, 0.0))),
-        ("bus_on_servos", robots.Compass(sda_pin=12, scl_pin=13)),
+        ("second_compass", MagneticCompass(sda_pin="A4", scl_pin="A5")),
+        ("horn", PiezoBuzzer(pin=4)),
+        ("light_right", LightSensor(pin=8, position_m=(0.05, -0.04), heading_rad=-0.5)),
+        ("second_sharp", SharpSensor(pin="A2", position_m=(0.0, 0.0), heading_rad=0.0)),
+        ("second_turret", PositionServo(pin=13, position_m=(0.0, 0.0))),
+        ("bus_on_servos", MagneticCompass(sda_pin=12, scl_pin=13)),
     ],
 )
 def test_two_devices_that_listen_at_one_place_are_refused_in_one_sentence(name: str, device: robots.AnyDevice) -> None:
@@ -79,7 +86,7 @@ def test_two_devices_that_listen_at_one_place_are_refused_in_one_sentence(name: 
 
 def test_values_out_of_range_are_refused_in_one_sentence() -> None:
     robot = equipped()
-    sensor = robots.AnalogInfrared(pin="A2", position_m=(0.0, 0.0), heading_rad=math.nan)
+    sensor = SharpSensor(pin="A2", position_m=(0.0, 0.0), heading_rad=math.nan)
     wrong = msgspec.structs.replace(robot, device={**robot.device, "analog_infrared": sensor})
     with pytest.raises(BoardError, match=r"^device 'analog_infrared' cannot be joined .* is out of its range$"):
         add_scripted(Sim(arena_of(), noise=False), wrong)

@@ -17,15 +17,18 @@ from boebot import Member
 from boebot.boards import BoardRequest, imperfections, open_board
 from boebot.description import robots
 from boebot.description.robots import load_robot
-from boebot.devices.vehicle_devices import (
-    Accelerometer,
-    DcMotor,
-    Energy,
-    InfraredProximity,
-    Laser,
-    Phototransistor,
-    Sonar,
-)
+from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.analog_infrared import SharpSensor
+from boebot.devices.battery import Energy
+from boebot.devices.device import pin_number
+from boebot.devices.encoder import SingleEncoder
+from boebot.devices.infrared import InfraredPair, InfraredProximity
+from boebot.devices.laser import Laser
+from boebot.devices.light import LightSensor, Phototransistor
+from boebot.devices.motor import DcMotor
+from boebot.devices.ping import PingSensor, Sonar
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError
 from boebot.record.result import RunResult
 from boebot.robot import Robot
@@ -54,7 +57,7 @@ def drawn(seed: int, *without: str) -> Draw:
 
 def servo(seed: int, *without: str) -> Any:
     device = SHIELDBOT.device["servo_left"]
-    assert isinstance(device, robots.ContinuousServo)
+    assert isinstance(device, ContinuousServo)
     return parts.servo_parameters(device, SHIELDBOT.body, 0, drawn(seed, *without))
 
 
@@ -63,19 +66,19 @@ def servo(seed: int, *without: str) -> Any:
 
 def sharp(draw: Draw) -> Any:
     device = BOEBOT.device["analog_infrared"]
-    assert isinstance(device, robots.AnalogInfrared)
+    assert isinstance(device, SharpSensor)
     return parts.analog_infrared_parameters(device, draw)
 
 
 def light(draw: Draw) -> Any:
     device = SHIELDBOT.device["light_left"]
-    assert isinstance(device, robots.LightSensor)
+    assert isinstance(device, LightSensor)
     return parts.light_parameters(device, 0, draw).light
 
 
 def turret(draw: Draw) -> Any:
     device = SHIELDBOT.device["turret"]
-    assert isinstance(device, robots.PositionServo)
+    assert isinstance(device, PositionServo)
     return parts.turret_parameters(device, draw).centre_us
 
 
@@ -178,8 +181,8 @@ def test_encoders_see_each_edge_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "ENCODER_MISSED", 0.2)
     monkeypatch.setattr(parts, "ENCODER_EXTRA", 0.2)
     device = SHIELDBOT.device["encoder_left"]
-    assert isinstance(device, robots.Encoder)
-    pin = robots.pin_number(device.pin)
+    assert isinstance(device, SingleEncoder)
+    pin = pin_number(device.pin)
 
     def off(*without: str) -> float:
         robot = scripted(noise=True, without=without)
@@ -204,7 +207,7 @@ def test_whiskers_close_once() -> None:
 def infrared_sees(distance: float, seed: int, *without: str) -> bool:
     """A burst of the left LED with a wall across its beam at that distance."""
     pair = SHIELDBOT.device["infrared_left"]
-    assert isinstance(pair, robots.InfraredPair)
+    assert isinstance(pair, InfraredPair)
     (x, y), heading = pair.position_m, math.pi / 2 - pair.heading_rad
     px, py = x * math.cos(heading) - y * math.sin(heading), x * math.sin(heading) + y * math.cos(heading)
     wall = y + distance
@@ -226,7 +229,7 @@ def test_infrared_range_is_sharp(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_only_the_robot_that_switches_it_off_is_spared_cross_talk() -> None:
     pair = SHIELDBOT.device["infrared_left"]
-    assert isinstance(pair, robots.InfraredPair)
+    assert isinstance(pair, InfraredPair)
     turn, (px, py) = -pair.heading_rad, pair.position_m
     back = math.pi + turn
     dx, dy = px * math.cos(turn) - py * math.sin(turn), px * math.sin(turn) + py * math.cos(turn)
@@ -267,7 +270,7 @@ def test_echoes_are_exact_and_heard(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_flat_surfaces_answer() -> None:
     """The echo comes by the ray that is nearest to the wall's normal, of a wall 0.5 m from the body's centre."""
     device = SHIELDBOT.device["ping"]
-    assert isinstance(device, robots.Ping)
+    assert isinstance(device, PingSensor)
     turn = math.radians(70)
     c, s = math.cos(turn), math.sin(turn)
     wall = arena_of([(c * x - s * y, s * x + c * y) for x, y in [(0.5, -5), (0.6, -5), (0.6, 5), (0.5, 5)]])

@@ -15,8 +15,12 @@ from dataclasses import dataclass, fields
 from itertools import count
 from math import gcd, prod
 
-from boebot.description import robots
 from boebot.description.robots import RobotDescription
+from boebot.devices.compass import MagneticCompass
+from boebot.devices.device import pin_number
+from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
+from boebot.devices.ping import PingSensor
+from boebot.devices.whisker import WhiskerSwitch
 from boebot.link import frame, messages
 from sim_bridge.timing.line import BYTE_CYCLES, Line
 from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
@@ -200,10 +204,10 @@ def encoder_pins(robot: RobotDescription) -> list[tuple[int, ...]]:
     """The encoder lines of each wheel, one or two each."""
     lines: list[tuple[int, ...]] = []
     for device in robot.device.values():
-        if isinstance(device, robots.Encoder):
-            lines.append((robots.pin_number(device.pin),))
-        elif isinstance(device, robots.QuadratureEncoder):
-            lines.append((robots.pin_number(device.pin_a), robots.pin_number(device.pin_b)))
+        if isinstance(device, SingleEncoder):
+            lines.append((pin_number(device.pin),))
+        elif isinstance(device, QuadratureEncoder):
+            lines.append((pin_number(device.pin_a), pin_number(device.pin_b)))
     return lines
 
 
@@ -257,26 +261,26 @@ def load(
     start = bench.now + 2_000
     turning = turn(bench, robot, scenario, numbers, start)
     first = start + numbers.line
-    whiskers = [d for d in robot.device.values() if isinstance(d, robots.Whisker)]
+    whiskers = [d for d in robot.device.values() if isinstance(d, WhiskerSwitch)]
     if scenario == "everything":
         bench.sources += [
-            Contact(robots.pin_number(d.pin), CONTACT_PERIOD + 2 * i, BOUNCE, start + numbers.contact // (i + 1))
+            Contact(pin_number(d.pin), CONTACT_PERIOD + 2 * i, BOUNCE, start + numbers.contact // (i + 1))
             for i, d in enumerate(whiskers)
         ]
         last = max(first, bench.now + cycles - SILENCE)
         bench.sources += [
-            Contact(robots.pin_number(d.sda_pin), NEVER_AGAIN, STUCK, last - STUCK)
+            Contact(pin_number(d.sda_pin), NEVER_AGAIN, STUCK, last - STUCK)
             for d in robot.device.values()
-            if isinstance(d, robots.Compass)
+            if isinstance(d, MagneticCompass)
         ]
         bench.sources.append(AllSorts(line, numbers, first, last))
         return turning
     for device in robot.device.values():
-        if isinstance(device, robots.Ping):
-            bench.sources.append(Ping(robots.pin_number(device.pin), step=23_459 + numbers.echo))
+        if isinstance(device, PingSensor):
+            bench.sources.append(Ping(pin_number(device.pin), step=23_459 + numbers.echo))
     if scenario == "faults":
         bench.sources += [
-            Contact(robots.pin_number(d.pin), BOUNCE_PERIOD, BOUNCE_CLOSED, start + numbers.contact) for d in whiskers
+            Contact(pin_number(d.pin), BOUNCE_PERIOD, BOUNCE_CLOSED, start + numbers.contact) for d in whiskers
         ]
         bench.sources.append(Deaf(line, first))
         return turning

@@ -78,7 +78,7 @@ class ChargeBattery(MotorBehavior):
         self.machine.step(robot)
 
     def seek(self, robot: Robot) -> State | None:
-        left, right = brightness(robot.left_light), brightness(robot.right_light)
+        left, right = brightness(robot.light_left), brightness(robot.light_right)
         seen = left + right
         if seen < self.passed * self._brightest:
             return self.under

@@ -143,7 +143,7 @@ class Escalate(MotorBehavior):
 
     def step(self, robot: Robot) -> None:
         if self.answer != self._aside and self.answer in ("turn", "call"):
-            self._left = robot.right_whisker.pressed and not robot.left_whisker.pressed  # away from the touch
+            self._left = robot.whisker_right.pressed and not robot.whisker_left.pressed  # away from the touch
         self._aside = self.answer
         match self.answer:
             case "turn":
@@ -195,6 +195,6 @@ class Touchiness(CognitiveProcess):
         rate, source = self.escalation.rise if self._touched else self.escalation.fade
         chosen = self._chain.advance(self.stimulus, elapsed)
         self.stimulus = LeakyIntegrator(rate, 1.0, self.stimulus).advance(source, elapsed)
-        self._touched = robot.left_whisker.pressed or robot.right_whisker.pressed
+        self._touched = robot.whisker_left.pressed or robot.whisker_right.pressed
         self.escalation.answer = ("", *ANSWERS)[chosen]
         self.kick(self.escalation, HOLD if chosen else -HOLD)

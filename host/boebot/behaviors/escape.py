@@ -57,7 +57,7 @@ class Escape(FixedActionPattern):
         self._actions = [Action(-s, -s, self.back), Action(turn, -turn, seconds), Action(s, s, self.forward)]
 
     def _touched(self, robot: Robot) -> bool:
-        left, right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        left, right = robot.whisker_left.pressed, robot.whisker_right.pressed
         if left or right:
             self._left = self.chance(0.5) if left == right else right  # turns away from the touch
         return left or right

@@ -41,7 +41,7 @@ class Phototaxis(MotorBehavior):
         parameters.not_negative(self, "dark")
 
     def step(self, robot: Robot) -> None:
-        left, right = brightness(robot.left_light), brightness(robot.right_light)
+        left, right = brightness(robot.light_left), brightness(robot.light_right)
         if left + right <= self.dark:
             if self.flee:
                 robot.drive(0.0, 0.0)
@@ -56,7 +56,7 @@ class Phototaxis(MotorBehavior):
 class Klinotaxis(MotorBehavior):
     """To the light by one sensor, or away from it: swings left and right, and compares the last two swings."""
 
-    NEEDS = ("left_light",)
+    NEEDS = ("light_left",)
 
     signal: float = 0.4
     """s_0"""
@@ -82,7 +82,7 @@ class Klinotaxis(MotorBehavior):
         self._steer = 0.0
 
     def step(self, robot: Robot) -> None:
-        self._sum += brightness(robot.left_light)
+        self._sum += brightness(robot.light_left)
         self._count += 1
         if robot.time >= self._until - 1e-9:
             self._seen[self._side] = self._sum / self._count

@@ -85,7 +85,7 @@ class Withdraw(MotorBehavior):
 
     def enter(self, robot: Robot) -> None:
         self._begun = robot.time
-        self._left = robot.right_whisker.pressed and not robot.left_whisker.pressed  # turns away from the touch
+        self._left = robot.whisker_right.pressed and not robot.whisker_left.pressed  # turns away from the touch
 
     def step(self, robot: Robot) -> None:
         since = robot.time - self._begun
@@ -119,7 +119,7 @@ class Irritation(CognitiveProcess):
 
     def step(self, robot: Robot) -> None:
         reflex, now = self.reflex, robot.time
-        touched = robot.left_whisker.pressed or robot.right_whisker.pressed
+        touched = robot.whisker_left.pressed or robot.whisker_right.pressed
         intensity = self._intensity.advance(1.0 if touched else 0.0, now - self._time)
         self._time = now
         if touched and intensity >= self.least and now >= self._until - 1e-9:

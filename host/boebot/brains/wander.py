@@ -40,8 +40,8 @@ class Brain:
         if self.whiskers is None:
             self.whiskers = robot.has("whiskers")
         if self.whiskers:
-            touched_left, touched_right = robot.left_whisker.pressed, robot.right_whisker.pressed
-        seen_left, seen_right = robot.left_ir.detected, robot.right_ir.detected
+            touched_left, touched_right = robot.whisker_left.pressed, robot.whisker_right.pressed
+        seen_left, seen_right = robot.infrared_left.detected, robot.infrared_right.detected
 
         if touched_left or touched_right:
             self.state = "back"

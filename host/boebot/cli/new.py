@@ -25,16 +25,16 @@ NEEDS = ["whiskers", "infrared"]  # a robot without them is refused
 
 def step(robot: Robot) -> None:
     """Called every PERIOD: look at the sensors, drive the motors (-1 full backward ... 1 full forward)."""
-    if robot.left_whisker.pressed or robot.right_whisker.pressed:
+    if robot.whisker_left.pressed or robot.whisker_right.pressed:
         robot.drive(-0.6, -0.2)
-    elif robot.left_ir.detected:
+    elif robot.infrared_left.detected:
         robot.drive(0.5, -0.5)
-    elif robot.right_ir.detected:
+    elif robot.infrared_right.detected:
         robot.drive(-0.5, 0.5)
     else:
         robot.drive(0.5, 0.5)
 
-    # More to look at:  robot.ping.distance (m, or None)    robot.left_encoder.count    robot.time (s)
+    # More to look at:  robot.ping.distance (m, or None)    robot.encoder_left.count    robot.time (s)
     # More to do:       robot.drive_speed(0.1, 0.1) (m/s)   robot.stop()                robot.chance(0.02)
 '''
 

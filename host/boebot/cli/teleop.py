@@ -83,18 +83,20 @@ def sensors(robot: Robot) -> str:
     drive = "stopped, latched  " if robot.latched else f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"
     parts = [f"{robot.time:7.1f} s", drive]
     equipment = robot.observation.equipment
-    if equipment.has("left_whisker") and equipment.has("right_whisker"):
+    if equipment.has("whisker_left") and equipment.has("whisker_right"):
         parts.append(
-            f"whiskers {'L' if robot.left_whisker.pressed else '·'}{'R' if robot.right_whisker.pressed else '·'}"
+            f"whiskers {'L' if robot.whisker_left.pressed else '·'}{'R' if robot.whisker_right.pressed else '·'}"
         )
-    if equipment.has("left_ir") and equipment.has("right_ir"):
-        parts.append(f"IR {'L' if robot.left_ir.detected else '·'}{'R' if robot.right_ir.detected else '·'}")
+    if equipment.has("infrared_left") and equipment.has("infrared_right"):
+        parts.append(
+            f"IR {'L' if robot.infrared_left.detected else '·'}{'R' if robot.infrared_right.detected else '·'}"
+        )
     if equipment.has("ping"):
         distance = robot.ping.distance
         unknown = robot.ping.status.name.lower().replace("_", " ")
         parts.append(f"ping {unknown}" if distance is None else f"ping {distance:4.2f} m")
-    if equipment.has("left_encoder") and equipment.has("right_encoder"):
-        parts.append(f"encoders {robot.left_encoder.count} {robot.right_encoder.count}")
+    if equipment.has("encoder_left") and equipment.has("encoder_right"):
+        parts.append(f"encoders {robot.encoder_left.count} {robot.encoder_right.count}")
     return "   ".join(parts)
 
 

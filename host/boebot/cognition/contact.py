@@ -34,7 +34,7 @@ class Contact(CognitiveProcess):
         self.forget()
 
     def step(self, robot: Robot) -> None:
-        left, right = robot.left_whisker.pressed, robot.right_whisker.pressed
+        left, right = robot.whisker_left.pressed, robot.whisker_right.pressed
         self.touches += (left and not self.left) + (right and not self.right)
         self.left, self.right = left, right
         if left or right:
@@ -47,6 +47,6 @@ def contact() -> StateVariable:
     def read(robot: Robot) -> float:
         if not robot.has("whiskers"):
             return 0.0
-        return float(robot.left_whisker.pressed or robot.right_whisker.pressed)
+        return float(robot.whisker_left.pressed or robot.whisker_right.pressed)
 
     return StateVariable("contact", read)

@@ -41,7 +41,7 @@ class LightSense(CognitiveProcess):
         self.forget()
 
     def step(self, robot: Robot) -> None:
-        left, right = robot.left_light, robot.right_light
+        left, right = robot.light_left, robot.light_right
         self.left = left.brightness if left.valid else None
         self.right = right.brightness if right.valid else None
         both = (self.left or 0.0) + (self.right or 0.0)

@@ -75,7 +75,7 @@ class Odometry(CognitiveProcess):
         self._reckoning = DeadReckoning(robot.dimensions.track_width, *self.start)
         self._directions = WheelDirection(), WheelDirection()
         if self.source == "encoders":
-            self._encoders = robot.left_encoder, robot.right_encoder
+            self._encoders = robot.encoder_left, robot.encoder_right
         self._speeds = (0.0, 0.0)
 
     def step(self, robot: Robot) -> None:
@@ -114,7 +114,7 @@ class Odometry(CognitiveProcess):
 
     def _counted(self, robot: Robot, elapsed: float) -> tuple[float, float]:
         """What the wheels have rolled by their encoders (m)."""
-        before, self._encoders = self._encoders, (robot.left_encoder, robot.right_encoder)
+        before, self._encoders = self._encoders, (robot.encoder_left, robot.encoder_right)
         signals = _signals(robot)
         rolled = [0.0, 0.0]
         for side in (0, 1):
@@ -148,7 +148,7 @@ def _rolled(before: Encoder, now: Encoder) -> float:
 def _signals(robot: Robot) -> tuple[float, float]:
     """Motor signals now in force: as the servos are driven, else as they were last told."""
     if robot.has("servos"):
-        return robot.observation.left_servo.signal, robot.observation.right_servo.signal
+        return robot.observation.servo_left.signal, robot.observation.servo_right.signal
     kind, left, right = robot.command
     if kind == "speed":
         return left / robot.dimensions.speed, right / robot.dimensions.speed

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable, maximum
+from boebot.devices.infrared import Infrared
 
 if TYPE_CHECKING:
     from boebot.devices.analog_infrared import AnalogInfrared
@@ -53,12 +54,12 @@ class Proximity(CognitiveProcess):
 
 def left_nearness(robot: Robot) -> float | None:
     """Nearness of what the left IR sensor sees, 0..1; None: no fresh reading."""
-    return _sided(robot, "left_ir", "left_zone")
+    return _nearness(robot, "infrared_left")
 
 
 def right_nearness(robot: Robot) -> float | None:
     """The same of the right one."""
-    return _sided(robot, "right_ir", "right_zone")
+    return _nearness(robot, "infrared_right")
 
 
 def nearness_ahead(robot: Robot) -> float | None:
@@ -69,8 +70,8 @@ def nearness_ahead(robot: Robot) -> float | None:
     found = []
     if robot.has("ping") and not _looks_aside(robot):
         found.append(ping_nearness(robot))
-    if robot.has("analog_ir"):
-        found.append(_of_distance(robot.analog_ir))
+    if robot.has("analog_infrared"):
+        found.append(_of_distance(robot.analog_infrared))
     return maximum(found)
 
 
@@ -96,14 +97,13 @@ def near() -> StateVariable:
     )
 
 
-def _sided(robot: Robot, pair: str, zone: str) -> float | None:
-    """An analog sensor's reading; of a pair its zone if it sweeps, else 1 for seen and 0 for not."""
-    if robot.has(zone):
-        swept = getattr(robot, zone)
-        if swept.valid:
-            return float(swept.zone / ZONES)
-    if robot.has(pair):
-        sensor = getattr(robot, pair)
-        if sensor.valid:
-            return float(getattr(sensor, "reading", sensor.detected))
-    return None
+def _nearness(robot: Robot, name: str) -> float | None:
+    """An analog sensor's reading; of a pair its zone if it sweeps, else 1 for detected and 0 for not."""
+    sensor = robot.device(name, Infrared) if robot.has(name) else None
+    if sensor is None:
+        return None
+    if sensor.zone is not None:
+        return sensor.zone / ZONES
+    if not sensor.valid:
+        return None
+    return float(sensor.detected) if sensor.reading is None else sensor.reading

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 
 import msgspec
 
-from boebot.description.robots import InfraredSchedule, RobotDescription
+from boebot.description.robots import RobotDescription
+from boebot.devices.infrared import InfraredSchedule
 from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS, Devices
 from boebot.link.session import Link
 

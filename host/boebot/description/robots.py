@@ -10,18 +10,21 @@ from __future__ import annotations
 import math
 import reprlib
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 import msgspec
 
 from boebot import resources
 from boebot.description import toml_files
-from boebot.devices.device import Device as Device
-from boebot.devices.device import pin_name as pin_name
-from boebot.devices.device import pin_number as pin_number
-from boebot.devices.vehicle_devices import AnyVehicleDevice, Energy, Laser, Motor, VehicleDevice
+from boebot.devices.battery import Energy
+from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
+from boebot.devices.encoder import WheelEncoder
+from boebot.devices.equipment import RENAMED
+from boebot.devices.laser import Laser
+from boebot.devices.motor import Motor
 from boebot.errors import RobotError
 from boebot.geometry import Point, polygon_fault, way_out
+from boebot.robot import Robot
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -72,191 +75,10 @@ class Supply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     charger_a: NotNegative = 1.0  # flows into the pack at a charging station (chosen: C/2 of 2,000 mA h)
 
 
-_ANALOG = tuple(range(14, 20))
-
-
-class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True):
-    """A servo modified for continuous rotation: the pulse sets the wheel's speed."""
-
-    pin: int | str
-    centre_us: Annotated[float, msgspec.Meta(ge=1400, le=1600)]
-    gain_us: Annotated[float, msgspec.Meta(ge=-200, le=200)]  # pulse offset at full forward signal
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
-
-
-class PositionServo(Device, tag="position_servo", frozen=True, kw_only=True):
-    """A servo that turns to an angle: pulse = centre + gain * angle. A Ping, where there is one, is mounted on it."""
-
-    pin: int | str
-    position_m: Point  # of its axis
-    centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
-    gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
-
-
-class Encoder(Device, tag="encoder", frozen=True, kw_only=True):
-    """Single-channel wheel encoder: both edges counted, direction unknown."""
-
-    pin: int | str
-    edges_per_turn: Annotated[int, msgspec.Meta(ge=2, le=4096)]
-    LINES: ClassVar[int] = 1
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
-
-
-class QuadratureEncoder(Device, tag="quadrature_encoder", frozen=True, kw_only=True):
-    """Two-channel wheel encoder: four edges per period, direction known."""
-
-    pin_a: int | str
-    pin_b: int | str
-    edges_per_turn: Annotated[int, msgspec.Meta(ge=4, le=4096)]  # of both lines together
-    LINES: ClassVar[int] = 2
-
-    PINS: ClassVar[dict[str, str]] = {"pin_a": "a", "pin_b": "b"}
-    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin_a": _ANALOG, "pin_b": _ANALOG}
-
-
-class Whisker(Device, tag="whisker", frozen=True, kw_only=True):
-    """A wire that closes a switch to ground when it is bent."""
-
-    pin: int | str
-    root_m: Point
-    tip_m: Point
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-
-
-class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
-    """An infra-red LED and a 38 kHz receiver that looks the same way."""
-
-    led_pin: int | str
-    receiver_pin: int | str
-    position_m: Point
-    heading_rad: float
-    beam_rad: Positive
-    range_m: Positive
-
-    PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
-    NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
-
-
-class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=True):
-    """How often the IR pairs are read."""
-
-    period_ticks: Annotated[int, msgspec.Meta(ge=2, le=250)]
-    sweep: bool = False  # flash at five frequencies in turn: zones of distance
-
-
-class Ping(Device, tag="ping", frozen=True, kw_only=True):
-    """Parallax Ping))): an ultrasonic range finder on one pin."""
-
-    pin: int | str
-    position_m: Point
-    heading_rad: float
-    beam_rad: Positive
-    range_min_m: Positive
-    range_max_m: Positive
-    period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
-
-
-class Battery(Device, tag="battery", frozen=True, kw_only=True):
-    """Battery voltage behind a divider."""
-
-    pin: int | str
-    ratio: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # voltage of the pack for each volt at the pin
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
-
-
-class AnalogInfrared(Device, tag="analog_infrared", frozen=True, kw_only=True):
-    """Sharp analog infra-red distance sensor."""
-
-    pin: int | str
-    position_m: Point
-    heading_rad: float
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": _ANALOG}
-
-
-class LightSensor(Device, tag="light_sensor", frozen=True, kw_only=True):
-    """Phototransistor read by its RC decay time."""
-
-    pin: int | str
-    position_m: Point
-    heading_rad: float
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *_ANALOG)}
-
-
-class Compass(Device, tag="compass", frozen=True, kw_only=True):
-    """HMC5883L on the two-wire bus."""
-
-    sda_pin: int | str
-    scl_pin: int | str
-    offset_counts: tuple[float, float] = (0.0, 0.0)  # of the robot's own iron along x and y, at 1090 counts a gauss
-
-    PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
-    NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
-
-
-class Buzzer(Device, tag="buzzer", frozen=True, kw_only=True):
-    """Piezo speaker."""
-
-    pin: int | str
-
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
-
-
-class Uart(Device, tag="uart", frozen=True, kw_only=True):
-    """The serial line to the host."""
-
-    receive_pin: int | str
-    transmit_pin: int | str
-    baud: Annotated[int, msgspec.Meta(ge=9600, le=1_000_000)]
-
-    PINS: ClassVar[dict[str, str]] = {"receive_pin": "receive", "transmit_pin": "transmit"}
-    NEEDS: ClassVar[dict[str, str]] = {"USART0": ""}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"receive_pin": (0,), "transmit_pin": (1,)}
-
-
-AnyDevice = (
-    ContinuousServo
-    | PositionServo
-    | Encoder
-    | QuadratureEncoder
-    | Whisker
-    | InfraredPair
-    | InfraredSchedule
-    | Ping
-    | Battery
-    | AnalogInfrared
-    | LightSensor
-    | Compass
-    | Buzzer
-    | Uart
-    | AnyVehicleDevice
-)
+if TYPE_CHECKING:
+    AnyDevice = Device
+else:
+    AnyDevice = Union[kinds()]  # noqa: UP007  # of which msgspec chooses by `type`
 
 NO_BOARD = "none"  # the board of a robot that is driven by motor signals
 
@@ -285,9 +107,9 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         """Edges of one encoder line that follow faster are bounces (us): a quarter of the time between two edges at the
         wheel's top speed. 0: there are no encoders."""
         encoder = self.device.get("encoder_left")
-        if not isinstance(encoder, Encoder | QuadratureEncoder):
+        if not isinstance(encoder, WheelEncoder):
             return 0.0
-        edge_m = 2 * math.pi * self.body.wheel_radius_m * encoder.LINES / encoder.edges_per_turn
+        edge_m = encoder.LINES * encoder.metres_per_edge(self.body.wheel_radius_m)
         return min(0.25 * edge_m / self.body.wheel_speed_maximum_m_s * 1e6, 65535.0)
 
     def has(self, name: str) -> bool:
@@ -312,6 +134,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
     if description.body.outline_m and (fault := polygon_fault(description.body.outline_m, OUTLINE_CORNERS_MAXIMUM)):
         place = f"body.outline_m{fault.partition(' ')[0].rstrip(':')}"
         raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
+    _check_devices(description, table, path.name)
     if description.has_board:
         _check_supply(description, path.name)
         _check_pins(description, path.name)
@@ -368,6 +191,18 @@ def _check_supply(robot: RobotDescription, file: str) -> None:
         )
 
 
+def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
+    """Refuses keys that do not fit each other, and names that a brain could not write."""
+    for name, device in robot.device.items():
+        at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
+        if not name.isidentifier() or name in RENAMED or hasattr(Robot, name):
+            expected = f"{RENAMED[name]!r}" if name in RENAMED else "a name that robot.NAME can have in a brain"
+            raise RobotError(f"{at}: a device cannot have this name; expected {expected}")
+        if device.on and (fault := device.fault()):
+            key = f"device.{name}.{fault[0]}"
+            raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
+
+
 def _check_pins(robot: RobotDescription, file: str) -> None:
     """Refuses devices that cannot share a pin or a unit of the chip (ATmega328P data sheet), naming both."""
     pin_owner: dict[int, str] = {}
@@ -376,6 +211,9 @@ def _check_pins(robot: RobotDescription, file: str) -> None:
         if isinstance(device, VehicleDevice):
             kind = device.__struct_config__.tag
             raise RobotError(f"{file}: device.{name} is {kind}, which only a robot without a board can have")
+        if name not in device.NAMES:
+            kind, known = device.__struct_config__.tag, " or ".join(device.NAMES)
+            raise RobotError(f"{file}: device.{name} is {kind}; expected the name {known}, which the firmware knows")
         try:
             pins = {field: pin_number(getattr(device, field)) for field in device.PINS}
         except ValueError as error:
@@ -426,9 +264,6 @@ def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file:
     for name, device in robot.device.items():
         if not isinstance(device, VehicleDevice) or not device.on:
             continue
-        if fault := device.fault():
-            key = f"device.{name}.{fault[0]}"
-            raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
         if isinstance(device, Motor):
             continue
         at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"

@@ -1,9 +1,6 @@
-"""One file per device: wire value to SI value, with age and validity.
+"""One file per kind of device, under the name of the device: its keys in robot files, its pins, how wire values become
+a reading in SI units with age and validity, its columns in the record, what it looks like.
 
-Each file has the small immutable view that a brain sees and the reader that makes it from a telemetry
-message, or from that of the slow devices. A reader is made once per robot from the robot's description; it
-holds the constants.
-
-Messages of the slow devices come less often than telemetry: their readers are told how many ticks have passed since, so
-that ages count on.
+What a board's devices say comes with telemetry in every tick, or in messages of their own, less often: then ages count
+on from message to message (`latest`). A robot without a board has readings at each step (`readings`).
 """

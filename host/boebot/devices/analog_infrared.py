@@ -2,15 +2,26 @@
 
 V ≈ 33.9 / (d + 4.74)   with d in cm, from 10 to 80 cm; so   d = 33.9 / V - 4.74.
 Nearer than 10 cm the voltage falls again: what is read there looks farther away than it is.
+
+Wiring: 5 V, ground, the output to an analog pin.
+
+    [device.analog_infrared]
+    type = "analog_infrared"
+    pin = "A2"
+    position_m = [0.06, 0.0]
+    heading_rad = 0.0
+
+    robot.analog_infrared.distance
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
-from boebot.devices.infrared import NEVER
+from boebot.devices.device import ANALOG_PINS, Place, Point, Reader, SlowDevice
+from boebot.devices.drawing import Ray, Shape
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.link.messages import DevicesTelemetry
 
 SCALE_V_M = 0.339
@@ -39,18 +50,35 @@ class AnalogInfrared(NamedTuple):
     """The reading is fresh."""
 
 
-class AnalogInfraredReader:
-    """Reads the sensor; `told_ticks`: from one message to the next."""
+class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
+    """Sharp analog infra-red distance sensor."""
 
-    def __init__(self, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
-        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
-        self._tick_s = tick_s
+    pin: int | str
+    position_m: Point
+    heading_rad: float
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> AnalogInfrared:
-        """The last reading, `since` ticks after that message."""
-        told = devices.analog_infrared_age
-        ticks = told + since
-        at_pin = voltage(devices.analog_infrared, devices.supply)
-        if told >= NEVER or at_pin is None:
-            return AnalogInfrared(None, None, float("inf"), False)
-        return AnalogInfrared(distance(at_pin), at_pin, ticks * self._tick_s, ticks <= self._fresh)
+    READING: ClassVar = AnalogInfrared
+    NAMES: ClassVar[tuple[str, ...]] = ("analog_infrared",)
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    COLUMNS: ClassVar = (("distance", "", "m", 4),)
+    SHOWN: ClassVar = ("", "m", 1.0, 3)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        fresh, tick_s = fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
+
+        def read(_: object, slow: Latest) -> AnalogInfrared:
+            message, since = slow.of(DevicesTelemetry)
+            at_pin = voltage(message.analog_infrared, message.supply)
+            if message.analog_infrared_age >= NEVER or at_pin is None:
+                return AnalogInfrared(None, None, float("inf"), False)
+            ticks = message.analog_infrared_age + since
+            return AnalogInfrared(distance(at_pin), at_pin, ticks * tick_s, ticks <= fresh)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """Its line of sight."""
+        return [Ray(self.position_m, self.heading_rad, RANGE_MAX_M)]

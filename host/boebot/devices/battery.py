@@ -1,15 +1,37 @@
-"""Battery: the pack's voltage behind a divider, against the supply.
+"""Battery. On a board the pack's voltage behind a divider, against the supply:
 
 voltage = ratio · result / 1024 · supply
+
+In a robot without a board the notes' energy (section 1.9), read as a voltage.
+
+Wiring: two equal resistors from the pack to ground, their middle to an analog pin.
+
+    [device.battery]
+    type = "battery"
+    pin = "A0"
+    ratio = 2.0
+
+    robot.battery.voltage
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
+
+import msgspec
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
-from boebot.devices.infrared import NEVER
+from boebot.devices.device import (
+    ANALOG_PINS,
+    NotNegative,
+    Place,
+    Positive,
+    Reader,
+    SlowDevice,
+    VehicleDevice,
+)
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.devices.readings import Readings
 from boebot.link.messages import DevicesTelemetry
 
 
@@ -24,19 +46,60 @@ class Battery(NamedTuple):
     """The measurement is fresh."""
 
 
-class BatteryReader:
-    """Reads the pack; `ratio`: its voltage for each volt at the pin; `told_ticks`: from one message to the next."""
+class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
+    """Battery voltage behind a divider."""
 
-    def __init__(self, ratio: float, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
-        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
-        self._ratio = ratio
-        self._tick_s = tick_s
+    pin: int | str
+    ratio: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # voltage of the pack for each volt at the pin
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Battery:
-        """The last measurement, `since` ticks after that message."""
-        told = devices.battery_age
-        ticks = told + since
-        at_pin = voltage(devices.battery, devices.supply)
-        if told >= NEVER or at_pin is None:
-            return Battery(None, float("inf"), False)
-        return Battery(at_pin * self._ratio, ticks * self._tick_s, ticks <= self._fresh)
+    READING: ClassVar = Battery
+    NAMES: ClassVar[tuple[str, ...]] = ("battery",)
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    COLUMNS: ClassVar = (("voltage", "", "v", 3),)
+    SHOWN: ClassVar = ("", "V", 1.0, 2)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        ratio, fresh, tick_s = self.ratio, fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
+
+        def read(_: object, slow: Latest) -> Battery:
+            message, since = slow.of(DevicesTelemetry)
+            at_pin = voltage(message.battery, message.supply)
+            if message.battery_age >= NEVER or at_pin is None:
+                return Battery(None, float("inf"), False)
+            ticks = message.battery_age + since
+            return Battery(at_pin * ratio, ticks * tick_s, ticks <= fresh)
+
+        return read
+
+
+class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
+    """The notes' battery (section 1.9): its energy E in [0, 1] is read as a voltage."""
+
+    idle_per_s: NotNegative = 0.002  # p_0
+    signal_per_s: NotNegative = 0.004  # p_m
+    charger_per_s: NotNegative = 0.1  # p_c
+    empty_v: Positive = 10.0
+    full_v: Positive = 12.0
+    sigma_v: NotNegative = 0.0
+
+    READING: ClassVar = Battery
+    COLUMNS: ClassVar = (("voltage", "", "v", 5),)
+    SHOWN: ClassVar = ("", "V", 1.0, 2)
+
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.empty_v < self.full_v:
+            return None
+        return "full_v", f" is {self.full_v:g}; expected more than empty_v, {self.empty_v:g} V"
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first = place.where.start
+        return lambda sample, _: _of_readings(sample, first)
+
+
+def _of_readings(sample: Readings, first: int) -> Battery:
+    return Battery(sample.values[first], sample.ages[first], True)

@@ -1,13 +1,22 @@
-"""Buzzer: tones, told to the board with a token, so that one told twice sounds once.
+"""Buzzer: tones. Each is sent with a token, so that one that comes twice sounds once.
 
-A message may be lost: it is to be sent again, unchanged, until devices_telemetry brings its token back.
+A message may be lost: it is sent again, unchanged, until devices_telemetry brings its token back.
+
+Wiring: a piezo speaker from the pin to ground.
+
+    [device.buzzer]
+    type = "buzzer"
+    pin = 4
+
+    robot.beep(880, 0.2)
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+from boebot.devices.device import Place, Reader, SlowDevice
+from boebot.devices.latest import Latest, fresh_ticks
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
 
@@ -46,13 +55,24 @@ class Buzzer(NamedTuple):
     """Whether the value may be trusted."""
 
 
-class BuzzerReader:
-    """Reads the buzzer; `told_ticks`: from one message to the next."""
+class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
+    """Piezo speaker."""
 
-    def __init__(self, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
-        self._fresh = fresh_ticks(1, told_ticks)
-        self._tick_s = tick_s
+    pin: int | str
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Buzzer:
-        """The buzzer as that message had it, `since` ticks ago."""
-        return Buzzer(devices.buzzer_token, since * self._tick_s, since <= self._fresh)
+    READING: ClassVar = Buzzer
+    NAMES: ClassVar[tuple[str, ...]] = ("buzzer",)
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
+    COLUMNS: ClassVar = (("token", "token", "", 0),)
+    SHOWN: ClassVar = ("token", "tones", 1.0, 0)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        fresh, tick_s = fresh_ticks(1, place.message_ticks), place.tick_s
+
+        def read(_: object, slow: Latest) -> Buzzer:
+            message, since = slow.of(DevicesTelemetry)
+            return Buzzer(message.buzzer_token, since * tick_s, since <= fresh)
+
+        return read

@@ -1,28 +1,42 @@
-"""Compass HMC5883L: the magnetic field along three axes, x forward, y left, z up.
+"""Compass. On a board an HMC5883L: the magnetic field along three axes, x forward, y left, z up.
 
 With the sensor level the field's horizontal part points to magnetic north, so the robot's heading from there, counted
 counter-clockwise, is   heading = atan2(-(y - y0), x - x0)   with (x0, y0) the field of the robot itself (hard iron).
+In a robot without a board it is the notes' compass (section 1.8), with the heading from the x axis.
+
+Wiring: SDA to A4, SCL to A5.
+
+    [device.compass]
+    type = "compass"
+    sda_pin = "A4"
+    scl_pin = "A5"
+
+    robot.compass.heading
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
-from boebot.devices.infrared import NEVER
+import msgspec
+
+from boebot.devices.device import NotNegative, Place, Reader, Sensor, SlowDevice
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.devices.readings import Readings
 from boebot.link.messages import CompassStatus, DevicesTelemetry
 
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
 OVERFLOW = -4096
 READ_TICKS = 4
+_SHOWN = ("", "°", 180 / math.pi, 1)
 
 
 class Compass(NamedTuple):
     """The compass's last reading."""
 
     heading: float | None
-    """Radians counter-clockwise from magnetic north, -pi..pi, or None if it is not known."""
+    """Radians counter-clockwise, -pi..pi, from magnetic north, without a board from the x axis; None if not known."""
     field: tuple[float, float, float] | None
     """Tesla along x, y, z, or None."""
     status: CompassStatus
@@ -33,27 +47,57 @@ class Compass(NamedTuple):
     """The reading is fresh."""
 
 
-class CompassReader:
-    """Reads the compass; `offset`: the robot's own field along x and y, in counts; `told_ticks`: from one message to
-    the next."""
+class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
+    """HMC5883L on the two-wire bus."""
 
-    def __init__(
-        self, tick_s: float, offset: tuple[float, float] = (0.0, 0.0), told_ticks: int = MESSAGE_TICKS
-    ) -> None:
-        self._fresh = fresh_ticks(READ_TICKS, told_ticks)
-        self._tick_s = tick_s
-        self._offset = offset
+    sda_pin: int | str
+    scl_pin: int | str
+    offset_counts: tuple[float, float] = (0.0, 0.0)  # of the robot's own iron along x and y, at 1090 counts a gauss
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Compass:
-        """The last reading, `since` ticks after that message."""
-        told, status = devices.compass_age, CompassStatus(devices.compass_status)
-        ticks = told + since
-        counts = (devices.compass_x, devices.compass_y, devices.compass_z)
-        age = ticks * self._tick_s if told < NEVER else float("inf")
-        if told >= NEVER or OVERFLOW in counts:
-            return Compass(None, None, status, age, False)
-        x, y, z = (count * TESLA_PER_COUNT for count in counts)
-        ahead, aside = counts[0] - self._offset[0], counts[1] - self._offset[1]
-        heading = math.atan2(-aside, ahead) if ahead or aside else None
-        fresh = status == CompassStatus.OK and ticks <= self._fresh
-        return Compass(heading, (x, y, z), status, age, fresh and heading is not None)
+    READING: ClassVar = Compass
+    NAMES: ClassVar[tuple[str, ...]] = ("compass",)
+    PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
+    NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
+    COLUMNS: ClassVar = (("heading", "", "rad", 5),)
+    SHOWN: ClassVar = _SHOWN
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        fresh, tick_s = fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
+        x0, y0 = self.offset_counts
+
+        def read(_: object, slow: Latest) -> Compass:
+            message, since = slow.of(DevicesTelemetry)
+            status, ticks = CompassStatus(message.compass_status), message.compass_age + since
+            counts = (message.compass_x, message.compass_y, message.compass_z)
+            if message.compass_age >= NEVER or OVERFLOW in counts:
+                age = ticks * tick_s if message.compass_age < NEVER else float("inf")
+                return Compass(None, None, status, age, False)
+            x, y, z = (count * TESLA_PER_COUNT for count in counts)
+            ahead, aside = counts[0] - x0, counts[1] - y0
+            heading = math.atan2(-aside, ahead) if ahead or aside else None
+            known = status == CompassStatus.OK and heading is not None
+            return Compass(heading, (x, y, z), status, ticks * tick_s, known and ticks <= fresh)
+
+        return read
+
+
+class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):
+    """The notes' compass (section 1.8): a heading."""
+
+    sigma_rad: NotNegative = 0.05
+    bias_rad: Annotated[float, msgspec.Meta(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
+
+    READING: ClassVar = Compass
+    COLUMNS: ClassVar = (("heading", "", "rad", 5),)
+    SHOWN: ClassVar = _SHOWN
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first = place.where.start
+
+        def read(sample: Readings, _: object) -> Compass:
+            return Compass(sample.values[first], None, CompassStatus.OK, sample.ages[first], True)
+
+        return read

@@ -1,10 +1,44 @@
-"""What every device of a robot's description has, and the pins of an Arduino board."""
+"""What every kind of device has: keys in robot files, pins, a reading, columns in the record, a drawing.
+
+A kind is one class in a file of this folder; a robot's description names its devices and gives each a kind by `type`.
+Everything else follows: `robot.<name>`, the keys that a file may have and their checks, run.csv, pictures. Two kinds
+may stand for one device, on a board with pins and in a robot without a board by the notes' model; a brain reads both
+alike.
+"""
 
 from __future__ import annotations
 
-from typing import ClassVar
+import importlib
+import math
+import pkgutil
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.devices.latest import Latest
+from boebot.link.messages import DevicesTelemetry
+
+if TYPE_CHECKING:
+    from boebot.devices.drawing import Shape
+
+LARGEST = 1e12  # of any number of a robot without a board: products of some of them stay finite
+Positive = Annotated[float, msgspec.Meta(gt=0, le=LARGEST)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0, le=LARGEST)]
+Finite = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
+Angle = Annotated[float, msgspec.Meta(ge=-1e4, le=1e4)]
+Opening = Annotated[float, msgspec.Meta(ge=0, le=math.pi)]
+BeamRays = Annotated[int, msgspec.Meta(ge=1, le=32)]
+Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
+Point = tuple[Finite, Finite]
+
+ANALOG_PINS = tuple(range(14, 20))
+
+Reader = Callable[[Any, Any], Any]
+"""Makes a reading of an observation's `sample` and `slow`."""
 
 
 def pin_number(pin: int | str) -> int:
@@ -25,17 +59,189 @@ def pin_name(number: int) -> str:
     return str(number) if number < 14 else f"A{number - 14}"
 
 
+class Place(NamedTuple):
+    """Where a device is: what its reader needs to know besides its own keys."""
+
+    name: str
+    """Of the device, in the robot's description."""
+    devices: Mapping[str, Device]
+    """All of the robot."""
+    wheel_radius_m: float
+    """m"""
+    tick_s: float
+    """s, the control tick of the board, or the time step of a robot without one."""
+    message_ticks: int
+    """Ticks from one message of the board's slow devices to the next."""
+    where: slice
+    """Where its readings stand among those of a robot without a board."""
+
+
+class Column(NamedTuple):
+    """One column of run.csv; its heading is the device's name, `name` and `unit`."""
+
+    name: str
+    """What it says of the device; empty: the reading itself."""
+    unit: str
+    """As in headings: "m", "rad"."""
+    values: NDArray[Any]
+    """One entry per tick."""
+    digits: int | None
+    """None: whole numbers."""
+
+
+class Readout(NamedTuple):
+    """What one device said over time, for people to read: one entry per tick; NaN: nothing, or not known yet."""
+
+    device: str
+    """Its name."""
+    unit: str
+    """As people write it: "ms", "°"."""
+    digits: int
+    """After the point."""
+    values: NDArray[np.float64]
+    """in that unit"""
+    ages: NDArray[np.float64]
+    """s"""
+
+
+class Run(Protocol):
+    """A run after its end, as devices make their columns of it (`boebot.record`)."""
+
+    raw: NDArray[np.void]
+    """A board's telemetry: a structured array of the message's fields, one entry per tick. Of a robot without a board
+    its readings, in the column "values"."""
+
+    def held(self, kind: type) -> Held:
+        """A board's other messages of that kind."""
+
+    def values(self, device: str) -> NDArray[np.float64]:
+        """Readings of a device of a robot without a board, shape (ticks, readings of the device)."""
+
+    def ages(self, device: str) -> NDArray[np.float64]:
+        """Their ages (s)."""
+
+
+class Held(NamedTuple):
+    """Messages of one kind, each of which holds until the next has come."""
+
+    messages: list[Any]
+    """Oldest first."""
+    newest: NDArray[np.intp]
+    """For each tick of telemetry the index of the newest message then; -1: none."""
+    since_s: NDArray[np.float64]
+    """Seconds since that; NaN: none."""
+
+
 class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, tag_field="type"):
-    """What every device has. `on = false` reserves its pins and leaves it switched off; `plugged = false`: of a
+    """What every kind of device has. `on = false` reserves its pins and leaves it switched off; `plugged = false`: of a
     simulated robot's board it is switched on, but its plug is out."""
 
     on: bool = True
     plugged: bool = True
 
-    PINS: ClassVar[dict[str, str]] = {}  # field of the pin -> role in the firmware's names ("" = the device itself)
+    READING: ClassVar[type | None] = None  # of what a brain reads; None: a brain does not meet it
+    GROUP: ClassVar[str] = ""  # name of all devices of its kind together, in a brain's NEEDS
+    NAMES: ClassVar[tuple[str, ...]] = ()  # its usual ones; on a board, whose firmware knows them, the only ones
+    PINS: ClassVar[dict[str, str]] = {}  # key of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # field of the pin -> the pins that can do it
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that can do it
+    COLUMNS: ClassVar[tuple[tuple[str, str, str, int | None], ...]] = ()
+    """Field of the reading, name, unit and digits of its column in run.csv."""
+    SHOWN: ClassVar[tuple[str, str, float, int] | None] = None
+    """What pages show of it as a number: name of the column, unit, factor, digits."""
+
+    def fault(self) -> tuple[str, str] | None:
+        """A key that does not fit the others, and the rest of the sentence about it; None: all fit."""
+        return None
 
     def pins(self) -> dict[str, int]:
         """Role of each pin ("" for a device with one pin) and its Arduino number."""
-        return {role: pin_number(getattr(self, field)) for field, role in self.PINS.items()}
+        return {role: pin_number(getattr(self, key)) for key, role in self.PINS.items()}
+
+    def reader(self, place: Place) -> Reader:
+        """What makes its reading; for kinds that have one."""
+        raise NotImplementedError
+
+    def has_messages(self, devices: Mapping[str, Device]) -> bool:
+        """Whether it speaks in messages besides telemetry, among these devices of its robot's board."""
+        return False
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Its columns of run.csv."""
+        raise NotImplementedError
+
+    def readout(self, place: Place, run: Run, columns: Mapping[str, Column]) -> Readout | None:
+        """What pages show of it as a number."""
+        if self.SHOWN is None:
+            return None
+        name, unit, factor, digits = self.SHOWN
+        ages = columns["age"].values if "age" in columns else run.ages(place.name)
+        return Readout(place.name, unit, digits, columns[name].values * factor, ages)
+
+    def drawing(self) -> list[Shape]:
+        """What it looks like from above, in the robot's frame."""
+        return []
+
+
+class SlowDevice(Device, frozen=True, kw_only=True):
+    """A device of a board whose readings come in a message besides telemetry."""
+
+    MESSAGE: ClassVar[type] = DevicesTelemetry
+
+    def has_messages(self, devices: Mapping[str, Device]) -> bool:
+        """It does."""
+        return True
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """One per entry of COLUMNS, and the age."""
+        held = run.held(self.MESSAGE)
+        reader = self.reader(place)
+        readings = [reader(None, Latest({self.MESSAGE: message}, message.tick)) for message in held.messages]
+
+        def array(values: list[float | None]) -> NDArray[np.float64]:
+            found = np.array([*values, None], dtype=np.float64)  # None becomes NaN
+            found[np.isinf(found)] = np.nan  # never measured
+            return found[held.newest]
+
+        found = [
+            Column(name, unit, array([getattr(reading, field) for reading in readings]), digits)
+            for field, name, unit, digits in self.COLUMNS
+        ]
+        return [*found, Column("age", "s", array([reading.age for reading in readings]) + held.since_s, 3)]
+
+
+class VehicleDevice(Device, frozen=True, kw_only=True):
+    """A device of a robot without a board: no pins. `on = false` leaves it out."""
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """One per entry of COLUMNS, each of which is one number of the device."""
+        values = run.values(place.name)
+        return [Column(name, unit, values[:, i], digits) for i, (_, name, unit, digits) in enumerate(self.COLUMNS)]
+
+
+class Sensor(VehicleDevice, frozen=True, kw_only=True):
+    """What every sensor of a robot without a board has: between two samples the last one stands, with its age (rule S4
+    of section 1.3)."""
+
+    period_s: NotNegative = 0.0  # 0: every step
+    reading_s: NotNegative = 0.0
+    """what a reading takes the robot's hardware; sensors without a `period_s` are read one after another in each step,
+    and with the brain's step they have to fit into it (section 3.2); 0: no time is said"""
+
+
+@cache
+def kinds() -> tuple[type[Device], ...]:
+    """All kinds of devices: the tagged classes in the files of this folder."""
+    package = importlib.import_module(__package__)
+    modules = [importlib.import_module(f"{__package__}.{file.name}") for file in pkgutil.iter_modules(package.__path__)]
+    return tuple(
+        one
+        for module in modules
+        for one in vars(module).values()
+        if isinstance(one, type) and issubclass(one, Device) and one.__module__ == module.__name__ and _is_tagged(one)
+    )
+
+
+def _is_tagged(kind: type[Device]) -> bool:
+    """What kinds share is in classes that say no tag: theirs is the name of the class."""
+    return kind.__struct_config__.tag != kind.__name__

@@ -2,13 +2,25 @@
 
     distance = 2 pi r n / N,   speed = 2 pi r / (N t_edge)
 A single-channel encoder knows no direction: its count only grows, its speed is never negative.
+
+Wiring: each output to a pin of port C (A0 to A5), whose interrupt stamps the edges.
+
+    [device.encoder_left]
+    type = "encoder"
+    pin = "A2"
+    edges_per_turn = 64
+
+    robot.encoder_left.distance
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
+import msgspec
+
+from boebot.devices.device import ANALOG_PINS, Column, Device, Place, Reader, Run
 from boebot.link.messages import Status, Telemetry
 
 EDGE_PERIOD_SCALE = 16e-6  # seconds per count of the edge periods on the wire
@@ -31,21 +43,66 @@ class Encoder(NamedTuple):
     """False while the line fires so fast that the firmware masks it."""
 
 
-class EncoderReader:
-    """Reads one encoder."""
+class WheelEncoder(Device, frozen=True, kw_only=True):
+    """What both kinds of encoders have."""
 
-    def __init__(self, left: bool, edges_per_turn: int, wheel_radius_m: float, directed: bool) -> None:
-        self.metres_per_edge = 2 * math.pi * wheel_radius_m / edges_per_turn
-        self._left = left
-        self._directed = directed
-        self._masked = int(Status.ENCODER_LEFT_MASKED if left else Status.ENCODER_RIGHT_MASKED)
+    edges_per_turn: Annotated[int, msgspec.Meta(ge=2, le=4096)]  # of all lines together
 
-    def __call__(self, telemetry: Telemetry) -> Encoder:
-        """The encoder at that tick."""
-        if self._left:
-            count, edge_period = telemetry.encoder_left, telemetry.edge_period_left
-        else:
-            count, edge_period = telemetry.encoder_right, telemetry.edge_period_right
-        speed = self.metres_per_edge / (edge_period * EDGE_PERIOD_SCALE) if edge_period else 0.0
-        valid = not telemetry.status & self._masked
-        return Encoder(count, count * self.metres_per_edge, speed, self._directed, 0.0, valid)
+    READING: ClassVar = Encoder
+    GROUP: ClassVar[str] = "encoders"
+    NAMES: ClassVar[tuple[str, ...]] = ("encoder_left", "encoder_right")
+    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
+    LINES: ClassVar[int]
+
+    def metres_per_edge(self, wheel_radius_m: float) -> float:
+        """What the wheel rolls from one edge to the next (m)."""
+        return 2 * math.pi * wheel_radius_m / self.edges_per_turn
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        side = place.name.removeprefix("encoder_")
+        count_field, period_field = (Telemetry._fields.index(f"{what}_{side}") for what in ("encoder", "edge_period"))
+        masked = int(Status[f"ENCODER_{side.upper()}_MASKED"])
+        metres, directed = self.metres_per_edge(place.wheel_radius_m), self.LINES > 1
+
+        def read(sample: Telemetry, _: object) -> Encoder:
+            count, period = sample[count_field], sample[period_field]
+            speed = metres / (period * EDGE_PERIOD_SCALE) if period else 0.0
+            return Encoder(count, count * metres, speed, directed, 0.0, not sample.status & masked)
+
+        return read
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Edges counted, and the time between the last two."""
+        side = place.name.removeprefix("encoder_")
+        return [
+            Column("", "", run.raw[place.name], None),
+            Column("period", "s", run.raw[f"edge_period_{side}"] * EDGE_PERIOD_SCALE, 6),
+        ]
+
+
+class SingleEncoder(WheelEncoder, tag="encoder", frozen=True, kw_only=True):
+    """Single-channel wheel encoder: both edges counted, direction unknown."""
+
+    pin: int | str
+
+    LINES: ClassVar[int] = 1
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+
+
+class QuadratureEncoder(WheelEncoder, tag="quadrature_encoder", frozen=True, kw_only=True):
+    """Two-channel wheel encoder: four edges per period, direction known."""
+
+    pin_a: int | str
+    pin_b: int | str
+
+    LINES: ClassVar[int] = 2
+    PINS: ClassVar[dict[str, str]] = {"pin_a": "a", "pin_b": "b"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin_a": ANALOG_PINS, "pin_b": ANALOG_PINS}
+
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.edges_per_turn >= 4:
+            return None
+        return "edges_per_turn", f" is {self.edges_per_turn}; expected at least 4, two edges of each line"

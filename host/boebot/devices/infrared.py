@@ -1,80 +1,205 @@
-"""Infra-red pairs: an LED flashes at 38 kHz, a receiver says whether something reflects it.
+"""Infra-red sensors that look for objects near by.
 
-The firmware reads both pairs every few ticks; between two readings the last one stands, with its age. With the
-parameter infrared_sweep on it flashes at 38, 39, 40, 41 and 42 kHz in turn, at which the receiver is less and less
-sensitive: the nearer the object, the more of the five show it (zones of a few centimetres: Parallax,
-"Robotics with the Board of Education Shield for Arduino", chapter 8).
+On a board an LED flashes at 38 kHz, and a receiver says whether something reflects it. The firmware reads the pairs
+every few ticks; between two readings the last one stands, with its age. With `sweep = true` it flashes at 38, 39, 40,
+41 and 42 kHz in turn, at which the receiver is less and less sensitive: the nearer the object, the more of the five
+show it (zones of a few centimetres: Parallax, "Robotics with the Board of Education Shield for Arduino", chapter 8).
+A robot without a board has the notes' IR proximity sensor, (3.9) to (3.14): a number from 0 to 1.
+
+Wiring: LED with 2 kOhm from `led_pin` to ground, the receiver's output to `receiver_pin`.
+
+    [device.infrared_left]
+    type = "infrared_pair"
+    led_pin = 9
+    receiver_pin = 10
+    position_m = [0.050, 0.040]
+    heading_rad = 0.45
+    beam_rad = 0.40
+    range_m = 0.20
+
+    if robot.infrared_left.detected: ...
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, NamedTuple
 
+import msgspec
+import numpy as np
+
+from boebot.devices.device import (
+    Angle,
+    BeamRays,
+    Column,
+    Device,
+    NotNegative,
+    Opening,
+    Place,
+    Point,
+    Positive,
+    Reader,
+    Readout,
+    Run,
+    Sensor,
+    Share,
+)
+from boebot.devices.drawing import Cone, Shape
+from boebot.devices.latest import NEVER, STALE_PERIODS, Latest
+from boebot.devices.readings import Readings
 from boebot.link.messages import DevicesTelemetry, Telemetry
+from boebot.link.messages import Infrared as Bits
 
-NEVER = 255  # age in telemetry: never measured, or older
-STALE_PERIODS = 3  # a reading older than this many of its periods is not valid
-MESSAGE_TICKS = 2  # from one message of the slow devices to the next: parameter devices_period, unless set otherwise
+SWEEP_TICKS = 5  # of a whole sweep: one frequency in each
+_PERIOD_TICKS = 5  # where no schedule is given
+_SHADE = 0.22
 
 
 class Infrared(NamedTuple):
-    """One infra-red pair."""
+    """One infra-red sensor."""
 
     detected: bool
-    """Something reflected the last flash."""
+    """Something reflected the last flash; without a board: the reading is at the sensor's threshold or above."""
     age: float
     """Seconds since the last flash; infinite if there was none."""
     valid: bool
     """The reading is fresh."""
+    zone: int | None = None
+    """At how many of a sweep's five frequencies something reflected the flash: 0 nothing, 5 nearest. None: there is no
+    sweep, or none is fresh."""
+    reading: float | None = None
+    """Without a board: 0 (nothing within range) to 1 (close by)."""
 
 
-class InfraredReader:
-    """Reads one pair; `bit` is its flag in telemetry."""
+class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
+    """An infra-red LED and a 38 kHz receiver that looks the same way."""
 
-    def __init__(self, bit: int, period_ticks: int, tick_s: float) -> None:
-        fresh = min(STALE_PERIODS * period_ticks, NEVER - 1)
-        # [detected][age in ticks] -> view; a reading has only 512 values
-        self._views = [
+    led_pin: int | str
+    receiver_pin: int | str
+    position_m: Point
+    heading_rad: float
+    beam_rad: Positive  # full opening
+    range_m: Positive  # at 38 kHz, light surfaces
+
+    READING: ClassVar = Infrared
+    GROUP: ClassVar[str] = "infrared"
+    NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
+    PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        schedule, bit, tick_s = _schedule(place.devices), _bit(place), place.tick_s
+        fresh = min(STALE_PERIODS * schedule.period_ticks, NEVER - 1)
+        # [detected][age in ticks] -> reading; without zones there are only 512
+        views = [
             [
                 Infrared(detected, ticks * tick_s if ticks < NEVER else float("inf"), ticks <= fresh)
                 for ticks in range(NEVER + 1)
             ]
             for detected in (False, True)
         ]
-        self._bit = int(bit)
 
-    def __call__(self, telemetry: Telemetry) -> Infrared:
-        """The pair's last reading as of that tick."""
-        return self._views[telemetry.infrared & self._bit != 0][telemetry.infrared_age]
+        def read(sample: Telemetry, _: Latest) -> Infrared:
+            return views[sample.infrared & bit != 0][sample.infrared_age]
+
+        if not schedule.sweep:
+            return read
+        zone_fresh = STALE_PERIODS * max(schedule.period_ticks, SWEEP_TICKS, place.message_ticks)
+        field = _zone_field(place)
+
+        def read_zone(sample: Telemetry, slow: Latest) -> Infrared:
+            message, since = slow.of(DevicesTelemetry)
+            age = message.infrared_zone_age
+            known = age < NEVER and age + since <= zone_fresh
+            return read(sample, slow)._replace(zone=message[field] if known else None)
+
+        return read_zone
+
+    def has_messages(self, devices: Mapping[str, Device]) -> bool:
+        """The zones."""
+        return _schedule(devices).sweep
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Detected or not, the age, and the zone of a robot that sweeps."""
+        age = run.raw["infrared_age"]
+        found = [
+            Column("", "", (run.raw["infrared"] & _bit(place)) != 0, None),
+            Column("age", "s", np.where(age < NEVER, age * place.tick_s, np.nan), 3),
+        ]
+        if _schedule(place.devices).sweep:
+            messages, newest, _ = run.held(DevicesTelemetry)
+            field = _zone_field(place)
+            zones = [message[field] if message.infrared_zone_age < NEVER else np.nan for message in messages]
+            found.append(Column("zone", "", np.array([*zones, np.nan])[newest], 0))
+        return found
+
+    def readout(self, place: Place, run: Run, columns: Mapping[str, Column]) -> Readout | None:
+        """The zone of a robot that sweeps."""
+        if "zone" not in columns:
+            return None
+        return Readout(place.name, "of 5", 0, columns["zone"].values, columns["age"].values)
+
+    def drawing(self) -> list[Shape]:
+        """Its beam."""
+        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_m, _SHADE)]
 
 
-SWEEP_TICKS = 5  # of a whole sweep: one frequency in each
+class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=True):
+    """How often the IR pairs are read."""
+
+    period_ticks: Annotated[int, msgspec.Meta(ge=2, le=250)] = _PERIOD_TICKS
+    sweep: bool = False  # flash at five frequencies in turn: zones of distance
+
+    NAMES: ClassVar[tuple[str, ...]] = ("infrared",)
 
 
-class InfraredZone(NamedTuple):
-    """One infra-red pair's zone."""
-
-    zone: int
-    """At how many of the five frequencies something reflected the flash: 0 nothing, 5 nearest."""
-    age: float
-    """Seconds since the sweep's last flash; infinite if there was none."""
-    valid: bool
-    """The zone is fresh."""
+def _schedule(devices: Mapping[str, Device]) -> InfraredSchedule:
+    found = devices.get("infrared")
+    return found if isinstance(found, InfraredSchedule) and found.on else InfraredSchedule()
 
 
-class InfraredZoneReader:
-    """Reads the zone of one pair; `period_ticks` as of the pairs, `told_ticks` of the messages that tell it."""
+def _bit(place: Place) -> int:
+    return int(Bits[place.name.removeprefix("infrared_").upper()])
 
-    def __init__(self, left: bool, period_ticks: int, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
-        self._left = left
-        self._fresh = STALE_PERIODS * max(period_ticks, SWEEP_TICKS, told_ticks)
-        self._tick_s = tick_s
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> InfraredZone:
-        """The pair's last zone, `since` ticks after that message."""
-        told = devices.infrared_zone_age
-        ticks = told + since
-        if told >= NEVER:
-            return InfraredZone(0, float("inf"), False)
-        zone = devices.infrared_zone_left if self._left else devices.infrared_zone_right
-        return InfraredZone(zone, ticks * self._tick_s, ticks <= self._fresh)
+def _zone_field(place: Place) -> int:
+    return DevicesTelemetry._fields.index(place.name.replace("infrared_", "infrared_zone_"))
+
+
+class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=True):
+    """The notes' IR proximity sensor (3.9) to (3.14): a reading from 0 to 1."""
+
+    position_m: Point
+    heading_rad: Angle
+    beam_rad: Opening = 0.5  # full opening
+    rays: BeamRays = 3
+    range_m: Positive = 1.0  # D
+    c1_m2: NotNegative = 0.03
+    c2: NotNegative = 0.1
+    sigma: NotNegative = 0.01  # relative, of (3.1)
+    height_m: NotNegative = 0.06
+    threshold: Share = 0.3  # a reading from here on is a thing detected
+
+    READING: ClassVar = Infrared
+    GROUP: ClassVar[str] = "infrared"
+    SHOWN: ClassVar = ("reading", "", 1.0, 2)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first, threshold = place.where.start, self.threshold
+
+        def read(sample: Readings, _: object) -> Infrared:
+            value = sample.values[first]
+            return Infrared(value >= threshold, sample.ages[first], True, None, value)
+
+        return read
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Detected or not, and the reading."""
+        values = run.values(place.name)[:, 0]
+        return [Column("", "", values >= self.threshold, None), Column("reading", "", values, 5)]
+
+    def drawing(self) -> list[Shape]:
+        """Its beam."""
+        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_m, _SHADE)]

@@ -1,17 +1,42 @@
-"""Light sensors: a phototransistor discharges a capacitor; the time that it takes is the shorter, the brighter it is.
+"""Light sensors.
 
-The current of the phototransistor is proportional to the light, so   brightness ∝ 1 / decay time.
+On a board a phototransistor discharges a capacitor; the time that it takes is the shorter, the brighter it is. The
+current of the phototransistor is proportional to the light, so   brightness ∝ 1 / decay time.
+In a robot without a board the irradiance itself is read, by section 1.9 of the notes.
+
+Wiring (Robotics with the Board of Education Shield, chapter 6): the phototransistor and 0.1 uF side by side from the
+pin to ground, 220 Ohm before the pin.
+
+    [device.light_left]
+    type = "light_sensor"
+    pin = "A1"
+    position_m = [0.050, 0.040]
+    heading_rad = 0.5
+
+    robot.light_left.brightness
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
-from boebot.devices.infrared import NEVER
+from boebot.devices.device import (
+    ANALOG_PINS,
+    Angle,
+    NotNegative,
+    Place,
+    Point,
+    Positive,
+    Reader,
+    Sensor,
+    SlowDevice,
+)
+from boebot.devices.drawing import Shape, Spot
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.devices.readings import Readings
 from boebot.link.messages import DevicesTelemetry
 
-LONGEST_US = 14_000  # on the wire: so long or longer
+LONGEST_US = 14_000  # on the wire: this time or longer
 FRAME_TICKS = 2  # one reading in each servo frame
 
 
@@ -19,7 +44,7 @@ class Light(NamedTuple):
     """One light sensor."""
 
     decay_time: float | None
-    """Seconds that the capacitor took; None if it could not be measured."""
+    """Seconds that the capacitor took; None if it could not be measured, or there is none."""
     brightness: float | None
     """Twice as much in twice the light: 1 / decay time (1/s), or the irradiance in a robot without a board, whose
     sensor needs no time. None if it could not be measured."""
@@ -31,20 +56,66 @@ class Light(NamedTuple):
     """The reading is fresh and could be measured."""
 
 
-class LightReader:
-    """Reads one light sensor; `told_ticks`: from one message to the next."""
+class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
+    """Phototransistor read by its RC decay time."""
 
-    def __init__(self, left: bool, tick_s: float, told_ticks: int = MESSAGE_TICKS) -> None:
-        self._left = left
-        self._fresh = fresh_ticks(FRAME_TICKS, told_ticks)
-        self._tick_s = tick_s
+    pin: int | str
+    position_m: Point
+    heading_rad: float
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Light:
-        """The last reading, `since` ticks after that message."""
-        us = devices.light_left if self._left else devices.light_right
-        told = devices.light_age
-        ticks = told + since
-        age = ticks * self._tick_s if told < NEVER else float("inf")
-        if told >= NEVER or us == 0:
-            return Light(None, None, False, age, False)
-        return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= self._fresh)
+    READING: ClassVar = Light
+    GROUP: ClassVar[str] = "lights"
+    NAMES: ClassVar[tuple[str, ...]] = ("light_left", "light_right")
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
+    COLUMNS: ClassVar = (("decay_time", "", "s", 6),)
+    SHOWN: ClassVar = ("", "ms", 1e3, 3)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        field = DevicesTelemetry._fields.index(place.name)
+        fresh, tick_s = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s
+
+        def read(_: object, slow: Latest) -> Light:
+            message, since = slow.of(DevicesTelemetry)
+            us, ticks = message[field], message.light_age + since
+            age = ticks * tick_s if message.light_age < NEVER else float("inf")
+            if message.light_age >= NEVER or us == 0:
+                return Light(None, None, False, age, False)
+            return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= fresh)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """Where it sits, and which way it looks."""
+        return [Spot(self.position_m, self.heading_rad)]
+
+
+class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
+    """A light sensor (section 1.9): L = sum of P max(0, cos theta) / (d0^2 + d^2)."""
+
+    position_m: Point
+    heading_rad: Angle
+    near_distance_m: Positive = 0.05  # d0
+    ambient: NotNegative = 0.0
+    sigma: NotNegative = 0.01
+    height_m: NotNegative = 0.09
+
+    READING: ClassVar = Light
+    GROUP: ClassVar[str] = "lights"
+    COLUMNS: ClassVar = (("brightness", "", "", 5),)
+    SHOWN: ClassVar = ("", "W/m²", 1.0, 2)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first = place.where.start
+
+        def read(sample: Readings, _: object) -> Light:
+            return Light(None, sample.values[first], False, sample.ages[first], True)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """Where it sits, and which way it looks."""
+        return [Spot(self.position_m, self.heading_rad)]

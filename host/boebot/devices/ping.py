@@ -1,24 +1,60 @@
 """Ping))): an ultrasonic range finder. The echo pulse lasts as long as sound takes to the obstacle and back.
 
 distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature
+
+A robot without a board has the notes' sonar (section 1.6): a distance, or nothing heard.
+
+Wiring: 5 V, ground, and the signal on pin 8, the timer's capture input.
+
+    [device.ping]
+    type = "ping"
+    pin = 8
+    position_m = [0.060, 0.0]
+    heading_rad = 0.0
+    beam_rad = 0.70
+    range_min_m = 0.02
+    range_max_m = 3.0
+    period_ticks = 5
+
+    if robot.ping.distance is not None and robot.ping.distance < 0.2: ...
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from boebot.devices.infrared import NEVER, STALE_PERIODS
+from boebot.devices.device import (
+    Angle,
+    BeamRays,
+    Column,
+    Device,
+    NotNegative,
+    Opening,
+    Place,
+    Point,
+    Positive,
+    Reader,
+    Run,
+    Sensor,
+)
+from boebot.devices.drawing import Cone, Shape
+from boebot.devices.latest import NEVER, STALE_PERIODS
+from boebot.devices.readings import Readings
 from boebot.link.messages import PingStatus, Telemetry
 
 TEMPERATURE_C = 20.0
+_SHADE = 0.10
 
 
 def speed_of_sound(temperature_c: float = TEMPERATURE_C) -> float:
     """Speed of sound in air (m/s)."""
     return 331.5 + 0.6 * temperature_c
+
+
+METRES_PER_US = speed_of_sound() / 2 * 1e-6
 
 
 class Ping(NamedTuple):
@@ -45,32 +81,101 @@ class Ping(NamedTuple):
         return self.status == PingStatus.ABSENT
 
 
-class PingReader:
-    """Reads the Ping; echoes from outside its range count as nothing near or too near."""
+class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
+    """Parallax Ping))): an ultrasonic range finder on one pin. It sits on the turret of a robot that has one."""
 
-    def __init__(self, range_min_m: float, range_max_m: float, period_ticks: int, tick_s: float) -> None:
-        self._metres_per_us = speed_of_sound() / 2 * 1e-6
-        # The range's ends on the wire. A Ping that hears nothing ends its pulse after 18.5 ms, as if at 3.18 m.
-        self._least_us = 0.9 * range_min_m / self._metres_per_us
-        self._greatest_us = 1.03 * range_max_m / self._metres_per_us
-        self._fresh = min(STALE_PERIODS * period_ticks, NEVER - 1)
-        self._tick_s = tick_s
+    pin: int | str
+    position_m: Point
+    heading_rad: float
+    beam_rad: Positive  # full opening
+    range_min_m: Positive
+    range_max_m: Positive
+    period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
 
-    def __call__(self, telemetry: Telemetry) -> Ping:
-        """The last measurement as of that tick."""
-        ticks, status = telemetry.ping_age, PingStatus(telemetry.ping_status)
-        if ticks >= NEVER:
-            return Ping(None, float("inf"), False, status)
-        echo_us = telemetry.ping_echo
-        if status == PingStatus.OK and echo_us > self._greatest_us:
-            status = PingStatus.NOTHING_NEAR
-        elif status == PingStatus.OK and echo_us < self._least_us:
-            status = PingStatus.TOO_NEAR
-        distance = echo_us * self._metres_per_us if status == PingStatus.OK else None
-        knows = status in (PingStatus.OK, PingStatus.NOTHING_NEAR)
-        return Ping(distance, ticks * self._tick_s, knows and ticks <= self._fresh, status)
+    READING: ClassVar = Ping
+    NAMES: ClassVar[tuple[str, ...]] = ("ping",)
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
 
-    def distances(self, echo_us: NDArray[Any], age_ticks: NDArray[Any]) -> NDArray[np.float64]:
-        """Distances of many telemetry messages at once (m), NaN where there was no echo."""
-        heard = (self._least_us <= echo_us) & (echo_us <= self._greatest_us) & (age_ticks < NEVER)
-        return np.where(heard, echo_us * self._metres_per_us, np.nan)
+    def _echo_range_us(self) -> tuple[float, float]:
+        """The range's ends on the wire. A Ping that hears nothing ends its pulse after 18.5 ms, as if at 3.18 m."""
+        return 0.9 * self.range_min_m / METRES_PER_US, 1.03 * self.range_max_m / METRES_PER_US
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`. Echoes from outside its range count as nothing near or too near."""
+        least_us, greatest_us = self._echo_range_us()
+        fresh, tick_s = min(STALE_PERIODS * self.period_ticks, NEVER - 1), place.tick_s
+
+        def read(sample: Telemetry, _: object) -> Ping:
+            ticks, status = sample.ping_age, PingStatus(sample.ping_status)
+            if ticks >= NEVER:
+                return Ping(None, float("inf"), False, status)
+            echo_us = sample.ping_echo
+            if status == PingStatus.OK and echo_us > greatest_us:
+                status = PingStatus.NOTHING_NEAR
+            elif status == PingStatus.OK and echo_us < least_us:
+                status = PingStatus.TOO_NEAR
+            distance = echo_us * METRES_PER_US if status == PingStatus.OK else None
+            known = status in (PingStatus.OK, PingStatus.NOTHING_NEAR)
+            return Ping(distance, ticks * tick_s, known and ticks <= fresh, status)
+
+        return read
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Distance (NaN: no echo), age and status."""
+        least_us, greatest_us = self._echo_range_us()
+        echo_us, age = run.raw["ping_echo"], run.raw["ping_age"]
+        echoed = (least_us <= echo_us) & (echo_us <= greatest_us) & (age < NEVER)
+        return [
+            Column("distance", "m", np.where(echoed, echo_us * METRES_PER_US, np.nan), 4),
+            Column("age", "s", np.where(age < NEVER, age * place.tick_s, np.nan), 3),
+            Column("status", "", run.raw["ping_status"], None),
+        ]
+
+    def drawing(self) -> list[Shape]:
+        """Its beam."""
+        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE, turns=True)]
+
+
+class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
+    """The notes' sonar (section 1.6): a distance, or nothing heard."""
+
+    position_m: Point
+    heading_rad: Angle
+    beam_rad: Opening = 0.35
+    rays: BeamRays = 3
+    range_min_m: Positive = 0.02
+    range_max_m: Positive = 3.0
+    sigma: NotNegative = 0.01
+    miss: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.02  # 1 - p
+    height_m: NotNegative = 0.08
+
+    READING: ClassVar = Ping
+
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.range_min_m < self.range_max_m:
+            return None
+        return "range_min_m", f" is {self.range_min_m:g}; expected less than range_max_m, {self.range_max_m:g}"
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first, beyond = place.where.start, self.range_max_m
+
+        def read(sample: Readings, _: object) -> Ping:
+            value = sample.values[first]
+            if value < beyond:
+                return Ping(value, sample.ages[first], True, PingStatus.OK)
+            return Ping(None, sample.ages[first], True, PingStatus.NOTHING_NEAR)
+
+        return read
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Distance; NaN: nothing heard."""
+        distance = run.values(place.name)[:, 0]
+        return [Column("distance", "m", np.where(distance < self.range_max_m, distance, np.nan), 5)]
+
+    def drawing(self) -> list[Shape]:
+        """Its beam."""
+        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)]

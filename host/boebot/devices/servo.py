@@ -1,12 +1,25 @@
-"""Continuous-rotation servos: the pulse that the firmware sends them now, read back from telemetry.
+"""Continuous-rotation servos, which drive the wheels: the pulse sets the speed.
 
-signal = (pulse - centre) / gain
+pulse = centre + gain · signal,   signal = (pulse - centre) / gain
+
+What a brain reads is the pulse that the firmware sends now. Wiring: the signal to one of the pins 8 to 13.
+
+    [device.servo_left]
+    type = "continuous_servo"
+    pin = 13
+    centre_us = 1500.0
+    gain_us = 200.0
+
+    robot.servo_left.signal
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
+import msgspec
+
+from boebot.devices.device import Column, Device, Place, Reader, Run
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire
@@ -25,19 +38,38 @@ class Servo(NamedTuple):
     """Whether the value may be trusted."""
 
 
-class ServoReader:
-    """Reads one servo."""
+class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True):
+    """A servo modified for continuous rotation: the pulse sets the wheel's speed."""
 
-    def __init__(self, left: bool, centre_us: float, gain_us: float) -> None:
-        self._left = left
-        self._centre_us = centre_us
-        self._gain_us = gain_us
+    pin: int | str
+    centre_us: Annotated[float, msgspec.Meta(ge=1400, le=1600)]
+    gain_us: Annotated[float, msgspec.Meta(ge=-200, le=200)]  # pulse offset at full forward signal
 
-    def __call__(self, telemetry: Telemetry) -> Servo:
-        """The servo's pulse at that tick."""
-        counts = telemetry.pulse_left if self._left else telemetry.pulse_right
-        if counts == 0:
-            return Servo(None, 0.0, 0.0, True)
-        pulse_us = counts * PULSE_SCALE_US
-        signal = (pulse_us - self._centre_us) / self._gain_us if self._gain_us else 0.0
-        return Servo(pulse_us, signal, 0.0, True)
+    READING: ClassVar = Servo
+    GROUP: ClassVar[str] = "servos"
+    NAMES: ClassVar[tuple[str, ...]] = ("servo_left", "servo_right")
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        field = Telemetry._fields.index(_pulse_field(place))
+        centre_us, gain_us = self.centre_us, self.gain_us
+
+        def read(sample: Telemetry, _: object) -> Servo:
+            counts = sample[field]
+            if counts == 0:
+                return Servo(None, 0.0, 0.0, True)
+            pulse_us = counts * PULSE_SCALE_US
+            return Servo(pulse_us, (pulse_us - centre_us) / gain_us if gain_us else 0.0, 0.0, True)
+
+        return read
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """The pulse; 0: none."""
+        return [Column("pulse", "us", run.raw[_pulse_field(place)] * PULSE_SCALE_US, 4)]
+
+
+def _pulse_field(place: Place) -> str:
+    return place.name.replace("servo_", "pulse_")

@@ -1,13 +1,28 @@
 """Turret: a position servo, set by message, and the pulse that it gets now.
 
-angle = (pulse - centre) / gain
+pulse = centre + gain · angle,   angle = (pulse - centre) / gain
+
+Wiring: the signal to one of the pins 8 to 13. A Ping is mounted on it, where there is one.
+
+    [device.turret]
+    type = "position_servo"
+    pin = 11
+    position_m = [0.045, 0.0]
+
+    robot.turn_turret(0.5)
+    robot.turret.angle
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Annotated, ClassVar, NamedTuple
 
-from boebot.devices.freshness import MESSAGE_TICKS, fresh_ticks
+import msgspec
+
+from boebot.devices.device import Place, Point, Reader, SlowDevice
+from boebot.devices.drawing import Axis, Shape
+from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import DevicesTelemetry
 from boebot.link.messages import Turret as TurretMessage
@@ -30,14 +45,6 @@ def command(angle: float | None) -> TurretMessage:
     return TurretMessage(round(max(-ANGLE_MAX, min(ANGLE_MAX, angle)) / ANGLE_SCALE), 1)
 
 
-def pulse_of(message: TurretMessage, centre_us: float, gain_us_per_rad: float) -> int:
-    """The pulse (counts) by which the board shows that it has done so; 0: none."""
-    if not message.hold:
-        return 0
-    pulse_us = centre_us + gain_us_per_rad * message.angle * ANGLE_SCALE
-    return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
-
-
 class Turret(NamedTuple):
     """The turret, as driven now."""
 
@@ -51,22 +58,44 @@ class Turret(NamedTuple):
     """Whether the value may be trusted."""
 
 
-class TurretReader:
-    """Reads the turret; centre and gain as its servo has them; `told_ticks`: from one message to the next."""
+class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True):
+    """A servo that turns to an angle."""
 
-    def __init__(
-        self, centre_us: float, gain_us_per_rad: float, tick_s: float, told_ticks: int = MESSAGE_TICKS
-    ) -> None:
-        self._fresh = fresh_ticks(1, told_ticks)
-        self._tick_s = tick_s
-        self._centre_us = centre_us
-        self._gain_us_per_rad = gain_us_per_rad
+    pin: int | str
+    position_m: Point  # of its axis
+    centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
+    gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
 
-    def __call__(self, devices: DevicesTelemetry, since: float = 0) -> Turret:
-        """The turret as that message had it, `since` ticks ago."""
-        age, valid = since * self._tick_s, since <= self._fresh
-        if devices.turret_pulse == 0:
-            return Turret(None, None, age, valid)
-        pulse_us = devices.turret_pulse * PULSE_SCALE_US
-        gain = self._gain_us_per_rad
-        return Turret((pulse_us - self._centre_us) / gain if gain else None, pulse_us, age, valid)
+    READING: ClassVar = Turret
+    NAMES: ClassVar[tuple[str, ...]] = ("turret",)
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+    COLUMNS: ClassVar = (("angle", "", "rad", 4),)
+    SHOWN: ClassVar = ("", "°", 180 / math.pi, 1)
+
+    def pulse_of(self, message: TurretMessage) -> int:
+        """The pulse (counts) by which the board shows that it has done so; 0: none."""
+        if not message.hold:
+            return 0
+        pulse_us = self.centre_us + self.gain_us_per_rad * message.angle * ANGLE_SCALE
+        return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        fresh, tick_s = fresh_ticks(1, place.message_ticks), place.tick_s
+        centre_us, gain = self.centre_us, self.gain_us_per_rad
+
+        def read(_: object, slow: Latest) -> Turret:
+            message, since = slow.of(DevicesTelemetry)
+            age, valid = since * tick_s, since <= fresh
+            if message.turret_pulse == 0:
+                return Turret(None, None, age, valid)
+            pulse_us = message.turret_pulse * PULSE_SCALE_US
+            return Turret((pulse_us - centre_us) / gain if gain else None, pulse_us, age, valid)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """What turns on it, turns about its axis."""
+        return [Axis(self.position_m)]

@@ -1,10 +1,24 @@
-"""Whiskers: wires that close a switch when something bends them (telemetry `whiskers`, debounced by the firmware)."""
+"""Whiskers: wires that touch something or not.
+
+On a board each closes a switch to ground when it is bent (its pin pulled up, 10 kOhm to the contact); the firmware
+debounces it and samples it in every tick. In a robot without a board it is a segment that touches something.
+
+    [device.whisker_left]
+    type = "whisker"
+    pin = 5
+    root_m = [0.045, 0.030]
+    tip_m = [0.100, 0.055]
+
+    if robot.whisker_left.pressed: ...
+"""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
-from boebot.link.messages import Telemetry
+from boebot.devices.device import Column, Device, Place, Point, Reader, Run, VehicleDevice
+from boebot.devices.drawing import Shape, Stroke
+from boebot.link.messages import Whiskers
 
 
 class Whisker(NamedTuple):
@@ -22,12 +36,60 @@ _PRESSED: Final = Whisker(True, 0.0, True)
 _FREE: Final = Whisker(False, 0.0, True)
 
 
-class WhiskerReader:
-    """Reads one whisker; `bit` is its flag in telemetry."""
+class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
+    """A wire that closes a switch to ground when it is bent."""
 
-    def __init__(self, bit: int) -> None:
-        self._bit = int(bit)
+    pin: int | str
+    root_m: Point
+    tip_m: Point
 
-    def __call__(self, telemetry: Telemetry) -> Whisker:
-        """The whisker at that tick: it is sampled in every tick, so its age is 0."""
-        return _PRESSED if telemetry.whiskers & self._bit else _FREE
+    READING: ClassVar = Whisker
+    GROUP: ClassVar[str] = "whiskers"
+    NAMES: ClassVar[tuple[str, ...]] = ("whisker_left", "whisker_right")
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        bit = _bit(place)
+        return lambda sample, _: _PRESSED if sample.whiskers & bit else _FREE
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Pressed or not."""
+        return [Column("", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
+
+    def drawing(self) -> list[Shape]:
+        """The wire."""
+        return [Stroke(self.root_m, self.tip_m)]
+
+
+def _bit(place: Place) -> int:
+    return int(Whiskers[place.name.removeprefix("whisker_").upper()])
+
+
+class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True):
+    """A whisker without a switch: a segment that touches something or not."""
+
+    root_m: Point
+    tip_m: Point
+
+    READING: ClassVar = Whisker
+    GROUP: ClassVar[str] = "whiskers"
+
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.tip_m != self.root_m:
+            return None
+        return "tip_m", " is where root_m is; expected a whisker that has a length"
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first = place.where.start
+        return lambda sample, _: _PRESSED if sample.values[first] else _FREE
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Pressed or not."""
+        return [Column("", "", run.values(place.name)[:, 0] > 0, None)]
+
+    def drawing(self) -> list[Shape]:
+        """The wire."""
+        return [Stroke(self.root_m, self.tip_m)]

@@ -46,7 +46,7 @@ def escape(robot: str) -> FixedActionPattern:
 
 def something_near(robot: Robot) -> bool:
     """The sign stimulus: an infra-red sensor sees something."""
-    return any(one.valid and one.detected for one in (robot.left_ir, robot.right_ir))
+    return any(one.valid and one.detected for one in (robot.infrared_left, robot.infrared_right))
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Escape:
     def seen(self) -> Floats:
         """Whether a sensor saw something, at those ticks."""
         series = self.result.series
-        return self.span(np.asarray(series.left_ir) | np.asarray(series.right_ir))
+        return self.span(series.flag("infrared_left") | series.flag("infrared_right"))
 
     @property
     def turned(self) -> float:
@@ -156,7 +156,7 @@ def pattern_shieldbot(seed: int, progress: Progress) -> Outcome:
     stays, gone = (run_escape("shieldbot", at, one, seed) for one in (True, False))
     measured = compare(stays, gone, escape("shieldbot").duration)
     pulses = [
-        np.column_stack([one.span(one.result.telemetry.left_pulse_us), one.span(one.result.telemetry.right_pulse_us)])
+        np.column_stack([one.span(one.result.series.number(name, "pulse")) for name in ("servo_left", "servo_right")])
         for one in (stays, gone)
     ]
     measured.append(exactly("ticks whose servo pulses differ", differing(*pulses), 0))
@@ -169,9 +169,9 @@ def _outcome(stays: Escape, gone: Escape, measured: list[Measured]) -> Outcome:
     ticks = min(len(one) for one in series)
     data: dict[str, Any] = {"time_s": series[0].time[:ticks]}
     for name, one in zip(("stays", "gone"), series, strict=True):
-        data[f"seen_{name}"] = (np.asarray(one.left_ir) | np.asarray(one.right_ir))[:ticks].astype(int)
-        data[f"left_{name}"] = np.asarray(one.left_signal)[:ticks]
-        data[f"right_{name}"] = np.asarray(one.right_signal)[:ticks]
+        data[f"seen_{name}"] = (one.flag("infrared_left") | one.flag("infrared_right"))[:ticks].astype(int)
+        data[f"left_{name}"] = one.signals[0][:ticks]
+        data[f"right_{name}"] = one.signals[1][:ticks]
 
     def draw(figure: Figure) -> None:
         rows = figure.subplots(2, 1, sharex=True, sharey=True)

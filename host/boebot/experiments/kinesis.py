@@ -13,7 +13,7 @@ import numpy as np
 from boebot import run
 from boebot.behaviors import Kinesis
 from boebot.brain import Brain
-from boebot.devices.vehicle_devices import RegulatedMotor
+from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Floats, Outcome, Progress, about, experiment
 from boebot.experiments.variants import varied
 

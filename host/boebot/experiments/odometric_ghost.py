@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.cognition import Odometry
-from boebot.description.robots import Encoder
+from boebot.devices.encoder import SingleEncoder as Encoder
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner

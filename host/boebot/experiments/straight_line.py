@@ -99,8 +99,8 @@ def columns(trial: Straight) -> dict[str, NDArray[np.float64]]:
         "distance_m": trial.distances,
         "believed_x_m": trial.result.odometry.x,
         "believed_y_m": trial.result.odometry.y,
-        "signal_left": np.asarray(series.left_signal),
-        "signal_right": np.asarray(series.right_signal),
+        "signal_left": series.signals[0],
+        "signal_right": series.signals[1],
     }
 
 
@@ -117,7 +117,7 @@ def draw_runs(runs: Sequence[Straight]) -> Draw:
                     one.stop_time, one.believed, "o", color="C1", ms=4, label="" if number else "stop, d as believed"
                 )
             series = one.result.series
-            for side, signal, colour in (("left", series.left_signal, "C0"), ("right", series.right_signal, "C3")):
+            for side, signal, colour in (("left", series.signals[0], "C0"), ("right", series.signals[1], "C3")):
                 lower.plot(one.time, signal, color=colour, lw=0.8, alpha=0.7, label="" if number else side)
         upper.set(ylabel="distance (m)", ylim=(0, 1.08))
         lower.set(xlabel="time (s)", ylabel="motor signal")

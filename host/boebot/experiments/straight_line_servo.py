@@ -197,15 +197,15 @@ def servo_shieldbot(seed: int, progress: Progress) -> Outcome:
         runs.append(drive(brain, robot, 20.0, PER_SEED * seed + number, "native", "encoder_errors"))
         progress((number + 1) / 2)
     rows: list[Series] = [
-        (name, list(run.time), list(run.distances), list(run.result.series.left_signal))
+        (name, list(run.time), list(run.distances), list(run.result.series.signals[0]))
         for name, run in zip(("s_min = 0.06", "without s_min"), runs, strict=True)
     ]
     count = min(len(run.time) for run in runs)
     data = {
         "time_s": runs[0].time[:count],
         "distance_m": runs[0].distances[:count],
-        "signal": runs[0].result.series.left_signal[:count],
+        "signal": runs[0].result.series.signals[0][:count],
         "distance_without_m": runs[1].distances[:count],
-        "signal_without": runs[1].result.series.left_signal[:count],
+        "signal_without": runs[1].result.series.signals[0][:count],
     }
     return Outcome(judge_shieldbot(*runs), data, lambda figure: _draw(figure, rows, 0.045))

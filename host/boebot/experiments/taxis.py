@@ -17,7 +17,7 @@ import numpy as np
 from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
-from boebot.devices.vehicle_devices import Phototransistor
+from boebot.devices.light import Phototransistor
 from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import PER_SEED, Trial, start_of, try_once

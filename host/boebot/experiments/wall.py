@@ -11,7 +11,8 @@ from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
-from boebot.devices.vehicle_devices import InfraredProximity, RegulatedMotor
+from boebot.devices.infrared import InfraredProximity
+from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
 from boebot.experiments.paths import floor
 from boebot.experiments.variants import arena_file, at_angle, varied

@@ -18,8 +18,8 @@ class Record:
     Attributes:
         telemetry: a board's payloads, oldest first.
         readings: those of a robot without a board, and the motor signals in force, oldest first.
-        devices: (index into telemetry of the latest that had come, payload) of each message of a board's slow
-        devices, oldest first.
+        devices: (index into telemetry of the latest that had come, message id, payload) of each message of a board's
+        slow devices, oldest first.
         times: the run's time (s) of each, by the board's clock.
         stamps: (host time of the tick in s, its error bound in s) of each.
         events: what the board told exactly once, oldest first.
@@ -29,7 +29,7 @@ class Record:
 
     telemetry: list[bytes] = field(default_factory=list)
     readings: list[tuple[Readings, float, float]] = field(default_factory=list)
-    devices: list[tuple[int, bytes]] = field(default_factory=list)
+    devices: list[tuple[int, int, bytes]] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
     stamps: list[tuple[float, float]] = field(default_factory=list)
     events: list[BoardEvent] = field(default_factory=list)

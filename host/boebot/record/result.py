@@ -13,7 +13,9 @@ import numpy as np
 
 from boebot.boards import Truth, WatchdogReset
 from boebot.description.robots import RobotDescription
+from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
+from boebot.devices.whisker import Whisker
 from boebot.link.messages import EventKind, Identity, Status
 from boebot.link.session import text
 from boebot.record import figures
@@ -118,7 +120,7 @@ class RunResult:
     def series(self) -> Series:
         """Everything the robot told, as arrays, one entry per control tick received."""
         if self.layout is not None:
-            return ReadingsSeries(self.record, self.robot, self.layout)
+            return ReadingsSeries(self.record, self.robot, self.tick, self.layout)
         return self.telemetry
 
     @cached_property
@@ -175,7 +177,7 @@ class RunResult:
     @cached_property
     def whisker_touches(self) -> int:
         """How many times a whisker was pressed."""
-        return onsets(self.series.left_whisker) + onsets(self.series.right_whisker)
+        return sum(onsets(self.series.flag(whisker)) for whisker in self.whiskers)
 
     @property
     def ticks(self) -> int:
@@ -206,9 +208,9 @@ class RunResult:
         return all(self.robot.has(device) for device in measures)
 
     @property
-    def has_whiskers(self) -> bool:
-        """The robot has at least one."""
-        return self.robot.has("whisker_left") or self.robot.has("whisker_right")
+    def whiskers(self) -> list[str]:
+        """Names of the robot's whiskers."""
+        return [name for name, device in self.robot.device.items() if device.on and device.READING is Whisker]
 
     @property
     def has_path(self) -> bool:
@@ -235,7 +237,8 @@ class RunResult:
         if self.layout is not None or not self.record.devices:
             return None
         steps = np.array([index for index, *_ in self.record.steps], dtype=np.intp)
-        ages = [values[steps[steps < len(values)]] for values in self.telemetry.devices.ages.values()]
+        slow = [name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)]
+        ages = [values[steps[steps < len(values)]] for values in (self.series.number(name, "age") for name in slow)]
         known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
         return float(known.max()) if len(known) else None
 
@@ -260,8 +263,8 @@ class RunResult:
             "without": ", ".join(self.without) or None,
             "run_time_s": round(self.run_time, 3),
             "distance_m": round(self.distance, 3) if self.has_path else None,
-            "contacts": self.contacts if self.truth is not None or self.has_whiskers else None,
-            "whisker_touches": self.whisker_touches if self.has_whiskers else None,
+            "contacts": self.contacts if self.truth is not None or self.whiskers else None,
+            "whisker_touches": self.whisker_touches if self.whiskers else None,
             "odometry": self.odometry_source,
             "odometry_error_m": None if self.odometry_error is None else round(self.odometry_error, 3),
             "period_ms": round(self.period * 1000, 3),

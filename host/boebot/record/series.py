@@ -4,23 +4,26 @@ board. Computed when first asked for."""
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.devices.device import Column, Place, Readout, Run
+from boebot.devices.equipment import places
 from boebot.link.messages import Status
 
 if TYPE_CHECKING:
     from boebot.boards import Truth
+    from boebot.description.robots import RobotDescription
+    from boebot.devices.readings import Layout
+    from boebot.record.record import Record
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Steps = Sequence[tuple[int, str, float, float]]
-"""(index of the tick of the observation, command kind, left, right), one per step of the brain"""
 
 
 @dataclass(frozen=True)
@@ -35,21 +38,7 @@ class Pose:
     """rad, counter-clockwise from the x axis"""
 
 
-@dataclass(frozen=True)
-class Readout:
-    """What one device said over time, for people to read: one entry per tick; NaN: nothing, or not known yet."""
-
-    device: str
-    """by the brain's name"""
-    unit: str
-    digits: int
-    values: Floats
-    """in that unit"""
-    ages: Floats
-    """s"""
-
-
-class Series(ABC):
+class Series(Run, ABC):
     """What the robot told, and what was asked of it.
 
     Attributes:
@@ -58,50 +47,22 @@ class Series(ABC):
         status: flags as in telemetry (`boebot.link.messages.Status`).
     """
 
-    raw: NDArray[np.void]
     status: NDArray[np.uint16]
 
-    def __init__(self, times: Sequence[float], steps: Steps) -> None:
-        self.time: Floats = np.array(times, dtype=np.float64)
-        self._steps = steps
+    def __init__(self, record: Record, robot: RobotDescription, tick_s: float, layout: Layout | None) -> None:
+        self.time: Floats = np.array(record.times, dtype=np.float64)
+        self._steps = record.steps
+        self._robot = robot
+        self._tick_s = tick_s
+        self._layout = layout
 
     def __len__(self) -> int:
         return len(self.time)
 
     @property
     @abstractmethod
-    def left_whisker(self) -> Bools:
-        """Pressed; never, if there is none."""
-
-    @property
-    @abstractmethod
-    def right_whisker(self) -> Bools:
-        """Pressed; never, if there is none."""
-
-    @property
-    @abstractmethod
-    def left_ir(self) -> Bools:
-        """Something detected."""
-
-    @property
-    @abstractmethod
-    def right_ir(self) -> Bools:
-        """Something detected."""
-
-    @property
-    @abstractmethod
-    def ping_distance(self) -> Floats:
-        """Metres; NaN without an echo."""
-
-    @property
-    @abstractmethod
-    def left_signal(self) -> Floats:
-        """Motor signal in force."""
-
-    @property
-    @abstractmethod
-    def right_signal(self) -> Floats:
-        """Motor signal in force."""
+    def signals(self) -> tuple[Floats, Floats]:
+        """Motor signals in force, left and right."""
 
     @property
     def overruns(self) -> int:
@@ -113,12 +74,52 @@ class Series(ABC):
         """The pose estimate at each tick, from `start` (x m, y m, heading rad) at the first."""
 
     @abstractmethod
-    def columns(self) -> dict[str, tuple[NDArray[np.generic], int | None]]:
+    def _own_columns(self) -> list[Column]:
+        """What run.csv says besides the devices."""
+
+    @cached_property
+    def _places(self) -> dict[str, Place]:
+        return places(self._robot, self._tick_s, self._layout)
+
+    @cached_property
+    def _device_columns(self) -> dict[str, dict[str, Column]]:
+        return {}
+
+    def device_columns(self, device: str) -> Mapping[str, Column]:
+        """The columns of one device, by their names; none: the robot does not have it."""
+        if device not in self._places:
+            return {}
+        if device not in self._device_columns:
+            place = self._places[device]
+            found = self._robot.device[device].columns(place, self)
+            self._device_columns[device] = {column.name: column for column in found}
+        return self._device_columns[device]
+
+    def flag(self, device: str, name: str = "") -> Bools:
+        """A column of yes and no, such as a whisker's; no, if the robot does not have the device."""
+        column = self.device_columns(device).get(name)
+        return np.zeros(len(self), dtype=np.bool_) if column is None else np.asarray(column.values, dtype=np.bool_)
+
+    def number(self, device: str, name: str = "") -> Floats:
+        """A column of numbers, such as the Ping's "distance"; NaN, if the robot does not have the device."""
+        column = self.device_columns(device).get(name)
+        return np.full(len(self), np.nan) if column is None else np.asarray(column.values, dtype=np.float64)
+
+    def columns(self) -> dict[str, tuple[NDArray[Any], int | None]]:
         """What the devices said, for run.csv: heading (unit in its name) -> (values, digits; None: whole numbers)."""
+        found = {}
+        for device in self._places:
+            for column in self.device_columns(device).values():
+                found[_heading(device, column)] = (column.values, column.digits)
+        return found | {_heading("", column): (column.values, column.digits) for column in self._own_columns()}
 
     def readouts(self) -> list[Readout]:
-        """What the devices said that have a number to tell, besides those above."""
-        return []
+        """What the devices said that pages show as a number."""
+        found = [
+            self._robot.device[device].readout(place, self, self.device_columns(device))
+            for device, place in self._places.items()
+        ]
+        return [readout for readout in found if readout is not None]
 
     @cached_property
     def commands(self) -> list[tuple[str, float, float]]:
@@ -133,6 +134,10 @@ class Series(ABC):
     def rising(self, flag: Status) -> int:
         """How many times the status flag went up."""
         return onsets((self.status & int(flag)) != 0)
+
+
+def _heading(device: str, column: Column) -> str:
+    return "_".join(part for part in (device, column.name, column.unit) if part)
 
 
 def onsets(flags: Bools) -> int:

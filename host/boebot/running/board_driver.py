@@ -15,16 +15,16 @@ import math
 import time as wall
 from collections.abc import Iterator
 from struct import Struct
+from typing import Any
 
 from boebot.boards import BoardSession
-from boebot.description import robots
 from boebot.description.board_parameters import configure
-from boebot.devices import turret
-from boebot.devices.freshness import message_ticks
-from boebot.devices.told import NOTHING_TOLD, Told, told
+from boebot.devices.latest import NO_MESSAGES, Latest
+from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages, reset_cause
 from boebot.link.delivery import LatchedAgainError, SessionLostError
+from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.session import Link, text
 from boebot.link.session import Telemetry as Received
 from boebot.record.brain_record import BrainRecord
@@ -44,6 +44,7 @@ _READY_TRIES = 10  # sessions that may end, one after another, before the board 
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
+_LINE_SHARE = 4  # messages of slow devices fill a quarter of the line at most (PROTOCOL.md, "Delivery")
 # How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
 # all later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
 # idle; so it is taken when so many bytes of the telemetry are still to come, and ends with the last one.
@@ -55,6 +56,15 @@ _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
 _TICK = Struct("<I")  # telemetry begins with it
 _NOT_YET = 1 << 32  # no tick is later
+
+
+def message_ticks(devices_period: int, byte_s: float, tick_s: float) -> int:
+    """Ticks from one message of slow devices to the next: as the parameter says, or more where the line is slow.
+
+    `byte_s`: time that a byte needs on the line (s); 0 where that is not known.
+    """
+    needed_s = _LINE_SHARE * (messages.DevicesTelemetry.LENGTH + FRAME_OVERHEAD) * byte_s
+    return max(devices_period, math.ceil(needed_s / tick_s - 1e-6))
 
 
 def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
@@ -111,8 +121,8 @@ class BoardDriver:
         self._first_session = 0
         self._armed_tick = -1
         self._halted = False  # by the brain's emergency stop
-        self._told_payload: bytes | None = None
-        self._told = NOTHING_TOLD.devices  # that payload
+        self._payload: bytes | None = None  # the newest of the slow devices
+        self._messages: dict[type, Any] = {}  # the newest of each kind
 
     def begin(self) -> None:
         """Configures and arms the board."""
@@ -181,11 +191,11 @@ class BoardDriver:
     def _equipment(self) -> Equipment:
         """The devices as the board has them; how often it tells of slow ones it says itself."""
         equipment = Equipment(self.description, self.tick_s)
-        if not equipment.tells_slowly:
+        if not equipment.needs_messages:
             return equipment
         period = int(self.link.get_parameter("devices_period"))
-        told_ticks = message_ticks(period, self.link.byte_s, self.tick_s)
-        return Equipment(self.description, self.tick_s, told_ticks=told_ticks)
+        ticks = message_ticks(period, self.link.byte_s, self.tick_s)
+        return Equipment(self.description, self.tick_s, message_ticks=ticks)
 
     def _arm(self) -> None:
         for _ in range(_ARM_TRIES - 1):
@@ -214,26 +224,28 @@ class BoardDriver:
         assert asked is not None
         if asked.turret is not None:
             servo = self.description.device["turret"]
-            assert isinstance(servo, robots.PositionServo)
-            pulse = turret.pulse_of(asked.turret, servo.centre_us, servo.gain_us_per_rad)
-            self.link.want_turret(asked.turret, pulse)
+            assert isinstance(servo, PositionServo)
+            self.link.want_turret(asked.turret, servo.pulse_of(asked.turret))
         if asked.tone is not None:
             self.link.want_tone(asked.tone)
 
-    def _slow(self, tick: int) -> Told:
-        """What the slow devices said last, as of that tick."""
+    def _slow(self, tick: int) -> Latest:
+        """The newest messages of the slow devices, as of that tick."""
         payload = self.link.latest_devices
         if payload is None:
-            return NOTHING_TOLD
-        if payload is not self._told_payload:
-            self._told_payload, self._told = payload, messages.DevicesTelemetry.unpack(payload)
+            return NO_MESSAGES
+        if payload is not self._payload:
+            self._payload = payload
+            self._messages = {messages.DevicesTelemetry: messages.DevicesTelemetry.unpack(payload)}
             self._put_devices_aside()
-        return told(self._told, tick)
+        return Latest(self._messages, tick)
 
     def _put_devices_aside(self) -> None:
         row = len(self.record.times) - 1
         if row >= 0:
-            self.record.devices += [(row, payload) for payload in self.link.fetch_devices()]
+            self.record.devices += [
+                (row, messages.DevicesTelemetry.ID, payload) for payload in self.link.fetch_devices()
+            ]
 
     def _heed_latch(self, payload: bytes) -> None:
         """The board has latched its motors off: a reason to end the run, unless a new session mends it.
@@ -323,7 +335,7 @@ class BoardDriver:
                 if progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + PROGRESS_S
                     progress(time_s)
-                slow = self._slow(last) if equipment.tells_slowly else NOTHING_TOLD
+                slow = self._slow(last) if equipment.needs_messages else NO_MESSAGES
                 sample = make(unpack(payload))
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
                 shown = wall.perf_counter()

@@ -37,7 +37,7 @@ class DirectDriver:
         self.record = Record()
         self.step_limit = step_limit(task)
         self.late_steps = 0
-        self._periods = periods(request.robot, session.layout, len(session.readings()))
+        self._periods = periods(request.robot.device, session.layout, len(session.readings()))
         self._sampled = any(period_s > session.tick_s for period_s in self._periods)
         self._ages = (0.0,) * len(self._periods)
 

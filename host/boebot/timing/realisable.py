@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from boebot import resources
-from boebot.description.robots import RobotDescription, Uart
-from boebot.devices.vehicle_devices import Sensor
+from boebot.description.robots import RobotDescription
+from boebot.devices.device import Sensor
+from boebot.devices.uart import Uart
 from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD

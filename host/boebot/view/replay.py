@@ -23,16 +23,17 @@ import numpy as np
 
 from boebot.description import robots
 from boebot.link.messages import Status
-from boebot.view import scene, sensors, style
+from boebot.view import scene, style
 from boebot.view.utility_panel import shown_cognitive
 
 if TYPE_CHECKING:
+    from boebot.devices.device import Readout
     from boebot.floor_plan import FloorPlan, Moving, Solid
     from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
-    from boebot.record.series import Floats, Pose, Readout
+    from boebot.record.series import Floats, Pose
 
-FORMAT = 4
+FORMAT = 5
 FRAMES_AT_MOST = 20_000
 STEPS_AT_MOST = 6_000  # of a brain of processes
 _PAGE = Path(__file__).with_name("replay_page.html")
@@ -100,10 +101,10 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
     status = series.status
     flags = (
-        series.left_whisker * LEFT_WHISKER
-        | series.right_whisker * RIGHT_WHISKER
-        | series.left_ir * LEFT_IR
-        | series.right_ir * RIGHT_IR
+        series.flag("whisker_left") * LEFT_WHISKER
+        | series.flag("whisker_right") * RIGHT_WHISKER
+        | series.flag("infrared_left") * LEFT_IR
+        | series.flag("infrared_right") * RIGHT_IR
         | _contact(result) * CONTACT
         | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
@@ -122,9 +123,9 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "path": _pose(view.path, thin),
         "estimate": None if view.estimate is None else _pose(view.estimate, thin),
         "turret": _array(view.turret[thin]),
-        "left": _array(series.left_signal[thin]),
-        "right": _array(series.right_signal[thin]),
-        "ping": _array(np.nan_to_num(series.ping_distance[thin], nan=-1.0)),
+        "left": _array(series.signals[0][thin]),
+        "right": _array(series.signals[1][thin]),
+        "ping": _array(np.nan_to_num(series.number("ping", "distance")[thin], nan=-1.0)),
         "mind": None if result.brain_record is None else _mind(result.brain_record),
         "readings": [_reading(readout, thin) for readout in series.readouts()],
         "flags": _flags(flags[thin]),
@@ -159,7 +160,7 @@ def _flags(values: np.ndarray) -> str:
 
 def _reading(readout: Readout, thin: slice) -> dict[str, Any]:
     return {
-        "name": readout.device.replace("_ir", "_IR").replace("_", " "),
+        "name": readout.device.replace("_", " "),
         "unit": readout.unit,
         "digits": readout.digits,
         "values": _array(readout.values[thin]),
@@ -175,8 +176,10 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
         "front": robot.body.front_m,
         "track": robot.body.track_width_m,
         "wheel": robot.body.wheel_radius_m,
-        "whiskers": {name: {"root": root, "tip": tip} for name, (root, tip) in sensors.whiskers(robot).items()},
-        "looks": [vars(look) for look in sensors.looks(robot)],
+        "shapes": [
+            {"device": device, "form": type(shape).__name__.lower(), **shape._asdict()}
+            for device, shape in scene.shapes(robot)
+        ],
     }
 
 

@@ -10,21 +10,22 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle, Wedge
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 
-from boebot.view import style
-from boebot.view.sensors import Look, looks, whiskers
+from boebot.devices.drawing import Axis, Cone, Ray, Shape, Spot, Stroke
+from boebot.view import scene, style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.transforms import Transform
 
     from boebot.description.robots import RobotDescription
     from boebot.floor_plan import FloorPlan
 
 REACH_SHOWN_M = 0.35  # the Ping reaches 3 m; a cone is drawn this far at most
-LIGHT_SHOWN_M = 0.04
+SPOT_SHOWN_M = 0.04
 RIM_M = 0.012  # width of a wheel
-_SHADES = {"infrared": 0.22, "sonar": 0.10, "laser": 0.06}
 
 
 def draw_robot(
@@ -41,11 +42,15 @@ def draw_robot(
     x, y, heading = pose
     place = Affine2D().rotate(heading).translate(x, y)
     seen = _inside(plan)
-    for sensor in looks(robot):
-        _draw_look(axes, sensor, colour, place, turret, seen)
+    shapes = [shape for _, shape in scene.shapes(robot)]
+    turning = Affine2D()
+    for shape in shapes:
+        if isinstance(shape, Axis):
+            turning = Affine2D().rotate_around(*shape.position, turret)
     on_axes = place + axes.transData
-    for root, tip in whiskers(robot).values():
-        axes.plot(*zip(root, tip, strict=True), color=style.INK, lw=1.1, transform=on_axes, zorder=11)
+    for shape in shapes:
+        turns = isinstance(shape, Cone) and shape.turns
+        _draw_shape(axes, shape, colour, turning + on_axes if turns else on_axes, seen)
     wheel, track = robot.body.wheel_radius_m, robot.body.track_width_m
     for side in (-1, 1):
         corner = (-wheel, side * track / 2 - RIM_M / 2)
@@ -68,29 +73,33 @@ def _inside(plan: FloorPlan | None) -> Path | None:
     return Path.make_compound_path(*(Path(np.vstack((o.points, o.points[:1])), closed=True) for o in plan.outlines))
 
 
-def _draw_look(axes: Axes, look: Look, colour: str, place: Affine2D, turret: float, seen: Path | None) -> None:
-    on_axes = place + axes.transData
-    if look.axis is not None:
-        on_axes = Affine2D().rotate_around(*look.axis, turret) + on_axes
-    (x, y), angle = look.position, look.heading
-    if look.beam == 0.0:
-        far = min(look.reach, REACH_SHOWN_M) or LIGHT_SHOWN_M
-        light = look.kind == "light"
-        line = axes.plot(
-            (x, x + far * math.cos(angle)), (y, y + far * math.sin(angle)), color=colour, transform=on_axes,
-            lw=1.6 if light else 1.0, ls="-" if light else ":", zorder=13 if light else 1.5,
-        )[0]  # fmt: skip
-        if light:
-            axes.plot(x, y, marker="o", ms=2.6, color=colour, transform=on_axes, zorder=13)
-        elif seen is not None:
-            line.set_clip_path(seen, axes.transData)
-        return
-    half = math.degrees(look.beam) / 2
-    turn = math.degrees(angle)
-    cone = Wedge(
-        (x, y), min(look.reach, REACH_SHOWN_M), turn - half, turn + half, facecolor=colour, edgecolor="none",
-        alpha=_SHADES[look.kind], transform=on_axes, zorder=1.5,
-    )  # fmt: skip
-    axes.add_patch(cone)
-    if seen is not None:
-        cone.set_clip_path(seen, axes.transData)
+def _draw_shape(axes: Axes, shape: Shape, colour: str, on_axes: Transform, seen: Path | None) -> None:
+    sight: Artist | None = None
+    match shape:
+        case Cone():
+            middle, half = math.degrees(shape.heading), math.degrees(shape.opening) / 2
+            sight = axes.add_patch(
+                Wedge(
+                    shape.position, min(shape.reach, REACH_SHOWN_M), middle - half, middle + half, facecolor=colour,
+                    edgecolor="none", alpha=shape.shade, transform=on_axes, zorder=1.5,
+                )
+            )  # fmt: skip
+        case Ray():
+            line = _from(shape.position, shape.heading, min(shape.reach, REACH_SHOWN_M))
+            sight = axes.plot(*line, color=colour, transform=on_axes, lw=1.0, ls=":", zorder=1.5)[0]
+        case Spot():
+            axes.plot(*shape.position, marker="o", ms=2.6, color=colour, transform=on_axes, zorder=13)
+            if shape.heading is not None:
+                line = _from(shape.position, shape.heading, SPOT_SHOWN_M)
+                axes.plot(*line, color=colour, transform=on_axes, lw=1.6, zorder=13)
+        case Stroke():
+            line = tuple(zip(shape.begin, shape.end, strict=True))
+            axes.plot(*line, color=style.INK, lw=1.1, transform=on_axes, zorder=11)
+    if sight is not None and seen is not None:
+        sight.set_clip_path(seen, axes.transData)
+
+
+def _from(start: tuple[float, float], heading: float, length: float) -> tuple[tuple[float, ...], ...]:
+    """A line from there in that direction: both x, both y."""
+    (x, y), far = start, length
+    return (x, x + far * math.cos(heading)), (y, y + far * math.sin(heading))

@@ -13,6 +13,8 @@ from boebot.record.series import touch_indices
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from boebot.description.robots import RobotDescription
+    from boebot.devices.drawing import Shape
     from boebot.record.result import RunResult
     from boebot.record.series import Bools, Floats, Pose
 
@@ -58,9 +60,8 @@ def view(result: RunResult) -> View:
         inside = truth.time >= result.clock_offset
         begins = touch_indices(truth.time, truth.contact & inside)
         contacts = np.column_stack((truth.x[begins], truth.y[begins]))
-    begins = _onset_indices(series.left_whisker | series.right_whisker)
+    begins = _onset_indices(np.any([series.flag(name) for name in result.whiskers] or [series.time < 0], axis=0))
     touches = np.column_stack((path.x[begins], path.y[begins]))
-    degrees = next((row.values for row in series.readouts() if row.device == "turret"), np.zeros(len(series)))
     return View(
         known=known,
         path=path,
@@ -68,10 +69,15 @@ def view(result: RunResult) -> View:
         plan=truth.plan if truth is not None else FloorPlan(),
         contacts=contacts,
         touches=touches,
-        turret=np.nan_to_num(np.radians(degrees), nan=0.0),
-        has_whiskers=result.has_whiskers,
+        turret=np.nan_to_num(series.number("turret"), nan=0.0),
+        has_whiskers=bool(result.whiskers),
         path_is_seen=known or result.has_odometry,
     )
+
+
+def shapes(robot: RobotDescription) -> list[tuple[str, Shape]]:
+    """What the robot's devices look like, each with the device's name: those that are on."""
+    return [(name, shape) for name, device in robot.device.items() if device.on for shape in device.drawing()]
 
 
 def bounds(*views: View) -> tuple[Floats, Floats]:

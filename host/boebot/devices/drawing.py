@@ -1,0 +1,64 @@
+"""What devices look like from above, as data: any painter can draw it (boebot.view). Lengths in m, angles in rad, in
+the robot's frame: x forward, y left, origin at the middle of the axle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Point = tuple[float, float]
+
+
+class Cone(NamedTuple):
+    """What a sensor sees at once."""
+
+    position: Point
+    """m"""
+    heading: float
+    """rad, of its middle"""
+    opening: float
+    """rad, full"""
+    reach: float
+    """m"""
+    shade: float
+    """Opacity, 0 to 1."""
+    turns: bool = False
+    """It sits on the robot's turret."""
+
+
+class Ray(NamedTuple):
+    """A line of sight."""
+
+    position: Point
+    """m"""
+    heading: float
+    """rad"""
+    reach: float
+    """m"""
+
+
+class Spot(NamedTuple):
+    """A small sensor."""
+
+    position: Point
+    """m"""
+    heading: float | None
+    """rad, the way that it looks; None: downwards."""
+
+
+class Stroke(NamedTuple):
+    """A wire from here to there."""
+
+    begin: Point
+    """m"""
+    end: Point
+    """m"""
+
+
+class Axis(NamedTuple):
+    """The axis of the turret: what turns, turns about it."""
+
+    position: Point
+    """m"""
+
+
+Shape = Cone | Ray | Spot | Stroke | Axis

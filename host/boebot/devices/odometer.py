@@ -1,0 +1,51 @@
+"""The notes' odometer (sections 1.4, 2.2) of a robot without a board: a pose, calibrated once at the start.
+
+[device.odometer]
+type = "odometer"
+
+robot.odometer.x
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+from boebot.devices.device import NotNegative, Place, Positive, Reader, Sensor
+from boebot.devices.readings import Readings
+
+
+class OdometerPose(NamedTuple):
+    """Where the odometer believes the robot to be; it got the true pose once, at the start."""
+
+    x: float
+    """m"""
+    y: float
+    """m"""
+    heading: float
+    """rad, counter-clockwise from the x axis"""
+    age: float
+    """Seconds since it was taken."""
+    valid: bool
+    """Whether the value may be trusted."""
+
+
+class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
+    """The notes' odometer (sections 1.4, 2.2): a pose, calibrated once at the start."""
+
+    sigma_step_m: NotNegative = 0.0  # per wheel in 10 ms
+    factor_left: Positive = 1.0  # k_w: what it takes the left wheel to travel for each metre
+    factor_right: Positive = 1.0
+
+    READING: ClassVar = OdometerPose
+    NAMES: ClassVar[tuple[str, ...]] = ("odometer",)
+    COLUMNS: ClassVar = (("x", "x", "m", 5), ("y", "y", "m", 5), ("heading", "heading", "rad", 5))
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        where, first = place.where, place.where.start
+
+        def read(sample: Readings, _: object) -> OdometerPose:
+            x, y, heading = sample.values[where]
+            return OdometerPose(x, y, heading, sample.ages[first], True)
+
+        return read
