@@ -25,6 +25,7 @@ from boebot.link import messages
 from boebot.link.session import Link
 from boebot.robot import Robot
 from boebot.running import runner
+from boebot.running.tasks import Request
 from command import boebot, heed_signals
 from peer import InProcess, Peer, Pty, pty
 
@@ -672,7 +673,7 @@ def test_keyboard_drives_while_keys_are_held(peer: Peer, monkeypatch: pytest.Mon
             super().step(robot)
             commands.append((robot.command.left, robot.command.right))
 
-    result = runner.execute(Watched(lambda: next(typed), shown.append), seconds=10)
+    result = runner.execute(Request.single(Watched(lambda: next(typed), shown.append), seconds=10))
     assert isinstance(result.error, KeyboardInterrupt)
     turn = teleop.TURN
     assert commands == [(0.5, 0.5), (0.5, 0.5), (1, 1), (turn, -turn), (0, 0), (1, 1), (1, 1)]

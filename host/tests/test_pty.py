@@ -18,6 +18,7 @@ from boebot.link.ports.serial_port import SerialTransport
 from boebot.link.session import Link
 from boebot.robot import Robot
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from lines import line
 from peer import Peer, Pty, pty
 
@@ -51,7 +52,7 @@ def test_leftovers_of_an_earlier_run_do_no_harm() -> None:
 def test_port_that_vanishes_in_mid_run() -> None:
     served = Pty(Peer())
     threading.Timer(0.5, served.unplug).start()
-    result = execute(straight, on=served.path, seconds=20)
+    result = execute(Request.single(straight, on=served.path, seconds=20))
     assert isinstance(result.error, BoardError)
     assert str(result.error) == f"{served.path} has gone: unplugged, or closed by the other side"
     assert result.ticks > 10 and len(result.series.time) == result.ticks

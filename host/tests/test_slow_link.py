@@ -27,6 +27,7 @@ from boebot.record.telemetry_series import newest_messages
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import runner
 from boebot.running.board_driver import message_ticks
+from boebot.running.tasks import Request
 from peer import FIELD_COUNTS, InProcess, Peer
 
 BOEBOT, BASIC, SHIELDBOT = (load_robot(name) for name in ("boebot", "shieldbot-basic", "shieldbot"))
@@ -44,7 +45,7 @@ def run_on(
 ) -> RunResult:
     session = InProcess(peer, channel)
     monkeypatch.setattr(runner, "open_board", lambda url, request: session)
-    return runner.execute(brain, robot=peer.robot, **options)  # type: ignore[arg-type]
+    return runner.execute(Request.single(brain, robot=peer.robot, **options))  # type: ignore[arg-type]
 
 
 def test_brain_sees_what_the_board_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,7 +221,7 @@ def test_turret_turns_back_after_a_reset_and_no_tone_is_repeated(monkeypatch: py
         seen.append((robot.time, robot.turret.angle))
 
     session.before_tick = lambda tick: peer.reset() if peer.starts == 1 and session.now() > 1.5 else None
-    result = runner.execute(step, robot=BOEBOT, seconds=4)
+    result = runner.execute(Request.single(step, robot=BOEBOT, seconds=4))
     assert result.error is None and result.resets == 1
     assert peer.tones == [(440, 0.1)]
     assert seen[-1][1] == pytest.approx(0.8, abs=2e-4)

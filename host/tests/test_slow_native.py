@@ -19,6 +19,7 @@ from boebot.robot import Observation, Robot
 from boebot.running.board_driver import BoardDriver
 from boebot.running.driver import Task
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 
 pytestmark = pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
 
@@ -150,7 +151,7 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
             robot.beep(440, 0.1)
 
     for name in ("shieldbot-basic", "shieldbot", "boebot", "arsim"):
-        result = execute(step, robot=name, arena="showcase", seconds=2)
+        result = execute(Request.single(step, robot=name, arena="showcase", seconds=2))
         assert result.error is None, (name, result.error)
         assert result.distance > 0.05
         result.save(tmp_path / name)

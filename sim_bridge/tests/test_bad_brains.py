@@ -30,6 +30,7 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from sim_bridge.direct import DirectSession
 from sim_bridge.session import SimSession
 
@@ -188,7 +189,7 @@ def test_whatever_is_raised_ends_the_run_in_one_sentence(stood_still: list[bool]
             if robot.time > 0.299:
                 raise error
 
-        result = execute(step, seconds=5)
+        result = execute(Request.single(step, seconds=5))
         assert isinstance(result.error, BrainError) and type(error).__name__ in str(result.error)
         assert result.run_time == pytest.approx(BAD_FROM_S)
     assert stood_still == [True] * 5
@@ -233,7 +234,7 @@ def stubborn(robot: Robot) -> None:
 
 
 def test_brain_that_catches_everything_is_found_out_once_it_returns(stood_still: list[bool]) -> None:
-    result = execute(stubborn, seconds=5, step_timeout=0.2)
+    result = execute(Request.single(stubborn, seconds=5, step_timeout=0.2))
     assert str(result.error).startswith("the brain: a step of the brain has not ended after 0.2 s")
     assert result.run_time == pytest.approx(BAD_FROM_S) and stood_still == [True]
 
@@ -247,7 +248,7 @@ def test_step_of_another_thread_and_among_several_robots() -> None:
             pass
 
     def alone() -> None:
-        errors.append(execute(hang, robot="arsim", seconds=5, step_timeout=0.2).error)
+        errors.append(execute(Request.single(hang, robot="arsim", seconds=5, step_timeout=0.2)).error)
 
     thread = threading.Thread(target=alone)
     thread.start()
@@ -267,7 +268,7 @@ def test_long_step_within_its_time_is_no_error_and_leaves_nothing_behind() -> No
             time.sleep(0.3)
 
     for limit in (60.0, float("inf")):
-        assert execute(slow, robot="arsim", seconds=0.5, step_timeout=limit).error is None
+        assert execute(Request.single(slow, robot="arsim", seconds=0.5, step_timeout=limit)).error is None
     assert (signal.getsignal(signal.SIGURG), threading.active_count()) == before
 
 
@@ -279,7 +280,7 @@ def test_step_that_somebody_debugs_is_not_interrupted() -> None:
             time.sleep(0.5)
             sys.settrace(None)
 
-    assert execute(traced, robot="arsim", seconds=0.5, step_timeout=0.1).error is None
+    assert execute(Request.single(traced, robot="arsim", seconds=0.5, step_timeout=0.1)).error is None
 
 
 # ---- at the command line ---------------------------------------------------------------------------------------------
@@ -375,7 +376,7 @@ def late(clock: Clock, seconds: float) -> Callable[[Robot], None]:
 
 
 def paced(brain: object, **options: float) -> RunResult:
-    return execute(brain, arena="empty", seconds=1.0, realtime=True, **options)  # type: ignore[arg-type]
+    return execute(Request.single(brain, arena="empty", seconds=1.0, realtime=True, **options))  # type: ignore[arg-type]
 
 
 def test_run_in_real_time_takes_its_time(clock: Clock) -> None:
@@ -419,5 +420,5 @@ def test_step_that_outlasts_its_set_points_ends_a_run_in_real_time(
 
 
 def test_late_step_without_a_board_is_counted(clock: Clock) -> None:
-    result = execute(late(clock, 0.12), robot="arsim", seconds=0.5, realtime=True)
+    result = execute(Request.single(late(clock, 0.12), robot="arsim", seconds=0.5, realtime=True))
     assert result.error is None and result.late_steps == 2, "those that were due at 0.35 and at 0.40 s"

@@ -23,6 +23,7 @@ from boebot.devices.whisker import TouchWhisker
 from boebot.errors import BoardError, BrainError
 from boebot.robot import Observation, Robot
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 
 ARSIM = load_robot("arsim")
 
@@ -62,7 +63,7 @@ def test_speed_command_is_its_share_of_the_greatest_speed() -> None:
 
 def test_same_brain_runs_with_and_without_a_board(tmp_path: Path) -> None:
     for robot in ("arsim", "shieldbot", "shieldbot-basic"):
-        result = execute("wander", robot=robot, seconds=20)
+        result = execute(Request.single("wander", robot=robot, seconds=20))
         assert result.error is None and result.distance > 1.0 and result.steps == 400, robot
         assert result.robot.name == robot
         names = {path.name for path in result.save(tmp_path / robot)}
@@ -70,7 +71,7 @@ def test_same_brain_runs_with_and_without_a_board(tmp_path: Path) -> None:
 
 
 def test_same_seed_same_run() -> None:
-    one, two, other = (execute("wander", robot="arsim", seconds=10, seed=seed) for seed in (3, 3, 4))
+    one, two, other = (execute(Request.single("wander", robot="arsim", seconds=10, seed=seed)) for seed in (3, 3, 4))
     assert one.truth is not None and two.truth is not None and other.truth is not None
     assert np.array_equal(one.truth.x, two.truth.x) and np.array_equal(one.series.raw, two.series.raw)
     assert not np.array_equal(one.series.raw["values"], other.series.raw["values"])
@@ -120,7 +121,7 @@ def test_latched_motors_and_errors_end_as_with_a_board() -> None:
         else:
             raise ValueError("enough")
 
-    result = execute(step, robot="arsim", arena="empty", seconds=5)
+    result = execute(Request.single(step, robot="arsim", arena="empty", seconds=5))
     assert isinstance(result.error, BrainError) and "ValueError: enough" in str(result.error)
     assert result.run_time == pytest.approx(2.0)
     assert result.truth is not None and result.truth.left_speed is not None

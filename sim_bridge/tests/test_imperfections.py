@@ -15,6 +15,7 @@ from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
 from boebot.errors import RobotError
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from sim_bridge import imperfections
 from sim_bridge._core import ffi
 from sim_bridge.imperfections import Draw
@@ -70,7 +71,9 @@ def test_a_run_of_a_unit_differs_by_its_noise_only(tmp_path: Path) -> None:
     def bend(unit: str, seed: int) -> float:
         path = tmp_path / f"unit{len(unit)}.toml"
         path.write_text(f'extends = "shieldbot"\nname = "one"\n{unit}\n')
-        result = execute(lambda robot: robot.drive(0.8, 0.8), robot=path, arena="empty", seconds=3, seed=seed)
+        result = execute(
+            Request.single(lambda robot: robot.drive(0.8, 0.8), robot=path, arena="empty", seconds=3, seed=seed)
+        )
         assert result.error is None and result.truth is not None
         return float(result.truth.heading[-1] - result.truth.heading[0])
 

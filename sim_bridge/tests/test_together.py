@@ -26,6 +26,7 @@ from boebot.link.messages import Hello, Stopped
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import together
+from boebot.running.tasks import Request
 from boebot.running.together import StoppedError, execute_together
 from boebot.view import style
 from sim_bridge.arena import load_arena
@@ -204,7 +205,9 @@ def stopped(result: RunResult) -> bool:
 
 
 def test_error_in_one_brain_ends_the_run_and_names_the_robot() -> None:
-    result = execute_together([Member(brain=ahead), Member(brain=fails), Member(brain=ahead)], "empty", 30.0)
+    result = execute_together(
+        Request(members=[Member(brain=ahead), Member(brain=fails), Member(brain=ahead)], arena="empty", seconds=30.0)
+    )
     assert isinstance(result.error, BrainError)
     assert str(result.error).startswith("robot 2: ") and "RuntimeError: no more" in str(result.error)
     first, second, third = result.robots
@@ -223,7 +226,9 @@ def test_interrupt_in_a_brain_stops_all() -> None:
         if robot.time > 0.5:
             raise KeyboardInterrupt
 
-    result = execute_together([Member(brain=ahead), Member(brain=interrupts)], "empty", 30.0)
+    result = execute_together(
+        Request(members=[Member(brain=ahead), Member(brain=interrupts)], arena="empty", seconds=30.0)
+    )
     assert isinstance(result.error, KeyboardInterrupt)
     assert all(isinstance(robot.error, KeyboardInterrupt) and stopped(robot) for robot in result.robots)
 

@@ -11,6 +11,7 @@ from boebot.brains import load_brain
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from sim_bridge.sim_robot import SimRobot
 from tools.bench.figures import figure
 
@@ -24,7 +25,7 @@ def run(brain: object, on: str, seconds: float) -> RunResult:
     Raises:
         BoebotError: it ended before its time.
     """
-    result = execute(brain, robot=ROBOT, arena=ARENA, on=on, seconds=seconds, period=PERIOD_S)
+    result = execute(Request.single(brain, robot=ROBOT, arena=ARENA, on=on, seconds=seconds, period=PERIOD_S))
     if result.error is not None:
         raise result.error
     return result

@@ -6,6 +6,7 @@ import numpy as np
 
 from boebot.link import messages
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from hil_tests.rig import CYCLES_PER_US, Rig
 from tools.bench import arduino_servo
 from tools.bench.figures import Peer, figure
@@ -45,7 +46,7 @@ def servo_width() -> float:
 
 @figure("frames lost in 10 simulated minutes of wander on the AVR image", "frames", at_most=0)
 def lost_frames() -> float:
-    result = execute("wander", arena="room", on="avr", seconds=600.0)
+    result = execute(Request.single("wander", arena="room", on="avr", seconds=600.0))
     if result.error is not None:
         raise result.error
     return float(result.lost_frames + result.bad_frames)

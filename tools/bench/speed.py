@@ -7,6 +7,7 @@ import time
 from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 from tools.bench import peers
 from tools.bench.figures import Peer, figure
 
@@ -15,7 +16,7 @@ ARENA = "room"
 
 def times_real_time(on: str, seconds: float, period: float) -> float:
     """Speed of a whole run of the wander brain, as the command prints it."""
-    result = execute("wander", arena=ARENA, on=on, seconds=seconds, period=period)
+    result = execute(Request.single("wander", arena=ARENA, on=on, seconds=seconds, period=period))
     if result.error is not None:
         raise result.error
     return float(result.run_time / result.wall_time)

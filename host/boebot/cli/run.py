@@ -14,7 +14,7 @@ from boebot.cli import options, output
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
 from boebot.running.runner import execute
-from boebot.running.tasks import Member
+from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
@@ -92,41 +92,34 @@ def run(
     count = _count(robots, len(brain), len(kinds), len(poses))
     if out is not None:
         view.make_folder(out)
+    request = Request(
+        members=[
+            Member(
+                brain=brain[index % len(brain)],
+                robot=kinds[index % len(kinds)],
+                pose=poses[index] if index < len(poses) else None,
+                period=period_s,
+                without=ideal,
+            )
+            for index in range(count)
+        ],
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        step_timeout=step_timeout,
+        force_timing=force_timing,
+    )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with (
         output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
         output.step_watch(bar) as progress,
     ):
         if count == 1:
-            result = execute(
-                brain[0],
-                robot=kinds[0],
-                arena=arena,
-                on=on,
-                seconds=seconds,
-                seed=seed,
-                realtime=realtime,
-                period=period_s,
-                progress=progress,
-                without=ideal,
-                pose=poses[0] if poses else None,
-                step_timeout=step_timeout,
-                force_timing=force_timing,
-            )
+            result = execute(request, progress)
         else:
-            members = [
-                Member(
-                    brain=brain[index % len(brain)],
-                    robot=kinds[index % len(kinds)],
-                    pose=poses[index] if index < len(poses) else None,
-                    period=period_s,
-                    without=ideal,
-                )
-                for index in range(count)
-            ]
-            together = execute_together(
-                members, arena, seconds, on, seed, realtime, progress, step_timeout, force_timing
-            )
+            together = execute_together(request, progress)
     if count == 1:
         end(result, out, json)
     else:

@@ -21,6 +21,7 @@ from boebot.cli.ending import end
 from boebot.errors import BoebotError
 from boebot.robot import Robot
 from boebot.running.runner import execute
+from boebot.running.tasks import Request
 
 HOLD_S = 0.6  # a key counts as held so long: terminals begin to repeat it after half a second
 TURN = 0.35
@@ -120,14 +121,16 @@ def teleop(
     with raw_keyboard() as read_keys:
         brain = Keyboard(read_keys, functools.partial(_show, screen))
         result = execute(
-            brain,
-            robot=robot,
-            arena=arena,
-            on=on,
-            seconds=seconds,
-            seed=seed,
-            realtime=True,
-            without=options.names(without),
+            Request.single(
+                brain,
+                robot=robot,
+                arena=arena,
+                on=on,
+                seconds=seconds,
+                seed=seed,
+                realtime=True,
+                without=options.names(without),
+            )
         )
     with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
         output.line(file=screen)

@@ -242,11 +242,12 @@ def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, se
         return (step_ms or 0.0) / 1000, None
     from boebot.brains import load_brain
     from boebot.running.runner import execute
+    from boebot.running.tasks import Request
 
     own_period = load_brain(brain).period
     if step_ms is not None:
         return step_ms / 1000, own_period
-    result = execute(brain, robot=robot, seconds=5.0, seed=seed, force_timing=True)
+    result = execute(Request.single(brain, robot=robot, seconds=5.0, seed=seed, force_timing=True))
     if result.error is not None:
         raise result.error
     return result.longest_step, own_period

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 from boebot import view
-from boebot.boards import BoardSession, VehicleSession, default_board, open_board, open_vehicle
+from boebot.boards import BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
 from boebot.record.result import RunResult, TogetherResult
@@ -25,7 +25,7 @@ from boebot.running.board_driver import BoardDriver
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task
 from boebot.running.stepping import StepTimes, StepWatch, step_once
-from boebot.running.tasks import Member, Terms, expect, task_of
+from boebot.running.tasks import Request, expect
 
 Result = TypeVar("Result", RunResult, TogetherResult)
 
@@ -49,86 +49,42 @@ def run(
     """Runs a brain and returns what happened.
 
     Args:
-        brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)`, or object
-            or class with `step(robot)`.
-        robot: bundled name, .toml file, or a description.
-        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
-        on: "native", "avr", or a port: "/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT"; "direct" for a robot
-            without a board. None: native or direct.
-        seconds: length of the run by the board's clock; may be infinite.
-        seed: of the brain's chance, and of the noise of the simulated world.
-        realtime: slow a simulated run down to the wall clock.
+        brain, robot, pose, period, without: as of `boebot.Member`.
+        arena, on, seconds, seed, realtime, step_timeout, force_timing: as of `boebot.running.tasks.Request`.
         out: folder for run.csv, run.png, replay.html and the raw bytes.
-        period: seconds from step to step of the brain; None: the brain's PERIOD, or 0.05.
         progress: called with the seconds that have passed, about ten times a second.
-        without: imperfections of a simulated robot that are switched off, such as ("slip", "bounce");
-            docs/reference/imperfections.md names them.
-        pose: where a simulated robot starts: x (m), y (m), heading (rad). None: where the arena says.
-        step_timeout: seconds by the wall clock after which a step of the brain that has not ended is an error, which
-            ends the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points,
-            after which its dead-man stops the motors.
-        force_timing: run it even if sensors, period and line are not realisable in time (boebot.timing.realisable);
-            the record then says so.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
-    return keep(
-        lambda: execute(
-            brain,
-            robot,
-            arena,
-            on,
-            seconds,
-            seed,
-            realtime,
-            period,
-            progress,
-            without,
-            pose,
-            step_timeout,
-            force_timing,
-        ),
-        out,
-    )
-
-
-def execute(
-    brain: object,
-    robot: str | Path | RobotDescription = "shieldbot",
-    arena: str | Path | None = None,
-    on: str | None = None,
-    seconds: float = 60.0,
-    seed: int = 1,
-    realtime: bool = False,
-    period: float | None = None,
-    progress: Progress | None = None,
-    without: Sequence[str] = (),
-    pose: tuple[float, float, float] | None = None,
-    step_timeout: float | None = None,
-    force_timing: bool = False,
-) -> RunResult:
-    """As `run`, but once the run has begun every end of it, even by an error, is a result: see
-    `RunResult.error`.
-
-    Raises:
-        BoebotError: the run could not begin.
-    """
-    terms = Terms(
+    request = Request.single(
+        brain,
+        robot,
+        pose=pose,
+        period=period,
+        without=without,
         arena=arena,
         on=on,
         seconds=seconds,
         seed=seed,
         realtime=realtime,
-        progress=progress,
         step_timeout=step_timeout,
         force_timing=force_timing,
     )
-    terms.check()
-    task = task_of(Member(brain=brain, robot=robot, pose=pose, period=period, without=without), terms)
-    task = replace(task, on=default_board([task.request.robot]) if on is None else on)
+    return keep(lambda: execute(request, progress), out)
+
+
+def execute(request: Request, progress: Progress | None = None) -> RunResult:
+    """Runs the one robot of a request. Once the run has begun every end of it, even by an error, is a result: see
+    `RunResult.error`.
+
+    Raises:
+        BoebotError: the run could not begin.
+    """
+    (task,) = request.tasks()
+    task = replace(task, progress=progress)
     opening = open_board if task.request.robot.has_board else open_vehicle
     session = opening(task.on, task.request)
     try:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from pathlib import Path
+from typing import Any
 
 from boebot import brains
-from boebot.boards import BoardRequest
+from boebot.boards import DIRECT, BoardRequest, default_board
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
-from boebot.running.driver import Progress, Task
+from boebot.running.driver import Task
 from boebot.timing import realisable
 
 DEFAULT_PERIOD = 0.05  # s
@@ -45,17 +46,45 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Terms:
-    """What all robots of a run have in common; as for `boebot.run`."""
+class Request:
+    """What to run: one value, from the command line to the last step.
 
-    arena: str | Path | None
-    on: str | None
-    seconds: float
-    seed: int
-    realtime: bool
-    progress: Progress | None
+    Attributes:
+        members: the robots; several share one simulated world.
+        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
+        on: what robots with boards run on: "native", "avr", or, for a single one, a port: "/dev/ttyACM0",
+            "serial:PORT", "socket://HOST:PORT"; "direct" where no robot has a board. None: native or direct.
+        seconds: length of the run by the robots' clocks; may be infinite.
+        seed: of the simulated world's noise, of the robots' imperfections, and of the first brain's chance.
+        realtime: slow a simulated run down to the wall clock.
+        step_timeout: seconds by the wall clock after which a step of a brain that has not ended is an error, which ends
+            the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after
+            which its dead-man stops the motors.
+        force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
+    """
+
+    members: Sequence[Member]
+    arena: str | Path | None = None
+    on: str | None = None
+    seconds: float = 60.0
+    seed: int = 1
+    realtime: bool = False
     step_timeout: float | None = None
     force_timing: bool = False
+
+    @classmethod
+    def single(
+        cls,
+        brain: object = "wander",
+        robot: str | Path | RobotDescription = "shieldbot",
+        *,
+        pose: tuple[float, float, float] | None = None,
+        period: float | None = None,
+        without: Sequence[str] = (),
+        **others: Any,
+    ) -> Request:
+        """Of one robot: what a `Member` has, and `others` of the attributes above."""
+        return cls(members=[Member(brain=brain, robot=robot, pose=pose, period=period, without=without)], **others)
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -70,36 +99,64 @@ class Terms:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
         if not isinstance(self.force_timing, bool):
             raise BoebotError(f"force_timing is {self.force_timing!r}; expected True or False")
+        expect("members", self.members, "a list of boebot.Member", list, tuple)
+        if not self.members:
+            raise BoebotError("there is no robot to run; expected at least one Member")
+        for member in self.members:
+            expect("members", member, "a list of boebot.Member", Member)
+
+    def tasks(self) -> list[Task]:
+        """The runs of its robots, checked.
+
+        Raises:
+            BoebotError: in one sentence; where there are several robots, it says which one it is about.
+        """
+        self.check()
+        tasks = []
+        for number, member in enumerate(self.members, 1):
+            try:
+                tasks.append(_task(member, self, number))
+            except BoebotError as error:
+                raise of_robot(error, number, len(self.members)) from None
+        kind = default_board([task.request.robot for task in tasks]) if self.on is None else self.on
+        if len(tasks) == 1:
+            return [replace(tasks[0], on=kind)]
+        return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
 
 
-def task_of(member: Member, terms: Terms, number: int = 1) -> Task:
-    """The run of the `number`-th robot, from 1; `on` is what is asked for, or "".
+def of_robot(error: BaseException, number: int, count: int) -> BaseException:
+    """The error, saying which robot it is about, where there are several."""
+    if count == 1 or not isinstance(error, BoebotError):
+        return error
+    named = type(error)(f"robot {number}: {error}")
+    for note in getattr(error, "__notes__", ()):
+        named.add_note(note)
+    return named
 
-    Raises:
-        BoebotError: in one sentence.
-    """
+
+def _task(member: Member, request: Request, number: int) -> Task:
+    """The run of the `number`-th robot, from 1."""
     expect("seed", member.seed, "a whole number or None", Integral, type(None))
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
     verdict = realisable.judge(description, period_s, board=realisable.of_image(description))
-    if not terms.force_timing:
+    if not request.force_timing:
         realisable.check(verdict)
-    request = BoardRequest(
+    board = BoardRequest(
         robot=description,
-        arena=None if terms.arena is None else str(terms.arena),
-        seed=terms.seed,
-        realtime=terms.realtime,
+        arena=None if request.arena is None else str(request.arena),
+        seed=request.seed,
+        realtime=request.realtime,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
     )
     return Task(
         brain=loaded,
-        request=request,
-        on=terms.on or "",
-        seconds=terms.seconds,
+        request=board,
+        on="",
+        seconds=request.seconds,
         period_s=period_s,
-        progress=terms.progress,
-        step_timeout_s=terms.step_timeout,
-        brain_seed=terms.seed + number - 1 if member.seed is None else member.seed,
+        step_timeout_s=request.step_timeout,
+        brain_seed=request.seed + number - 1 if member.seed is None else member.seed,
         unrealisable=None if verdict.is_realisable else verdict.sentence,
     )
 

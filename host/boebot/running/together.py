@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, default_board, open_together
+from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, open_together
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
 from boebot.record.result import RunResult, TogetherResult
@@ -24,7 +23,7 @@ from boebot.running.driver import PROGRESS_S, Driver, Progress, Task
 from boebot.running.pausable_thread import PAUSED, PausableThread
 from boebot.running.runner import driver_of, keep, with_times
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
-from boebot.running.tasks import Member, Terms, expect, task_of
+from boebot.running.tasks import Member, Request, of_robot
 
 __all__ = ["Member", "StoppedError", "execute_together", "run_together"]
 
@@ -52,14 +51,7 @@ def run_together(
         boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
 
     Args:
-        members: the robots.
-        arena: bundled name or .toml file; None: the simulator's own choice.
-        seconds: length of the run by each robot's clock.
-        on: what the robots with boards run on: "native" or "avr"; "direct" where no robot has one. None: native or
-            direct.
-        seed: of the world's noise and of the robots' imperfections.
-        realtime: slow down to the wall clock.
-        step_timeout, force_timing: as for `boebot.run`.
+        members, arena, seconds, on, seed, realtime, step_timeout, force_timing: as of `boebot.running.tasks.Request`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the seconds that have passed, about ten times a second.
 
@@ -71,52 +63,29 @@ def run_together(
             place). The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    return keep(
-        lambda: execute_together(members, arena, seconds, on, seed, realtime, progress, step_timeout, force_timing), out
-    )
-
-
-def execute_together(
-    members: Sequence[Member],
-    arena: str | Path | None = None,
-    seconds: float = 60.0,
-    on: str | None = None,
-    seed: int = 1,
-    realtime: bool = False,
-    progress: Progress | None = None,
-    step_timeout: float | None = None,
-    force_timing: bool = False,
-) -> TogetherResult:
-    """As `run_together`, but once the run has begun every end of it, even by an error, is a result: see
-    `TogetherResult.error`.
-
-    Raises:
-        BoebotError: the run could not begin.
-    """
-    expect("members", members, "a list of boebot.Member", list, tuple)
-    terms = Terms(
+    request = Request(
+        members=members,
         arena=arena,
         on=on,
         seconds=seconds,
         seed=seed,
         realtime=realtime,
-        progress=None,
         step_timeout=step_timeout,
         force_timing=force_timing,
     )
-    terms.check()
-    if not members:
-        raise BoebotError("there is no robot to run; expected at least one Member")
-    tasks = []
-    for number, member in enumerate(members, 1):
-        expect("members", member, "a list of boebot.Member", Member)
-        try:
-            tasks.append(task_of(member, terms, number))
-        except BoebotError as error:
-            raise _of_robot(error, number, len(members)) from None
+    return keep(lambda: execute_together(request, progress), out)
+
+
+def execute_together(request: Request, progress: Progress | None = None) -> TogetherResult:
+    """Runs all robots of a request in one world. Once the run has begun every end of it, even by an error, is a result:
+    see `TogetherResult.error`.
+
+    Raises:
+        BoebotError: the run could not begin.
+    """
+    tasks = request.tasks()
     _check_own_brains([task.brain for task in tasks])
-    kind = default_board([task.request.robot for task in tasks]) if on is None else on
-    tasks = [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+    kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
     world = open_together(kind, [task.request for task in tasks])
     try:
         return _Run(world, tasks, progress).run()
@@ -139,16 +108,6 @@ def _check_own_brains(loaded: Sequence[LoadedBrain]) -> None:
                     f"robots {first} and {number} share the brain of {process.name!r}; expected a Brain of its own for "
                     "each (a file, or a function that makes one, gives that)"
                 )
-
-
-def _of_robot(error: BaseException, number: int, count: int) -> BaseException:
-    """The error, saying which robot it is about, where there are several."""
-    if count == 1 or not isinstance(error, BoebotError):
-        return error
-    told = type(error)(f"robot {number}: {error}")
-    for note in getattr(error, "__notes__", ()):
-        told.add_note(note)
-    return told
 
 
 class _Robot:
@@ -249,9 +208,9 @@ class _Run:
         try:
             robot.turn(watch)
         except BoebotError as error:
-            raise _of_robot(error, robot.number, len(self._robots)) from error
+            raise of_robot(error, robot.number, len(self._robots)) from error
         if (failure := robot.failure) is not None:
-            raise _of_robot(failure, robot.number, len(self._robots)) from failure
+            raise of_robot(failure, robot.number, len(self._robots)) from failure
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:
