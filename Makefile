@@ -89,7 +89,7 @@ pictures:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures
 	@cp build/pictures/run.png docs/images/demo.png
-	@$(PYTHON_VENV) -m sim_bridge.arena_reference --pictures
+	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(PYTHON_VENV) -m tools.experiment_pages

@@ -2,13 +2,14 @@
 
 * `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
 * `boebot.link.ports._reader`: the thread that reads a port (host/boebot/link/ports/build_reader.py), MIT.
+* `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py), MIT.
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
 * `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
   GPL-3.0-or-later. Built where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything
   else works without it.
 * `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
 
-A wheel also carries the robots, the arenas and the AVR images. BOEBOT_SANITIZE=1 builds all C with the
+A wheel also carries the robots and the AVR images. BOEBOT_SANITIZE=1 builds all C with the
 address and undefined-behaviour sanitizers.
 """
 
@@ -38,7 +39,6 @@ PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in 
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
 WHEEL_DATA = {
     "boebot/data/robots": ("protocol/robots", ("*.toml",)),
-    "boebot/data/arenas": ("sim_bridge/arenas", ("*.toml",)),
     "boebot/data/images": ("build/images", ("*.elf", "*.hex")),
 }
 
@@ -48,6 +48,7 @@ CFFI_MODULES = [
     for script, wanted in (
         ("host/boebot/link/build_codec.py", True),
         ("host/boebot/link/ports/build_reader.py", HAS_POLL),
+        ("host/boebot/arenas/build_arena.py", True),
         ("sim_bridge/build_core.py", True),
         ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),
     )
@@ -173,17 +174,14 @@ setup(
     cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
     package_dir={"boebot": "host/boebot", "sim_bridge": "sim_bridge"},
     packages=[
-        *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data", "*.data.*"]),
+        *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],
-            exclude=[
-                f"sim_bridge.{folder}*"
-                for folder in ("tests", "fuzz", "world", "vehicles", "parts", "arenas", "images")
-            ],
+            exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "fuzz", "world", "vehicles", "parts", "images")],
         ),
     ],
-    package_data={"": ["py.typed", "*.html"], "boebot.brains": ["*.toml"]},
+    package_data={"": ["py.typed", "*.html"], "boebot.brains": ["*.toml"], "boebot.arenas.bundled": ["*.toml"]},
     include_package_data=False,
     cffi_modules=CFFI_MODULES,
     options={"bdist_wheel": {"py_limited_api": "cp311"}},

@@ -11,10 +11,9 @@ from typing import Any
 
 import msgspec
 
+from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
 from hil_tests.rig import Rig
-from sim_bridge.arena import Arena, ArenaDescription
-from sim_bridge.arena_description import Disc, Light, Patch, Polygon
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
 from sim_bridge.opening import alone
 from sim_bridge.session import SimSession

@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 
+from boebot.arenas import Light
 from boebot.description.robots import load_robot
 from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.compass import MagneticCompass
@@ -20,7 +21,6 @@ from hil_tests.circle import CircleRig, arena_of, block, circle, robot_of, wall_
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge import imperfections
-from sim_bridge.arena_description import Light
 
 pytestmark = pytest.mark.emulated
 

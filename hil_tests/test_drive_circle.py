@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 
+from boebot.arenas import Patch
 from boebot.description.robots import RobotDescription, Supply, load_robot
 from boebot.devices.battery import BatteryDivider
 from boebot.link import messages
@@ -18,7 +19,6 @@ from hil_tests.circle import CircleRig, arena_of, circle, robot_of
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge import imperfections
-from sim_bridge.arena_description import Patch
 
 pytestmark = pytest.mark.emulated
 

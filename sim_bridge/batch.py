@@ -17,10 +17,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from boebot import arguments
+from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from sim_bridge import arguments, worlds
+from sim_bridge import worlds
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 from sim_bridge.compiled_brain import WANDER, CompiledBrain
 from sim_bridge.vehicle import VehicleModel
 

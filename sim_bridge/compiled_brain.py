@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from boebot import arguments
 from boebot.errors import BrainError
-from sim_bridge import arguments
 from sim_bridge._core import ffi, lib
 from sim_bridge.worlds import STATE_BYTES_MAXIMUM
 

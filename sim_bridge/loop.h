@@ -16,6 +16,7 @@
 #include <stdint.h>
 
 #include "boards/board.h"
+#include "geometry/arena.h"
 #include "logs.h"
 #include "parts/analog_infrared.h"
 #include "parts/battery.h"
@@ -29,7 +30,6 @@
 #include "parts/turret.h"
 #include "parts/whisker.h"
 #include "vehicles/model.h"
-#include "world/arena.h"
 #include "world/body.h"
 
 /* python: begin */

@@ -166,7 +166,7 @@ void sim_forget_received(sim *self, int number, size_t keep) {
 
 static uint64_t mixed(uint64_t sum, const void *bytes, size_t size) {
   const uint8_t *at = bytes;
-  for (size_t i = 0; i < size; i += 8) sum = noise_mix(sum ^ got(at + i, size - i < 8 ? size - i : 8));
+  for (size_t i = 0; i < size; i += 8) sum = hash_mix(sum ^ got(at + i, size - i < 8 ? size - i : 8));
   return sum;
 }
 
@@ -174,9 +174,9 @@ static uint64_t mixed_edges(uint64_t sum, const edge_log *log) {
   const uint64_t kept = log->count < log->capacity ? log->count : log->capacity;
   for (uint64_t i = log->count - kept; i < log->count; i++) {
     const sim_edge *e = &log->edges[i & (log->capacity - 1)];
-    sum = noise_mix(sum ^ e->cycle ^ (uint64_t)e->pin << 56 ^ (uint64_t)e->level << 48);
+    sum = hash_mix(sum ^ e->cycle ^ (uint64_t)e->pin << 56 ^ (uint64_t)e->level << 48);
   }
-  return noise_mix(sum ^ log->count);
+  return hash_mix(sum ^ log->count);
 }
 
 /* Of a board what can be had: what it counted and did to its pins, its EEPROM, and its data space if it has one. */
@@ -186,7 +186,7 @@ static uint64_t mixed_board(uint64_t sum, const robot *r) {
   b->op->counters(b, &c);
   const uint64_t counted[] = {b->op->now(b), c.interrupts,     c.bytes_in, c.bytes_out, c.executed_cycles,
                               c.overruns,    c.framing_errors, c.resets,   c.edges_out, r->last_byte};
-  for (size_t i = 0; i < sizeof counted / sizeof *counted; i++) sum = noise_mix(sum ^ counted[i]);
+  for (size_t i = 0; i < sizeof counted / sizeof *counted; i++) sum = hash_mix(sum ^ counted[i]);
   const board_eeprom *eeprom = b->op->extension(b, BOARD_EEPROM);
   if (eeprom != NULL) sum = mixed(sum, eeprom->bytes, BOARD_EEPROM_SIZE);
   const uint8_t *data = b->op->extension(b, BOARD_DATA);
@@ -195,14 +195,14 @@ static uint64_t mixed_board(uint64_t sum, const robot *r) {
 }
 
 uint64_t sim_state_hash(const sim *self) {
-  uint64_t sum = noise_mix(self->now) ^ sim_hash(self);
+  uint64_t sum = hash_mix(self->now) ^ sim_hash(self);
   for (int i = 0; i < self->robot_count; i++) {
     const robot *r = self->robots[i];
     const double volts[] = {r->chassis.supply, r->battery == NULL ? 0.0 : r->battery->supply.pack_v};
-    for (int k = 0; k < 2; k++) sum = noise_mix(sum ^ input_of_double(volts[k]));
-    sum = noise_mix(sum ^ r->contacts);
-    sum = r->vehicle != NULL ? noise_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
+    for (int k = 0; k < 2; k++) sum = hash_mix(sum ^ input_of_double(volts[k]));
+    sum = hash_mix(sum ^ r->contacts);
+    sum = r->vehicle != NULL ? hash_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
   }
-  for (size_t k = 0; k < self->world.obstacles; k++) sum = noise_mix(sum ^ input_of_double(self->movers[k].waited));
+  for (size_t k = 0; k < self->world.obstacles; k++) sum = hash_mix(sum ^ input_of_double(self->movers[k].waited));
   return sum;
 }

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
+from boebot.arguments import shown, switch
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import shown, switch
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.outline import collision_outline
 from sim_bridge.parameters import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, struct

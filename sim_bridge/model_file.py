@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import msgspec
 
+from boebot.arguments import shown
 from boebot.description import robots
 from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.battery import Energy
@@ -27,7 +28,6 @@ from boebot.devices.ping import Sonar
 from boebot.devices.whisker import TouchWhisker
 from boebot.errors import RobotError
 from sim_bridge import imperfections
-from sim_bridge.arguments import shown
 from sim_bridge.model import SIDES, VehicleModel, beam
 from sim_bridge.parameters import FINITE, number
 from sim_bridge.switches import idealised

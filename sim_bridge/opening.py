@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from boebot.arenas import load_arena
+from boebot.arenas.floor_plan import floor_plan
 from boebot.boards import BoardRequest, Truth
-from sim_bridge.arena import load_arena
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.floor_plan import floor_plan
 from sim_bridge.sim import Sim
 from sim_bridge.sim_robot import SimRobot
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from boebot.description.outlines import polygon_fault
 from boebot.errors import RobotError
-from boebot.geometry import polygon_fault
 from sim_bridge._core import ffi, lib
 
 CORNERS_MAXIMUM: Final[int] = lib.BODY_CORNERS_MAXIMUM

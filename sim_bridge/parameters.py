@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from boebot.arguments import shown
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import shown
 
 LIMIT: Final = 1e12  # of any number: products of some of them stay finite
 

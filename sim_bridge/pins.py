@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arguments import number, shown
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import number, shown
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
 from sim_bridge.sim import checked_pose
 from sim_bridge.sim_robot import SimRobot

@@ -7,9 +7,9 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from boebot.arenas import Arena
 from boebot.boards import BoardRequest
 from boebot.errors import ArenaError
-from sim_bridge.arena import Arena
 from sim_bridge.sim import Pose
 
 GAPS_M = (0.3, 0.1, 0.02)  # between robots, and to what is around, that places are looked for with, in this order

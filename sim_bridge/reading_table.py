@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arguments import shown, whole
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import shown, whole
 from sim_bridge.parameters import number
 
 COLUMNS: Final = ("distance_m", "angle_rad", "reading")

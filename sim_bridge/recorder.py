@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arenas.floor_plan import FloorPlan, plan_of_poses, poses_of
 from boebot.errors import RobotError
-from boebot.floor_plan import FloorPlan
-from sim_bridge.floor_plan import plan_of_poses, poses_of
 from sim_bridge.vehicle import Vehicle
 
 Floats = NDArray[np.float64]

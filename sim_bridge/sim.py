@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from boebot import arguments
+from boebot.arenas import Arena
+from boebot.arenas.floor_plan import Lateness
+from boebot.arguments import point, shown, whole
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import arguments, imperfections, saved, switches
+from sim_bridge import imperfections, saved, switches
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
-from sim_bridge.arguments import point, shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.floor_plan import Lateness
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.outline import collision_outline
 from sim_bridge.sim_robot import PORTION_CYCLES, SimRobot

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arguments import shown, whole
 from boebot.description import robots
 from boebot.errors import BoardError, BrainError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arguments import shown, whole
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.vehicle import ENDS

@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+from boebot import arguments
+from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from sim_bridge import arguments, worlds
+from sim_bridge import worlds
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 from sim_bridge.model import VehicleModel as VehicleModel
 from sim_bridge.model import beam as beam
 from sim_bridge.model_file import ARSIM_BODY as ARSIM_BODY

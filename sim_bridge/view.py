@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon
 from matplotlib.transforms import Affine2D
 
+from boebot.arenas.floor_plan import floor_plan, moving_solids, poses_of
+from boebot.description.outlines import way_out
 from boebot.errors import BoebotError
-from boebot.geometry import way_out
 from boebot.view import style
 from boebot.view.arena_drawing import draw_arena, frame
 from boebot.view.robot_drawing import body_patch
 from boebot.view.scene import plan_bounds
 from sim_bridge._core import ffi, lib
-from sim_bridge.floor_plan import floor_plan, moving_solids, poses_of
 from sim_bridge.vehicle import Vehicle
 
 BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"

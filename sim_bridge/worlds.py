@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from boebot import arguments
+from boebot.arenas import Arena
 from boebot.errors import ArenaError, RobotError
-from sim_bridge import arguments
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 
 if TYPE_CHECKING:
     from sim_bridge.model import VehicleModel

@@ -27,7 +27,8 @@ def main() -> None:
     database = json.loads(DATABASE.read_text(encoding="utf-8"))
     database += entries("firmware/src/hal/native", "-DPIN_MAP_SHIELDBOT", "-Ifirmware/src")
     simavr = [f"-I{header.parent}" for header in (PROJECT / "build" / "simavr").rglob("sim_avr.h")]
-    database += entries("sim_bridge", "-Isim_bridge", "-Isim_bridge/boards", *simavr)
+    database += entries("host", "-Ihost/boebot/arenas", "-Ihost/boebot/link", "-Ifirmware/src")
+    database += entries("sim_bridge", "-Isim_bridge", "-Isim_bridge/boards", "-Ihost/boebot/arenas", *simavr)
     DATABASE.write_text(json.dumps(database, indent=2) + "\n", encoding="utf-8")
 
 

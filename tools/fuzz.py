@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware" / "src"
+ARENAS = ROOT / "host" / "boebot" / "arenas"
 BUILT = ROOT / "build" / "fuzz"
 FRAME = FIRMWARE / "link" / "frame.c"
 TEST = ROOT / "firmware" / "test"
 SANITIZE = "-fsanitize=fuzzer,address,undefined"
 FLAGS = (
     *("-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fno-omit-frame-pointer"),
-    *(SANITIZE, "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}"),
+    *(SANITIZE, "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", f"-I{ARENAS}"),
 )
 
 
@@ -56,8 +57,9 @@ def firmware_sources() -> tuple[Path, ...]:
 
 def world_sources() -> tuple[Path, ...]:
     """Worlds without boards."""
-    rooms = ("vehicles", "world", "world/sensors")
-    return tuple(path for room in rooms for path in sorted((ROOT / "sim_bridge" / room).glob("*.c")))
+    simulator = ROOT / "sim_bridge"
+    rooms = (ARENAS / "geometry", simulator / "vehicles", simulator / "world", simulator / "world" / "sensors")
+    return tuple(path for room in rooms for path in sorted(room.glob("*.c")))
 
 
 # Actions of link_fuzzer.cpp: opens; arms and moves; presses a whisker; lets the supply sag; a message of each kind.

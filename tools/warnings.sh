@@ -16,11 +16,11 @@ for compiler in gcc clang; do
     find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c |
       compile $compiler -DPIN_MAP_$pin_map -Ifirmware/src
   done
-  find host -name '*.c' -not -name '_*.c' | compile $compiler -Ihost/boebot/link -Ifirmware/src
-  find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards -Ifirmware/src
+  find host -name '*.c' -not -name '_*.c' | compile $compiler -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
+  find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
   if [ -n "$simavr" ]; then
     find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' |
-      compile $compiler -Isim_bridge -Isim_bridge/boards -isystem "$simavr/sim" -isystem "$simavr/cores"
+      compile $compiler -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
   fi
 done
 

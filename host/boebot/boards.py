@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
+from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError
-from boebot.floor_plan import FloorPlan
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
 from boebot.link.ports.tcp import SocketTransport

@@ -11,7 +11,7 @@ _CHECKOUT = _PACKAGE.parents[1]
 _FOLDERS: dict[str, tuple[Path, Path]] = {
     "robots": (_PACKAGE / "data" / "robots", _CHECKOUT / "protocol" / "robots"),
     "images": (_PACKAGE / "data" / "images", _CHECKOUT / "build" / "images"),
-    "arenas": (_PACKAGE / "data" / "arenas", _CHECKOUT / "sim_bridge" / "arenas"),
+    "arenas": (_PACKAGE / "arenas" / "bundled", _PACKAGE / "arenas" / "bundled"),
 }
 
 

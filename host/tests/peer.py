@@ -25,11 +25,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from channel import Channel
 
+from boebot.arenas.floor_plan import FloorPlan, Solid
 from boebot.boards import Truth, WatchdogReset
 from boebot.description.board_parameters import parameters_of
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
-from boebot.floor_plan import FloorPlan, Solid
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch, Status

@@ -18,10 +18,10 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import boebot
+from boebot.arenas.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
 from boebot.boards import Truth
+from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
-from boebot.geometry import way_out
 from boebot.record.result import RunResult
 from boebot.running import runner
 from boebot.view import picture, scene, style

@@ -8,7 +8,7 @@
 
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
-#include "../world/hash.h"
+#include "geometry/hash.h"
 
 #define WORLDS 2
 #define STEPS 64        /* of an action */

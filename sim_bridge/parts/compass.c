@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 #define NEVER UINT64_MAX
 #define CYCLES_PER_US (BOARD_CLOCK_HZ / 1000000u)

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 static uint8_t level_a(const encoder *self, long long index) {
   if (self->pin_b == PART_NO_PIN) return (uint8_t)(index & 1);

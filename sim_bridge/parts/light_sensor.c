@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 static double supply_volts(const light_sensor *self) { return self->part.chassis->supply * BOARD_NOMINAL_VOLTS; }
 

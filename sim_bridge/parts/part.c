@@ -1,7 +1,7 @@
 /* part.c: see part.h. */
 #include "part.h"
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 void part_join(part *self, const part_operations *op, const part_place *place, const part_pin *pins, int count) {
   self->op = op;

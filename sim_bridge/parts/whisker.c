@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 #define BOUNCES_MAXIMUM 4
 

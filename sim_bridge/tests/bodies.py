@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from boebot.arenas import Arena
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 from sim_bridge.tests.simulated import arena_of
 
 Points = Sequence[tuple[float, float]]

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from boebot.arenas import Arena, ArenaDescription, Polygon, Start
 from boebot.description.robots import RobotDescription, Supply, load_robot
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena, ArenaDescription, Polygon, Start
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins

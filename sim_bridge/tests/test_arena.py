@@ -12,10 +12,9 @@ import shapely
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from boebot.arenas import Arena, ArenaDescription, Moving, Polygon, Waypoint, arena_names, load_arena
 from boebot.errors import ArenaError
 from sim_bridge._core import lib
-from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
-from sim_bridge.arena_description import Moving, Waypoint
 from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))
@@ -70,7 +69,7 @@ def grazes(arena: Arena, x: float, y: float, angle: float) -> bool:
 @given(arenas, coordinates, coordinates, angles)
 def test_grid_changes_no_answer(arena: Arena, x: float, y: float, angle: float) -> None:
     def answers() -> tuple[float | None, float, bool]:
-        return arena.ray(x, y, angle, 20.0), arena.clearance(x, y, 1.0), arena.is_free(x, y, 0.07)
+        return arena.ray(x, y, angle, 20.0), lib.arena_clearance(arena.handle, x, y, 1.0), arena.is_free(x, y, 0.07)
 
     lib.arena_use_index(arena.handle, lib.ARENA_INDEX_NONE)
     without = answers()
@@ -80,7 +79,7 @@ def test_grid_changes_no_answer(arena: Arena, x: float, y: float, angle: float) 
 
 @given(arenas, coordinates, coordinates)
 def test_clearance_is_the_distance_to_the_nearest_edge(arena: Arena, x: float, y: float) -> None:
-    assert arena.clearance(x, y, 20.0) == pytest.approx(distance_to_segments(arena, x, y), abs=1e-12)
+    assert lib.arena_clearance(arena.handle, x, y, 20.0) == pytest.approx(distance_to_segments(arena, x, y), abs=1e-12)
 
 
 def test_no_ray_slips_through_a_shared_corner() -> None:

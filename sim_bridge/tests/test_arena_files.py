@@ -14,12 +14,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot import resources
+from boebot.arenas import (
+    Arena,
+    ArenaDescription,
+    Disc,
+    Moving,
+    Polygon,
+    Wall,
+    Waypoint,
+    arena_names,
+    load_arena,
+    reference,
+)
+from boebot.arenas.floor_plan import floor_plan, poses_of
+from boebot.arenas.picture import draw
 from boebot.errors import ArenaError
-from sim_bridge import arena_reference
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena, arena_names, load_arena
-from sim_bridge.arena_description import ArenaDescription, Disc, Moving, Polygon, Wall, Waypoint
-from sim_bridge.arena_picture import draw
 
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs" / "reference").is_dir())
 PAGE = (ROOT / "docs/reference/arenas.md").read_text(encoding="utf-8")
@@ -138,10 +148,10 @@ def test_showcase_holds_what_its_file_says() -> None:
     assert arena.grip(0, 0, 0.6) == 0.9
     assert arena.grip(1.2, -1.2, 0.6) == 0.15
     assert arena.grip(-1.5, -1, 0.6) == 0.6
-    charger, light = lib.arena_charger_of(handle), lib.arena_lights(handle)[0]
-    assert (charger.x, charger.y, charger.radius) == (1.6, 1.2, 0.15)
+    light = lib.arena_lights(handle)[0]
+    assert [lib.arena_is_at_charger(handle, 1.6, 1.2 + away) for away in (-0.149, 0.149, 0.151)] == [1, 1, 0]
     assert (light.x, light.y, light.height, light.power) == (1.6, 1.2, 0.25, 5.0)
-    surfaces = [lib.arena_shape_at(handle, number).surface for number in range(lib.arena_shape_count(handle))]
+    surfaces = [lib.arena_shape_at(handle, number).surface for number in range(6)]
     assert [surface.height for surface in surfaces] == [math.inf, math.inf, 0.04, math.inf, math.inf, math.inf]
     assert (surfaces[3].infrared_reflectance, surfaces[3].sound_reflectance) == (0.1, 0.2)
     assert not arena.is_free(1.0, -0.7, 0.05)  # the cart, at the start
@@ -192,25 +202,22 @@ def test_velocity_is_the_derivative_of_the_pose(repeat: str, time: float) -> Non
 
 
 def test_moving_shapes_are_where_their_path_says() -> None:
-    arena = load_arena("showcase")
-    cart, ball = arena.moving_outlines(
-        5.0
-    )  # the cart is half-way from (1.6, -0.7) to (1.7, -0.6), turned by 45 degrees
-    assert cart.mean(axis=0) == pytest.approx((1.65, -0.65))
-    assert np.ptp(cart, axis=0) == pytest.approx(2 * [(0.3 + 0.2) * math.sqrt(0.5)], abs=1e-4)
-    assert ball.mean(axis=0) == pytest.approx((-0.8, 0.7))
-    assert np.hypot(*(ball - (-0.8, 0.7)).T) == pytest.approx(np.full(48, 0.08))
+    """At 5 s the cart is half-way from (1.6, -0.7) to (1.7, -0.6), turned by 45 degrees."""
+    cart, ball = (moving.at(5.0) for moving in floor_plan(load_arena("showcase"), 5.0, 6.0).moving)
+    assert cart.points.mean(axis=0) == pytest.approx((1.65, -0.65))
+    assert np.ptp(cart.points, axis=0) == pytest.approx(2 * [(0.3 + 0.2) * math.sqrt(0.5)], abs=1e-4)
+    assert ball.points[0] == pytest.approx((-0.8, 0.7)) and ball.radius == 0.08
 
 
 @pytest.mark.unsanitized
 def test_schema_and_page_are_fresh() -> None:
-    """`python -m sim_bridge.arena_reference` renews them."""
-    assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == arena_reference.schema()
-    assert arena_reference.page(PAGE) == PAGE
+    """`python -m boebot.arenas.reference` renews them."""
+    assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == reference.schema()
+    assert reference.page(PAGE) == PAGE
 
 
 def test_schema_names_every_key_with_its_limits() -> None:
-    definitions = json.loads(arena_reference.schema())["$defs"]
+    definitions = json.loads(reference.schema())["$defs"]
     assert definitions["Disc"]["required"] == ["x_m", "y_m", "radius_m"]
     assert definitions["Disc"]["properties"]["radius_m"]["exclusiveMinimum"] == 0
     assert definitions["Polygon"]["properties"]["corners_m"]["minItems"] == 3
@@ -317,8 +324,9 @@ def test_a_spoilt_file_is_refused_in_a_sentence_or_is_an_arena(
     x, y, heading = arena.start
     distance = arena.ray(x, y, heading, 20)
     assert distance is None or 0 <= distance < 20
-    assert 0 <= arena.clearance(x, y, 5) <= 5
-    assert all(np.isfinite(outline).all() for outline in [*arena.outlines, *arena.moving_outlines(7.3)])
+    assert arena.is_free(x, y, 0.0)
+    assert all(np.isfinite(outline).all() for outline in arena.outlines)
+    assert np.isfinite(poses_of(arena.movers(7.3))).all()
 
 
 @given(st.binary(max_size=200))

@@ -11,12 +11,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.arenas import (
+    Arena,
+    ArenaDescription,
+    Charger,
+    Disc,
+    Light,
+    Moving,
+    Patch,
+    Polygon,
+    Start,
+    Wall,
+    Waypoint,
+    load_arena,
+)
+from boebot.arenas.floor_plan import poses_of
+from boebot.arenas.rays import ray_segment
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena, ArenaDescription, Polygon, load_arena
-from sim_bridge.arena_description import Charger, Disc, Light, Moving, Patch, Start, Wall, Waypoint
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
-from sim_bridge.geometry import ray_segment
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim
 
@@ -135,16 +148,13 @@ def test_any_question_to_an_arena_is_answered_in_numbers_or_refused(x: Any, y: A
     answers: list[Any] = []
     for question in (
         lambda: ROOM.ray(x, y, angle, reach),
-        lambda: ROOM.clearance(x, y, reach),
         lambda: ROOM.is_free(x, y, reach),
         lambda: ROOM.grip(x, y, reach),
-        lambda: ROOM.moving_outlines(angle),
         lambda: FIELD.ray(x, y, 0.0, reach),
     ):
         refused(lambda: answers.append(question()))  # noqa: B023
     for answer in answers:
-        assert not isinstance(answer, list) or all(np.isfinite(part).all() for part in answer)
-        assert isinstance(answer, (list, bool, type(None))) or math.isfinite(answer)
+        assert isinstance(answer, (bool, type(None))) or math.isfinite(answer)
 
 
 pairs = st.tuples(small, small) | st.lists(things | small, max_size=3)
@@ -186,8 +196,8 @@ def test_any_description_is_an_arena_or_a_sentence(description: ArenaDescription
         return
     distance = made[0].ray(0, 0, 0.3, 9)
     assert distance is None or 0 <= distance < 9
-    assert 0 <= made[0].clearance(0, 0, 5) <= 5
-    assert all(np.isfinite(outline).all() for outline in [*made[0].outlines, *made[0].moving_outlines(7.3)])
+    assert all(np.isfinite(outline).all() for outline in made[0].outlines)
+    assert np.isfinite(poses_of(made[0].movers(7.3))).all()
 
 
 # ---- what the sentences say ------------------------------------------------------------------------------------------
@@ -268,10 +278,8 @@ def test_one_description_cannot_be_changed_behind_an_arena() -> None:
         (lambda a: a.ray(math.nan, 0, 0, 1), "arena: the position is (nan, 0); expected 2 finite numbers, x, y (m), w"),
         (lambda a: a.ray(0, 0, math.nan, 1), "arena: angle is nan; expected a finite number"),
         (lambda a: a.ray(0, 0, 0, -1), "arena: reach is -1; expected a finite number from 0 to 1e+07"),
-        (lambda a: a.clearance(0, 0, -0.1), "arena: limit is -0.1; expected a finite number from 0 to 1e+07"),
         (lambda a: a.is_free(0, 0, "r"), "arena: radius is 'r'; expected a finite number from 0"),
         (lambda a: a.grip(0, 0, math.inf), "arena: otherwise is inf; expected a finite number of at least 0"),
-        (lambda a: a.moving_outlines(math.nan), "arena: time is nan; expected a finite number from -1e+09 to 1e+09"),
         (lambda a: type(a)(None), "arena: expected object, got null"),
         (lambda a: ray_segment(0, 0, 0, (1, 0), (1e7, 0)), "segment (1, 0) to (10000000.0, 0), ray from (0, 0) at 0"),
     ],

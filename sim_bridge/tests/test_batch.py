@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boebot.arenas import load_arena
 from boebot.errors import ArenaError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import load_arena
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
@@ -188,12 +188,15 @@ def hashes_by(folder: Path, compiler: str, *more: str) -> list[str]:
     """Prints of hash_runs.c, built by that compiler."""
     program = folder / "".join((compiler, *more))
     core = HERE.parent
-    sources = [path for room in ("vehicles", "world", "world/sensors") for path in sorted((core / room).glob("*.c"))]
+    geometry = core.parent / "host" / "boebot" / "arenas" / "geometry"
+    rooms = (geometry, core / "vehicles", core / "world", core / "world" / "sensors")
+    sources = [path for room in rooms for path in sorted(room.glob("*.c"))]
     command = [
         compiler,
         "-std=gnu11",
         "-ffp-contract=off",
         *more,
+        f"-I{geometry.parent}",
         str(HERE / "hash_runs.c"),
         *map(str, sources),
     ]

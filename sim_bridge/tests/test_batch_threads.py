@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boebot.arenas import load_arena
 from boebot.errors import RobotError
-from sim_bridge.arena import load_arena
 from sim_bridge.batch import WANDER, Batch
 from sim_bridge.vehicle import STAGES, Vehicle, arsim
 
@@ -94,7 +94,7 @@ def test_threads_end_with_close_with_the_block_and_with_the_batch() -> None:
 
 def test_a_process_with_an_open_batch_ends() -> None:
     code = (
-        "import numpy as np; from sim_bridge.batch import Batch; from sim_bridge.arena import load_arena; "
+        "import numpy as np; from sim_bridge.batch import Batch; from boebot.arenas import load_arena; "
         "from sim_bridge.vehicle import arsim; b = Batch(arsim(), load_arena('arsim'), np.zeros((4, 3)), range(4), "
         "threads=4); b.step(np.ones((4, 2)), 50); print('done')"
     )

@@ -17,10 +17,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from boebot.arenas import Arena, ArenaDescription, Moving, Waypoint, load_arena
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena, load_arena
-from sim_bridge.arena_description import ArenaDescription, Moving, Waypoint
 from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim

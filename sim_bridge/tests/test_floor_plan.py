@@ -6,14 +6,11 @@ import math
 
 import numpy as np
 import pytest
-import shapely
 
+from boebot.arenas import Arena, ArenaDescription, Disc, Moving, Polygon, Wall, Waypoint, load_arena
+from boebot.arenas.floor_plan import SAMPLES_MAXIMUM, Solid, floor_plan, path_end, poses_of
 from boebot.boards import BoardRequest, open_board, open_vehicle
 from boebot.description.robots import load_robot
-from boebot.floor_plan import Solid
-from sim_bridge.arena import Arena, ArenaDescription, load_arena
-from sim_bridge.arena_description import Disc, Moving, Polygon, Wall, Waypoint
-from sim_bridge.floor_plan import SAMPLES_MAXIMUM, floor_plan, path_end
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import Vehicle, arsim
 from sim_bridge.view import View
@@ -45,12 +42,9 @@ def test_showcase_is_told_whole() -> None:
 def test_moving_shapes_are_where_the_world_has_them(time: float) -> None:
     arena = load_arena("showcase")
     plan = floor_plan(arena, 0.0, 60.0)
-    for moving, truth in zip(plan.moving, arena.moving_outlines(time), strict=True):
-        told = moving.at(time)
-        shape = shapely.Polygon(told.points) if told.kind == "obstacle" else shapely.Point(told.points[0])
-        assert shape.centroid.coords[0] == pytest.approx(shapely.Polygon(truth).centroid.coords[0], abs=2e-3)
-        if told.kind == "obstacle":
-            assert np.allclose(told.points, truth, atol=2e-3)
+    for moving, truth in zip(plan.moving, poses_of(arena.movers(time)), strict=True):
+        x, y, heading = moving.pose(time)
+        assert (x, y, math.cos(heading), math.sin(heading)) == pytest.approx(truth, abs=2e-3)
 
 
 def test_poses_go_on_over_full_turns() -> None:

@@ -12,15 +12,12 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.arenas import Arena, ArenaDescription, Start, Waypoint, description
+from boebot.arenas.floor_plan import Lateness, Moving, Solid, floor_plan
 from boebot.boards import Truth
 from boebot.description.robots import load_robot
-from boebot.floor_plan import Moving, Solid
-from sim_bridge import arena_description
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
-from sim_bridge.arena_description import ArenaDescription, Start, Waypoint
 from sim_bridge.direct import DirectSession
-from sim_bridge.floor_plan import Lateness, floor_plan
 from sim_bridge.opening import alone, truth_of
 from sim_bridge.recorder import Recorder
 from sim_bridge.sim import Sim
@@ -43,7 +40,7 @@ def press(*, disc: bool = False) -> Arena:
         Waypoint(time_s=2.5007, x_m=0.78, y_m=0),
     ]
     shape: dict[str, Any] = {"radius_m": SIDE / 2} if disc else {"corners_m": square(0, 0, SIDE)}
-    moving = arena_description.Moving(path=way, repeat="back_and_forth", **shape)
+    moving = description.Moving(path=way, repeat="back_and_forth", **shape)
     walls = arena_of(square(2.0, 0.0, 2.0)).description.obstacle
     start = Start(x_m=0.7, y_m=0.0, heading_rad=math.pi / 2)
     return Arena(ArenaDescription(name="press", start=start, obstacle=walls, moving=[moving]))
@@ -212,7 +209,7 @@ def test_poses_are_those_of_the_path_by_its_own_clock(
     """Numpy interpolates the waypoints, the clock and its fold at the turns."""
     times = np.cumsum([0.0, *(duration for duration, *_ in way[1:])])
     path = [Waypoint(float(t), x, y, turn) for t, (_, x, y, turn) in zip(times, way, strict=True)]
-    moving = arena_description.Moving(corners_m=square(0, 0, SIDE), path=path, repeat=repeat)  # type: ignore[arg-type]
+    moving = description.Moving(corners_m=square(0, 0, SIDE), path=path, repeat=repeat)  # type: ignore[arg-type]
     rows = [(0.0, 0.0)]
     for goes, waits in stops:
         time, late = rows[-1]

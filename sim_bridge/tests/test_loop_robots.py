@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
+from boebot.arenas import Arena, ArenaDescription, Moving, Polygon, Waypoint
 from boebot.errors import ArenaError, BoardError
-from sim_bridge.arena import Arena
-from sim_bridge.arena_description import ArenaDescription, Moving, Polygon, Waypoint
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import NEVER, Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, square

@@ -17,11 +17,11 @@ import pytest
 
 import boebot
 from boebot import Member
+from boebot.arenas import Arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.record.result import RunResult
 from boebot.robot import Robot
-from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.model_file import vehicle_model

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import boebot
+from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from sim_bridge.arena import load_arena
 from sim_bridge.model import beam
 from sim_bridge.model_file import ARSIM_BODY, arsim, vehicle_model
 from sim_bridge.tests.simulated import arena_of

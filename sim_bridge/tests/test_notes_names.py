@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from PIL import Image
 from shapely.geometry import LineString, Point
 
+from boebot.arenas import load_arena
+from boebot.arenas.rays import bearing_interval, ray_segment
 from boebot.errors import ArenaError, RobotError
-from sim_bridge.arena import load_arena
-from sim_bridge.geometry import bearing_interval, ray_segment
 from sim_bridge.motor import DCMotor
 from sim_bridge.recorder import Recorder
 from sim_bridge.tests.simulated import arena_of, square

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import boebot
+from boebot.description.outlines import polygon_fault
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, RobotError
-from boebot.geometry import polygon_fault
 from sim_bridge import imperfections
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.sim import Sim

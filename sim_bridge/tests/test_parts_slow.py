@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boebot.arenas import Arena
 from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.light import LightSensor
 from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 

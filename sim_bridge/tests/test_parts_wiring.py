@@ -8,6 +8,7 @@ import math
 import msgspec
 import pytest
 
+from boebot.arenas import Arena, ArenaDescription, Moving, Waypoint
 from boebot.description import robots
 from boebot.description.robots import load_robot
 from boebot.devices.analog_infrared import SharpSensor
@@ -19,8 +20,6 @@ from boebot.devices.light import LightSensor
 from boebot.devices.turret import PositionServo
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import lib
-from sim_bridge.arena import Arena, ArenaDescription
-from sim_bridge.arena_description import Moving, Waypoint
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim

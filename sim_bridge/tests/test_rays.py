@@ -217,7 +217,7 @@ def test_things_that_are_no_shapes_are_refused() -> None:
     assert lib.arena_add_polygon(handle, line, 3, lib.ARENA_WALL, ffi.NULL) == -1
     assert lib.arena_add_wall(handle, ffi.new("double[]", [1, 1, 1, 1]), 2, ffi.NULL) == -1
     assert lib.arena_add_disc(handle, 0, 0, 0, ffi.NULL) == -1
-    assert lib.arena_edge_count(handle) == lib.arena_shape_count(handle) == 0
+    assert lib.arena_edge_count(handle) == lib.arena_disc_count(handle) == 0
 
 
 def test_grip_is_that_of_the_last_patch() -> None:

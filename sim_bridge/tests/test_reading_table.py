@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from boebot.arenas import Arena
 from boebot.errors import RobotError
-from sim_bridge.arena import Arena
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, beam

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 import boebot
 from boebot import Member
+from boebot.arenas import Arena, load_arena
 from boebot.boards import BoardRequest
 from boebot.brains import load_brain
 from boebot.description.robots import load_robot
@@ -27,7 +28,6 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge import opening
 from sim_bridge import session as sessions
-from sim_bridge.arena import Arena, load_arena
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
 from sim_bridge.pins import BoardPins

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.arenas.arena import Floats
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Floats
 from sim_bridge.tests.shapes import Shapes, angles, coordinates, ring_of, scenes
 from sim_bridge.tests.simulated import square
 

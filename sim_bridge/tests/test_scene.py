@@ -12,8 +12,8 @@ import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.arenas import Arena
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena
 from sim_bridge.tests.simulated import arena_of, square
 
 Hit = tuple[float, Any]

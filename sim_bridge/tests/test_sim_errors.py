@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
+from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoebotError
-from sim_bridge.arena import load_arena
 from sim_bridge.boards.emulated import EmulatedBoard, native_board, native_library
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim

@@ -12,10 +12,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.arenas import (
+    Arena,
+    ArenaDescription,
+    Charger,
+    Disc,
+    Light,
+    Moving,
+    Patch,
+    Polygon,
+    Wall,
+    Waypoint,
+    arena_names,
+    load_arena,
+)
 from boebot.errors import RobotError
 from sim_bridge._core import ffi
-from sim_bridge.arena import Arena, ArenaDescription, Polygon, arena_names, load_arena
-from sim_bridge.arena_description import Charger, Disc, Light, Moving, Patch, Wall, Waypoint
 from sim_bridge.batch import WANDER, Batch
 from sim_bridge.motor import DCMotor
 from sim_bridge.reading_table import ReadingTable

@@ -14,6 +14,7 @@ import pytest
 
 import boebot
 from boebot import Member
+from boebot.arenas import Arena, ArenaDescription, Patch
 from boebot.boards import BoardRequest, imperfections, open_board
 from boebot.description import robots
 from boebot.description.robots import load_robot
@@ -34,8 +35,6 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge import imperfections as parts
 from sim_bridge._core import lib
-from sim_bridge.arena import Arena, ArenaDescription
-from sim_bridge.arena_description import Patch
 from sim_bridge.imperfections import Draw
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.sim import Sim

@@ -18,6 +18,7 @@ import pytest
 
 import boebot
 from boebot import Member
+from boebot.arenas import load_arena
 from boebot.boards import BoardRequest, SharedWorld, open_together
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
@@ -29,7 +30,6 @@ from boebot.running import together
 from boebot.running.tasks import Request
 from boebot.running.together import StoppedError, execute_together
 from boebot.view import style
-from sim_bridge.arena import load_arena
 from sim_bridge.places import places_of
 from sim_bridge.session import SimSession
 from sim_bridge.together import SimWorld

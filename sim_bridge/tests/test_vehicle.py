@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boebot.arenas import Arena, load_arena
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.arena import Arena, load_arena
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam

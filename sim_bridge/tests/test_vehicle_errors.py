@@ -11,9 +11,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, RobotError
-from sim_bridge.arena import load_arena
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.parameters import keys_of
 from sim_bridge.reading_table import ReadingTable

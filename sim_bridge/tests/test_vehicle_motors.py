@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from boebot.arenas import load_arena
 from boebot.errors import RobotError
-from sim_bridge.arena import load_arena
 from sim_bridge.model_file import vehicle_model
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.tests.simulated import arena_of

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 from numpy.typing import NDArray
 
+from boebot.arenas import load_arena
 from boebot.description.robots import RobotDescription
-from sim_bridge.arena import load_arena
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import Level
 from sim_bridge.boards.emulated import EmulatedBoard

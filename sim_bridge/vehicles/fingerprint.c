@@ -1,5 +1,5 @@
 /* fingerprint.c: what tells a model from another one: a hash of every parameter of its body, drive, battery and sensors. */
-#include "../world/hash.h"
+#include "geometry/hash.h"
 #include "model.h"
 
 static uint64_t hash_body(uint64_t sum, const body_parameters *b) {

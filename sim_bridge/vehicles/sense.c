@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 
 typedef struct {
   vehicles *all;

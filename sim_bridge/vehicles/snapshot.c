@@ -6,7 +6,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "../world/hash.h"
+#include "geometry/hash.h"
 #include "vehicle.h"
 
 #define VERSION UINT64_C(0x32746f6f62656f62) /* "boeboot2": changes with the walk */

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../world/numbers.h"
+#include "geometry/numbers.h"
 #include "sense.h"
 #include "vehicle_row.h"
 

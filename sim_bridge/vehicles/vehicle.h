@@ -9,8 +9,8 @@
 #ifndef VEHICLES_VEHICLE_H
 #define VEHICLES_VEHICLE_H
 
-#include "../world/numbers.h"
 #include "../world/world.h"
+#include "geometry/numbers.h"
 #include "model.h"
 
 /* python: begin */

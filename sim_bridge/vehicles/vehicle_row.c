@@ -4,9 +4,9 @@
 
 #include <string.h>
 
-#include "../world/lanes.h"
 #include "../world/noise_block.h"
 #include "../world/row.h"
+#include "geometry/lanes.h"
 #include "sense.h"
 
 #define DRAWS (VEHICLE_SENSORS + 1u) /* sensors draw one number each, an odometer two */

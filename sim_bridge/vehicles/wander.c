@@ -9,7 +9,7 @@
 #define STOP_TURN_PROBABILITY 0.03
 #define NEAR 0.25 /* IR reading at which it turns away (chosen: 0.45 m) */
 
-static double draw(vehicle_wander_state *s) { return noise_unit(noise_mix(noise_mix(s->seed) ^ s->draws++)); }
+static double draw(vehicle_wander_state *s) { return noise_unit(hash_mix(hash_mix(s->seed) ^ s->draws++)); }
 
 void vehicle_wander(void *state, const double *readings, double *signals) {
   vehicle_wander_state *s = state;

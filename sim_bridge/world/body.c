@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "contact.h"
+#include "geometry/numbers.h"
 #include "ground.h"
-#include "numbers.h"
 
 #define SLIP_ROUNDS 40
 #define SLIP_SETTLED 1e-12 /* m/s */

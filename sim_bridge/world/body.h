@@ -11,10 +11,10 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "arena.h"
+#include "geometry/arena.h"
+#include "geometry/scene.h"
 #include "outline.h"
 #include "row.h"
-#include "scene.h"
 
 /* python: begin */
 enum { BODY_HEADING_LIMIT = 100000 }; /* rad, that a body may be placed at: beyond it an angle loses its precision */

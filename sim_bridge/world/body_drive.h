@@ -3,7 +3,7 @@
 #define WORLD_BODY_DRIVE_H
 
 #include "body.h"
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 #define BODY_SPEED_LIMIT 100.0 /* m/s: a drive that diverges stays finite */
 #define BODY_TURN_LIMIT 1000.0 /* rad/s */

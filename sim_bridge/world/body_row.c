@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "body_drive.h"
-#include "lanes.h"
+#include "geometry/lanes.h"
 
 /* Bodies of a row side by side, as numbers that wait for each other's turn in no order. */
 typedef struct {

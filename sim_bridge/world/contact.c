@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 /* What is met: everything within `rounding` of a segment, moving. */
 typedef struct {

@@ -2,7 +2,7 @@
 #include <math.h>
 
 #include "contact.h"
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 #define ROUNDS 100
 #define DEPTH_LIMIT 5e-7           /* m: deeper than this after all rounds there is no place */

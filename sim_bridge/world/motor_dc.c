@@ -1,7 +1,7 @@
 /* motor_dc.c: see motor_dc.h. */
 #include "motor_dc.h"
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 void motor_dc_default(motor_dc_parameters *out) {
   *out = (motor_dc_parameters){

@@ -22,7 +22,7 @@
 
 #include <math.h>
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 #define MOTOR_DC_STANDSTILL 1e-6 /* rad/s of the motor's axis */
 

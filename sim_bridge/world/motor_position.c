@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 #define PULSE_MINIMUM_US 500.0
 #define PULSE_MAXIMUM_US 2500.0

@@ -2,7 +2,7 @@
  * cases of the ziggurat. */
 #include "noise.h"
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 /* Edge 1 is where the tail begins, edge 0 is so wide that layer 0, a rectangle and the tail, has the area of the others.
  * The test of this table derives it anew. */
@@ -80,7 +80,7 @@ double noise_layer_edge(int i) { return i >= 0 && i <= NOISE_LAYERS ? noise_laye
 double noise_layer_height(int i) { return i >= 0 && i <= NOISE_LAYERS ? noise_layer_heights[i] : 0.0; }
 
 uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
-  return noise_mix(noise_key(seed, robot, device) ^ step);
+  return hash_mix(noise_key(seed, robot, device) ^ step);
 }
 
 double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
@@ -92,9 +92,9 @@ static double tail(uint64_t bits, int negative) {
   const double begin = noise_layer_edges[1];
   double x, y;
   do {
-    bits = noise_mix(bits);
+    bits = hash_mix(bits);
     x = -number_log(1.0 - noise_unit(bits)) / begin;
-    bits = noise_mix(bits);
+    bits = hash_mix(bits);
     y = -number_log(1.0 - noise_unit(bits));
   } while (y + y < x * x);
   return negative ? -(begin + x) : begin + x;
@@ -123,8 +123,8 @@ double noise_normal_outside(uint64_t bits) {
     if (layer == 0) return tail(bits, x < 0.0);
     /* Within the layer, from its lower border, where the bell is at edge[0], to its upper one. */
     const double *height = &noise_layer_heights[layer];
-    bits = noise_mix(bits);
+    bits = hash_mix(bits);
     if (below_bell(height[0] + noise_unit(bits) * (height[1] - height[0]), x, edge[0], height[0])) return x;
-    bits = noise_mix(bits);
+    bits = hash_mix(bits);
   }
 }

@@ -9,6 +9,8 @@
 
 #include <stdint.h>
 
+#include "geometry/hash.h"
+
 #define NOISE_LAYERS 256
 
 /* python: begin */
@@ -42,17 +44,9 @@ extern const double noise_layer_edges[NOISE_LAYERS + 1];
 /* The bell's heights there. */
 extern const double noise_layer_heights[NOISE_LAYERS + 1];
 
-/* Finaliser of 64 bits: each bit of the result depends on each bit of x. */
-static inline uint64_t noise_mix(uint64_t x) {
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
 /* What the steps of one device are mixed with. */
 static inline uint64_t noise_key(uint64_t seed, uint32_t robot, uint32_t device) {
-  return noise_mix(noise_mix(seed) ^ (((uint64_t)robot << 32) | device));
+  return hash_mix(hash_mix(seed) ^ (((uint64_t)robot << 32) | device));
 }
 
 static inline double noise_unit(uint64_t bits) { return (double)(bits >> 11) * 0x1p-53; }
@@ -73,7 +67,7 @@ static inline uint64_t noise_next_bits(noise_source *self) {
     self->key = noise_key(self->seed, self->robot, self->device);
     self->keyed = 1;
   }
-  return noise_mix(self->key ^ self->step++);
+  return hash_mix(self->key ^ self->step++);
 }
 
 static inline double noise_next_uniform(noise_source *self) {

@@ -18,7 +18,7 @@ typedef struct {
 static uint64_t word(const source *s, size_t i) { return s->keys != NULL ? s->keys[i] : s->key ^ (s->step + i); }
 
 static void plain(const source *s, double *draws, size_t from, size_t count) {
-  for (size_t i = from; i < count; i++) draws[i] = noise_normal_of(noise_mix(word(s, i)));
+  for (size_t i = from; i < count; i++) draws[i] = noise_normal_of(hash_mix(word(s, i)));
 }
 
 #ifdef BY_AVX2
@@ -34,7 +34,7 @@ INLINE __m256i times(__m256i x, uint64_t constant) {
   return _mm256_add_epi64(_mm256_mul_epu32(x, c), _mm256_slli_epi64(upper, 32));
 }
 
-/* noise_mix */
+/* hash_mix */
 INLINE __m256i mix(__m256i x) {
   x = _mm256_add_epi64(x, _mm256_set1_epi64x((long long)0x9e3779b97f4a7c15u));
   x = times(_mm256_xor_si256(x, _mm256_srli_epi64(x, 30)), 0xbf58476d1ce4e5b9u);
@@ -98,7 +98,7 @@ AVX2 static size_t by_avx2(const source *s, double *draws, size_t count) {
     }
     for (; outside != 0; outside &= outside - 1) {
       const size_t i = block + (size_t)__builtin_ctzll(outside);
-      draws[i] = noise_normal_outside(noise_mix(word(s, i)));
+      draws[i] = noise_normal_outside(hash_mix(word(s, i)));
     }
   }
   return end;

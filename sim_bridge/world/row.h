@@ -7,7 +7,7 @@
 #ifndef WORLD_ROW_H
 #define WORLD_ROW_H
 
-#include "lanes.h"
+#include "geometry/lanes.h"
 
 #define ROW 8u /* two registers of AVX2 */
 

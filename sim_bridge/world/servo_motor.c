@@ -1,7 +1,7 @@
 /* servo_motor.c: see servo_motor.h. */
 #include "servo_motor.h"
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 #define PULSE_MINIMUM_US 500.0
 #define PULSE_MAXIMUM_US 2500.0

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "numbers.h"
+#include "geometry/numbers.h"
 
 static double within_one(double value) { return value < 0.0 ? 0.0 : (value > 1.0 ? 1.0 : value); }
 

@@ -10,9 +10,9 @@
 #ifndef WORLD_WORLD_H
 #define WORLD_WORLD_H
 
-#include "arena.h"
 #include "body.h"
-#include "scene.h"
+#include "geometry/arena.h"
+#include "geometry/scene.h"
 
 /* What a robot does in a step. */
 typedef struct {

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from boebot import resources
-from sim_bridge.arena import load_arena
+from boebot.arenas import load_arena
 from sim_bridge.boards.avr import build_avr
 from tools.bench import scene
 

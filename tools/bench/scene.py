@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 
-from sim_bridge.arena import Arena, ArenaDescription, Polygon
+from boebot.arenas import Arena, ArenaDescription, Polygon
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim
 
 RADIUS = ARSIM_BODY["radius"]

@@ -16,6 +16,7 @@ import msgspec
 
 from boebot import resources
 from boebot.description import toml_files
+from boebot.description.outlines import Point, polygon_fault, way_out
 from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
@@ -23,7 +24,6 @@ from boebot.devices.equipment import RENAMED
 from boebot.devices.laser import Laser
 from boebot.devices.motor import Motor
 from boebot.errors import RobotError
-from boebot.geometry import Point, polygon_fault, way_out
 from boebot.robot import Robot
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]

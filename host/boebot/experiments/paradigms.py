@@ -31,7 +31,7 @@ from boebot.record.series import touch_indices
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.floor_plan import FloorPlan
+    from boebot.arenas.floor_plan import FloorPlan
     from boebot.record.result import RunResult
     from boebot.robot import Command, Robot
 

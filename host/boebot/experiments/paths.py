@@ -13,7 +13,7 @@ from boebot.experiments.trials import Trial, start_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boebot.floor_plan import FloorPlan
+    from boebot.arenas.floor_plan import FloorPlan
 
 
 def floor(axes: Axes, plan: FloorPlan, *places: Floats) -> None:

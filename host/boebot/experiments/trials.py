@@ -20,9 +20,9 @@ from boebot.record.series import Pose, truth_at
 from boebot.running.runner import run
 
 if TYPE_CHECKING:
+    from boebot.arenas.floor_plan import FloorPlan
     from boebot.brain import Brain
     from boebot.description.robots import RobotDescription
-    from boebot.floor_plan import FloorPlan
     from boebot.record.result import RunResult
 
 PER_SEED = 1000

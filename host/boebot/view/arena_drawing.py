@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from boebot.floor_plan import Floats, FloorPlan, Moving, Solid
+    from boebot.arenas.arena import Floats
+    from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
 
 GHOSTS_MAXIMUM = 30  # places at which a moving shape is shown along its way
 HATCH = "////"

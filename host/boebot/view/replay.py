@@ -2,7 +2,7 @@
 `replay_page.html` beside this file; the run's data are put into it as one JSON object with base64 arrays:
 
 format   number of the data's form, which page and data share
-plan     what stands and moves in the arena (boebot.floor_plan)
+plan     what stands and moves in the arena (boebot.arenas.floor_plan)
 runs     one per robot: title, table, paths, flags, readings, what the robot looks like; `mind`, what a brain of
          processes did, or null: processes, utilities, the active motor behavior, the last switch to it
 
@@ -27,8 +27,8 @@ from boebot.view import scene, style
 from boebot.view.utility_panel import shown_cognitive
 
 if TYPE_CHECKING:
+    from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
     from boebot.devices.device import Readout
-    from boebot.floor_plan import FloorPlan, Moving, Solid
     from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
     from boebot.record.series import Floats, Pose

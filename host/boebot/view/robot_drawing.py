@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.transforms import Transform
 
+    from boebot.arenas.floor_plan import FloorPlan
     from boebot.description.robots import RobotDescription
-    from boebot.floor_plan import FloorPlan
 
 REACH_SHOWN_M = 0.35  # the Ping reaches 3 m; a cone is drawn this far at most
 SPOT_SHOWN_M = 0.04

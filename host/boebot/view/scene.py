@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boebot.floor_plan import FloorPlan
+from boebot.arenas.floor_plan import FloorPlan
 from boebot.record.series import touch_indices
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from boebot.floor_plan import Floats
+    from boebot.arenas.arena import Floats
 
 LEFT_IN, RIGHT_IN = 0.72, 0.18  # beside the field
 TALLEST_IN = 8.2  # of the field

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "../numbers.h"
+#include "geometry/numbers.h"
 
 int beam_init(beam *self, const beam_parameters *p) {
   if (!isfinite(p->x) || !isfinite(p->y) || !isfinite(p->height) || !(fabs(p->heading) < 1e4)) return -1;

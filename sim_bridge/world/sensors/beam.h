@@ -7,7 +7,7 @@
 #define SENSORS_BEAM_H
 
 #include "../noise.h"
-#include "../scene.h"
+#include "geometry/scene.h"
 
 #define BEAM_RAYS 32
 

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "../numbers.h"
+#include "geometry/numbers.h"
 
 int compass_check(const compass_parameters *p) {
   const double sum = p->sigma + p->bias + p->iron_x + p->iron_y + p->current_x + p->current_y;

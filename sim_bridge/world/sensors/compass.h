@@ -7,8 +7,8 @@
 #ifndef SENSORS_COMPASS_H
 #define SENSORS_COMPASS_H
 
-#include "../numbers.h"
 #include "beam.h"
+#include "geometry/numbers.h"
 
 /* python: begin */
 typedef struct {

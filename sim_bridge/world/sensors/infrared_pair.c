@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "../numbers.h"
+#include "geometry/numbers.h"
 
 double infrared_carrier_share(double frequency) {
   /* Sensitivity against frequency, relative to its peak; 38 kHz stands for the whole range. */

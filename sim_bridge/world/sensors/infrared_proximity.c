@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "../lanes.h"
+#include "geometry/lanes.h"
 
 int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_parameters *p) {
   if (beam_init(&self->beam, &p->beam)) return -1;

@@ -6,8 +6,8 @@
 #ifndef SENSORS_INFRARED_PROXIMITY_H
 #define SENSORS_INFRARED_PROXIMITY_H
 
-#include "../numbers.h"
 #include "beam.h"
+#include "geometry/numbers.h"
 
 /* python: begin */
 typedef struct {

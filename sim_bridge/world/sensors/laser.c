@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "../noise_block.h"
-#include "../numbers.h"
+#include "geometry/numbers.h"
 
 #define DRAWS 256u /* at once */
 

@@ -7,8 +7,8 @@
 #ifndef SENSORS_LASER_H
 #define SENSORS_LASER_H
 
-#include "../scan.h"
 #include "beam.h"
+#include "geometry/scan.h"
 
 #define LASER_RAYS 4096
 

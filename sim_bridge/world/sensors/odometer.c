@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "../numbers.h"
+#include "geometry/numbers.h"
 
 int odometer_check(const odometer_parameters *p) {
   const double lengths = p->half_track + p->wheel_radius + p->factor_left + p->factor_right;

@@ -9,8 +9,8 @@
 
 #include <math.h>
 
-#include "../numbers.h"
 #include "beam.h"
+#include "geometry/numbers.h"
 
 #define ODOMETER_ARSIM_STEP_S 0.01
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "../hash.h"
+#include "geometry/hash.h"
 
 struct table_noise {
   int rows, columns;

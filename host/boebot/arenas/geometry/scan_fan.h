@@ -1,6 +1,6 @@
-/* scan_fan.h: a fan of beams and edges before it, for scan.c and scan_edges.c. */
-#ifndef WORLD_SCAN_FAN_H
-#define WORLD_SCAN_FAN_H
+/* scan_fan.h: a fan of beams and edges before it, for scan_look.c and scan_edges.c. */
+#ifndef GEOMETRY_SCAN_FAN_H
+#define GEOMETRY_SCAN_FAN_H
 
 #include "rays.h"
 #include "scan.h"

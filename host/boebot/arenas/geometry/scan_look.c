@@ -1,4 +1,4 @@
-/* scan.c: see scan.h. What is before the fan: the arena's shapes and what moves. Edges are collected in blocks, which
+/* scan_look.c: see scan.h. What is before the fan: the arena's shapes and what moves. Edges are collected in blocks, which
  * scan_edges.c lets the fan see.
  */
 #include "scan.h"

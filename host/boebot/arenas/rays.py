@@ -1,6 +1,6 @@
 """Rays and segments one at a time, section 3.2.3 of the notes, (3.2)-(3.8): to try things out and to check results.
 
-Whoever asks a whole arena uses `Arena.ray` and `Arena.clearance`, which have an index. Lengths in m, angles in rad.
+A whole arena is asked by `Arena.ray`, which has an index. Lengths in m, angles in rad.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
+from boebot.arenas._arena import ffi, lib
 from boebot.errors import ArenaError
-from sim_bridge._core import ffi, lib
 
 Point = tuple[float, float]
 REACH_M = float(lib.ARENA_FARTHEST_M)  # of a ray unless one is said

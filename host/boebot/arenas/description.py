@@ -1,7 +1,7 @@
 """What an arena file says: its keys with their units and limits, and what a description has to keep beyond its types.
 
-`sim_bridge/arenas/schema.json` and the table in docs/reference/arenas.md are made from these types
-(sim_bridge/arena_reference.py).
+`bundled/schema.json` and the table in docs/reference/arenas.md are made from these types
+(reference.py).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from sim_bridge._core import ffi, lib
+from boebot.arenas._arena import ffi, lib
 
 Point = tuple[float, float]
 

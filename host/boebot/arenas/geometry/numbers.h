@@ -4,8 +4,8 @@
  * Errors are a few units in the last place, which no test or robot can see. Compile with -ffp-contract=off.
  * What every step needs is inline: in a loop the compiler may then compute several at once.
  */
-#ifndef WORLD_NUMBERS_H
-#define WORLD_NUMBERS_H
+#ifndef GEOMETRY_NUMBERS_H
+#define GEOMETRY_NUMBERS_H
 
 #include <stdint.h>
 #include <string.h>

@@ -4,8 +4,8 @@
  * (3.2)-(3.8) of the notes; a ray meets a polygon after it has been transformed into the polygon's own frame. A sensor
  * sees what reaches at least as high above the floor as it sits itself. Lengths in m, angles in rad.
  */
-#ifndef WORLD_SCENE_H
-#define WORLD_SCENE_H
+#ifndef GEOMETRY_SCENE_H
+#define GEOMETRY_SCENE_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -6,8 +6,8 @@
  * Agrees with scene_ray, except that from inside a closed shape that shape is seen from inside only. Lengths in m,
  * angles in rad.
  */
-#ifndef WORLD_SCAN_H
-#define WORLD_SCAN_H
+#ifndef GEOMETRY_SCAN_H
+#define GEOMETRY_SCAN_H
 
 #include <stddef.h>
 #include <stdint.h>

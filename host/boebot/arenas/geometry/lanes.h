@@ -4,8 +4,8 @@
  * gives them as well. Where the compiler has no vectors LANES is 1, a lane is a number and the same code is scalar.
  * Vectors go to functions by their addresses: how they are passed by value depends on the processor.
  */
-#ifndef WORLD_LANES_H
-#define WORLD_LANES_H
+#ifndef GEOMETRY_LANES_H
+#define GEOMETRY_LANES_H
 
 #include <stdint.h>
 #include <string.h>

@@ -4,8 +4,8 @@
  * met. A cell's lists are made when rays have started in it often enough to pay for them; making them changes no answer,
  * and threads may ask and make at the same time. What memory allows no list for is left to the grid.
  */
-#ifndef WORLD_RAY_LISTS_H
-#define WORLD_RAY_LISTS_H
+#ifndef GEOMETRY_RAY_LISTS_H
+#define GEOMETRY_RAY_LISTS_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,4 +1,4 @@
-"""Draws an arena: `python -m sim_bridge.arena_picture NAME_OR_FILE PICTURE` (the picture's ending says its format)."""
+"""Draws an arena: `python -m boebot.arenas.picture NAME_OR_FILE PICTURE` (the picture's ending says its format)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from boebot.arenas.arena import Arena, load_arena
+from boebot.arenas.floor_plan import floor_plan, path_end
 from boebot.errors import BoebotError
 from boebot.view import style
 from boebot.view.arena_drawing import draw_arena, frame
 from boebot.view.scene import plan_bounds
-from sim_bridge.arena import Arena, load_arena
-from sim_bridge.floor_plan import floor_plan, path_end
 
 ROBOT_RADIUS_M = 0.07
 LONGER_IN = 5.0  # longer side of the field

@@ -1,4 +1,4 @@
-"""Arenas: where things are and where a robot starts, read from `arenas/*.toml`, and what can be asked of them.
+"""Arenas: where things are and where a robot starts, read from a file, and what can be asked of them.
 
 Lengths in m, angles in rad. A wrong file gets one sentence that names file, line, key and what was expected.
 """
@@ -14,11 +14,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.description import toml_files
-from boebot.errors import ArenaError
-from sim_bridge import arguments
-from sim_bridge._core import ffi, lib
-from sim_bridge.arena_description import (
+from boebot import arguments
+from boebot.arenas._arena import ffi, lib
+from boebot.arenas.description import (
     ArenaDescription,
     DescriptionError,
     Disc,
@@ -29,6 +27,8 @@ from sim_bridge.arena_description import (
     Wall,
     check,
 )
+from boebot.description import toml_files
+from boebot.errors import ArenaError
 
 __all__ = ["Arena", "ArenaDescription", "Floats", "Point", "Polygon", "Start", "arena_names", "load_arena"]
 
@@ -36,7 +36,6 @@ Floats = NDArray[np.float64]
 REPEATS = {"loop": lib.PATH_LOOP, "back_and_forth": lib.PATH_BACK_AND_FORTH, "once": lib.PATH_ONCE}
 DISC_CORNERS = 48  # of a disc as it is drawn
 REACH_MAXIMUM_M = 1e7  # that may be asked for
-TIME_MAXIMUM_S = 1e9
 
 
 class Arena:
@@ -45,7 +44,7 @@ class Arena:
     It does not change, and any number of simulations may share it.
 
     Attributes:
-        handle: the C core's `arena *`.
+        handle: the `arena *` of geometry/arena.h.
     """
 
     def __init__(self, description: ArenaDescription | toml_files.Table, file: str = "arena") -> None:
@@ -119,25 +118,11 @@ class Arena:
         """
         return [polygon.copy() for polygon in self._polygons]
 
-    def moving_outlines(self, time: float) -> list[Floats]:
-        """The moving shapes where their paths are at `time` (s): closed polygons, arrays of shape (corners, 2) in m.
+    def movers(self, time: float, waited: Sequence[float] = ()) -> Any:
+        """The moving shapes at a time (s), as C has them (geometry/scene.h).
 
-        There they are in a world in which none has waited for a robot.
-
-        Raises:
-            ArenaError: `time` is no number of at most 1e9 s.
+        `waited`: how far the clock of each one's path is behind (s); none is while none has waited for a robot.
         """
-        time = arguments.number("arena: time", time, ArenaError, least=-TIME_MAXIMUM_S, most=TIME_MAXIMUM_S)
-        polygons = []
-        movers = self._movers(time)
-        for mover, moving in zip(movers, self.description.moving, strict=True):
-            shape = _ring(moving.radius_m or 0.0) if moving.corners_m is None else np.array(moving.corners_m)
-            rotation = np.array([[mover.cosine, mover.sine], [-mover.sine, mover.cosine]])
-            polygons.append(shape @ rotation + np.array((mover.x, mover.y)))
-        return polygons
-
-    def _movers(self, time: float, waited: Sequence[float] = ()) -> Any:
-        """The C core's movers at a time; `waited`: s by which the clock of each one's path is behind."""
         movers = ffi.new("mover[]", len(self.description.moving))
         for mover, late in zip(movers, waited, strict=False):
             mover.waited = late
@@ -162,17 +147,6 @@ class Arena:
         distance: float = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)
         return None if distance < 0 else distance
 
-    def clearance(self, x: float, y: float, limit: float = 10.0) -> float:
-        """Distance (m) from (x, y) to the nearest edge or circle, at most `limit`.
-
-        Raises:
-            ArenaError: a number is not finite, negative or too large.
-        """
-        x, y = _position(x, y)
-        limit = arguments.number("arena: limit", limit, ArenaError, least=0.0, most=REACH_MAXIMUM_M)
-        distance: float = lib.arena_clearance(self.handle, x, y, limit)
-        return distance
-
     def is_free(self, x: float, y: float, radius: float) -> bool:
         """Whether a disc of `radius` (m) at (x, y) lies in free space, also of what moves, at the start.
 
@@ -181,7 +155,7 @@ class Arena:
         """
         x, y = _position(x, y)
         radius = arguments.number("arena: radius", radius, ArenaError, least=0.0, most=REACH_MAXIMUM_M)
-        movers = self._movers(0.0)
+        movers = self.movers(0.0)
         scene = ffi.new("scene *", {"arena": self.handle, "movers": movers, "movers_count": len(movers)})
         return bool(lib.scene_is_free(scene, x, y, radius, 0))
 

@@ -1,4 +1,4 @@
-/* scan_edges.c: edges before the fan of a laser range finder, see scan.c.
+/* scan_edges.c: edges before the fan of a laser range finder, see scan_look.c.
  *
  * In the sensor's frame, turned so that the fan's middle lies on the x axis, an edge from a with direction e meets the
  * beam (c, s) at the distance K / (e_y c - e_x s) with K = a_x e_y - a_y e_x, from (3.6). The beams keep the reciprocal

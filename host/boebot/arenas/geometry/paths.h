@@ -3,8 +3,8 @@
  * Between waypoints position and heading go linearly in time. A heading is not wrapped: from 0 to 4 pi is two turns.
  * Lengths in m, angles in rad, times in s.
  */
-#ifndef WORLD_PATHS_H
-#define WORLD_PATHS_H
+#ifndef GEOMETRY_PATHS_H
+#define GEOMETRY_PATHS_H
 
 #include <stddef.h>
 

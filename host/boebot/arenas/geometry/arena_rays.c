@@ -1,4 +1,4 @@
-/* rays.c: the nearest item along a ray, see arena.h: from a list, by a walk through the grid, or among all items. */
+/* arena_rays.c: the nearest item along a ray, see arena.h: from a list, by a walk through the grid, or among all items. */
 #include "rays.h"
 
 #include "arena_data.h"

@@ -1,4 +1,4 @@
-/* arena.c: an arena is built up, see arena.h. */
+/* arena_build.c: an arena is built up, see arena.h. */
 #include "arena.h"
 
 #include <math.h>
@@ -255,14 +255,12 @@ void arena_use_index(arena *self, int choice) {
 
 size_t arena_edge_count(const arena *self) { return self->edge_count; }
 size_t arena_disc_count(const arena *self) { return self->disc_count; }
-size_t arena_shape_count(const arena *self) { return self->shape_count; }
 size_t arena_light_count(const arena *self) { return self->light_count; }
 size_t arena_moving_count(const arena *self) { return self->moving_count; }
 const arena_edge *arena_edges(const arena *self) { return self->edge; }
 const arena_disc *arena_discs(const arena *self) { return self->disc; }
 const arena_light *arena_lights(const arena *self) { return self->light; }
 const arena_moving *arena_movings(const arena *self) { return self->moving; }
-const arena_charger *arena_charger_of(const arena *self) { return self->has_charger ? &self->charger : NULL; }
 
 int arena_is_at_charger(const arena *self, double x, double y) {
   const double dx = x - self->charger.x;

@@ -1,6 +1,6 @@
-"""Writes what documents arena files: `python -m sim_bridge.arena_reference [--pictures]`.
+"""Writes what documents arena files: `python -m boebot.arenas.reference [--pictures]`.
 
-* sim_bridge/arenas/schema.json: the JSON schema of an arena file, made from the types (arena_description.py);
+* bundled/schema.json: the JSON schema of an arena file, made from the types (description.py);
 * the tables of keys in docs/reference/arenas.md, between its markers;
 * with --pictures, docs/images/arena-NAME.png of each bundled arena.
 """
@@ -15,9 +15,9 @@ from typing import Any
 import msgspec
 
 from boebot import resources
-from sim_bridge.arena import arena_names, load_arena
-from sim_bridge.arena_description import ArenaDescription
-from sim_bridge.arena_picture import draw
+from boebot.arenas.arena import arena_names, load_arena
+from boebot.arenas.description import ArenaDescription
+from boebot.arenas.picture import draw
 
 SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")

@@ -4,8 +4,8 @@
  * with SCAN_AVX2, else two, as every 64-bit processor has them. Where the compiler knows no vectors, or with
  * WORLD_PLAIN_LANES (for tests), a lane is a plain double, and the code reads as the definition.
  */
-#ifndef WORLD_SCAN_LANES_H
-#define WORLD_SCAN_LANES_H
+#ifndef GEOMETRY_SCAN_LANES_H
+#define GEOMETRY_SCAN_LANES_H
 
 #include <math.h>
 #include <stddef.h>

@@ -6,12 +6,13 @@
  * `arena_build` makes its index; from then on it does not change, and any number of worlds and threads may share it.
  * Lengths in m, directions as unit vectors.
  */
-#ifndef WORLD_ARENA_H
-#define WORLD_ARENA_H
+#ifndef GEOMETRY_ARENA_H
+#define GEOMETRY_ARENA_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "items.h"
 #include "paths.h"
 
 #define ARENA_SHORTEST_M 1e-9 /* edges are at least as long */
@@ -90,14 +91,11 @@ uint64_t arena_fingerprint(const arena *self);
 
 size_t arena_edge_count(const arena *self);
 size_t arena_disc_count(const arena *self);
-size_t arena_shape_count(const arena *self);
 const arena_shape *arena_shape_at(const arena *self, size_t number);
 size_t arena_light_count(const arena *self);
 const arena_light *arena_lights(const arena *self);
 size_t arena_moving_count(const arena *self);
 const arena_moving *arena_movings(const arena *self);
-/* NULL if there is none. */
-const arena_charger *arena_charger_of(const arena *self);
 
 /* 1 if a robot whose axle's middle is at (x, y) stands at the charging station: on its disc, the rim included. */
 int arena_is_at_charger(const arena *self, double x, double y);
@@ -147,38 +145,15 @@ int64_t arena_repeated(const double *xy, size_t count, int closed);
 int arena_crossing(const double *xy, size_t count, uint32_t *one, uint32_t *other);
 /* python: end */
 
-typedef struct {
-  double ax, ay; /* start */
-  double ex, ey; /* end - start */
-  double length_squared;
-  double height;
-  int shape;
-} arena_edge;
-
-typedef struct {
-  double x, y, radius, height;
-  int shape;
-} arena_disc;
-
 const arena_edge *arena_edges(const arena *self);
 const arena_disc *arena_discs(const arena *self);
 
 /* Changes whenever an edge moves; whoever keeps edges compares it. */
 uint32_t arena_version(const arena *self);
 
-/* Squared distance from (x, y) to an edge; the nearest point goes to (qx, qy). */
-double arena_edge_distance_squared(const arena_edge *edge, double x, double y, double *qx, double *qy);
-
-/* Distance from (x, y) to the circle of a disc, negative inside; the nearest point goes to (qx, qy). */
-double arena_disc_distance(const arena_disc *disc, double x, double y, double *qx, double *qy);
-
 /* Edges or discs nearer than `radius` to (x, y), in increasing number; a disc is near from inside as well. Return how
  * many there are, even when more than `capacity`. */
 size_t arena_edges_near(const arena *self, double x, double y, double radius, uint32_t *edges, size_t capacity);
 size_t arena_discs_near(const arena *self, double x, double y, double radius, uint32_t *discs, size_t capacity);
-
-/* 1 if the segment from (x0, y0) to (x1, y1) meets the edge, or the disc. */
-int arena_edge_meets_segment(const arena_edge *edge, double x0, double y0, double x1, double y1);
-int arena_disc_meets_segment(const arena_disc *disc, double x0, double y0, double x1, double y1);
 
 #endif

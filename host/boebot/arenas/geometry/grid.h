@@ -3,13 +3,13 @@
  * Around the cells that hold something lies one ring of empty ones, so that a walk may step out of them once. Cells are
  * a little larger in the eyes of an item than in those of a point: rounding hides no item.
  */
-#ifndef WORLD_GRID_H
-#define WORLD_GRID_H
+#ifndef GEOMETRY_GRID_H
+#define GEOMETRY_GRID_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#include "arena.h"
+#include "items.h"
 #include "numbers.h"
 
 #define GRID_MARGIN 1e-6 /* of a cell's side */

@@ -3,13 +3,13 @@
  * The distance to an item is a function of ray and item alone, and the nearest of equally near items is the one with the
  * smallest number: so the answer does not depend on the order in which items are asked, nor on an index.
  */
-#ifndef WORLD_RAYS_H
-#define WORLD_RAYS_H
+#ifndef GEOMETRY_RAYS_H
+#define GEOMETRY_RAYS_H
 
 #include <math.h>
 #include <stdint.h>
 
-#include "arena.h"
+#include "items.h"
 
 #define RAY_CRACK 1e-12 /* no ray passes a shared vertex: edges are longer by this share */
 #define RAY_MISS 1e300

@@ -1,6 +1,6 @@
 /* arena_data.h: what an arena consists of, for the files that answer questions about it (arena, near, rays, scan). */
-#ifndef WORLD_ARENA_DATA_H
-#define WORLD_ARENA_DATA_H
+#ifndef GEOMETRY_ARENA_DATA_H
+#define GEOMETRY_ARENA_DATA_H
 
 #include "arena.h"
 #include "grid.h"
