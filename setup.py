@@ -178,7 +178,7 @@ setup(
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],
-            exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "fuzz", "world", "vehicles", "parts", "images")],
+            exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "fuzz", "world", "parts", "images")],
         ),
     ],
     package_data={"": ["py.typed", "*.html"], "boebot.brains": ["*.toml"], "boebot.arenas.bundled": ["*.toml"]},

@@ -15,10 +15,9 @@ from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
 from hil_tests.rig import Rig
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
-from sim_bridge.opening import alone
-from sim_bridge.session import SimSession
-from sim_bridge.sim import Sim
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.sessions.opening import alone
+from sim_bridge.sessions.with_board import SimSession
+from sim_bridge.sim import Sim, SimRobot
 
 WALL_THICKNESS_M = 0.05
 

@@ -20,7 +20,7 @@ from boebot.link.messages import CompassStatus
 from hil_tests.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
-from sim_bridge import imperfections
+from sim_bridge.robots import imperfections
 
 pytestmark = pytest.mark.emulated
 

@@ -18,7 +18,7 @@ from boebot.link import messages
 from hil_tests.circle import CircleRig, arena_of, circle, robot_of
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
-from sim_bridge import imperfections
+from sim_bridge.robots import imperfections
 
 pytestmark = pytest.mark.emulated
 

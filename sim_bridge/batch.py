@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from sim_bridge import worlds
 from sim_bridge._core import ffi, lib
-from sim_bridge.compiled_brain import WANDER, CompiledBrain
 from sim_bridge.vehicle import VehicleModel
+from sim_bridge.vehicles import worlds
+from sim_bridge.vehicles.compiled_brain import WANDER, CompiledBrain
 
 __all__ = ["WANDER", "Batch", "CompiledBrain"]
 

@@ -18,6 +18,7 @@ HEADERS = [
     "world/noise_block.h",
     "world/outline.h",
     "world/body.h",
+    "world/body_step.h",
     "world/motor_regulated.h",
     "world/motor_dc.h",
     "world/motor_position.h",
@@ -33,7 +34,6 @@ HEADERS = [
     "world/sensors/accelerometer.h",
     "world/sensors/light.h",
     "world/sensors/odometer.h",
-    "world/sensors/quadrature.h",
     "world/sensors/table_noise.h",
     "world/sensors/unit.h",
     "world/sensors/sample_hold.h",
@@ -49,8 +49,8 @@ HEADERS = [
     "boards/script_board.h",
     "boards/board_access.h",
     "boards/native/native_board.h",
-    "logs.h",
-    "loop.h",
+    "parts/logs.h",
+    "loop/loop.h",
 ]
 # What headers cannot say in a form that cffi reads.
 BEFORE = """
@@ -61,9 +61,9 @@ static const double WHISKER_HEIGHT_M;
 typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
+void body_as_mover(const body *self, mover *out);
 int body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
-void body_as_mover(const body *self, mover *out);
 double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);
@@ -76,8 +76,7 @@ SOURCES = [
     "boards/board_access.c",
     "boards/script_board.c",
     "boards/native/*.c",
-    "logs.c",
-    "loop*.c",
+    "loop/*.c",
 ]
 ROOM = Path("sim_bridge")
 LIBRARIES = [] if sys.platform in ("win32", "darwin") else ["-ldl"]

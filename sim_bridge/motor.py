@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 from boebot.errors import RobotError
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
-from sim_bridge.parameters import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
+from sim_bridge.robots import imperfections
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
 
 
 def _defaults(kind: str) -> dict[str, float]:
@@ -131,7 +131,7 @@ class ServoMotor:
 
 
 def servo_parameters(where: str, changes: Any, mount: int = 1, wheel_radius: float = 0.0331) -> Any:
-    """C struct of the nominal servo with `changes`; values and sources are those of imperfections.py."""
+    """C struct of the nominal servo with `changes`; values and sources are those of robots/imperfections.py."""
     top = imperfections.SERVO_TOP_RPM * imperfections.RPM
     usual = {
         "mount": mount,

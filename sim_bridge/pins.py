@@ -12,8 +12,7 @@ from boebot.arguments import number, shown
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
-from sim_bridge.sim import checked_pose
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.sim import SimRobot, checked_pose
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0

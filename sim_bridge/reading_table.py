@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from boebot.arguments import shown, whole
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.parameters import number
+from sim_bridge.vehicles.checked_structs import number
 
 COLUMNS: Final = ("distance_m", "angle_rad", "reading")
 

@@ -20,8 +20,8 @@ from typing import Protocol
 
 from boebot.boards import BoardRequest
 from boebot.errors import BoardError
-from sim_bridge.opening import Pace
-from sim_bridge.session import SimSession, open_avr, open_native
+from sim_bridge.sessions.opening import Pace
+from sim_bridge.sessions.with_board import SimSession, open_avr, open_native
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
 BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late
@@ -124,7 +124,7 @@ class PtyPort:
                 self._waiting = self._waiting[os.write(self._master, self._waiting) :]
 
     def baud(self) -> int | None:
-        """The bit rate that the terminal is set to; None where it cannot be told."""
+        """The bit rate that the terminal is set to; None where it is not known."""
         import fcntl
         import termios
 

@@ -1,9 +1,9 @@
 """Vehicles without boards: motor signals in, readings out, as the notes' simulator ARSim drives its robot.
 
-A `VehicleModel` (model.py) says what a vehicle is made of; `arsim()`, or `vehicle_model(...)` of a robot's file, gives
-one that is ready (model_file.py); a `Vehicle` is one of them in one world. `batch.py` steps many worlds at once. The
-order of events in a step is Fig. 3.1 of the notes (vehicles/vehicle.h). Lengths in m, angles in rad, SI units; motor
-signals in [-1, 1], left and right.
+A `VehicleModel` (vehicles/model.py) says what a vehicle is made of; `arsim()`, or `vehicle_model(...)` of a robot's
+file, gives one that is ready (vehicles/model_file.py); a `Vehicle` is one of them in one world. `batch.py` steps many
+worlds at once. The order of events in a step is Fig. 3.1 of the notes (vehicles/vehicle.h). Lengths in m, angles in
+rad, SI units; motor signals in [-1, 1], left and right.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any, Final
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from sim_bridge import worlds
 from sim_bridge._core import ffi, lib
-from sim_bridge.model import VehicleModel as VehicleModel
-from sim_bridge.model import beam as beam
-from sim_bridge.model_file import ARSIM_BODY as ARSIM_BODY
-from sim_bridge.model_file import arsim as arsim
-from sim_bridge.model_file import vehicle_model as vehicle_model
+from sim_bridge.vehicles import worlds
+from sim_bridge.vehicles.model import VehicleModel as VehicleModel
+from sim_bridge.vehicles.model import beam as beam
+from sim_bridge.vehicles.model_file import ARSIM_BODY as ARSIM_BODY
+from sim_bridge.vehicles.model_file import arsim as arsim
+from sim_bridge.vehicles.model_file import vehicle_model as vehicle_model
 
 Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]

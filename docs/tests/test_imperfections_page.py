@@ -12,8 +12,8 @@ import pytest
 import boebot
 from boebot.description.robots import load_robot
 from boebot.devices.device import Sensor, VehicleDevice, kinds
-from sim_bridge import imperfections
-from sim_bridge.switches import SWITCHES
+from sim_bridge.robots import imperfections
+from sim_bridge.robots.switches import SWITCHES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text()

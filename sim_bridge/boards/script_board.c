@@ -21,7 +21,7 @@ struct script_board {
   script_list edges;
   size_t played;
   script_list bytes;
-  size_t taken;
+  size_t fetched;
   script_list input[BOARD_PIN_COUNT]; /* past and future, in order */
   script_list sent;
   uint8_t output[BOARD_PIN_COUNT];
@@ -97,8 +97,8 @@ static void send(board *b, uint64_t at, const uint8_t *bytes, size_t count) {
 static size_t receive(board *b, uint8_t *bytes, uint64_t *cycles, size_t capacity) {
   script_board *self = of(b);
   size_t count = 0;
-  while (count < capacity && self->taken < self->bytes.count && self->bytes.event[self->taken].cycle <= self->now) {
-    const script_event byte = self->bytes.event[self->taken++];
+  while (count < capacity && self->fetched < self->bytes.count && self->bytes.event[self->fetched].cycle <= self->now) {
+    const script_event byte = self->bytes.event[self->fetched++];
     bytes[count] = byte.value;
     if (cycles != NULL) cycles[count] = byte.cycle;
     count++;
@@ -126,7 +126,7 @@ static void counters(const board *b, board_counters *out) {
   const script_board *self = of_const(b);
   memset(out, 0, sizeof *out);
   out->bytes_in = self->sent.count;
-  out->bytes_out = self->taken;
+  out->bytes_out = self->fetched;
   out->edges_out = self->played;
   out->resets = self->resets;
 }

@@ -8,7 +8,7 @@ static double volts(analog_infrared *self, uint64_t cycle) {
   return sharp_infrared_read(&self->sensor, &self->state, &from, (double)cycle / BOARD_CLOCK_HZ, &self->part.noise);
 }
 
-/* It measures by a clock of its own, whoever asks: at a measurement within this step, from where the body is then. */
+/* It measures by its own clock, asked or not: at a measurement within this step, from where the body is then. */
 static void step(part *base) {
   analog_infrared *self = (analog_infrared *)base;
   if (!(self->sensor.period > 0.0)) return; /* it measures when it is asked */

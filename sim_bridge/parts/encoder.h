@@ -16,8 +16,9 @@ typedef struct {
   double missed;    /* probability that an edge of a channel is not seen; the next one then changes nothing; 0: never */
   double extra;     /* probability that a channel flickers after an edge: two more edges; 0: never */
   double flicker_s; /* how long such a flicker lasts, on average */
-  double bounces;   /* after each edge a channel goes back and forth 0 to so many times, all equally often; 0: never */
-  double bounce_s;  /* from one of these edges to the next, on average */
+  double
+      bounces; /* after each edge a channel goes back and forth, from 0 to this many times, all equally often; 0: never */
+  double bounce_s; /* from one of these edges to the next, on average */
 } encoder_parameters;
 /* python: end */
 

@@ -60,7 +60,7 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
   self->last_rise = cycle;
   uint64_t *first = &self->rises[self->carrier_cycles % CYCLES_TO_HEAR];
-  const uint64_t span = cycle - *first; /* of the last CYCLES_TO_HEAR cycles, when there are so many */
+  const uint64_t span = cycle - *first; /* of the last CYCLES_TO_HEAR cycles, once there are as many */
   *first = cycle;
   if (self->carrier_cycles < CYCLES_TO_HEAR) return;
   if (span < CYCLES_TO_HEAR * PERIOD_MINIMUM || span > CYCLES_TO_HEAR * PERIOD_MAXIMUM) {
@@ -92,7 +92,7 @@ int infrared_take_burst(infrared *self, infrared_burst *burst, infrared_light *s
 }
 
 void infrared_see_burst(infrared *self, const infrared_burst *burst, const infrared_light *span) {
-  if (self->part.taken || self->part.unplugged || !(self->pair.direct > 0.0)) return;
+  if (self->part.overridden || self->part.unplugged || !(self->pair.direct > 0.0)) return;
   const viewpoint from = part_view(&self->part, span->from);
   if (!infrared_pair_sees_burst(&self->pair, &from, burst)) return;
   infrared_light light = {span->from, span->until + HOLD_CYCLES};

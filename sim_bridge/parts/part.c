@@ -7,7 +7,7 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
   self->op = op;
   self->chassis = place->chassis;
   self->noise = place->noise;
-  self->taken = 0;
+  self->overridden = 0;
   self->unplugged = 0;
   self->turret = NULL;
   for (int i = 0; i < PART_PINS; i++) {
@@ -26,13 +26,13 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
   for (int i = 0; i < PART_PINS; i++) {
     if (self->pins[i].pin == pin) self->level[i] = level;
   }
-  if (!self->taken && !self->unplugged) drive(self, at, pin, level);
+  if (!self->overridden && !self->unplugged) drive(self, at, pin, level);
 }
 
 void part_unplug(part *self, int unplugged) {
   const uint64_t now = self->chassis->board->op->now(self->chassis->board);
   self->unplugged = unplugged;
-  if (self->taken) return;
+  if (self->overridden) return;
   for (int i = 0; i < PART_PINS; i++) {
     if (!(self->pins[i].role & PART_DRIVES) || self->pins[i].pin >= BOARD_PIN_COUNT) continue;
     drive(self, now, self->pins[i].pin, unplugged ? (uint8_t)BOARD_RELEASED : self->level[i]);

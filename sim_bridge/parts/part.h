@@ -14,10 +14,10 @@
 #include <stdint.h>
 
 #include "../boards/board.h"
-#include "../logs.h"
 #include "../world/body.h"
 #include "../world/noise.h"
 #include "../world/sensors/beam.h"
+#include "logs.h"
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
@@ -117,7 +117,7 @@ struct part {
   part_pin pins[PART_PINS];
   uint8_t level[PART_PINS];  /* what it does to each of them, or would if it were plugged in */
   const part_turret *turret; /* that carries it; NULL: the body does */
-  int taken;                 /* 1: a test has its pins; it drives none */
+  int overridden;            /* 1: a test has its pins; it drives none */
   int unplugged;             /* 1: its plug is out; it neither hears nor drives */
 };
 

@@ -15,8 +15,7 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Sim
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.sim import Sim, SimRobot
 
 MS = CLOCK_HZ // 1000
 SUPPLY = Supply(7.75, 5.0, 7200.0, 0.6, 0.5, "regulated", 4.2)  # full, empty, A s, ohm, drop-out, servos, minimum

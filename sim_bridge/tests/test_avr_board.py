@@ -72,7 +72,7 @@ def test_session_that_nobody_closes(tmp_path: Path) -> None:
     program = f"""
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
-from sim_bridge.session import open_avr
+from sim_bridge.sessions.with_board import open_avr
 session = open_avr(BoardRequest(robot=load_robot("shieldbot"), image={str(image)!r}))
 session.transport.read(0.1)
 """

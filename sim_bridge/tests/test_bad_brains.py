@@ -31,8 +31,8 @@ from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
-from sim_bridge.direct import DirectSession
-from sim_bridge.session import SimSession
+from sim_bridge.sessions.with_board import SimSession
+from sim_bridge.sessions.without_board import DirectSession
 
 BAD_FROM_S = 0.30
 FUNCTION = """import math, time
@@ -359,7 +359,11 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """What runs are held to in place of the machine's."""
     clock = Clock()
-    for name in ("boebot.running.board_driver.wall", "boebot.running.direct_driver.wall", "sim_bridge.opening.time"):
+    for name in (
+        "boebot.running.board_driver.wall",
+        "boebot.running.direct_driver.wall",
+        "sim_bridge.sessions.opening.time",
+    ):
         monkeypatch.setattr(name, clock)
     return clock
 

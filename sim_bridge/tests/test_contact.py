@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
+from sim_bridge.robots import imperfections
 from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of
 from sim_bridge.tests.simulated import arena_of, square
 

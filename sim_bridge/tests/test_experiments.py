@@ -220,22 +220,6 @@ def test_the_kits_odometer_noise() -> None:
     assert np.std(spread) == pytest.approx(math.sqrt(variance), rel=0.2)
 
 
-# ---- E10: quadrature -----------------------------------------------------------------------------------------------
-
-
-def test_e10_random_walk_is_counted_exactly_and_a_glitch_is_illegal() -> None:
-    draw, decoder, phase, truth = np.random.default_rng(5), ffi.new("quadrature *"), 0, 0
-    levels = [(0, 0), (1, 0), (1, 1), (0, 1)]  # forward
-    for step in draw.choice([-1, 1], 4000).tolist():
-        phase = (phase + step) % 4
-        truth += step
-        lib.quadrature_decode(decoder, *levels[phase])
-        assert decoder.count == truth
-    assert decoder.illegal == 0
-    lib.quadrature_decode(decoder, *levels[(phase + 2) % 4])
-    assert decoder.illegal == 1 and decoder.count == truth
-
-
 # ---- E11: noise of a reading ---------------------------------------------------------------------------------------
 
 

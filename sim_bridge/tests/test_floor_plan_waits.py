@@ -17,9 +17,9 @@ from boebot.arenas.floor_plan import Lateness, Moving, Solid, floor_plan
 from boebot.boards import Truth
 from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
-from sim_bridge.direct import DirectSession
-from sim_bridge.opening import alone, truth_of
 from sim_bridge.recorder import Recorder
+from sim_bridge.sessions.opening import alone, truth_of
+from sim_bridge.sessions.without_board import DirectSession
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel

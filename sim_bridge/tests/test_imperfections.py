@@ -16,9 +16,9 @@ from boebot.devices.turret import PositionServo
 from boebot.errors import RobotError
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
-from sim_bridge import imperfections
 from sim_bridge._core import ffi
-from sim_bridge.imperfections import Draw
+from sim_bridge.robots import imperfections
+from sim_bridge.robots.imperfections import Draw
 
 SHIELDBOT = robots.load_robot("shieldbot")
 SHARP = robots.load_robot("boebot").device["analog_infrared"]

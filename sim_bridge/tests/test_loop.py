@@ -16,8 +16,8 @@ from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.opening import alone
-from sim_bridge.session import SimTransport
+from sim_bridge.sessions.opening import alone
+from sim_bridge.sessions.with_board import SimTransport
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, square
 

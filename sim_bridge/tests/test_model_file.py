@@ -13,10 +13,10 @@ import boebot
 from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from sim_bridge.model import beam
-from sim_bridge.model_file import ARSIM_BODY, arsim, vehicle_model
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.vehicle import Vehicle
+from sim_bridge.vehicles.model import beam
+from sim_bridge.vehicles.model_file import ARSIM_BODY, arsim, vehicle_model
 
 
 def signals(time: float) -> tuple[float, float]:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from boebot.description.robots import load_robot
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
+from sim_bridge.robots import imperfections
 from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body
 
 C_T = C_E = 0.0333

@@ -17,11 +17,11 @@ import boebot
 from boebot.description.outlines import polygon_fault
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, RobotError
-from sim_bridge import imperfections
-from sim_bridge.model_file import vehicle_model
+from sim_bridge.robots import imperfections
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, script_board, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
+from sim_bridge.vehicles.model_file import vehicle_model
 from sim_bridge.view import View
 
 BOX = [[-0.15, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.15, 0.1]]

@@ -18,9 +18,9 @@ from boebot.devices.battery import BatteryDivider
 from boebot.devices.infrared import InfraredPair
 from boebot.devices.servo import ContinuousServo
 from boebot.errors import BoardError
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.robots import imperfections
 from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, square
 
 LEFT, RIGHT = 13, 12

@@ -12,9 +12,9 @@ import pytest
 from boebot.arenas import Arena
 from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.light import LightSensor
-from sim_bridge import imperfections
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.robots import imperfections
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8

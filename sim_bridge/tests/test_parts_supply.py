@@ -10,13 +10,12 @@ import pytest
 
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from sim_bridge import imperfections
 from sim_bridge._core import lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_board, native_board, native_library
 from sim_bridge.pins import BoardPins
-from sim_bridge.sim import Sim
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.robots import imperfections
+from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.avr_program import assemble
 from sim_bridge.tests.simulated import MS, SUPPLY, Scripted, arena_of, scripted
 

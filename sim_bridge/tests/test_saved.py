@@ -26,12 +26,11 @@ from boebot.link import messages
 from boebot.link.session import Link
 from boebot.record.result import RunResult
 from boebot.robot import Robot
-from sim_bridge import opening
-from sim_bridge import session as sessions
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
+from sim_bridge.loop.saved import FORMAT, MAGIC, SavedStateError
 from sim_bridge.pins import BoardPins
-from sim_bridge.saved import FORMAT, MAGIC, SavedStateError
+from sim_bridge.sessions import opening, with_board
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of
 
@@ -160,7 +159,7 @@ def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: 
         opened.append(opening.new_sim(request, step_s))
         return opened[-1]
 
-    monkeypatch.setattr(sessions, "new_sim", watched)
+    monkeypatch.setattr(with_board, "new_sim", watched)
     wander = load_brain("wander")
 
     def run(at_step: int | None) -> list[str]:
@@ -184,7 +183,7 @@ def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: 
     assert straight == interrupted
 
 
-def drive(session: sessions.SimSession) -> None:
+def drive(session: with_board.SimSession) -> None:
     """Straight on for half a second, over a link of its own."""
     link = Link(session.transport)
     link.open()
@@ -196,9 +195,9 @@ def drive(session: sessions.SimSession) -> None:
 
 def test_link_of_the_host_is_opened_anew_in_a_restored_simulation() -> None:
     """What the host's end knew is not saved: a new link takes the board over and drives it."""
-    first = sessions.open_native(BoardRequest(robot=SHIELDBOT, arena="empty"))
+    first = with_board.open_native(BoardRequest(robot=SHIELDBOT, arena="empty"))
     drive(first)
-    second = sessions.open_native(BoardRequest(robot=SHIELDBOT, arena="empty"))
+    second = with_board.open_native(BoardRequest(robot=SHIELDBOT, arena="empty"))
     second.sim.restore(first.sim.save())
     x = second.robot.body().x
     assert x > 0.005

@@ -16,7 +16,7 @@ from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.link.session import Link
 from sim_bridge.boards.board import CLOCK_HZ, Damage
-from sim_bridge.session import SimSession, open_native
+from sim_bridge.sessions.with_board import SimSession, open_native
 
 
 def open_with(**wishes: Any) -> SimSession:

@@ -33,14 +33,14 @@ from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError
 from boebot.record.result import RunResult
 from boebot.robot import Robot
-from sim_bridge import imperfections as parts
 from sim_bridge._core import lib
-from sim_bridge.imperfections import Draw
-from sim_bridge.model_file import vehicle_model
+from sim_bridge.robots import imperfections as parts
+from sim_bridge.robots.imperfections import Draw
+from sim_bridge.robots.switches import SWITCHES
 from sim_bridge.sim import Sim
-from sim_bridge.switches import SWITCHES
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square
 from sim_bridge.vehicle import Vehicle
+from sim_bridge.vehicles.model_file import vehicle_model
 
 LEFT, RIGHT = 13, 12
 WHEEL = 0.0331

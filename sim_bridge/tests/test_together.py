@@ -30,9 +30,9 @@ from boebot.running import together
 from boebot.running.tasks import Request
 from boebot.running.together import StoppedError, execute_together
 from boebot.view import style
-from sim_bridge.places import places_of
-from sim_bridge.session import SimSession
-from sim_bridge.together import SimWorld
+from sim_bridge.sessions.places import places_of
+from sim_bridge.sessions.together import SimWorld
+from sim_bridge.sessions.with_board import SimSession
 
 SECONDS = 8.0
 

@@ -15,11 +15,11 @@ from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, RobotError
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
-from sim_bridge.parameters import keys_of
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
+from sim_bridge.vehicles.checked_structs import keys_of
 
 ROOM = arena_of(outline=square(0, 0, 4))
 

@@ -18,10 +18,10 @@ from scipy.integrate import solve_ivp
 
 from boebot.arenas import load_arena
 from boebot.errors import RobotError
-from sim_bridge.model_file import vehicle_model
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
+from sim_bridge.vehicles.model_file import vehicle_model
 
 BODY = ARSIM_BODY | {"wheel_mass": 0.1, "wheel_inertia": 2e-4, "grip": 10.0}
 Phases = Sequence[tuple[float, float]]

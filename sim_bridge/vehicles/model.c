@@ -46,7 +46,7 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   return rate > 0.0 ? 2.0 / rate : INFINITY;
 }
 
-/* A model that steps too far keeps its drive, so that its limit can be told; vehicles_place refuses it. */
+/* A model that steps too far keeps its drive, so that its limit can be asked; vehicles_place refuses it. */
 static int check_step(const vehicle_model *self) {
   return self->dt < vehicle_model_euler_limit(self) ? VEHICLE_OK : VEHICLE_BAD_STEP;
 }
@@ -104,7 +104,7 @@ int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_par
 
 /* ---- sensors ------------------------------------------------------------------------------------------------------ */
 
-/* A new sensor with so many readings, NULL where there is no room or the period is no time. */
+/* A new sensor with that many readings, NULL where there is no room or the period is no time. */
 static vehicle_sensor *added(vehicle_model *self, int kind, double period, size_t readings) {
   if (self->sensors_count == VEHICLE_SENSORS || !(period >= 0.0) || !isfinite(period)) return NULL;
   uint32_t number = 0;

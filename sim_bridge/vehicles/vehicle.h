@@ -48,7 +48,7 @@ int vehicles_step_one(vehicles *self, size_t i, double left, double right);
  * and is reported. What the brain needs, memory and readings, is the caller's to see to. */
 int vehicles_run(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps);
 
-/* The stages of one step of one world by themselves, for whoever looks on in between: sense, then (the brain), send, move,
+/* The stages of one step of one world by themselves, for a caller that looks on in between: sense, then (the brain), send, move,
  * arena, check. Together they do what vehicles_step does; sensing twice in a step changes nothing. */
 void vehicles_sense(vehicles *self, size_t i);
 int vehicles_send(vehicles *self, size_t i, double left, double right);

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "../world/body_step.h"
 #include "../world/noise_block.h"
 #include "../world/row.h"
 #include "geometry/lanes.h"

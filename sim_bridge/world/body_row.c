@@ -1,8 +1,9 @@
-/* body_row.c: body_advance_row of body.h: speeds and the way where nothing stands in it for a whole row at once, all else for
+/* body_row.c: body_advance_row of body_step.h: speeds and the way where nothing stands in it for a whole row at once, all else for
  * each body alone. */
 #include <string.h>
 
 #include "body_drive.h"
+#include "body_step.h"
 #include "geometry/lanes.h"
 
 /* Bodies of a row side by side, as numbers that wait for each other's turn in no order. */

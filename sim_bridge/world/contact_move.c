@@ -9,7 +9,7 @@
 #define CORE_SHARE 0.5             /* a core that came nearer than this share of the rounding is treated as that far */
 #define PART_LEAST (1.0 / 65536.0) /* of a step: 16 m of it at a rounding of 1 mm, 0.25 m at 15 um */
 #define HALVINGS 8                 /* of a part in which a body would be pushed too far */
-#define MEETINGS_MAXIMUM 64        /* after so many parts of a step its meetings are not awaited one by one */
+#define MEETINGS_MAXIMUM 64        /* parts of a step; beyond them its meetings are not awaited one by one */
 
 /* ---- impulses and places ------------------------------------------------------------------------------------------ */
 

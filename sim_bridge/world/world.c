@@ -1,6 +1,8 @@
 /* world.c: see world.h. */
 #include "world.h"
 
+#include "body_step.h"
+
 void world_init(world *self, const arena *where, double dt, mover *movers) {
   *self = (world){.arena = where, .dt = dt, .obstacles = arena_moving_count(where), .movers = movers};
   world_update(self);

@@ -12,7 +12,7 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
-from sim_bridge.sim_robot import SimRobot
+from sim_bridge.sim import SimRobot
 from tools.bench.figures import figure
 
 ROBOT, ARENA = "shieldbot-charging", "station"

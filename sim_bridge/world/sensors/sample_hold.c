@@ -12,5 +12,3 @@ void sample_hold_take(sample_hold *self, double time, double value) {
   const double next = self->next + self->period;
   self->next = next > time ? next : time + self->period;
 }
-
-double sample_hold_age(const sample_hold *self, double time) { return time - self->taken; }

@@ -13,12 +13,9 @@ typedef struct {
   double value;
 } sample_hold;
 
-/* 1 if a new sample is due at `time` s; whoever asks then takes it by sample_hold_take. */
+/* 1 if a new sample is due at `time` s; the caller then takes it by sample_hold_take. */
 int sample_hold_due(const sample_hold *self, double time);
 void sample_hold_take(sample_hold *self, double time, double value);
-
-/* Age of the held value, s. */
-double sample_hold_age(const sample_hold *self, double time);
 /* python: end */
 
 #endif

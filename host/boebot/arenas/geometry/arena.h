@@ -148,7 +148,7 @@ int arena_crossing(const double *xy, size_t count, uint32_t *one, uint32_t *othe
 const arena_edge *arena_edges(const arena *self);
 const arena_disc *arena_discs(const arena *self);
 
-/* Changes whenever an edge moves; whoever keeps edges compares it. */
+/* Changes whenever an edge moves; a caller that keeps edges compares it. */
 uint32_t arena_version(const arena *self);
 
 /* Edges or discs nearer than `radius` to (x, y), in increasing number; a disc is near from inside as well. Return how

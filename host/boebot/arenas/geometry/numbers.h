@@ -77,7 +77,7 @@ NUMBERS_INLINE void number_sincos(double angle, double *sine, double *cosine) {
                                   z * (2.48015872894767294178e-05 +
                                        z * (-2.75573143513906633035e-07 +
                                             z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
-  /* Turned by so many quarters: sine and cosine change places by each, and signs by each second one. */
+  /* Turned by whole quarters: sine and cosine change places by each, and signs by each second one. */
   const uint64_t swap = (uint64_t)0 - (quarter & 1u);
   const uint64_t sine_sign = (quarter & 2u) << 62;
   const uint64_t cosine_sign = ((quarter + 1u) & 2u) << 62;

@@ -1,0 +1,197 @@
+/* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts; all of it is noted. */
+#include <math.h>
+#include <string.h>
+
+#include "state.h"
+
+static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
+
+int sim_place(sim *self, int number, double x, double y, double heading) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
+  if (!world_is_free(&self->world, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
+  const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
+  sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
+  body_place(r->body, x, y, heading);
+  r->chassis.x = x;
+  r->chassis.y = y;
+  r->chassis.heading = heading;
+  world_update(&self->world);
+  return SIM_OK;
+}
+
+/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nobody drives it. */
+static int take_pin(robot *r, uint8_t pin) {
+  int pulled_up = 0;
+  for (int i = 0; i < r->part_count; i++) {
+    part *p = r->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
+      p->overridden = 1;
+      pulled_up |= (p->pins[k].role & PART_PULLED_UP) != 0;
+    }
+  }
+  return pulled_up;
+}
+
+int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {at, pin, level};
+  sim_note(self, number, INPUT_DRIVE, words, 3, NULL, 0);
+  const int pulled_up = take_pin(r, pin);
+  for (int i = 0; i < r->waves; i++) {
+    if (r->wave[i].pin == pin) r->wave[i].end = 0;
+  }
+  if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
+  r->chassis.driven[pin] = level;
+  r->board->op->drive(r->board, at, pin, level);
+  return SIM_OK;
+}
+
+int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || bad_pin(pin) || half_cycles == 0) return SIM_BAD_ARGUMENT;
+  int i = 0; /* the place of this pin's wave, or of one that is over, or a new one */
+  while (i < r->waves && r->wave[i].pin != pin) i++;
+  if (i == r->waves) i = 0;
+  while (i < r->waves && r->wave[i].pin != pin && r->wave[i].next <= r->wave[i].end) i++;
+  if (i == WAVES_MAXIMUM) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {pin, half_cycles, duration};
+  sim_note(self, number, INPUT_WAVE, words, 3, NULL, 0);
+  take_pin(r, pin);
+  if (i == r->waves) r->waves++;
+  const uint64_t start = self->world_at + PART_GUARD; /* edges up to there are queued already */
+  r->wave[i] = (wave){.pin = pin,
+                      .level = r->chassis.driven[pin] == BOARD_HIGH,
+                      .half = half_cycles,
+                      .next = start + half_cycles,
+                      .end = start + duration};
+  return SIM_OK;
+}
+
+void robot_step_waves(robot *self, uint64_t until) {
+  for (int i = 0; i < self->waves; i++) {
+    wave *w = &self->wave[i];
+    for (; w->next <= until && w->next <= w->end; w->next += w->half) {
+      w->level = !w->level;
+      self->board->op->drive(self->board, w->next, w->pin, w->level);
+    }
+  }
+}
+
+int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || held < -1 || held > 1) return SIM_BAD_ARGUMENT;
+  for (int i = 0; i < r->part_count; i++) {
+    whisker *w = whisker_of(r->parts[i]);
+    if (w == NULL || w->part.pins[0].pin != pin) continue;
+    const uint64_t words[] = {pin, (uint64_t)(int64_t)held};
+    sim_note(self, number, INPUT_WHISKER, words, 2, NULL, 0);
+    whisker_hold(w, held);
+    return SIM_OK;
+  }
+  return SIM_BAD_ARGUMENT;
+}
+
+int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
+  robot *r = sim_robot_with_board(self, number);
+  int pings = 0;
+  for (int i = 0; r != NULL && i < r->part_count; i++) {
+    ping *p = ping_of(r->parts[i]);
+    if (p == NULL) continue;
+    p->answer = echo_cycles;
+    pings++;
+  }
+  if (pings == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t word = (uint64_t)echo_cycles;
+  sim_note(self, number, INPUT_PING, &word, 1, NULL, 0);
+  return SIM_OK;
+}
+
+int sim_unplug(sim *self, int number, uint8_t pin, int unplugged) {
+  robot *r = sim_robot_with_board(self, number);
+  int parts = 0;
+  for (int i = 0; r != NULL && i < r->part_count; i++) {
+    part *p = r->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || p->pins[k].pin == PART_NO_PIN) continue;
+      part_unplug(p, unplugged != 0);
+      parts++;
+    }
+  }
+  if (parts == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {pin, unplugged != 0};
+  sim_note(self, number, INPUT_UNPLUG, words, 2, NULL, 0);
+  return SIM_OK;
+}
+
+int sim_set_supply(sim *self, int number, double volts) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || !(volts >= 0.0) || !isfinite(volts)) return SIM_BAD_ARGUMENT;
+  const uint64_t word = input_of_double(volts);
+  sim_note(self, number, INPUT_SUPPLY, &word, 1, NULL, 0);
+  r->held_supply = volts / BOARD_NOMINAL_VOLTS;
+  robot_update_supply(r);
+  return SIM_OK;
+}
+
+int sim_set_brown_out(sim *self, int number, const brown_out_parameters *parameters) {
+  robot *r = sim_robot_with_board(self, number);
+  const brown_out_parameters *p = parameters;
+  if (r == NULL || !(p->reset_v >= 0.0 && p->reset_v < p->erratic_v && p->hysteresis_v >= 0.0)) return SIM_BAD_ARGUMENT;
+  if (!(p->upsets_per_s >= 0.0)) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {input_of_double(p->reset_v), input_of_double(p->hysteresis_v),
+                            input_of_double(p->erratic_v), input_of_double(p->upsets_per_s)};
+  sim_note(self, number, INPUT_BROWN_OUT, words, 4, NULL, 0);
+  r->brown_out.parameters = *p;
+  return SIM_OK;
+}
+
+int sim_reset(sim *self, int number, int cause) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || cause < BOARD_RESET_POWER || cause > BOARD_RESET_WATCHDOG) return SIM_BAD_ARGUMENT;
+  const uint64_t word = (uint64_t)cause;
+  sim_note(self, number, INPUT_RESET, &word, 1, NULL, 0);
+  r->reset_at = self->now;
+  r->board->op->reset(r->board, (board_reset_cause)cause);
+  return SIM_OK;
+}
+
+/* ---- memory -------------------------------------------------------------------------------------------------------- */
+
+static int write_cells(sim *self, int number, input_kind kind, uint8_t *cells, size_t size, uint32_t address,
+                       const uint8_t *bytes, size_t count) {
+  if (cells == NULL || address > size || count > size - address) return SIM_BAD_ARGUMENT;
+  if (count == 0) return SIM_OK;
+  const uint64_t word = address;
+  sim_note(self, number, kind, &word, 1, bytes, count);
+  memcpy(cells + address, bytes, count);
+  return SIM_OK;
+}
+
+static board_eeprom *eeprom_of(const robot *r) {
+  return r == NULL ? NULL : r->board->op->extension(r->board, BOARD_EEPROM);
+}
+
+int sim_write_eeprom(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
+  const board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
+  uint8_t *cells = eeprom == NULL ? NULL : eeprom->bytes;
+  return write_cells(self, number, INPUT_EEPROM, cells, BOARD_EEPROM_SIZE, address, bytes, count);
+}
+
+int sim_write_memory(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
+  const robot *r = sim_robot_with_board(self, number);
+  uint8_t *cells = r == NULL ? NULL : r->board->op->extension(r->board, BOARD_DATA);
+  return write_cells(self, number, INPUT_MEMORY, cells, BOARD_DATA_SIZE, address, bytes, count);
+}
+
+int sim_damage_eeprom(sim *self, int number, int damage, uint8_t garbage) {
+  board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
+  if (eeprom == NULL || damage < BOARD_DAMAGE_ERASED || damage > BOARD_DAMAGE_GARBAGE) return SIM_BAD_ARGUMENT;
+  const uint64_t words[] = {(uint64_t)damage, garbage};
+  sim_note(self, number, INPUT_DAMAGE, words, 2, NULL, 0);
+  eeprom->damage = (board_damage)damage;
+  eeprom->garbage = garbage;
+  return SIM_OK;
+}

@@ -1,0 +1,199 @@
+/* loop.h: one simulation: an arena, robots in it, on each a board or none, everything in lockstep.
+ *
+ * The world leads: a step takes world and parts from t to t + dt by what the pins did until t, and parts queue their edges
+ * at exact cycles of that span; then each board runs through it, and its edges go to the parts as they happen. Everything
+ * is counted in cycles of the boards' 16 MHz. The simulation knows bytes, not messages.
+ *
+ * A robot without a board is a vehicle (vehicles/vehicle.h): its sensors read at the end of the world's step, and its
+ * motor signals hold until it gets others.
+ *
+ * Boards, models and arena belong to the caller and must outlive the simulation.
+ */
+#ifndef LOOP_LOOP_H
+#define LOOP_LOOP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "boards/board.h"
+#include "geometry/arena.h"
+#include "parts/analog_infrared.h"
+#include "parts/battery.h"
+#include "parts/brown_out.h"
+#include "parts/compass.h"
+#include "parts/encoder.h"
+#include "parts/infrared.h"
+#include "parts/light_sensor.h"
+#include "parts/logs.h"
+#include "parts/ping.h"
+#include "parts/servo.h"
+#include "parts/turret.h"
+#include "parts/whisker.h"
+#include "vehicles/model.h"
+#include "world/body.h"
+
+/* python: begin */
+enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
+enum { SIM_OBSTACLES_MAXIMUM = 64 }; /* that move; robots: BODY_MAXIMUM */
+enum {
+  SIM_OK = 0,
+  SIM_NO_MEMORY = -1,
+  SIM_WRONG_BOARD = -2,
+  SIM_BAD_ARGUMENT = -3,
+  SIM_NOT_FREE = -4,  /* something is in that place: arena, obstacle on its way, robot */
+  SIM_PIN_TAKEN = -5, /* another device listens there */
+};
+
+/* One row of the truth. */
+typedef struct {
+  double time;             /* s */
+  double x, y, heading;    /* m, m, rad */
+  double speed, turn_rate; /* m/s, rad/s */
+  double left, right;      /* wheel speeds along the ground, m/s */
+  double contact;          /* 1: touched something since the last row */
+} sim_truth;
+
+typedef struct sim sim;
+
+/* step_cycles: world step; record_cycles: between two rows of the truth, a multiple of it, 0: no record. NULL without
+ * memory or on bad arguments. */
+sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise);
+void sim_destroy(sim *self);
+
+/* Adds a robot at rest with its board (the address of a `board`). `robot` >= 0 is its number from now on, and the key of
+ * its noise: a run is the same in whatever order robots are added. Returns SIM_OK or an error. */
+int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *parameters, double x, double y,
+                  double heading);
+
+/* The same for a robot without a board; its model steps as far as the world. */
+int sim_add_vehicle(sim *self, int robot, const vehicle_model *model, double x, double y, double heading);
+
+/* Motor signals of such a robot, from now on; its readings, which stay in place; and VEHICLE_RUNS, or why its motors do
+ * nothing any more. NULL and VEHICLE_RUNS for others. */
+int sim_signals(sim *self, int robot, double left, double right);
+const double *sim_readings(sim *self, int robot, size_t *count);
+int sim_vehicle_flag(const sim *self, int robot);
+
+/* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
+int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
+int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters);
+int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
+int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
+                     const infrared_pair_parameters *parameters);
+int sim_add_ping(sim *self, int robot, uint8_t pin, const sonar_parameters *parameters);
+/* The HMC5883L on the two-wire bus of those pins; the bus comes with its first device. */
+int sim_add_compass(sim *self, int robot, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters);
+int sim_add_analog_infrared(sim *self, int robot, uint8_t channel, const sharp_infrared_parameters *parameters);
+int sim_add_light_sensor(sim *self, int robot, uint8_t pin, const light_sensor_parameters *parameters);
+int sim_add_buzzer(sim *self, int robot, uint8_t pin);
+/* A position servo with its axis at (x, y) of the body's frame, m, and the sensor that it carries: the part that
+ * drives `pin` of the board, or is measured there. The sensor's place and heading are those with the turret straight
+ * ahead. */
+int sim_add_turret(sim *self, int robot, uint8_t pin, double x, double y, const motor_position_parameters *parameters);
+int sim_mount(sim *self, int robot, uint8_t turret_pin, uint8_t pin);
+int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
+
+/* Runs until a cycle, or until bytes have come from a robot that is listened to and its line has been idle for two byte
+ * times. Returns 0, or 1 + the number of a robot whose board crashed. */
+int sim_run_until(sim *self, uint64_t deadline);
+
+/* From that cycle on bytes from the robot end a run (2^64 - 1, as at first: never). `sim_speaks` says whether they have
+ * come, and its line has been idle since. When a robot is heard does not depend on the other listeners. */
+int sim_listen(sim *self, int robot, uint64_t from);
+uint64_t sim_listens(const sim *self, int robot);
+int sim_speaks(const sim *self, int robot);
+
+/* Listens to a robot when `quiet` cycles from now have passed, and runs for `cycles` at most. Returns as
+ * sim_run_until. */
+int sim_run_for(sim *self, int robot, uint64_t cycles, uint64_t quiet);
+
+/* The cycle up to which the simulation has run. */
+uint64_t sim_now(const sim *self);
+
+/* Bit rate of the outside's side of a robot's serial line, 500,000 unless set. Returns SIM_OK or an error. */
+int sim_line_rate(sim *self, int robot, uint32_t baud);
+
+/* The cycle at which the last byte from a robot's board had come. */
+uint64_t sim_last_byte(const sim *self, int robot);
+
+/* Bytes to and from a robot's board. */
+int sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
+size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
+
+/* All that has come from outside since power-on (bytes sent and whatever below changes something), with its cycles; NULL
+ * where some of it found no memory, or a board has crashed. Good until the next input. */
+const uint8_t *sim_inputs(const sim *self, size_t *count);
+
+/* Plays such inputs again, from byte `at` of them on, which goes on with them, and runs until that cycle; the simulation
+ * has the same arena, robots, boards and firmware, and has heard nothing else. Returns 0, 1 + the number of a robot whose
+ * board crashed, or SIM_BAD_ARGUMENT where they are no inputs of such a simulation. */
+int sim_replay(sim *self, const uint8_t *inputs, size_t size, size_t *at, uint64_t until);
+
+/* Forgets what was received of that robot but for the newest bytes. */
+void sim_forget_received(sim *self, int robot, size_t keep);
+
+/* Bytes that were received and not yet taken. */
+size_t sim_waiting(const sim *self, int robot);
+
+/* Of all that can be had of the state: bodies, supplies, what boards did, counted and hold. */
+uint64_t sim_state_hash(const sim *self);
+
+/* Truth. The pointers stay good until the next run. */
+void sim_body(const sim *self, int robot, body_state *out);
+const sim_truth *sim_record(const sim *self, int robot, size_t *count);
+const sim_look *sim_looks(const sim *self, int robot, size_t *count);
+const sim_wait *sim_waits(const sim *self, size_t *count); /* by time; none without a record */
+/* The arena's moving shapes as they stand, at `time`, s: up to a step ahead of sim_now. */
+const mover *sim_movers(const sim *self, size_t *count, double *time);
+uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
+uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
+
+/* What buzzers sounded, oldest first; a tone that sounds is not yet in it. */
+const sim_tone *sim_tones(const sim *self, int robot, size_t *count);
+double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 where there is no turret */
+
+/* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */
+size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
+uint64_t sim_edges_seen(const sim *self, int robot);
+
+/* A reset from outside (a board_reset_cause); `sim_reset_at`: the cycle of the last one. */
+int sim_reset(sim *self, int robot, int cause);
+uint64_t sim_reset_at(const sim *self, int robot);
+
+/* For tests: a robot put elsewhere, at rest (or SIM_NOT_FREE); a pin taken from its part
+ * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
+ * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled out (1) or put in
+ * again (0); voltage of the rail that board and servos run
+ * on, 0: what the regulator gives; bytes put into the EEPROM, or into the data space of a board that has one; what
+ * becomes of a cell whose write is cut short. Return SIM_OK or an error. */
+int sim_place(sim *self, int robot, double x, double y, double heading);
+int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
+int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
+int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
+int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
+int sim_unplug(sim *self, int robot, uint8_t pin, int unplugged);
+int sim_set_supply(sim *self, int robot, double volts);
+int sim_write_eeprom(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
+int sim_write_memory(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
+int sim_damage_eeprom(sim *self, int robot, int damage, uint8_t garbage);
+
+/* What a weak supply does to a robot's board; by default it is as the data sheet has it, with 2 upsets per second at the
+ * worst. Returns SIM_OK or an error. `sim_brown_outs`: resets by the detector, and upsets above it. */
+int sim_set_brown_out(sim *self, int robot, const brown_out_parameters *parameters);
+uint32_t sim_brown_outs(const sim *self, int robot, uint32_t *upsets);
+
+/* Voltages of pack and regulator. */
+double sim_pack_voltage(const sim *self, int robot);
+double sim_supply_voltage(const sim *self, int robot);
+
+/* Operations of a board by its address, for Python. */
+int board_check(uintptr_t board); /* 0, or SIM_WRONG_BOARD where it was built for another interface */
+uint8_t board_output(uintptr_t board, uint8_t pin);
+void board_destroy(uintptr_t board);
+const char *board_fault(uintptr_t board);
+int64_t board_fault_address(uintptr_t board); /* in flash, of the instruction that crashed it; -1: not known */
+/* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
+void board_read_counters(uintptr_t board, uint64_t counters[8]);
+/* python: end */
+
+#endif

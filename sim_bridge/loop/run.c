@@ -1,0 +1,256 @@
+/* run.c: see loop.h. Here: the loop itself. */
+#include "state.h"
+
+#define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */
+#define SLICE_CYCLES 4000u                 /* how often lines are looked at while somebody listens */
+
+/* ---- what boards do and ask ---------------------------------------------------------------------------------------- */
+
+void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
+  robot *self = context;
+  if (pin >= BOARD_PIN_COUNT) return;
+  edge_log_add(&self->edges, cycle, pin, level);
+  part *p = self->hears[pin];
+  if (p != NULL && !p->unplugged) p->op->edge(p, cycle, pin, level);
+}
+
+double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
+  robot *self = context;
+  if (channel == BOARD_ANALOG_SUPPLY) return self->chassis.supply * BOARD_NOMINAL_VOLTS;
+  part *p = channel < BOARD_ANALOG_COUNT ? self->analog[channel] : NULL;
+  return p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
+}
+
+/* ---- the world's step ---------------------------------------------------------------------------------------------- */
+
+static void record(robot *r, uint64_t cycle) {
+  const body_state *s = &r->body->state;
+  const sim_truth row = {
+      .time = (double)cycle / BOARD_CLOCK_HZ,
+      .x = s->x,
+      .y = s->y,
+      .heading = s->heading,
+      .speed = s->speed,
+      .turn_rate = s->turn_rate,
+      .left = body_left_speed(r->body),
+      .right = body_right_speed(r->body),
+      .contact = r->touched,
+  };
+  r->touched = s->touching;
+  buffer_append(&r->truth, &row, sizeof row);
+}
+
+void robot_update_supply(robot *self) {
+  chassis *c = &self->chassis;
+  const int held = self->held_supply > 0.0;
+  const supply *s = self->battery == NULL || held ? NULL : &self->battery->supply;
+  c->supply = s == NULL ? (held ? self->held_supply : 1.0) : s->board_v / BOARD_NOMINAL_VOLTS;
+  c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
+}
+
+/* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
+static void exchange_light(sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    const robot *from = self->robots[i];
+    for (int k = 0; k < from->part_count; k++) {
+      infrared *sender = infrared_of(from->parts[k]);
+      infrared_burst burst;
+      infrared_light span;
+      if (sender == NULL || !infrared_take_burst(sender, &burst, &span)) continue;
+      span.from += self->step_cycles + PART_GUARD;
+      span.until += self->step_cycles + PART_GUARD;
+      for (int j = 0; j < self->robot_count; j++) {
+        const robot *to = self->robots[j];
+        for (int n = 0; j != i && n < to->part_count; n++) {
+          infrared *receiver = infrared_of(to->parts[n]);
+          if (receiver != NULL) infrared_see_burst(receiver, &burst, &span);
+        }
+      }
+    }
+  }
+}
+
+/* Motors say their torque for the step that begins. */
+static void begin_step(void *owner, double torques[2]) {
+  robot *r = owner;
+  chassis *c = &r->chassis;
+  const body_state *s = &r->body->state;
+  c->since = r->sim->world_at;
+  c->x = s->x;
+  c->y = s->y;
+  c->heading = s->heading;
+  c->at_charger = arena_is_at_charger(r->sim->world.arena, s->x, s->y);
+  c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
+  c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
+  for (int i = 0; i < r->part_count; i++) {
+    part *p = r->parts[i];
+    if (p->op->before_step != NULL) p->op->before_step(p);
+  }
+  for (int side = 0; side < 2; side++) torques[side] = c->wheel[side].torque;
+  if (r->vehicle != NULL) VEHICLE_OPERATIONS.torques(r->vehicle->worlds, torques);
+}
+
+static void has_moved(void *owner) {
+  const robot *r = owner;
+  if (r->vehicle != NULL) VEHICLE_OPERATIONS.moved(r->vehicle->worlds);
+}
+
+/* Parts follow the body to the end of the step. */
+static void end_step(void *owner) {
+  robot *r = owner;
+  const uint64_t end = r->sim->world_at + r->sim->step_cycles;
+  for (int i = 0; i < r->part_count; i++) {
+    part *p = r->parts[i];
+    if (p->op->step != NULL) p->op->step(p);
+  }
+  if (r->vehicle != NULL) {
+    VEHICLE_OPERATIONS.sense(r->vehicle->worlds);
+  } else {
+    robot_update_supply(r);
+    brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->world.dt);
+    robot_step_waves(r, end + PART_GUARD);
+  }
+  if (!r->body->state.touching) return;
+  if (r->contacts == 0 || end - r->last_touch > CONTACT_GAP) r->contacts++;
+  r->last_touch = end;
+  r->touched = 1;
+}
+
+const world_robot_operations ROBOT_OPERATIONS = {.torques = begin_step, .moved = has_moved, .sense = end_step};
+
+static void step_world(sim *self) {
+  if (self->record_cycles > 0 && self->world_at >= self->next_record) {
+    for (int i = 0; i < self->robot_count; i++) record(self->robots[i], self->world_at);
+    self->next_record += self->record_cycles;
+  }
+  if (self->robot_count > 1) exchange_light(self);
+  world_step(&self->world);
+  if (self->record_cycles > 0) sim_record_waits(self, self->world_at);
+  self->world_at += self->step_cycles;
+}
+
+/* ---- running ------------------------------------------------------------------------------------------------------- */
+
+static void take_bytes(robot *r) {
+  enum { CHUNK = 64 };
+  uint64_t cycles[CHUNK];
+  for (;;) {
+    uint8_t *room = buffer_room(&r->received, CHUNK);
+    if (room == NULL) return;
+    const size_t count = r->board->op->receive(r->board, room, cycles, CHUNK);
+    if (count > 0) r->last_byte = cycles[count - 1];
+    r->received.count += count;
+    if (count < CHUNK) return;
+  }
+}
+
+/* Lines are looked at only at the ends of world steps and slices, counted from power-on: when a robot is heard does not
+ * depend on how the others cut the run. */
+static int is_look(const sim *self) { return self->now == self->world_at || self->now % SLICE_CYCLES == 0; }
+
+/* Bytes have come since somebody listens to the robot, and its line has been idle since. */
+static int message_waits(const robot *r, uint64_t now) {
+  return now >= r->listen_from && r->received.count > 0 && now >= r->last_byte + r->idle;
+}
+
+static int somebody_speaks(const sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    if (message_waits(self->robots[i], self->now)) return 1;
+  }
+  return 0;
+}
+
+/* The first slice's end after `now` at which that robot may be heard. */
+static uint64_t next_slice(const sim *self, const robot *r) {
+  const uint64_t from = r->listen_from > self->now ? r->listen_from : self->now + 1u;
+  return from > SIM_NEVER - SLICE_CYCLES ? SIM_NEVER : (from + SLICE_CYCLES - 1u) / SLICE_CYCLES * SLICE_CYCLES;
+}
+
+/* Up to where boards run next. */
+static uint64_t next_target(const sim *self, uint64_t deadline) {
+  uint64_t target = self->world_at < deadline ? self->world_at : deadline;
+  for (int i = 0; i < self->robot_count; i++) {
+    const uint64_t slice = next_slice(self, self->robots[i]);
+    if (slice < target) target = slice;
+  }
+  return target;
+}
+
+int sim_run_until(sim *self, uint64_t deadline) {
+  while (self->now < deadline) {
+    if (self->world_at <= self->now) step_world(self);
+    const uint64_t target = next_target(self, deadline);
+    for (int i = 0; i < self->robot_count; i++) {
+      robot *r = self->robots[i];
+      if (r->board == NULL) continue;
+      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) {
+        self->crashed = 1;
+        return 1 + r->number;
+      }
+      take_bytes(r);
+    }
+    self->now = target;
+    if (is_look(self) && somebody_speaks(self)) return 0;
+  }
+  return 0;
+}
+
+int sim_listen(sim *self, int number, uint64_t from) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL) return SIM_BAD_ARGUMENT;
+  r->listen_from = from;
+  return SIM_OK;
+}
+
+uint64_t sim_listens(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? SIM_NEVER : r->listen_from;
+}
+
+int sim_run_for(sim *self, int number, uint64_t cycles, uint64_t quiet) {
+  sim_listen(self, number, self->now + quiet);
+  return sim_run_until(self, self->now + cycles);
+}
+
+int sim_speaks(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r != NULL && is_look(self) && message_waits(r, self->now);
+}
+
+uint64_t sim_now(const sim *self) { return self->now; }
+
+/* ---- the lines ----------------------------------------------------------------------------------------------------- */
+
+int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || count > UINT32_MAX) return SIM_BAD_ARGUMENT;
+  if (count == 0) return SIM_OK;
+  sim_note(self, number, INPUT_SEND, NULL, 0, bytes, count);
+  r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
+  return SIM_OK;
+}
+
+int sim_line_rate(sim *self, int number, uint32_t baud) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
+  const uint64_t word = baud;
+  sim_note(self, number, INPUT_LINE_RATE, &word, 1, NULL, 0);
+  r->idle = line_idle_cycles(baud);
+  r->board->op->line_rate(r->board, baud);
+  return SIM_OK;
+}
+
+uint64_t sim_last_byte(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->last_byte;
+}
+
+size_t sim_waiting(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : r->received.count;
+}
+
+size_t sim_receive(sim *self, int number, uint8_t *bytes, size_t capacity) {
+  robot *r = sim_robot(self, number);
+  return r == NULL ? 0 : buffer_take(&r->received, bytes, capacity);
+}

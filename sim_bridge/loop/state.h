@@ -1,0 +1,154 @@
+/* state.h: what the files of the loop know of a simulation: run.c runs it, join.c builds it, truth.c reads
+ * it, interventions.c lays a test's hands on it, inputs.c notes what comes from outside and plays it again,
+ * vehicle.c has the robots without boards.
+ */
+#ifndef LOOP_STATE_H
+#define LOOP_STATE_H
+
+#include "loop.h"
+#include "parts/part.h"
+#include "vehicles/vehicle.h"
+#include "world/world.h"
+
+#define WAVES_MAXIMUM 4
+#define SIM_NEVER UINT64_MAX
+
+/* A square wave that a test puts on a pin. */
+typedef struct {
+  uint8_t pin;
+  uint8_t level;
+  uint32_t half;
+  uint64_t next;
+  uint64_t end;
+} wave;
+
+/* A moving shape's clock as the record of waits has it. */
+typedef struct {
+  double waited; /* s, after the last step */
+  double lost;   /* s, in that step */
+} mover_clock;
+
+typedef struct {
+  sim *sim;
+  int number;
+  board *board; /* NULL: it has none, and is a vehicle */
+  body *body;
+  vehicles *vehicle; /* one, in this simulation's world; NULL: it has a board */
+  body own;          /* of a robot with a board */
+  chassis chassis;
+  part **parts;
+  int part_count;
+  int parts_of_kind[PART_KINDS]; /* by kind (PART_WHISKER and so on), how many there are */
+  part *hears[BOARD_PIN_COUNT];
+  part *analog[BOARD_ANALOG_COUNT];
+  brown_out brown_out;
+  battery *battery;   /* NULL: a supply that never sags */
+  double held_supply; /* share of the nominal voltage that a test holds, or 0 */
+  wave wave[WAVES_MAXIMUM];
+  int waves;
+  buffer received;
+  uint64_t last_byte;   /* cycle of the end of the last byte received */
+  uint64_t listen_from; /* bytes end a run from this cycle on */
+  uint64_t idle;        /* cycles without a byte after which the line is idle: two bytes' time */
+  uint64_t reset_at;    /* cycle of the last reset from outside */
+  buffer truth;
+  buffer looks;
+  buffer tones;
+  edge_log edges;
+  int touched; /* since the last row of the truth */
+  uint64_t last_touch;
+  uint64_t contacts;
+} robot;
+
+struct sim {
+  world world;
+  world_robot members[BODY_MAXIMUM]; /* of the world, by increasing number */
+  mover movers[SIM_OBSTACLES_MAXIMUM + BODY_MAXIMUM];
+  uint64_t seed;
+  uint32_t step_cycles;
+  uint32_t record_cycles;
+  int noise;
+  uint64_t now;      /* boards have run up to here */
+  uint64_t world_at; /* world and parts have run up to here */
+  uint64_t next_record;
+  robot **robots; /* by increasing number */
+  int robot_count;
+  mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
+  buffer waits;  /* rows of sim_wait */
+  buffer inputs; /* from outside, as inputs.c notes them */
+  int crashed;   /* 1: a board has */
+};
+
+/* What comes from outside, and what its words and bytes are in the notes; the numbers stand in saved simulations. */
+typedef enum {
+  INPUT_SEND = 1,      /* bytes */
+  INPUT_LINE_RATE = 2, /* bit/s */
+  INPUT_PLACE = 3,     /* x, y, heading */
+  INPUT_DRIVE = 4,     /* cycle, pin, level */
+  INPUT_WAVE = 5,      /* pin, half period, duration */
+  INPUT_WHISKER = 6,   /* pin, held */
+  INPUT_PING = 7,      /* cycles of the echo */
+  INPUT_SUPPLY = 8,    /* volts */
+  INPUT_BROWN_OUT = 9, /* the four parameters */
+  INPUT_RESET = 10,    /* cause */
+  INPUT_EEPROM = 11,   /* address; bytes */
+  INPUT_DAMAGE = 12,   /* damage, garbage */
+  INPUT_MEMORY = 13,   /* address; bytes */
+  INPUT_SIGNALS = 14,  /* left, right */
+  INPUT_UNPLUG = 15,   /* pin, unplugged */
+} input_kind;
+
+#define INPUT_WORDS 4 /* at most */
+
+/* Notes an input of now. */
+void sim_note(sim *self, int number, input_kind kind, const uint64_t *words, size_t count, const uint8_t *bytes,
+              size_t size);
+
+/* The bits of a double. */
+uint64_t input_of_double(double value);
+
+/* The robot of that number, or NULL. */
+robot *sim_robot(const sim *self, int number);
+
+/* The same; NULL also for one without a board. */
+robot *sim_robot_with_board(const sim *self, int number);
+
+/* The turret on that pin, or NULL. */
+turret *robot_turret(const robot *self, uint8_t pin);
+
+/* A new robot with a board or without; the caller fills in its body. NULL without memory. */
+robot *sim_new_robot(sim *self, int number, board *b);
+
+/* It stands at that pose, and is among the others from now on. */
+void sim_insert(sim *self, robot *r, double x, double y, double heading);
+
+/* SIM_OK where there can be one more robot of that number and radius at a place. */
+int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
+
+/* vehicle.c: sensors of robots without a board begin anew, when another robot has come: they may meet another thing
+ * now. */
+void sim_sense_anew(sim *self);
+
+/* run.c: what a robot does in a step of the world, with a board or without. */
+extern const world_robot_operations ROBOT_OPERATIONS;
+
+/* Sinks of the board: context is the robot. */
+void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
+double robot_on_analog(void *context, uint64_t cycle, uint8_t channel);
+
+/* Cycles without a byte after which a line of that bit rate is idle. */
+uint64_t line_idle_cycles(uint32_t baud);
+
+/* The voltage of the rail as it is now goes to all that runs on it. */
+void robot_update_supply(robot *self);
+
+/* truth.c: how long movers waited in the world's step that began at `begin`. */
+void sim_record_waits(sim *self, uint64_t begin);
+
+/* The id of a robot among the movers; never 0. */
+static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }
+
+/* Queues the edges of a test's square waves up to `until`. */
+void robot_step_waves(robot *self, uint64_t until);
+
+#endif

@@ -1,0 +1,63 @@
+/* vehicle.c: see loop.h. Here: robots without a board, which motor signals drive. They share the world's step, so that
+ * their model steps as far as the world does.
+ */
+#include <math.h>
+
+#include "state.h"
+#include "vehicles/sense.h"
+
+void sim_sense_anew(sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    vehicles *v = self->robots[i]->vehicle;
+    if (v == NULL) continue;
+    v->worlds[0].state.sensed = 0;
+    vehicle_sensors_start(v, 0);
+  }
+}
+
+int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x, double y, double heading) {
+  if (fabs(model->dt - self->world.dt) > 1e-12) return SIM_BAD_ARGUMENT;
+  const int room = sim_has_room(self, number, body_reach_of(&model->body), x, y, heading);
+  if (room != SIM_OK) return room;
+  vehicles *v = vehicles_new(model, 1, 0);
+  if (v == NULL) return SIM_NO_MEMORY;
+  const int status = vehicles_place(v, 0, self->world.arena, self->seed, robot_mover_id(number), x, y, heading);
+  robot *r = status == VEHICLE_OK ? sim_new_robot(self, number, NULL) : NULL;
+  if (r == NULL) {
+    vehicles_destroy(v);
+    if (status == VEHICLE_NOT_FREE) return SIM_NOT_FREE;
+    return status == VEHICLE_OK || status == VEHICLE_NO_MEMORY ? SIM_NO_MEMORY : SIM_BAD_ARGUMENT;
+  }
+  v->worlds[0].in = &self->world;
+  r->vehicle = v;
+  r->body = &v->worlds[0].body;
+  sim_insert(self, r, x, y, heading);
+  return SIM_OK;
+}
+
+int sim_signals(sim *self, int number, double left, double right) {
+  robot *r = sim_robot(self, number);
+  if (r == NULL || r->vehicle == NULL || !isfinite(left) || !isfinite(right)) return SIM_BAD_ARGUMENT;
+  vehicle_state *s = &r->vehicle->worlds[0].state;
+  if (s->flag != VEHICLE_RUNS) return SIM_OK;
+  const double before[2] = {s->signals[0], s->signals[1]};
+  (void)vehicles_send(r->vehicle, 0, left, right);
+  if (s->signals[0] == before[0] && s->signals[1] == before[1]) return SIM_OK;
+  const uint64_t words[] = {input_of_double(left), input_of_double(right)};
+  sim_note(self, number, INPUT_SIGNALS, words, 2, NULL, 0);
+  return SIM_OK;
+}
+
+const double *sim_readings(sim *self, int number, size_t *count) {
+  const robot *r = sim_robot(self, number);
+  *count = 0;
+  if (r == NULL || r->vehicle == NULL) return NULL;
+  vehicles_sense(r->vehicle, 0);
+  *count = vehicles_reading_count(r->vehicle);
+  return vehicles_readings(r->vehicle);
+}
+
+int sim_vehicle_flag(const sim *self, int number) {
+  const robot *r = sim_robot(self, number);
+  return r == NULL || r->vehicle == NULL ? VEHICLE_RUNS : r->vehicle->worlds[0].state.flag;
+}

@@ -1,0 +1,108 @@
+"""A robot without a board in a simulated world, as the host opens it: a vehicle built from the robot's description.
+
+`open_direct` is what the entry point of the group `boebot.vehicles` names: called with one request it gives a session,
+its `together` puts several such robots into one world. Where there are robots with boards too, it is the boards' turn
+(with_board.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from boebot.boards import BoardRequest, SharedWorld, Truth
+from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.sessions.opening import Wait, alone, new_sim, truth_of
+from sim_bridge.sessions.together import SimWorld
+from sim_bridge.sim import Sim, SimRobot
+from sim_bridge.vehicles.model_file import STEP_S
+
+DEFAULT_ARENA = "arsim"
+
+
+class DirectSession:
+    """An opened vehicle (VehicleSession of boebot.boards)."""
+
+    tick_s = STEP_S
+
+    def __init__(self, robot: SimRobot, wait: Wait, *, shared: bool = False) -> None:
+        """`shared`: the world is not this robot's alone, and is closed by somebody else."""
+        self.robot = robot
+        self.sim = robot.sim
+        self.layout: Mapping[str, slice] = robot.layout
+        self.description = f"robot without a board in arena {robot.sim.arena.name}"
+        self._wait = wait
+        self._cycles = round(STEP_S * CLOCK_HZ)
+        self._shared = shared
+
+    def readings(self) -> tuple[float, ...]:
+        """All readings now."""
+        return self.robot.readings()
+
+    def step(self, left: float, right: float) -> None:
+        """One step under these motor signals."""
+        self.robot.signals(left, right)
+        self._wait(self.robot, self._cycles, self._cycles)
+
+    def stop(self) -> None:
+        """No motor signals from now on."""
+        self.robot.signals(0.0, 0.0)
+
+    @property
+    def ended(self) -> str:
+        """Why it can go no further, or ""."""
+        return self.robot.ended
+
+    def truth(self) -> Truth | None:
+        """What happened so far; None without recording."""
+        return truth_of(self.robot)
+
+    def counters(self) -> Mapping[str, float]:
+        """`contacts`, `distance` (m) and `time` (s)."""
+        return {
+            "contacts": float(self.robot.contacts),
+            "distance": float(self.robot.body().distance),
+            "time": self.sim.cycle / CLOCK_HZ,
+        }
+
+    def close(self) -> None:
+        """Frees the world. May be called twice."""
+        if not self._shared:
+            self.sim.close()
+
+
+def add_vehicle(sim: Sim, request: BoardRequest) -> SimRobot:
+    """Puts the request's robot, which has no board, into a world.
+
+    Raises:
+        RobotError: its description is none of such a robot.
+        ArenaError: its place is not free.
+        BoardError: no such imperfection.
+    """
+    return sim.add(None, request.robot, pose=request.start_pose, without=request.without)
+
+
+class DirectKind:
+    """Robots without boards (VehicleFactory and TogetherFactory of boebot.boards)."""
+
+    def __call__(self, request: BoardRequest) -> DirectSession:
+        """Opens one in a world of its own. Raises as `add_vehicle`, and an ArenaError where there is no such arena."""
+        sim = new_sim(_in_arena(request), STEP_S)
+        try:
+            return DirectSession(add_vehicle(sim, request), alone(sim))
+        except Exception:
+            sim.close()
+            raise
+
+    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
+        """Opens several in one world."""
+        sim = new_sim(_in_arena(requests[0]), STEP_S)
+        return SimWorld(sim, requests, add_vehicle, lambda robot, wait: DirectSession(robot, wait, shared=True))
+
+
+def _in_arena(request: BoardRequest) -> BoardRequest:
+    return request if request.arena else replace(request, arena=DEFAULT_ARENA)
+
+
+open_direct = DirectKind()
+"""Robots that motor signals drive."""

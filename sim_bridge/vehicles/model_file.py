@@ -1,0 +1,285 @@
+"""Models of vehicles from robots' files: what `boebot run --robot arsim` drives, and what scripts drive by themselves.
+
+protocol/robots/arsim.toml is the one source of the notes' default robot; `arsim()` builds it. Keys and defaults of the
+devices are those of boebot.devices.vehicle_devices.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from boebot.arguments import shown
+from boebot.description import robots
+from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.battery import Energy
+from boebot.devices.compass import HeadingCompass
+from boebot.devices.device import Device
+from boebot.devices.infrared import InfraredProximity
+from boebot.devices.laser import Laser
+from boebot.devices.light import Phototransistor
+from boebot.devices.motor import DcMotor, Motor, RegulatedMotor
+from boebot.devices.odometer import Odometer
+from boebot.devices.ping import Sonar
+from boebot.devices.whisker import TouchWhisker
+from boebot.errors import RobotError
+from sim_bridge.robots import imperfections
+from sim_bridge.robots.switches import idealised
+from sim_bridge.vehicles.checked_structs import FINITE, number
+from sim_bridge.vehicles.model import SIDES, VehicleModel, beam
+
+STEP_S: Final = 0.01  # notes, section 3.2.6
+
+
+def vehicle_model(
+    robot: str | Path | robots.RobotDescription,
+    *,
+    dt: float = STEP_S,
+    noise: bool = True,
+    ends_at_collision: bool = False,
+    without: Sequence[str] = (),
+) -> VehicleModel:
+    """The model of a robot without a board: a bundled name, a .toml file, or its description.
+
+    Touching something does not end a run, as with `boebot run`, unless `ends_at_collision`. `without`: names of
+    robots/switches.py.
+
+    Raises:
+        RobotError: no such robot, one with a board, or a parameter outside its range.
+        BoardError: no such imperfection.
+    """
+    described = robot if isinstance(robot, robots.RobotDescription) else robots.load_robot(_file(robot))
+    if described.has_board:
+        raise RobotError(f"robot {described.name!r} is driven by its board; expected one with board = 'none'")
+    described = idealised(described, without)
+    draw = imperfections.Draw(0, noise, without=without)
+    body = _body(described.body) | {"grip": draw.own("TYRE_GRIP", described.body.tyre_grip)}
+    if described.body.tyre_slip:
+        body["slip"] = int(draw["TYRE_SLIP"])
+    if described.body.outline_m:
+        body["outline_m"] = described.body.outline_m
+    model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
+    _drive(model, described)
+    for name, device in described.device.items():
+        if device.on and not isinstance(device, Motor):
+            _add(model, name, device)
+    return model
+
+
+def _file(robot: Any) -> str | Path:
+    if not isinstance(robot, str | Path):
+        raise RobotError(f"vehicle: robot is {shown(robot)}; expected a robot's name, file or description")
+    return robot
+
+
+def _body(body: robots.Body) -> dict[str, Any]:
+    return {
+        "mass": body.mass_kg,
+        "inertia": body.inertia_kg_m2,
+        "radius": body.radius_m,
+        "half_track": body.track_width_m / 2,
+        "wheel_radius": body.wheel_radius_m,
+        "wheel_mass": body.wheel_mass_kg,
+        "wheel_inertia": body.wheel_inertia_kg_m2,
+        "linear_damping": body.linear_damping_n_s_m,
+        "angular_damping": body.angular_damping_n_m_s,
+        "grip": imperfections.TYRE_GRIP,
+    }
+
+
+def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
+    match tuple(robot.device[f"motor_{side}"] for side in SIDES):
+        case (DcMotor() as left, DcMotor() as right):
+            model.dc_motors(_dc(left), _dc(right), full=left.full or right.full)
+        case (RegulatedMotor() as left, RegulatedMotor() as right):
+            most = robot.body.wheel_speed_maximum_m_s
+            model.regulated_motors(_regulated(left, most), _regulated(right, most))
+        case motors:
+            kinds = [motor.__struct_config__.tag for motor in motors]
+            raise RobotError(f"robot {robot.name!r}: motors of types {kinds}; expected two of one type")
+
+
+def _dc(motor: DcMotor) -> dict[str, float]:
+    return {
+        "torque_constant": motor.torque_constant_n_m_a,
+        "emf_constant": motor.emf_constant_v_s,
+        "resistance_ohm": motor.resistance_ohm,
+        "inductance_h": motor.inductance_h if motor.full else 0.0,
+        "coulomb_n_m": motor.coulomb_friction_n_m,
+        "viscous_n_m_s": motor.viscous_friction_n_m_s,
+        "gear": motor.gear,
+        "efficiency": motor.efficiency,
+        "torque_maximum_n_m": motor.torque_maximum_n_m,
+        "voltage_maximum": motor.voltage_maximum_v,
+    }
+
+
+def _regulated(motor: RegulatedMotor, most: float) -> dict[str, float]:
+    return {
+        "gain_n_s": motor.gain_n_s,
+        "torque_maximum_n_m": motor.torque_maximum_n_m,
+        "speed_maximum_m_s": most,
+    }
+
+
+def _look(device: InfraredProximity | Sonar) -> dict[str, float]:
+    return beam(*device.position_m, device.heading_rad, device.beam_rad, device.rays, device.height_m)
+
+
+def _add(model: VehicleModel, name: str, device: Device) -> None:
+    """Adds a sensor or a battery."""
+    match device:
+        case InfraredProximity():
+            model.infrared_proximity(
+                name,
+                period=device.period_s,
+                beam=_look(device),
+                range=device.range_m,
+                c1=device.c1_m2,
+                c2=device.c2,
+                sigma=device.sigma,
+            )
+        case Sonar():
+            model.sonar(
+                name,
+                period=device.period_s,
+                beam=_look(device),
+                range_minimum=device.range_min_m,
+                range_maximum=device.range_max_m,
+                sigma=device.sigma,
+                miss=device.miss,
+            )
+        case Laser():
+            x, y = device.position_m
+            model.laser(
+                name,
+                period=device.period_s,
+                x=x,
+                y=y,
+                heading=device.heading_rad,
+                height=device.height_m,
+                first=-device.step_rad * (device.rays - 1) / 2,
+                step=device.step_rad,
+                rays=device.rays,
+                range=device.range_m,
+                sigma=device.sigma,
+            )
+        case Odometer():
+            model.odometer(
+                name,
+                sigma_step=device.sigma_step_m,
+                factor_left=device.factor_left,
+                factor_right=device.factor_right,
+            )
+        case HeadingCompass():
+            model.compass(name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
+        case Accelerometer():
+            model.accelerometer(
+                name,
+                period=device.period_s,
+                mass=device.proof_mass_kg,
+                stiffness=device.stiffness_n_m,
+                damping=device.damping_n_s_m,
+                range=device.range_m_s2,
+                sigma=device.sigma_m_s2,
+                bias=device.bias_m_s2,
+            )
+        case Phototransistor():
+            x, y = device.position_m
+            model.light(
+                name,
+                period=device.period_s,
+                x=x,
+                y=y,
+                heading=device.heading_rad,
+                height=device.height_m,
+                near_distance=device.near_distance_m,
+                ambient=device.ambient,
+                sigma=device.sigma,
+            )
+        case TouchWhisker():
+            model.whisker(name, device.root_m, device.tip_m)
+        case Energy():
+            model.battery(
+                name,
+                empty=device.empty_v,
+                full=device.full_v,
+                sigma=device.sigma_v,
+                idle_per_s=device.idle_per_s,
+                signal_per_s=device.signal_per_s,
+                charger_per_s=device.charger_per_s,
+            )
+        case _:
+            raise RobotError(f"device.{name} is no device of a robot without a board")
+
+
+# ---- the notes' default robot ----------------------------------------------------------------------------------------
+
+ARSIM: Final = robots.load_robot("arsim")
+ARSIM_BODY: Final = _body(ARSIM.body)
+"""Its body, for models with other drives and sensors."""
+
+
+def arsim(
+    *,
+    dt: float = STEP_S,
+    noise: bool = True,
+    ends_at_collision: bool = True,
+    infrared_rad: Sequence[float] | None = None,
+    rays: int | None = None,
+    odometer_sigma: float | None = None,
+    compass_sigma: float | None = None,
+) -> VehicleModel:
+    """The notes' default robot, by protocol/robots/arsim.toml (notes, sections 3.2.3, 3.2.4, Fig. 3.6, appendix A).
+
+    3 kg, two 12 V DC motors, IR sensors of three rays on the body's circle at +-0.7854 rad, odometer, compass.
+    Readings: infrared_left, infrared_right (infrared_0 ... where there are not two), odometer (x, y, heading), compass.
+
+    Args:
+        dt: s, of a step.
+        noise: False switches all of it off.
+        ends_at_collision: whether touching something ends a run, as in ARSim.
+        infrared_rad: other angles of the IR sensors, from straight ahead to the left.
+        rays: of each of them.
+        odometer_sigma: m, ARSim's noise of the odometer.
+        compass_sigma: rad, noise of the compass.
+
+    Raises:
+        RobotError: a number outside its range.
+    """
+    device = dict(ARSIM.device)
+    sensors = {name: kind for name, kind in device.items() if isinstance(kind, InfraredProximity)}
+    if infrared_rad is not None:
+        sensors = _turned(next(iter(sensors.values())), infrared_rad)
+    if rays is not None:
+        sensors = {name: msgspec.structs.replace(sensor, rays=rays) for name, sensor in sensors.items()}
+    if odometer_sigma is not None:
+        device["odometer"] = msgspec.structs.replace(device["odometer"], sigma_step_m=odometer_sigma)
+    if compass_sigma is not None:
+        device["compass"] = msgspec.structs.replace(device["compass"], sigma_rad=compass_sigma)
+    others = {name: kind for name, kind in device.items() if not isinstance(kind, InfraredProximity)}
+    robot = msgspec.structs.replace(ARSIM, device=sensors | others)
+    return vehicle_model(robot, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
+
+
+def _turned(sensor: Any, angles: Any) -> dict[str, Any]:
+    """That IR sensor at each of the angles, on the body's circle."""
+    try:
+        listed = None if isinstance(angles, str | bytes) else list(angles)
+    except TypeError:
+        listed = None
+    if listed is None:
+        raise RobotError(f"arsim: infrared_rad is {shown(angles)}; expected a list of angles (rad)")
+    turned = [number("arsim", f"infrared_rad[{index}]", angle, FINITE) for index, angle in enumerate(listed)]
+    names = SIDES if len(turned) == 2 else tuple(map(str, range(len(turned))))
+    radius = ARSIM.body.radius_m
+    return {
+        f"infrared_{name}": msgspec.structs.replace(
+            sensor, position_m=(radius * math.cos(angle), radius * math.sin(angle)), heading_rad=angle
+        )
+        for name, angle in zip(names, turned, strict=True)
+    }

@@ -1,0 +1,91 @@
+/* stages.c: the stages of one step of one world, see vehicle.h. */
+#include <math.h>
+
+#include "geometry/numbers.h"
+#include "sense.h"
+#include "vehicle.h"
+
+#define SERVO_PERIOD_S 0.020
+
+void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
+
+int vehicles_send(vehicles *self, size_t i, double left, double right) {
+  if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
+  self->worlds[i].state.signals[0] = number_limited(left, 1.0);
+  self->worlds[i].state.signals[1] = number_limited(right, 1.0);
+  return VEHICLE_OK;
+}
+
+/* Torques of both wheels for the next step. */
+static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
+  vehicle_state *s = &w->state;
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  if (m->drive == DRIVE_DC) {
+    for (int side = 0; side < 2; side++) {
+      const motor_dc_parameters *motor = &m->dc[side];
+      const double speed = rims[side] / m->body.wheel_radius;
+      out[side] = m->full ? motor_dc_step(motor, &s->currents[side], motor_dc_voltage(motor, s->signals[side]), speed,
+                                          w->hold, m->dt)
+                          : vehicle_dc_torque(motor, m->body.wheel_radius, s->signals[side], rims[side],
+                                              motor_dc_stopping(motor, w->hold));
+    }
+    return;
+  }
+  if (m->drive == DRIVE_REGULATED) {
+    for (int side = 0; side < 2; side++) {
+      const motor_regulated_parameters *motor = &m->regulated[side];
+      out[side] = motor_regulated(motor, motor_regulated_reference(motor, s->signals[side]), rims[side], 1.0);
+    }
+    return;
+  }
+  const int pulse = s->step >= s->next_pulse;
+  for (int side = 0; side < 2; side++) {
+    const servo_motor_parameters *servo = &m->servo[side];
+    if (pulse) servo_motor_pulse(servo, &s->servos[side], servo_motor_pulse_of(servo, s->signals[side]));
+    out[side] = servo_motor_torque(servo, &s->servos[side], rims[side], 1.0);
+  }
+  if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
+}
+
+static size_t index_of(const vehicle *w) { return (size_t)(w - w->all->worlds); }
+
+static void begin_step(void *owner, double out[2]) {
+  vehicle *w = owner;
+  vehicle_sense(w->all, index_of(w)); /* in a world of several nobody may have asked yet */
+  if (w->state.flag != VEHICLE_RUNS) (void)vehicles_send(w->all, index_of(w), 0.0, 0.0);
+  w->speed_before = w->body.state.speed;
+  torques(w->all->model, w, out);
+}
+
+void vehicle_moved(vehicle *self) {
+  self->state.acceleration = (self->body.state.speed - self->speed_before) / self->all->model->dt;
+  self->state.step++;
+}
+
+static void has_moved(void *owner) { vehicle_moved(owner); }
+
+static void end_step(void *owner) {
+  vehicle *w = owner;
+  (void)vehicles_check(w->all, index_of(w));
+  vehicle_sense(w->all, index_of(w));
+}
+
+const world_robot_operations VEHICLE_OPERATIONS = {.torques = begin_step, .moved = has_moved, .sense = end_step};
+
+void vehicles_move(vehicles *self, size_t i) { world_move(&self->worlds[i].own); }
+
+void vehicles_update_arena(vehicles *self, size_t i) { world_update(&self->worlds[i].own); }
+
+int vehicles_check(vehicles *self, size_t i) {
+  const vehicle_model *m = self->model;
+  vehicle_state *s = &self->worlds[i].state;
+  const body_state *b = &self->worlds[i].body.state;
+  const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].in->arena, b->x, b->y);
+  if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
+  if (m->ends_at_collision && self->worlds[i].body.state.touching) {
+    s->flag = VEHICLE_COLLIDED;
+  } else if (m->has_battery && s->energy <= 0.0) {
+    s->flag = VEHICLE_EXHAUSTED;
+  }
+  return s->flag;
+}

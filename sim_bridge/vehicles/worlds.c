@@ -1,0 +1,159 @@
+/* worlds.c: worlds are made, a vehicle is placed in each, and what can be asked of them; see vehicle.h. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sense.h"
+#include "vehicle.h"
+
+#define SPEED_LIMIT 100.0 /* m/s: as body_drive.h limits it */
+#define TURN_LIMIT 1000.0 /* rad/s */
+
+vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
+  if (state_size > SIZE_MAX - 15u) return NULL;
+  const size_t block = (state_size + 15u) & ~(size_t)15u; /* every brain's memory is aligned for any type */
+  vehicles *self = calloc(1, sizeof *self);
+  if (self == NULL) return NULL;
+  self->model = model;
+  self->count = count;
+  self->state_size = block;
+  self->worlds = calloc(count + 1, sizeof *self->worlds);
+  self->slots = calloc(count * model->sensors_count + 1, sizeof *self->slots);
+  self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
+  self->brains = calloc(count + 1, block + 1);
+  if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
+  vehicles_destroy(self);
+  return NULL;
+}
+
+/* Frees what a world has of its own. */
+static void leave(vehicle *w) {
+  free(w->own.movers);
+  laser_destroy(w->laser);
+  memset(w, 0, sizeof *w);
+}
+
+void vehicles_destroy(vehicles *self) {
+  if (self == NULL) return;
+  for (size_t i = 0; self->worlds != NULL && i < self->count; i++) leave(&self->worlds[i]);
+  free(self->worlds);
+  free(self->slots);
+  free(self->readings);
+  free(self->brains);
+  free(self);
+}
+
+int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
+                   double heading) {
+  const vehicle_model *m = self->model;
+  if (m->drive == DRIVE_NONE || i >= self->count) return VEHICLE_NOT_PLACED;
+  if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
+  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) <= BODY_HEADING_LIMIT))
+    return VEHICLE_BAD_NUMBER;
+  if (id == 0 || id >= SCENE_FIRST_MOVER) return VEHICLE_BAD_NUMBER;
+  vehicle *w = &self->worlds[i];
+  const size_t moving = arena_moving_count(where);
+  mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
+  if (moving > 0 && movers == NULL) return VEHICLE_NO_MEMORY;
+  world own;
+  world_init(&own, where, m->dt, movers);
+  body at;
+  body_init(&at, &m->body, m->reach);
+  if (!world_is_free(&own, x, y, at.body_reach, id)) {
+    free(movers);
+    return VEHICLE_NOT_FREE;
+  }
+  laser *eye = m->laser != NULL ? laser_new(&m->laser->as.laser) : NULL;
+  if (m->laser != NULL && eye == NULL) {
+    free(movers);
+    return VEHICLE_NO_MEMORY;
+  }
+  leave(w);
+  w->all = self;
+  w->own = own;
+  w->in = &w->own;
+  w->member = (world_robot){.body = &w->body, .op = &VEHICLE_OPERATIONS, .owner = w};
+  w->own.robots = &w->member;
+  w->own.count = 1;
+  w->laser = eye;
+  memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
+  memset(self->brains + i * self->state_size, 0, self->state_size);
+  w->state.seed = seed;
+  w->state.id = id;
+  w->state.energy = 1.0;
+  w->body = at;
+  w->body.id = id;
+  w->hold = body_wheel_hold(&w->body, m->dt);
+  body_place(&w->body, x, y, heading);
+  for (int side = 0; side < 2 && m->drive == DRIVE_SERVO; side++)
+    servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
+  vehicle_sensors_start(self, i);
+  vehicle_sense(self, i);
+  return VEHICLE_OK;
+}
+
+int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
+  if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
+  if (!(fabs(speed) < SPEED_LIMIT) || !(fabs(turn_rate) < TURN_LIMIT)) return VEHICLE_BAD_NUMBER;
+  body *b = &self->worlds[i].body;
+  b->state.speed = speed;
+  b->state.turn_rate = turn_rate;
+  b->state.lateral = 0.0;
+  b->state.rim_left = body_left_speed(b);
+  b->state.rim_right = body_right_speed(b);
+  b->state.slipping = 0;
+  return VEHICLE_OK;
+}
+
+/* ---- what can be asked -------------------------------------------------------------------------------------------- */
+
+double *vehicles_readings(vehicles *self) { return self->readings; }
+
+size_t vehicles_reading_count(const vehicles *self) { return self->model->readings; }
+
+void *vehicles_brain_state(vehicles *self, size_t i) { return self->brains + i * self->state_size; }
+
+void vehicles_poses(const vehicles *self, size_t first, size_t count, double *poses) {
+  for (size_t k = 0; k < count; k++) {
+    const body_state *b = &self->worlds[first + k].body.state;
+    poses[3 * k] = b->x;
+    poses[3 * k + 1] = b->y;
+    poses[3 * k + 2] = b->heading;
+  }
+}
+
+void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *flags) {
+  for (size_t k = 0; k < count; k++) flags[k] = (int8_t)self->worlds[first + k].state.flag;
+}
+
+const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
+
+const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
+  const world *own = &self->worlds[i].own;
+  *count = own->obstacles;
+  return own->movers;
+}
+
+uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
+
+double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
+
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  for (int side = 0; side < 2; side++) {
+    currents[side] = 0.0;
+    if (m->drive != DRIVE_DC) continue;
+    const motor_dc_parameters *motor = &m->dc[side];
+    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
+    currents[side] =
+        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
+  }
+}
+
+size_t vehicles_memory(const vehicles *self) {
+  const vehicle_model *m = self->model;
+  const size_t each = sizeof(vehicle) + m->sensors_count * sizeof(sensor_slot) + m->readings * sizeof(double);
+  return sizeof *self + self->count * (each + self->state_size);
+}

@@ -1,0 +1,106 @@
+"""Worlds in C (vehicles/vehicle.h) as `Vehicle` and `Batch` have them: made, placed, saved and restored."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from boebot import arguments
+from boebot.arenas import Arena
+from boebot.errors import ArenaError, RobotError
+from sim_bridge._core import ffi, lib
+
+if TYPE_CHECKING:
+    from sim_bridge.vehicles.model import VehicleModel
+
+STATE_BYTES: Final = 64  # of a compiled brain's memory, unless wished otherwise
+STATE_BYTES_MAXIMUM: Final = 2**24
+STEPS_MAXIMUM: Final = 2**52  # that a world counts
+
+
+def check_arena(who: str, arena: Any) -> None:
+    """Raises RobotError where it is of another type."""
+    if not isinstance(arena, Arena):
+        raise RobotError(f"{who}: the arena is {arguments.shown(arena)}; expected an Arena, such as load_arena gives")
+
+
+def make_worlds(who: str, model: VehicleModel, count: int, state_bytes: int) -> Any:
+    """`count` worlds of the model, not yet placed.
+
+    Raises:
+        RobotError: it is no model, or no room for that much of a brain's memory.
+        MemoryError: there is too little.
+    """
+    if not isinstance(getattr(model, "handle", None), ffi.CData):
+        raise RobotError(f"{who}: the model is {arguments.shown(model)}; expected a VehicleModel")
+    size = arguments.whole(f"{who}: state_bytes", state_bytes, RobotError, least=0, most=STATE_BYTES_MAXIMUM)
+    handle = lib.vehicles_new(model.handle, count, size)
+    if handle == ffi.NULL:
+        raise MemoryError(f"{who}: no memory for {count:,} worlds")
+    model.in_use = True
+    return ffi.gc(handle, lambda handle, model=model: lib.vehicles_destroy(handle))  # the model outlives them
+
+
+def kept(pointer: Any, handle: Any) -> Any:
+    """A pointer into the worlds that keeps them."""
+    return ffi.gc(pointer, lambda _, handle=handle: None)
+
+
+def place(
+    who: str, handle: Any, index: int, model: VehicleModel, arena: Arena, seed: Any, robot: Any, pose: Any
+) -> None:
+    """Puts the vehicle of world `index` at a pose (x, y, heading).
+
+    Raises:
+        ArenaError: that is no free space.
+        RobotError: what is given is no pose, seed or number of a robot, or the model has no drive or too long a step.
+    """
+    limit = float(lib.ARENA_FARTHEST_M)
+    x, y, heading = arguments.point(
+        f"{who}: the pose", pose, RobotError, "x, y (m), heading (rad)", (limit, limit, float(lib.BODY_HEADING_LIMIT))
+    )
+    number = arguments.whole(f"{who}: robot", robot, RobotError, least=1, most=2**31 - 1)
+    key = arguments.whole(f"{who}: the seed", seed, RobotError, least=-(2**63), most=2**64 - 1) % 2**64
+    status = lib.vehicles_place(handle, index, arena.handle, key, number, x, y, heading)
+    if status == lib.VEHICLE_NOT_FREE:
+        raise ArenaError(
+            f"{who}: in arena {arena.name} the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
+        )
+    if status == lib.VEHICLE_NOT_PLACED:
+        raise RobotError(f"{who}: the model has no drive; expected dc_motors, regulated_motors or servos")
+    if status == lib.VEHICLE_BAD_STEP:
+        raise RobotError(
+            f"{who}: the model's dt = {model.dt:g} s; expected less than {model.euler_limit:.4g} s, the Euler limit"
+        )
+    if status == lib.VEHICLE_NO_MEMORY:
+        raise MemoryError(f"{who}: no memory for the world's moving shapes or laser")
+    if status:
+        raise RobotError(f"{who}: cannot start at {pose}; expected a pose near the arena")
+
+
+def save(handle: Any, index: int) -> bytes:
+    """The state of one world."""
+    room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(handle, index))
+    lib.vehicles_save(handle, index, room)
+    return bytes(ffi.buffer(room))
+
+
+def restore(who: str, handle: Any, index: int, arena: Arena, state: Any) -> None:
+    """World `index` goes on from a saved state; what is refused changes nothing.
+
+    Raises:
+        RobotError: it is of another model, version, arena, size of the brain's memory, or damaged.
+    """
+    if not isinstance(state, (bytes, bytearray, memoryview)):
+        raise RobotError(f"{who}: {arguments.shown(state)} is no saved state; expected the bytes that save() gave")
+    given = bytes(state)
+    status = lib.vehicles_restore(handle, index, given, len(given))
+    if status == lib.VEHICLE_OTHER_MODEL:
+        raise RobotError(
+            f"{who}: the state was saved by another model; expected one whose body, drive and sensors are the same"
+        )
+    if status == lib.VEHICLE_OTHER_ARENA:
+        raise RobotError(f"{who}: the state was saved in another arena; expected one saved in this arena, {arena.name}")
+    if status == lib.VEHICLE_OTHER_MEMORY:
+        raise RobotError(f"{who}: the state has another size of a brain's memory; expected the same state_bytes")
+    if status:
+        raise RobotError(f"{who}: this is no saved state of this version, or damaged; expected what save() gave")

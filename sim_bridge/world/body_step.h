@@ -1,0 +1,22 @@
+/* body_step.h: bodies move for a step of time, alone, together in one world, or a row of worlds side by side. */
+#ifndef WORLD_BODY_STEP_H
+#define WORLD_BODY_STEP_H
+
+#include "body.h"
+
+/* One step of `dt` seconds of all robots of one world under their wheels' torques (left, right; N m; in the order of the
+ * bodies). `around`: the arena and its moving obstacles as they are at the step's beginning, without the robots. Moving
+ * obstacles push and are not pushed; one that would push a robot into something waits, and `waited` of it grows. Robots
+ * push each other. The result does not depend on the order of the bodies.
+ * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, BODY_BAD_TORQUE for one that is no finite
+ * number, and then nothing has moved. A body is saved and restored as a whole: its lists of near things belong to it. */
+int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
+
+/* The same for one robot. */
+int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
+
+/* The same for ROW robots of one model, each alone in a world of its own; torques are finite, dt as it has to be. */
+void body_advance_row(body *const bodies[], const scene around[], const double torques_left[],
+                      const double torques_right[], double dt);
+
+#endif
