@@ -6,6 +6,7 @@ that `boebot.arenas._arena` offers: arenas and rays are the same C in both.
 
 from __future__ import annotations
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -13,47 +14,9 @@ from types import SimpleNamespace
 
 from cffi import FFI
 
-HEADERS = [
-    "world/noise.h",
-    "world/noise_block.h",
-    "world/outline.h",
-    "world/body.h",
-    "world/body_step.h",
-    "world/motor_regulated.h",
-    "world/motor_dc.h",
-    "world/motor_position.h",
-    "world/servo_motor.h",
-    "world/supply.h",
-    "world/sensors/beam.h",
-    "world/sensors/infrared_proximity.h",
-    "world/sensors/infrared_pair.h",
-    "world/sensors/sharp_infrared.h",
-    "world/sensors/sonar.h",
-    "world/sensors/laser.h",
-    "world/sensors/compass.h",
-    "world/sensors/accelerometer.h",
-    "world/sensors/light.h",
-    "world/sensors/odometer.h",
-    "world/sensors/table_noise.h",
-    "world/sensors/unit.h",
-    "world/sensors/sample_hold.h",
-    "vehicles/model.h",
-    "vehicles/vehicle.h",
-    "vehicles/wander.h",
-    "parts/whisker.h",
-    "parts/compass.h",
-    "parts/encoder.h",
-    "parts/light_sensor.h",
-    "parts/battery.h",
-    "parts/brown_out.h",
-    "boards/script_board.h",
-    "boards/board_access.h",
-    "boards/native/native_board.h",
-    "parts/logs.h",
-    "loop/loop.h",
-]
 # What headers cannot say in a form that cffi reads.
 BEFORE = """
+typedef struct part_kind part_kind;
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """
@@ -78,20 +41,43 @@ SOURCES = [
     "boards/native/*.c",
     "loop/*.c",
 ]
+# What is declared here, or in boards/board_access.cdef.
+UNMARKED = ["world/body_step.h", "boards/board_access.h", "boards/native/native_board.h"]
 ROOM = Path("sim_bridge")
 LIBRARIES = [] if sys.platform in ("win32", "darwin") else ["-ldl"]
+
+
+def headers() -> list[str]:
+    """Headers of this room that Python may call, each after those that it includes."""
+    found: dict[str, None] = {}
+
+    def visit(path: Path) -> None:
+        text = path.read_text("utf-8")
+        for name in re.findall(r'^#include "(.*)"', text, re.MULTILINE):
+            for near in (path.parent / name, ROOM / name):
+                if near.exists():
+                    visit(near.resolve().relative_to(ROOM.resolve().parent))
+                    break
+        if "/* python: begin */" in text:
+            found[path.relative_to(ROOM).as_posix()] = None
+
+    for path in sorted(ROOM.rglob("*.h")):
+        if not {"avr", "native"} & set(path.parts) or path.name == "native_board.h":
+            visit(path)
+    return list(found)
 
 
 def builder() -> FFI:
     """The extension, with its sources named from the repository's root."""
     arena = SimpleNamespace(**runpy.run_path("host/boebot/arenas/build_arena.py"))
+    names = headers()
     built = FFI()
     built.include(arena.ffi)
     access = (ROOM / "boards/board_access.cdef").read_text("utf-8")
-    built.cdef("\n".join([access, BEFORE, *(arena.declarations(ROOM / name) for name in HEADERS), AFTER]))
+    built.cdef("\n".join([access, BEFORE, *(arena.declarations(ROOM / name) for name in names), AFTER]))
     built.set_source(
         "sim_bridge._core",
-        "\n".join(f'#include "{name}"' for name in HEADERS),
+        "\n".join(f'#include "{name}"' for name in [*names, *UNMARKED]),
         sources=[*arena.SOURCES, *sorted(path.as_posix() for pattern in SOURCES for path in ROOM.glob(pattern))],
         include_dirs=[ROOM.as_posix(), arena.HERE.as_posix(), "firmware/src"],
         extra_compile_args=arena.COMPILE,

@@ -13,7 +13,7 @@ import boebot
 from boebot.description.robots import load_robot
 from boebot.devices.device import Sensor, VehicleDevice, kinds
 from sim_bridge.robots import imperfections
-from sim_bridge.robots.switches import SWITCHES
+from sim_bridge.robots.switches import switches
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text()
@@ -40,6 +40,9 @@ def rows() -> list[Row]:
 KINDS = {kind.__name__: kind for kind in (Sensor, *kinds())}
 
 
+CONSTANTS = imperfections.parameters()
+
+
 def value(name: str) -> tuple[float, ...]:
     """Of a parameter in the code, as a tuple."""
     if name.startswith("supply."):
@@ -48,8 +51,8 @@ def value(name: str) -> tuple[float, ...]:
         struct, key = name.split(".")
         fields = {field.name: field.default for field in msgspec.structs.fields(KINDS[struct])}
         return (float(fields[key]),)
-    if hasattr(imperfections, name):
-        found = getattr(imperfections, name)
+    if name in CONSTANTS:
+        found = CONSTANTS[name]
         return found if isinstance(found, tuple) else (float(found),)
     (defined,) = re.findall(rf"^#define {name} ([\d.e-]+)", HEADERS, re.MULTILINE)
     return (float(defined),)
@@ -65,11 +68,7 @@ def test_row_says_what_the_code_has(names: tuple[str, ...], numbers: list[float]
 
 def test_every_parameter_has_one_row() -> None:
     named = [name for names, _, _ in ROWS for name in names]
-    constants = {
-        name
-        for name, held in vars(imperfections).items()
-        if name.isupper() and not name.startswith("_") and name != "RPM" and isinstance(held, float | int | tuple)
-    }
+    constants = CONSTANTS.keys() - {"RPM", "NO_PIN"}
     noisy = {
         f"{struct.__name__}.{field.name}"
         for struct in KINDS.values()
@@ -83,7 +82,7 @@ def test_every_parameter_has_one_row() -> None:
 @pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
 def test_row_names_its_switch(names: tuple[str, ...], numbers: list[float], off: str) -> None:
     """And the neutral value of what the switch sets, where that is not 0; no other switch sets anything of the row."""
-    pairs = [(name, switch.neutral) for name, switch in SWITCHES.items()]
+    pairs = [(name, switch.neutral) for name, switch in switches().items()]
     switched = {name: neutral[key] for name, neutral in pairs for key in names if key in neutral}
     if off in ("", "–"):
         assert not switched
@@ -94,12 +93,14 @@ def test_row_names_its_switch(names: tuple[str, ...], numbers: list[float], off:
 
 def test_everything_switched_has_a_row() -> None:
     named = {name for names, _, _ in ROWS for name in names}
-    assert {key for switch in SWITCHES.values() for key in switch.neutral} <= named
+    assert {key for switch in switches().values() for key in switch.neutral} <= named
 
 
 def test_a_robot_without_any_imperfection_drives() -> None:
     """Full speed is then that of the curve, 51.25 rpm tanh(200 / 78.5) of a wheel of 33.1 mm."""
-    result = boebot.run(lambda robot: robot.drive(1, 1), arena="empty", on="native", seconds=2, without=tuple(SWITCHES))
+    result = boebot.run(
+        lambda robot: robot.drive(1, 1), arena="empty", on="native", seconds=2, without=tuple(switches())
+    )
     speed = 51.25 * math.tanh(200 / 78.5) * 2 * math.pi / 60 * 0.0331
     assert result.true_pose is not None
     late = result.true_pose.x[-1] - result.true_pose.x[-101]

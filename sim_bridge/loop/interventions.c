@@ -2,6 +2,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "parts/ping.h"
+#include "parts/whisker.h"
 #include "state.h"
 
 static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }

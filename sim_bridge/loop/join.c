@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "parts/buzzer.h"
 #include "state.h"
 
 #define BITS_PER_BYTE 10u
@@ -77,10 +76,14 @@ static void insert(sim *self, robot *r) {
   self->world.count = (size_t)self->robot_count;
 }
 
-static part_place place_of(robot *r, uint32_t device) {
+static part_place place_of(robot *r, uint32_t kind, int index) {
   return (part_place){
       .chassis = &r->chassis,
-      .noise = {.seed = r->sim->seed, .robot = (uint32_t)r->number, .device = device, .on = r->sim->noise != 0},
+      .noise = {.seed = r->sim->seed,
+                .robot = (uint32_t)r->number,
+                .device = kind + (uint32_t)index,
+                .on = r->sim->noise != 0},
+      .index = index,
   };
 }
 
@@ -139,7 +142,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   robot *r = sim_new_robot(self, number, b);
   if (r == NULL) return SIM_NO_MEMORY;
   body_init(r->body, parameters, 0.0);
-  r->brown_out.noise = place_of(r, PART_BROWN_OUT).noise;
+  r->brown_out.noise = place_of(r, BROWN_OUT_NOISE, 0).noise;
   r->brown_out.parameters = (brown_out_parameters){
       .reset_v = SUPPLY_RESET_V, .hysteresis_v = 0.05, .erratic_v = SUPPLY_ERRATIC_V, .upsets_per_s = 2.0};
   b->sink = robot_on_edge;
@@ -152,11 +155,6 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
 /* ---- parts --------------------------------------------------------------------------------------------------------- */
 
 static int is_pin(uint8_t pin) { return pin < BOARD_PIN_COUNT; }
-
-static int is_side(int side) { return side == SIM_LEFT || side == SIM_RIGHT; }
-
-/* The place of one more part of a kind of which a robot may have several. */
-static part_place next_place(robot *r, uint32_t kind) { return place_of(r, kind + (uint32_t)r->parts_of_kind[kind]++); }
 
 /* Room for a part of that size in the robot's list, or NULL. */
 static void *new_part(robot *r, size_t size) {
@@ -192,163 +190,34 @@ static int join(robot *r, part *p) {
   return SIM_OK;
 }
 
-/* The same for a part whose `_init` may have found its parameters to be bad. */
-static int join_if(robot *r, part *p, int status) {
-  if (status == 0) return join(r, p);
+int sim_add_part(sim *self, int number, const part_kind *kind, int index, const uint8_t *pins, const void *parameters) {
+  robot *r = sim_robot_with_board(self, number);
+  if (r == NULL || index < 0 || !is_pin(pins[0])) return SIM_BAD_ARGUMENT;
+  for (int i = 1; i < kind->pins; i++) {
+    if (!is_pin(pins[i]) && pins[i] != PART_NO_PIN) return SIM_BAD_ARGUMENT;
+  }
+  part *p = new_part(r, kind->size);
+  if (p == NULL) return SIM_NO_MEMORY;
+  const part_place place = place_of(r, kind->noise, index);
+  if (kind->init(p, &place, pins, parameters) == 0) return join(r, p);
   free(p);
   return SIM_BAD_ARGUMENT;
-}
-
-int sim_add_servo(sim *self, int number, int side, uint8_t pin, const servo_motor_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin) || !is_side(side)) return SIM_BAD_ARGUMENT;
-  servo *s = new_part(r, sizeof *s);
-  if (s == NULL) return SIM_NO_MEMORY;
-  const part_place place = place_of(r, PART_SERVO_LEFT + (uint32_t)side);
-  servo_init(s, &place, pin, side, parameters, self->world.dt);
-  return join(r, &s->part);
-}
-
-int sim_add_encoder(sim *self, int number, int side, uint8_t pin_a, uint8_t pin_b,
-                    const encoder_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin_a) || !is_side(side) || parameters->edges_per_turn == 0) return SIM_BAD_ARGUMENT;
-  encoder *e = new_part(r, sizeof *e);
-  if (e == NULL) return SIM_NO_MEMORY;
-  const part_place place = place_of(r, PART_ENCODER_LEFT + (uint32_t)side);
-  encoder_init(e, &place, side, pin_a, pin_b, parameters);
-  return join(r, &e->part);
-}
-
-/* What touches on the body reaches as far as this point of its frame. */
-static void widen_reach(body *b, double x, double y) {
-  const double distance = sqrt(x * x + y * y);
-  if (distance > b->reach) b->reach = distance;
-  b->near.slack = -1.0; /* look around again */
-}
-
-int sim_add_whisker(sim *self, int number, uint8_t pin, const whisker_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
-  whisker *w = new_part(r, sizeof *w);
-  if (w == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_WHISKER);
-  whisker_init(w, &place, pin, parameters);
-  widen_reach(r->body, parameters->root_x, parameters->root_y);
-  widen_reach(r->body, parameters->tip_x, parameters->tip_y);
-  return join(r, &w->part);
-}
-
-int sim_add_infrared(sim *self, int number, uint8_t led_pin, uint8_t receiver_pin,
-                     const infrared_pair_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(led_pin) || !is_pin(receiver_pin)) return SIM_BAD_ARGUMENT;
-  infrared *i = new_part(r, sizeof *i);
-  if (i == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_INFRARED);
-  return join_if(r, &i->part, infrared_init(i, &place, led_pin, receiver_pin, parameters));
-}
-
-int sim_add_ping(sim *self, int number, uint8_t pin, const sonar_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
-  ping *p = new_part(r, sizeof *p);
-  if (p == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_PING);
-  return join_if(r, &p->part, ping_init(p, &place, pin, parameters));
 }
 
 int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parameters *parameters) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || (channel != PART_NO_PIN && channel >= BOARD_ANALOG_COUNT)) return SIM_BAD_ARGUMENT;
+  const part_place place = place_of(r, BATTERY_NOISE, 0);
   if (r->battery != NULL) { /* a fresh one */
-    const part_place place = place_of(r, PART_BATTERY);
     battery_init(r->battery, &place, channel, parameters);
     return SIM_OK;
   }
   battery *b = new_part(r, sizeof *b);
   if (b == NULL) return SIM_NO_MEMORY;
-  const part_place place = place_of(r, PART_BATTERY);
   battery_init(b, &place, channel, parameters);
   const int status = join(r, &b->part);
   if (status == SIM_OK) r->battery = b;
   return status;
-}
-
-static two_wire *bus_at(const robot *r, uint8_t sda_pin, uint8_t scl_pin) {
-  for (int i = 0; i < r->part_count; i++) {
-    two_wire *bus = two_wire_of(r->parts[i]);
-    if (bus != NULL && bus->sda_pin == sda_pin && bus->scl_pin == scl_pin) return bus;
-  }
-  return NULL;
-}
-
-/* The bus at those pins, a new one if need be; NULL without memory. */
-static two_wire *bus_of(robot *r, uint8_t sda_pin, uint8_t scl_pin) {
-  two_wire *bus = bus_at(r, sda_pin, scl_pin);
-  if (bus != NULL) return bus;
-  bus = new_part(r, sizeof *bus);
-  if (bus == NULL) return NULL;
-  const part_place place = next_place(r, PART_TWO_WIRE);
-  two_wire_init(bus, &place, sda_pin, scl_pin);
-  return join(r, &bus->part) == SIM_OK ? bus : NULL; /* the caller has checked that the pins are free */
-}
-
-int sim_add_compass(sim *self, int number, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(sda_pin) || !is_pin(scl_pin) || sda_pin == scl_pin) return SIM_BAD_ARGUMENT;
-  if (bus_at(r, sda_pin, scl_pin) == NULL && (r->hears[sda_pin] != NULL || r->hears[scl_pin] != NULL)) {
-    return SIM_PIN_TAKEN;
-  }
-  two_wire *bus = bus_of(r, sda_pin, scl_pin);
-  compass *c = bus == NULL ? NULL : new_part(r, sizeof *c);
-  if (c == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_COMPASS);
-  const int usable = compass_init(c, &place, parameters) == 0;
-  if (usable && two_wire_attach(bus, &c->device) != 0) { /* two of them have one address */
-    free(c);
-    return SIM_PIN_TAKEN;
-  }
-  return join_if(r, &c->part, usable ? 0 : -1);
-}
-
-int sim_add_analog_infrared(sim *self, int number, uint8_t channel, const sharp_infrared_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || channel >= BOARD_ANALOG_COUNT) return SIM_BAD_ARGUMENT;
-  analog_infrared *a = new_part(r, sizeof *a);
-  if (a == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_ANALOG_INFRARED);
-  return join_if(r, &a->part, analog_infrared_init(a, &place, channel, parameters));
-}
-
-int sim_add_light_sensor(sim *self, int number, uint8_t pin, const light_sensor_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
-  light_sensor *l = new_part(r, sizeof *l);
-  if (l == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_LIGHT_SENSOR);
-  return join_if(r, &l->part, light_sensor_init(l, &place, pin, parameters));
-}
-
-int sim_add_buzzer(sim *self, int number, uint8_t pin) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin)) return SIM_BAD_ARGUMENT;
-  buzzer *b = new_part(r, sizeof *b);
-  if (b == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_BUZZER);
-  buzzer_init(b, &place, pin);
-  return join(r, &b->part);
-}
-
-int sim_add_turret(sim *self, int number, uint8_t pin, double x, double y,
-                   const motor_position_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || !is_pin(pin) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
-  turret *t = new_part(r, sizeof *t);
-  if (t == NULL) return SIM_NO_MEMORY;
-  const part_place place = next_place(r, PART_TURRET);
-  turret_init(t, &place, pin, x, y, parameters);
-  return join(r, &t->part);
 }
 
 turret *robot_turret(const robot *self, uint8_t pin) {

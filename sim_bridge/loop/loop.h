@@ -17,18 +17,10 @@
 
 #include "boards/board.h"
 #include "geometry/arena.h"
-#include "parts/analog_infrared.h"
 #include "parts/battery.h"
 #include "parts/brown_out.h"
-#include "parts/compass.h"
-#include "parts/encoder.h"
-#include "parts/infrared.h"
-#include "parts/light_sensor.h"
 #include "parts/logs.h"
-#include "parts/ping.h"
-#include "parts/servo.h"
-#include "parts/turret.h"
-#include "parts/whisker.h"
+#include "parts/part.h"
 #include "vehicles/model.h"
 #include "world/body.h"
 
@@ -74,23 +66,15 @@ int sim_signals(sim *self, int robot, double left, double right);
 const double *sim_readings(sim *self, int robot, size_t *count);
 int sim_vehicle_flag(const sim *self, int robot);
 
-/* Each joins one device to pins of a robot's board. Return SIM_OK or an error. */
-int sim_add_servo(sim *self, int robot, int side, uint8_t pin, const servo_motor_parameters *parameters);
-int sim_add_encoder(sim *self, int robot, int side, uint8_t pin_a, uint8_t pin_b, const encoder_parameters *parameters);
-int sim_add_whisker(sim *self, int robot, uint8_t pin, const whisker_parameters *parameters);
-int sim_add_infrared(sim *self, int robot, uint8_t led_pin, uint8_t receiver_pin,
-                     const infrared_pair_parameters *parameters);
-int sim_add_ping(sim *self, int robot, uint8_t pin, const sonar_parameters *parameters);
-/* The HMC5883L on the two-wire bus of those pins; the bus comes with its first device. */
-int sim_add_compass(sim *self, int robot, uint8_t sda_pin, uint8_t scl_pin, const hmc5883l_parameters *parameters);
-int sim_add_analog_infrared(sim *self, int robot, uint8_t channel, const sharp_infrared_parameters *parameters);
-int sim_add_light_sensor(sim *self, int robot, uint8_t pin, const light_sensor_parameters *parameters);
-int sim_add_buzzer(sim *self, int robot, uint8_t pin);
-/* A position servo with its axis at (x, y) of the body's frame, m, and the sensor that it carries: the part that
- * drives `pin` of the board, or is measured there. The sensor's place and heading are those with the turret straight
- * ahead. */
-int sim_add_turret(sim *self, int robot, uint8_t pin, double x, double y, const motor_position_parameters *parameters);
+/* Joins a device to pins of a robot's board, as many as its kind has; `index` among those of its kind on the robot (of
+ * what has a side 0 left, 1 right), and `parameters` as its kind says. Returns SIM_OK or an error. */
+int sim_add_part(sim *self, int robot, const part_kind *kind, int index, const uint8_t *pins, const void *parameters);
+
+/* Puts a sensor on the turret at that pin: the part that drives `pin` of the board, or is measured there. The sensor's
+ * place and heading are those with the turret straight ahead. */
 int sim_mount(sim *self, int robot, uint8_t turret_pin, uint8_t pin);
+
+/* The pack that everything runs on, measured at an analog channel or at none (PART_NO_PIN). */
 int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
 
 /* Runs until a cycle, or until bytes have come from a robot that is listened to and its line has been idle for two byte

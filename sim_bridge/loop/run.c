@@ -1,4 +1,5 @@
 /* run.c: see loop.h. Here: the loop itself. */
+#include "parts/infrared.h"
 #include "state.h"
 
 #define CONTACT_GAP (BOARD_CLOCK_HZ / 10u) /* touches nearer in time are one contact */

@@ -6,7 +6,7 @@
 #define LOOP_STATE_H
 
 #include "loop.h"
-#include "parts/part.h"
+#include "parts/turret.h"
 #include "vehicles/vehicle.h"
 #include "world/world.h"
 
@@ -38,7 +38,6 @@ typedef struct {
   chassis chassis;
   part **parts;
   int part_count;
-  int parts_of_kind[PART_KINDS]; /* by kind (PART_WHISKER and so on), how many there are */
   part *hears[BOARD_PIN_COUNT];
   part *analog[BOARD_ANALOG_COUNT];
   brown_out brown_out;

@@ -1,8 +1,6 @@
 /* analog_infrared.c: see analog_infrared.h. */
 #include "analog_infrared.h"
 
-#include <string.h>
-
 static double volts(analog_infrared *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
   return sharp_infrared_read(&self->sensor, &self->state, &from, (double)cycle / BOARD_CLOCK_HZ, &self->part.noise);
@@ -23,11 +21,12 @@ static double analog(part *base, uint64_t cycle) {
 
 static const part_operations OPERATIONS = {.step = step, .analog = analog};
 
-int analog_infrared_init(analog_infrared *self, const part_place *place, uint8_t channel,
-                         const sharp_infrared_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  if (sharp_infrared_init(&self->sensor, parameters) != 0) return -1;
-  const uint8_t pin = (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel);
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_ANALOG}, 1);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  analog_infrared *self = (analog_infrared *)base;
+  if (pins[0] < BOARD_FIRST_ANALOG_PIN || sharp_infrared_init(&self->sensor, parameters) != 0) return -1;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_ANALOG}, 1);
   return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(analog_infrared), .noise = 66, .pins = 1, .init = init};
+const part_kind *const analog_infrared_kind = &KIND;

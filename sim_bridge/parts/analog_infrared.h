@@ -13,8 +13,9 @@ typedef struct {
   sharp_infrared_state state;
 } analog_infrared;
 
-/* Returns 0, or -1 for parameters that no sensor has. */
-int analog_infrared_init(analog_infrared *self, const part_place *place, uint8_t channel,
-                         const sharp_infrared_parameters *parameters);
+/* python: begin */
+/* Parameters: sharp_infrared_parameters. Pin: an analog one. */
+extern const part_kind *const analog_infrared_kind;
+/* python: end */
 
 #endif

@@ -23,6 +23,8 @@ typedef struct {
   supply supply;
 } battery;
 
+#define BATTERY_NOISE 51u /* key of its noise */
+
 /* A battery that is measured at analog channel 0..5, or at none (PART_NO_PIN). */
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters);
 

@@ -19,6 +19,8 @@ typedef struct {
 } brown_out_parameters;
 /* python: end */
 
+#define BROWN_OUT_NOISE 91u /* key of its noise */
+
 typedef struct {
   brown_out_parameters parameters;
   noise_source noise;

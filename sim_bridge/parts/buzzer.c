@@ -1,8 +1,6 @@
 /* buzzer.c: see buzzer.h. */
 #include "buzzer.h"
 
-#include <string.h>
-
 #define PERIOD_MAXIMUM (BOARD_CLOCK_HZ / 20u) /* below 20 Hz there are clicks, no tone */
 
 #define PERIODS_MINIMUM 2u /* one alone is the pause between two tones */
@@ -62,7 +60,11 @@ static void step(part *base) {
 
 static const part_operations OPERATIONS = {.edge = edge, .step = step};
 
-void buzzer_init(buzzer *self, const part_place *place, uint8_t pin) {
-  memset(self, 0, sizeof *self);
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS}, 1);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  (void)parameters;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
+  return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(buzzer), .noise = 86, .pins = 1, .init = init};
+const part_kind *const buzzer_kind = &KIND;

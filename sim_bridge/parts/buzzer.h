@@ -19,6 +19,9 @@ typedef struct {
   uint64_t period;     /* its first one, cycles */
 } buzzer;
 
-void buzzer_init(buzzer *self, const part_place *place, uint8_t pin);
+/* python: begin */
+/* Without parameters. Pin: the signal. */
+extern const part_kind *const buzzer_kind;
+/* python: end */
 
 #endif

@@ -37,13 +37,13 @@ static int16_t counts(const compass *self, double gauss) {
 /* The field at the end of the measurement, averaged over 1, 2, 4 or 8 samples. */
 static void measure(compass *self) {
   const hmc5883l_parameters *p = &self->parameters;
-  const viewpoint from = part_view(&self->part, self->done);
+  const viewpoint from = part_view(&self->bus.part, self->done);
   double x, y, sine, cosine;
-  compass_field(&p->field, &from, self->part.chassis->servos_a, &x, &y);
+  compass_field(&p->field, &from, self->bus.part.chassis->servos_a, &x, &y);
   number_sincos(p->field.bias, &sine, &cosine); /* a turned mounting turns the field */
   const double samples = 1 << (self->registers[CONFIGURATION_A] >> 5 & 3);
   const double sigma = p->field.sigma / sqrt(samples);
-  noise_source *noise = &self->part.noise;
+  noise_source *noise = &self->bus.part.noise;
   double gauss[3] = {
       p->horizontal_gauss * (x * cosine + y * sine + sigma * noise_next_normal(noise)),
       p->horizontal_gauss * (y * cosine - x * sine + sigma * noise_next_normal(noise)),
@@ -156,15 +156,17 @@ static uint8_t read(two_wire_device *device, uint64_t cycle) {
 }
 
 static const two_wire_operations CHIP = {.begin = begin, .write = write, .read = read};
-static const part_operations OPERATIONS = {.step = step};
+static const part_operations OPERATIONS = {.edge = two_wire_edge, .step = step};
 
-int compass_init(compass *self, const part_place *place, const hmc5883l_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  const double fields = parameters->horizontal_gauss + parameters->down_gauss;
-  if (compass_check(&parameters->field) != 0 || !isfinite(fields) || parameters->horizontal_gauss < 0.0) return -1;
-  part_join(&self->part, &OPERATIONS, place, NULL, 0);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  compass *self = (compass *)base;
+  const hmc5883l_parameters *p = parameters;
+  const double fields = p->horizontal_gauss + p->down_gauss;
+  if (compass_check(&p->field) != 0 || !isfinite(fields) || p->horizontal_gauss < 0.0) return -1;
+  if (two_wire_init(&self->bus, &OPERATIONS, place, pins) != 0) return -1;
   self->device = (two_wire_device){.op = &CHIP, .address = COMPASS_ADDRESS};
-  self->parameters = *parameters;
+  two_wire_attach(&self->bus, &self->device);
+  self->parameters = *p;
   self->registers[CONFIGURATION_A] = 0x10;
   self->registers[CONFIGURATION_B] = 0x20;
   self->registers[MODE] = MODE_SINGLE;
@@ -172,3 +174,6 @@ int compass_init(compass *self, const part_place *place, const hmc5883l_paramete
   self->done = NEVER;
   return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(compass), .noise = 61, .pins = 2, .init = init};
+const part_kind *const compass_kind = &KIND;

@@ -23,7 +23,7 @@ typedef struct {
 /* python: end */
 
 typedef struct {
-  part part; /* without pins: the bus has them */
+  two_wire bus; /* that it is on, by itself */
   two_wire_device device;
   hmc5883l_parameters parameters;
   uint8_t registers[13];
@@ -36,7 +36,9 @@ typedef struct {
   int ready;           /* there are data */
 } compass;
 
-/* Returns 0, or -1 for parameters that no compass has. */
-int compass_init(compass *self, const part_place *place, const hmc5883l_parameters *parameters);
+/* python: begin */
+/* Parameters: hmc5883l_parameters. Pins: SDA and SCL. */
+extern const part_kind *const compass_kind;
+/* python: end */
 
 #endif

@@ -1,8 +1,6 @@
 /* encoder.c: see encoder.h. */
 #include "encoder.h"
 
-#include <string.h>
-
 #include "geometry/numbers.h"
 
 static uint8_t level_a(const encoder *self, long long index) {
@@ -67,19 +65,23 @@ static void step(part *base) {
 
 static const part_operations OPERATIONS = {.step = step};
 
-void encoder_init(encoder *self, const part_place *place, int side, uint8_t pin_a, uint8_t pin_b,
-                  const encoder_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  const part_pin pins[] = {{pin_a, PART_DRIVES}, {pin_b, PART_DRIVES}};
-  part_join(&self->part, &OPERATIONS, place, pins, 2);
-  self->side = side;
-  self->pin_a = pin_a;
-  self->pin_b = pin_b;
-  self->parameters = *parameters;
-  self->edges_per_rad = (double)parameters->edges_per_turn / (2.0 * NUMBERS_PI);
-  self->phase = noise_next_uniform(&self->part.noise); /* 0.5 without noise */
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  encoder *self = (encoder *)base;
+  const encoder_parameters *p = parameters;
+  if (place->index > 1 || p->edges_per_turn == 0) return -1;
+  part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_DRIVES}, {pins[1], PART_DRIVES}}, 2);
+  self->side = place->index;
+  self->pin_a = pins[0];
+  self->pin_b = pins[1];
+  self->parameters = *p;
+  self->edges_per_rad = (double)p->edges_per_turn / (2.0 * NUMBERS_PI);
+  self->phase = noise_next_uniform(&base->noise); /* 0.5 without noise */
   self->position = wheel_angle(self) * self->edges_per_rad + self->phase;
   self->index = number_floor(self->position);
-  part_drive(&self->part, 0, pin_a, level_a(self, self->index));
-  part_drive(&self->part, 0, pin_b, level_b(self->index));
+  part_drive(base, 0, self->pin_a, level_a(self, self->index));
+  part_drive(base, 0, self->pin_b, level_b(self->index));
+  return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(encoder), .noise = 11, .pins = 2, .init = init};
+const part_kind *const encoder_kind = &KIND;

@@ -34,8 +34,9 @@ typedef struct {
   long long index; /* its whole part */
 } encoder;
 
-/* An encoder at the wheel of `side` (0 left, 1 right); its pins get their levels for the wheel's angle now. */
-void encoder_init(encoder *self, const part_place *place, int side, uint8_t pin_a, uint8_t pin_b,
-                  const encoder_parameters *parameters);
+/* python: begin */
+/* At a wheel; parameters: encoder_parameters. Pins: channels A and B, or PART_NO_PIN. */
+extern const part_kind *const encoder_kind;
+/* python: end */
 
 #endif

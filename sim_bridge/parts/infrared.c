@@ -1,8 +1,6 @@
 /* infrared.c: see infrared.h. */
 #include "infrared.h"
 
-#include <string.h>
-
 #define PERIOD_MINIMUM 360u /* 44.4 kHz */
 #define PERIOD_MAXIMUM 480u /* 33.3 kHz */
 #define GAP 800u            /* longer: a new train */
@@ -104,14 +102,16 @@ void infrared_see_burst(infrared *self, const infrared_burst *burst, const infra
   drive_output(self, light.from);
 }
 
-int infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
-                  const infrared_pair_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  if (infrared_pair_init(&self->pair, parameters) != 0) return -1;
-  const part_pin pins[] = {{led_pin, PART_HEARS}, {receiver_pin, PART_DRIVES | PART_PULLED_UP}};
-  part_join(&self->part, &OPERATIONS, place, pins, 2);
-  self->receiver_pin = receiver_pin;
-  self->mount = parameters->beam;
-  part_drive(&self->part, 0, receiver_pin, BOARD_HIGH);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  infrared *self = (infrared *)base;
+  const infrared_pair_parameters *p = parameters;
+  if (pins[1] == PART_NO_PIN || infrared_pair_init(&self->pair, p) != 0) return -1;
+  part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_HEARS}, {pins[1], PART_DRIVES | PART_PULLED_UP}}, 2);
+  self->receiver_pin = pins[1];
+  self->mount = p->beam;
+  part_drive(base, 0, pins[1], BOARD_HIGH);
   return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(infrared), .noise = 31, .pins = 2, .init = init};
+const part_kind *const infrared_kind = &KIND;

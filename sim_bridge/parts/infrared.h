@@ -39,9 +39,10 @@ typedef struct {
   uint64_t sent_from, sent_until; /* the same cycle: nothing */
 } infrared;
 
-/* Returns 0, or -1 for parameters that no pair has. */
-int infrared_init(infrared *self, const part_place *place, uint8_t led_pin, uint8_t receiver_pin,
-                  const infrared_pair_parameters *parameters);
+/* python: begin */
+/* Parameters: infrared_pair_parameters. Pins: LED and receiver. */
+extern const part_kind *const infrared_kind;
+/* python: end */
 
 /* The pair that this part is, or NULL. */
 infrared *infrared_of(part *base);

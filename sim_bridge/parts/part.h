@@ -23,26 +23,6 @@
 #define PART_NO_PIN 255u
 #define PART_PINS 2 /* at most, of one part */
 
-/* Who a part is among the keys of the noise; where a robot may have several of a kind, and on. */
-enum {
-  PART_SERVO_LEFT = 1,
-  PART_SERVO_RIGHT = 2,
-  PART_ENCODER_LEFT = 11,
-  PART_ENCODER_RIGHT = 12,
-  PART_WHISKER = 21,
-  PART_INFRARED = 31,
-  PART_PING = 41,
-  PART_BATTERY = 51,
-  PART_COMPASS = 61,
-  PART_ANALOG_INFRARED = 66,
-  PART_LIGHT_SENSOR = 71,
-  PART_TURRET = 76,
-  PART_TWO_WIRE = 81,
-  PART_BUZZER = 86,
-  PART_BROWN_OUT = 91,
-  PART_KINDS = 100 /* more than all of them */
-};
-
 /* What a part does with a pin of its own. */
 enum {
   PART_HEARS = 1,     /* `edge` is called for what the board does to it */
@@ -125,7 +105,17 @@ struct part {
 typedef struct {
   chassis *chassis;
   noise_source noise;
+  int index; /* among those of its kind on the robot; of what has a side 0 left, 1 right */
 } part_place;
+
+/* A kind of part, as the loop makes one. */
+typedef struct part_kind {
+  size_t size;    /* of its struct */
+  uint32_t noise; /* key of the first one's noise; of the others it is higher by their index */
+  int pins;       /* how many it has */
+  /* Makes it at those pins, with parameters of its own type. Returns 0, or -1: there is no such part. */
+  int (*init)(part *self, const part_place *place, const uint8_t *pins, const void *parameters);
+} part_kind;
 
 /* Joins a new part to its pins: the first `count` of `pins`. */
 void part_join(part *self, const part_operations *op, const part_place *place, const part_pin *pins, int count);

@@ -1,8 +1,6 @@
 /* ping.c: see ping.h. */
 #include "ping.h"
 
-#include <string.h>
-
 #define CYCLES_PER_US (BOARD_CLOCK_HZ / 1000000u)
 #define TRIGGER_CYCLES (2u * CYCLES_PER_US)
 #define TRIGGER_MAXIMUM (1000u * CYCLES_PER_US)
@@ -52,12 +50,16 @@ static const part_operations OPERATIONS = {.edge = edge};
 
 ping *ping_of(part *base) { return base->op == &OPERATIONS ? (ping *)base : NULL; }
 
-int ping_init(ping *self, const part_place *place, uint8_t pin, const sonar_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  if (sonar_init(&self->sonar, parameters) != 0) return -1;
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
-  self->mount = parameters->beam;
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  ping *self = (ping *)base;
+  const sonar_parameters *p = parameters;
+  if (sonar_init(&self->sonar, p) != 0) return -1;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS | PART_DRIVES}, 1);
+  self->mount = p->beam;
   self->answer = PING_ANSWER_WORLD;
   self->distance = -1.0;
   return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(ping), .noise = 41, .pins = 1, .init = init};
+const part_kind *const ping_kind = &KIND;

@@ -24,8 +24,10 @@ typedef struct {
   uint32_t pings;
 } ping;
 
-/* Returns 0, or -1 for parameters that no sonar has. */
-int ping_init(ping *self, const part_place *place, uint8_t pin, const sonar_parameters *parameters);
+/* python: begin */
+/* Parameters: sonar_parameters. Pin: the signal. */
+extern const part_kind *const ping_kind;
+/* python: end */
 
 /* The Ping that this part is, or NULL. */
 ping *ping_of(part *base);

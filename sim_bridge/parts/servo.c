@@ -1,8 +1,6 @@
 /* servo.c: see servo.h. */
 #include "servo.h"
 
-#include <string.h>
-
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   servo *self = (servo *)base;
   (void)pin;
@@ -27,11 +25,15 @@ static void before_step(part *base) {
 
 static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step};
 
-void servo_init(servo *self, const part_place *place, uint8_t pin, int side, const servo_motor_parameters *parameters,
-                double dt) {
-  memset(self, 0, sizeof *self);
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS}, 1);
-  self->side = side;
-  self->parameters = *parameters;
-  servo_motor_init(parameters, &self->motor, dt);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  servo *self = (servo *)base;
+  if (place->index > 1) return -1;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
+  self->side = place->index;
+  self->parameters = *(const servo_motor_parameters *)parameters;
+  servo_motor_init(&self->parameters, &self->motor, (double)place->chassis->step_cycles / BOARD_CLOCK_HZ);
+  return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(servo), .noise = 1, .pins = 1, .init = init};
+const part_kind *const servo_kind = &KIND;

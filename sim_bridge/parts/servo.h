@@ -18,8 +18,9 @@ typedef struct {
   uint32_t pulses; /* since power-on */
 } servo;
 
-/* A servo that turns the wheel of `side` (0 left, 1 right); `dt`: the world's step, s. */
-void servo_init(servo *self, const part_place *place, uint8_t pin, int side, const servo_motor_parameters *parameters,
-                double dt);
+/* python: begin */
+/* Turns a wheel; parameters: servo_motor_parameters. Pin: the signal. */
+extern const part_kind *const servo_kind;
+/* python: end */
 
 #endif

@@ -1,7 +1,7 @@
 /* turret.c: see turret.h. */
 #include "turret.h"
 
-#include <string.h>
+#include <math.h>
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   turret *self = (turret *)base;
@@ -29,11 +29,16 @@ static const part_operations OPERATIONS = {.edge = edge, .step = step};
 
 turret *turret_of(part *base) { return base->op == &OPERATIONS ? (turret *)base : NULL; }
 
-void turret_init(turret *self, const part_place *place, uint8_t pin, double x, double y,
-                 const motor_position_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS}, 1);
-  self->parameters = *parameters;
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  turret *self = (turret *)base;
+  const turret_parameters *p = parameters;
+  if (!isfinite(p->x + p->y)) return -1;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
+  self->parameters = p->motor;
   motor_position_init(&self->motor, 0.0);
-  self->carried = (part_turret){.x = x, .y = y};
+  self->carried = (part_turret){.x = p->x, .y = p->y};
+  return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(turret), .noise = 76, .pins = 1, .init = init};
+const part_kind *const turret_kind = &KIND;

@@ -18,9 +18,15 @@ typedef struct {
   uint64_t rise;
 } turret;
 
-/* A turret whose axis stands at (x, y) of the body's frame, m; it looks straight ahead. */
-void turret_init(turret *self, const part_place *place, uint8_t pin, double x, double y,
-                 const motor_position_parameters *parameters);
+/* python: begin */
+typedef struct {
+  double x, y; /* of its axis, in the body's frame, m */
+  motor_position_parameters motor;
+} turret_parameters;
+
+/* It looks straight ahead at first. Parameters: turret_parameters. Pin: the signal. */
+extern const part_kind *const turret_kind;
+/* python: end */
 
 /* The turret that this part is, or NULL. */
 turret *turret_of(part *base);

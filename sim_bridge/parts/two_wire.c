@@ -1,8 +1,6 @@
 /* two_wire.c: see two_wire.h. */
 #include "two_wire.h"
 
-#include <string.h>
-
 static void pull(two_wire *self, int low, uint64_t cycle) {
   if (self->pulling == low) return;
   self->pulling = (uint8_t)low;
@@ -68,7 +66,7 @@ static void begin_or_end(two_wire *self, uint64_t cycle) {
   pull(self, 0, cycle);
 }
 
-static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   two_wire *self = (two_wire *)base;
   const uint8_t high = level != BOARD_LOW;
   uint8_t *line = pin == self->sda_pin ? &self->sda : &self->scl;
@@ -83,24 +81,20 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-static const part_operations OPERATIONS = {.edge = edge};
-
-two_wire *two_wire_of(part *base) { return base->op == &OPERATIONS ? (two_wire *)base : NULL; }
-
 int two_wire_attach(two_wire *self, two_wire_device *device) {
   if (self->count == TWO_WIRE_DEVICES || find(self, device->address) != NULL) return -1;
   self->devices[self->count++] = device;
   return 0;
 }
 
-void two_wire_init(two_wire *self, const part_place *place, uint8_t sda_pin, uint8_t scl_pin) {
-  memset(self, 0, sizeof *self);
+int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins) {
   const uint8_t role = PART_HEARS | PART_DRIVES | PART_PULLED_UP;
-  const part_pin pins[] = {{sda_pin, role}, {scl_pin, role}};
-  part_join(&self->part, &OPERATIONS, place, pins, 2);
-  self->sda_pin = sda_pin;
-  self->scl_pin = scl_pin;
+  if (pins[0] == pins[1] || pins[1] == PART_NO_PIN) return -1;
+  part_join(&self->part, op, place, (part_pin[]){{pins[0], role}, {pins[1], role}}, 2);
+  self->sda_pin = pins[0];
+  self->scl_pin = pins[1];
   self->sda = self->scl = 1;
-  part_drive(&self->part, 0, sda_pin, BOARD_HIGH);
-  part_drive(&self->part, 0, scl_pin, BOARD_HIGH);
+  part_drive(&self->part, 0, self->sda_pin, BOARD_HIGH);
+  part_drive(&self->part, 0, self->scl_pin, BOARD_HIGH);
+  return 0;
 }

@@ -44,10 +44,9 @@ typedef struct {
   uint8_t shift;
 } two_wire;
 
-void two_wire_init(two_wire *self, const part_place *place, uint8_t sda_pin, uint8_t scl_pin);
-
-/* The bus that this part is, or NULL. */
-two_wire *two_wire_of(part *base);
+/* A part that begins with a bus, whose `edge` is two_wire_edge; pins: SDA, SCL. Returns 0, or -1: no such pins. */
+int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins);
+void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level);
 
 /* Returns 0, or -1 if the bus is full or the address taken. */
 int two_wire_attach(two_wire *self, two_wire_device *device);

@@ -1,8 +1,6 @@
 /* whisker.c: see whisker.h. */
 #include "whisker.h"
 
-#include <string.h>
-
 #include "geometry/numbers.h"
 
 #define BOUNCES_MAXIMUM 4
@@ -45,10 +43,16 @@ whisker *whisker_of(part *base) { return base->op == &OPERATIONS ? (whisker *)ba
 
 void whisker_hold(whisker *self, int held) { self->held = held; }
 
-void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters) {
-  memset(self, 0, sizeof *self);
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_DRIVES | PART_PULLED_UP}, 1);
-  self->parameters = *parameters;
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  whisker *self = (whisker *)base;
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_DRIVES | PART_PULLED_UP}, 1);
+  self->parameters = *(const whisker_parameters *)parameters;
   self->held = -1;
-  part_drive(&self->part, 0, pin, BOARD_HIGH);
+  body_widen_reach(place->chassis->body, self->parameters.root_x, self->parameters.root_y);
+  body_widen_reach(place->chassis->body, self->parameters.tip_x, self->parameters.tip_y);
+  part_drive(base, 0, pins[0], BOARD_HIGH);
+  return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(whisker), .noise = 21, .pins = 1, .init = init};
+const part_kind *const whisker_kind = &KIND;

@@ -29,6 +29,9 @@ void whisker_hold(whisker *self, int held);
 /* The whisker that this part is, or NULL. */
 whisker *whisker_of(part *base);
 
-void whisker_init(whisker *self, const part_place *place, uint8_t pin, const whisker_parameters *parameters);
+/* python: begin */
+/* Parameters: whisker_parameters. Pin: the switch. */
+extern const part_kind *const whisker_kind;
+/* python: end */
 
 #endif

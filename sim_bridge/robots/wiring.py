@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from boebot.description import robots
-from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.battery import BatteryDivider
-from boebot.devices.buzzer import PiezoBuzzer
-from boebot.devices.compass import MagneticCompass
-from boebot.devices.device import Device, pin_number
-from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
-from boebot.devices.infrared import InfraredPair
-from boebot.devices.light import LightSensor
+from boebot.devices.device import pin_number
 from boebot.devices.ping import PingSensor
-from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
-from boebot.devices.whisker import WhiskerSwitch
 from boebot.errors import BoardError
 from sim_bridge._core import lib
+from sim_bridge.devices.battery import battery_parameters
+from sim_bridge.devices.catalogue import At, Part, part_of
 from sim_bridge.robots import imperfections
 
 NO_PIN = 255
@@ -35,10 +30,15 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
         MemoryError: there is none.
     """
     _join_supply(handle, number, description, draw)
+    counts: Counter[type] = Counter()
     for name, device in description.device.items():
-        if device.on:
-            _join_drive(handle, number, name, device, description.body, draw)
-            _join_sensor(handle, number, name, device, draw)
+        if not device.on:
+            continue
+        side = int(name.endswith("right"))
+        part = part_of(device, At(side, counts[type(device)], description.body, draw))
+        counts[type(device)] += 1
+        if part is not None:
+            done(add_part(handle, number, part), f"device {name!r}")
     for device in description.device.values():
         if isinstance(device, PositionServo) and device.on:
             _mount(handle, number, device, description)
@@ -46,6 +46,13 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
         if device.on and not device.plugged:
             for pin in device.pins().values():
                 done(lib.sim_unplug(handle, number, pin, 1), f"device {name!r}")
+
+
+def add_part(handle: Any, number: int, part: Part) -> int:
+    """Joins a part to robot `number` of a simulation; a status of loop.h."""
+    pins = [pin if pin == NO_PIN else pin_number(pin) for pin in part.pins]
+    status: int = lib.sim_add_part(handle, number, getattr(lib, part.kind), part.number, pins, part.parameters)
+    return status
 
 
 def done(status: int, what: str) -> None:
@@ -66,72 +73,21 @@ def done(status: int, what: str) -> None:
     raise BoardError(f"{what} cannot be joined to the simulation: {why.get(status, 'a value is out of its range')}")
 
 
-def _pin(pin: int | str) -> int:
-    return pin_number(pin)
-
-
 def _join_supply(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
     """The pack, and where the board measures it."""
     if description.supply is None:
         return
     gauges = [d for d in description.device.values() if isinstance(d, BatteryDivider) and d.on]
-    channel = _pin(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
+    channel = pin_number(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
     ratio = gauges[0].ratio if gauges else 2.0
-    battery = imperfections.battery_parameters(description.supply, ratio, draw)
+    battery = battery_parameters(description.supply, ratio, draw)
     done(lib.sim_add_battery(handle, number, channel, battery), "the battery")
-
-
-def _side(name: str) -> int:
-    return int(lib.SIM_RIGHT if name.endswith("right") else lib.SIM_LEFT)
-
-
-def _join_drive(
-    handle: Any, number: int, name: str, device: Device, body: robots.Body, draw: imperfections.Draw
-) -> None:
-    side, what = _side(name), f"device {name!r}"
-    match device:
-        case ContinuousServo():
-            servo = imperfections.servo_parameters(device, body, side, draw)
-            done(lib.sim_add_servo(handle, number, side, _pin(device.pin), servo), what)
-        case SingleEncoder():
-            encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
-            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin), NO_PIN, encoder), what)
-        case QuadratureEncoder():
-            encoder = imperfections.encoder_parameters(device.edges_per_turn, draw)
-            done(lib.sim_add_encoder(handle, number, side, _pin(device.pin_a), _pin(device.pin_b), encoder), what)
-        case PositionServo():
-            x, y = device.position_m
-            turret = imperfections.turret_parameters(device, draw)
-            done(lib.sim_add_turret(handle, number, _pin(device.pin), x, y, turret), what)
-        case PiezoBuzzer():
-            done(lib.sim_add_buzzer(handle, number, _pin(device.pin)), what)
-
-
-def _join_sensor(handle: Any, number: int, name: str, device: Device, draw: imperfections.Draw) -> None:
-    what = f"device {name!r}"
-    match device:
-        case WhiskerSwitch():
-            whisker = imperfections.whisker_parameters(device, draw)
-            done(lib.sim_add_whisker(handle, number, _pin(device.pin), whisker), what)
-        case InfraredPair():
-            pair = imperfections.infrared_parameters(device, draw)
-            done(lib.sim_add_infrared(handle, number, _pin(device.led_pin), _pin(device.receiver_pin), pair), what)
-        case PingSensor():
-            ping = imperfections.ping_parameters(device, draw)
-            done(lib.sim_add_ping(handle, number, _pin(device.pin), ping), what)
-        case SharpSensor():
-            sharp = imperfections.analog_infrared_parameters(device, draw)
-            done(lib.sim_add_analog_infrared(handle, number, _pin(device.pin) - FIRST_ANALOG_PIN, sharp), what)
-        case LightSensor():
-            light = imperfections.light_parameters(device, _side(name), draw)
-            done(lib.sim_add_light_sensor(handle, number, _pin(device.pin), light), what)
-        case MagneticCompass():
-            compass = imperfections.compass_parameters(draw)
-            done(lib.sim_add_compass(handle, number, _pin(device.sda_pin), _pin(device.scl_pin), compass), what)
 
 
 def _mount(handle: Any, number: int, turret: PositionServo, description: robots.RobotDescription) -> None:
     """The Ping sits on the turret where there are both."""
     for device in description.device.values():
         if isinstance(device, PingSensor) and device.on:
-            done(lib.sim_mount(handle, number, _pin(turret.pin), _pin(device.pin)), "the Ping on the turret")
+            done(
+                lib.sim_mount(handle, number, pin_number(turret.pin), pin_number(device.pin)), "the Ping on the turret"
+            )

@@ -19,7 +19,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins
-from sim_bridge.robots.switches import SWITCHES
+from sim_bridge.robots.switches import switches
 from sim_bridge.sessions.opening import Wait, alone, new_sim, truth_of
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sessions.without_board import DirectSession, add_vehicle
@@ -140,7 +140,7 @@ class BoardKind:
     def __init__(self, name: str, find: Callable[[str], Path], make: Callable[[Path], EmulatedBoard]) -> None:
         """`find`: the bundled firmware for a pin map; `make`: a board with some firmware."""
         self.name = name
-        self.switches = {name: switch.what for name, switch in SWITCHES.items()}
+        self.switches = {name: switch.what for name, switch in switches().items()}
         self._find, self._make = find, make
 
     def __call__(self, request: BoardRequest) -> SimSession:

@@ -17,7 +17,11 @@ from boebot.errors import RobotError
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from sim_bridge._core import ffi
-from sim_bridge.robots import imperfections
+from sim_bridge.devices import analog_infrared as analog_infrared_model
+from sim_bridge.devices import compass as compass_model
+from sim_bridge.devices import light as light_model
+from sim_bridge.devices import servo as servo_model
+from sim_bridge.devices import turret as turret_model
 from sim_bridge.robots.imperfections import Draw
 
 SHIELDBOT = robots.load_robot("shieldbot")
@@ -32,11 +36,11 @@ def parts(draw: Draw) -> list[bytes]:
     assert isinstance(servo, ContinuousServo) and isinstance(turret, PositionServo)
     assert isinstance(light, LightSensor) and isinstance(SHARP, SharpSensor)
     made: list[Any] = [
-        imperfections.servo_parameters(servo, SHIELDBOT.body, 0, draw),
-        imperfections.analog_infrared_parameters(SHARP, draw),
-        imperfections.light_parameters(light, 1, draw),
-        imperfections.compass_parameters(draw),
-        imperfections.turret_parameters(turret, draw),
+        servo_model.servo_parameters(servo, SHIELDBOT.body, 0, draw),
+        analog_infrared_model.analog_infrared_parameters(SHARP, draw),
+        light_model.light_parameters(light, 1, draw),
+        compass_model.compass_parameters(draw),
+        turret_model.turret_parameters(turret, draw),
     ]
     return [bytes(ffi.buffer(each)) for each in made]
 

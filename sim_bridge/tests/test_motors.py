@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
+from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body
 
@@ -145,7 +146,7 @@ class Servo:
     def __init__(self, dt: float = 0.001, **changes: float) -> None:
         robot = load_robot("shieldbot")
         device: Any = robot.device["servo_left"]
-        self.p = imperfections.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
+        self.p = servo_model.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
         for name, value in changes.items():
             setattr(self.p, name, value)
         self.state = ffi.new("servo_motor *")

@@ -20,6 +20,8 @@ from boebot.devices.servo import ContinuousServo
 from boebot.errors import BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.devices import battery as battery_model
+from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, square
 
@@ -36,7 +38,7 @@ def servo(**changes: float) -> Any:
     robot = load_robot("shieldbot")
     device = robot.device["servo_left"]
     assert isinstance(device, ContinuousServo)
-    parameters = imperfections.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
+    parameters = servo_model.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
     for key, value in changes.items():
         setattr(parameters, key, value)
     return parameters
@@ -142,11 +144,11 @@ def test_units_differ_by_seed_and_keep_their_nature() -> None:
 
     def unit(seed: int, side: int) -> float:
         draw = imperfections.Draw(seed, noise=True)
-        return float(imperfections.servo_parameters(device, robot.body, side, draw).top_ccw_rad_s)
+        return float(servo_model.servo_parameters(device, robot.body, side, draw).top_ccw_rad_s)
 
     assert unit(1, 0) == unit(1, 0)
     assert len({unit(seed, side) for seed in range(5) for side in (0, 1)}) == 10
-    spread = np.std([unit(seed, 0) for seed in range(400)]) / (imperfections.SERVO_TOP_RPM * RPM)
+    spread = np.std([unit(seed, 0) for seed in range(400)]) / (servo_model.SERVO_TOP_RPM * RPM)
     assert spread == pytest.approx(math.hypot(0.025, 0.015), rel=0.15)
 
 
@@ -215,7 +217,7 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
 
 def bouncing(monkeypatch: pytest.MonkeyPatch, *, noise: bool) -> list[tuple[int, int]]:
     """A turning wheel's edges, at each of which the sensor goes back and forth up to three times."""
-    monkeypatch.setattr(imperfections, "ENCODER_BOUNCES", 3)
+    monkeypatch.setitem(imperfections.parameters(), "ENCODER_BOUNCES", 3)
     robot = scripted(noise=noise, without=("servo_spread", "servo_centre"))
     robot.pulses(2.0, {LEFT: 1600, RIGHT: 1400})
     robot.run(2.0)
@@ -505,7 +507,7 @@ def test_voltage_at_the_analog_pin() -> None:
 
 
 def test_charge_runs_out() -> None:
-    parameters = imperfections.battery_parameters(SUPPLY)
+    parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     robot = scripted()
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
@@ -518,7 +520,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     robot = scripted()
     supply = 128  # BOARD_ANALOG_SUPPLY
     assert lib.script_board_volts(robot.script, supply) == 5.0
-    parameters = imperfections.battery_parameters(SUPPLY)
+    parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)

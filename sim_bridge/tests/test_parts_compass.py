@@ -10,9 +10,12 @@ from typing import Any
 
 import pytest
 
+from boebot.devices.device import pin_name
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_board
+from sim_bridge.devices.catalogue import Part
+from sim_bridge.robots.wiring import add_part
 from sim_bridge.sim import Sim
 from sim_bridge.tests.avr_program import assemble
 from sim_bridge.tests.simulated import MS, Scripted, arena_of, scripted, square
@@ -32,7 +35,7 @@ class Master:
 
     def __init__(self, heading: float = 0.0, noise: bool = False, **field: float) -> None:
         self.robot: Scripted = scripted(pose=(0, 0, heading), noise=noise)
-        assert lib.sim_add_compass(self.robot.sim.handle, 0, SDA, SCL, parameters(**field)) == 0
+        assert add_part(self.robot.sim.handle, 0, Part("compass_kind", 0, ["A4", "A5"], parameters(**field))) == 0
         self.at = 1 * MS
 
     def wait(self, seconds: float) -> None:
@@ -265,11 +268,16 @@ def test_self_test_adds_its_bias() -> None:
 def test_one_address_is_for_one_chip() -> None:
     robot = scripted()
     handle = robot.sim.handle
-    assert lib.sim_add_compass(handle, 0, SDA, SCL, parameters()) == 0
-    assert lib.sim_add_compass(handle, 0, SDA, SCL, parameters()) == lib.SIM_PIN_TAKEN
-    assert lib.sim_add_compass(handle, 0, SDA, SDA, parameters()) == lib.SIM_BAD_ARGUMENT
-    assert lib.sim_add_compass(handle, 0, 20, SCL, parameters()) == lib.SIM_BAD_ARGUMENT
-    assert lib.sim_add_compass(handle, 0, 16, 17, parameters(sigma=-1.0)) == lib.SIM_BAD_ARGUMENT
+
+    def add(sda: int, scl: int, **field: float) -> int:
+        pins = [pin_name(sda) if sda > 13 else sda, pin_name(scl) if scl > 13 else scl]
+        return add_part(handle, 0, Part("compass_kind", 0, pins, parameters(**field)))
+
+    assert add(SDA, SCL) == 0
+    assert add(SDA, SCL) == lib.SIM_PIN_TAKEN
+    assert add(SDA, SDA) == lib.SIM_BAD_ARGUMENT
+    assert add(16, 17, sigma=-1.0) == lib.SIM_BAD_ARGUMENT
+    assert lib.sim_add_part(handle, 0, lib.compass_kind, 0, [20, SCL], parameters()) == lib.SIM_BAD_ARGUMENT
 
 
 PROGRAM = """
@@ -312,7 +320,7 @@ def test_the_chip_of_the_emulated_board_reads_it(heading: float) -> None:
 
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)
     robot = sim.add(board, load_robot("shieldbot"), pose=(0, 0, heading))
-    assert lib.sim_add_compass(sim.handle, 0, SDA, SCL, parameters()) == 0
+    assert add_part(sim.handle, 0, Part("compass_kind", 0, ["A4", "A5"], parameters())) == 0
     sim.run(round(0.02 * CLOCK_HZ))
     from sim_bridge.pins import BoardPins
 

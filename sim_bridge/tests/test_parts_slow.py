@@ -14,7 +14,12 @@ from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.light import LightSensor
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.devices import analog_infrared as analog_infrared_model
+from sim_bridge.devices import encoder as encoder_model
+from sim_bridge.devices import light as light_model
+from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots import imperfections
+from sim_bridge.robots.wiring import add_part
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
@@ -29,11 +34,11 @@ ON, OFF = imperfections.Draw(1, noise=True), imperfections.Draw(1, noise=False)
 
 def lit(arena: Arena, heading: float = 0.0, **changes: float) -> Scripted:
     """A robot with one phototransistor at its middle that looks straight ahead."""
-    parameters = imperfections.light_parameters(LIGHT_SENSOR, 0, OFF)
+    parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
     for name, value in changes.items():
         setattr(parameters.light if hasattr(parameters.light, name) else parameters, name, value)
     robot = scripted(arena, pose=(0, 0, heading))
-    assert lib.sim_add_light_sensor(robot.sim.handle, 0, LIGHT, parameters) == 0
+    assert add_part(robot.sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == 0
     return robot
 
 
@@ -99,9 +104,9 @@ def test_charging_again_takes_back_the_decay() -> None:
 
 def test_bad_light_parameters_are_refused() -> None:
     for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
-        parameters = imperfections.light_parameters(LIGHT_SENSOR, 0, OFF)
+        parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
         setattr(parameters, name, value)
-        assert lib.sim_add_light_sensor(scripted().sim.handle, 0, LIGHT, parameters) == lib.SIM_BAD_ARGUMENT
+        assert add_part(scripted().sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == lib.SIM_BAD_ARGUMENT
 
 
 # ---- analog infrared -------------------------------------------------------------------------------------
@@ -111,9 +116,8 @@ def sharp_before(distance: float, draw: imperfections.Draw = OFF) -> Scripted:
     """A robot that looks at a wall from that distance."""
     x = 0.06 + distance
     robot = scripted(arena_of([(x, -3), (x + 0.1, -3), (x + 0.1, 3), (x, 3)]), pose=(0, 0, 0))
-    assert (
-        lib.sim_add_analog_infrared(robot.sim.handle, 0, 2, imperfections.analog_infrared_parameters(SHARP, draw)) == 0
-    )
+    parameters = analog_infrared_model.analog_infrared_parameters(SHARP, draw)
+    assert add_part(robot.sim.handle, 0, Part("analog_infrared_kind", 0, ["A2"], parameters)) == 0
     return robot
 
 
@@ -158,9 +162,9 @@ def test_a_new_value_every_38_ms_whoever_asks_and_7_6_ms_late() -> None:
 def with_turret(arena: Arena, width_us: float, seconds: float = 1.0) -> Scripted:
     """A robot whose Ping sits on a turret at (0.045, 0); pulses of that width, then a ping."""
     robot = scripted(arena, pose=(0, 0, 0))
-    parameters = ffi.new("motor_position_parameters *")
-    lib.motor_position_default(parameters)
-    assert lib.sim_add_turret(robot.sim.handle, 0, TURRET, 0.045, 0.0, parameters) == 0
+    parameters = ffi.new("turret_parameters *", {"x": 0.045})
+    lib.motor_position_default(ffi.addressof(parameters.motor))
+    assert add_part(robot.sim.handle, 0, Part("turret_kind", 0, [TURRET], parameters)) == 0
     assert lib.sim_mount(robot.sim.handle, 0, TURRET, PING) == 0
     robot.pulses(seconds, {TURRET: width_us})
     robot.run(seconds)
@@ -228,7 +232,7 @@ def sound(robot: Scripted, start: float, frequency: float, seconds: float) -> No
 
 def buzzing() -> Scripted:
     robot = scripted()
-    assert lib.sim_add_buzzer(robot.sim.handle, 0, BUZZER) == 0
+    assert add_part(robot.sim.handle, 0, Part("buzzer_kind", 0, [BUZZER], ffi.NULL)) == 0
     return robot
 
 
@@ -288,9 +292,9 @@ def test_log_of_tones_does_not_depend_on_cuts() -> None:
 def turning(missed: float, extra: float, noise: bool = True) -> tuple[int, int]:
     """Edges that the left encoder shows in 20 s at full speed, and those that the wheel's angle has."""
     robot = scripted(noise=noise)
-    parameters = imperfections.encoder_parameters(64)
+    parameters = encoder_model.encoder_parameters(64)
     parameters.missed, parameters.extra = missed, extra
-    assert lib.sim_add_encoder(robot.sim.handle, 0, 0, 2, 255, parameters) == 0
+    assert add_part(robot.sim.handle, 0, Part("encoder_kind", 0, [2, 255], parameters)) == 0
     robot.pulses(20.0, {13: 1700, 12: 1300})
     robot.run(20.0)
     levels = [level for _, level in robot.inputs(2)]

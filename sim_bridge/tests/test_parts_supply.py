@@ -13,8 +13,8 @@ from boebot.errors import BoardError, RobotError
 from sim_bridge._core import lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_board, native_board, native_library
+from sim_bridge.devices import battery as battery_model
 from sim_bridge.pins import BoardPins
-from sim_bridge.robots import imperfections
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.avr_program import assemble
 from sim_bridge.tests.simulated import MS, SUPPLY, Scripted, arena_of, scripted
@@ -135,7 +135,7 @@ def charged(x: float) -> Scripted:
     assert lib.arena_set_charger(arena.handle, 1.0, 0.0, 0.2) == 0
     lib.arena_build(arena.handle)
     robot = scripted(arena, pose=(x, 0, 0))
-    parameters = imperfections.battery_parameters(SUPPLY)
+    parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 10.0
     parameters.supply.charger_a = 0.5
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
+from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.bodies import BOE_BOT, Body
 
@@ -112,7 +113,7 @@ def test_classic_robot_sags_as_measured() -> None:
     p, s = supply(**CLASSIC)
     robot = load_robot("shieldbot")
     device: Any = robot.device["servo_left"]
-    servo = imperfections.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
+    servo = servo_model.servo_parameters(device, robot.body, 0, imperfections.Draw(1, noise=False))
     motors = [ffi.new("servo_motor *"), ffi.new("servo_motor *")]
     for motor in motors:
         lib.servo_motor_init(servo, motor, 0.001)

@@ -34,9 +34,15 @@ from boebot.errors import BoardError, BoebotError
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge._core import lib
+from sim_bridge.devices import analog_infrared as analog_infrared_model
+from sim_bridge.devices import battery as battery_model
+from sim_bridge.devices import compass as compass_model
+from sim_bridge.devices import light as light_model
+from sim_bridge.devices import servo as servo_model
+from sim_bridge.devices import turret as turret_model
 from sim_bridge.robots import imperfections as parts
 from sim_bridge.robots.imperfections import Draw
-from sim_bridge.robots.switches import SWITCHES
+from sim_bridge.robots.switches import switches
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square
 from sim_bridge.vehicle import Vehicle
@@ -57,7 +63,7 @@ def drawn(seed: int, *without: str) -> Draw:
 def servo(seed: int, *without: str) -> Any:
     device = SHIELDBOT.device["servo_left"]
     assert isinstance(device, ContinuousServo)
-    return parts.servo_parameters(device, SHIELDBOT.body, 0, drawn(seed, *without))
+    return servo_model.servo_parameters(device, SHIELDBOT.body, 0, drawn(seed, *without))
 
 
 # ---- what is drawn of a unit: (switch, figures of the part, ideal values) -------------------------------------------
@@ -66,23 +72,23 @@ def servo(seed: int, *without: str) -> Any:
 def sharp(draw: Draw) -> Any:
     device = BOEBOT.device["analog_infrared"]
     assert isinstance(device, SharpSensor)
-    return parts.analog_infrared_parameters(device, draw)
+    return analog_infrared_model.analog_infrared_parameters(device, draw)
 
 
 def light(draw: Draw) -> Any:
     device = SHIELDBOT.device["light_left"]
     assert isinstance(device, LightSensor)
-    return parts.light_parameters(device, 0, draw).light
+    return light_model.light_parameters(device, 0, draw).light
 
 
 def turret(draw: Draw) -> Any:
     device = SHIELDBOT.device["turret"]
     assert isinstance(device, PositionServo)
-    return parts.turret_parameters(device, draw).centre_us
+    return turret_model.turret_parameters(device, draw).motor.centre_us
 
 
 def field(draw: Draw) -> Any:
-    return parts.compass_parameters(draw).field
+    return compass_model.compass_parameters(draw).field
 
 
 def body(draw: Draw) -> Any:
@@ -177,8 +183,8 @@ def test_without_slip_ice_is_like_any_floor() -> None:
 
 
 def test_encoders_see_each_edge_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "ENCODER_MISSED", 0.2)
-    monkeypatch.setattr(parts, "ENCODER_EXTRA", 0.2)
+    monkeypatch.setitem(parts.parameters(), "ENCODER_MISSED", 0.2)
+    monkeypatch.setitem(parts.parameters(), "ENCODER_EXTRA", 0.2)
     device = SHIELDBOT.device["encoder_left"]
     assert isinstance(device, SingleEncoder)
     pin = pin_number(device.pin)
@@ -218,8 +224,8 @@ def infrared_sees(distance: float, seed: int, *without: str) -> bool:
 
 
 def test_infrared_range_is_sharp(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "INFRARED_SPREAD", 0.3)
-    monkeypatch.setattr(parts, "INFRARED_FALSE_HIT", 0.3)
+    monkeypatch.setitem(parts.parameters(), "INFRARED_SPREAD", 0.3)
+    monkeypatch.setitem(parts.parameters(), "INFRARED_FALSE_HIT", 0.3)
     near = {infrared_sees(0.195, seed, "infrared_noise") for seed in SEEDS}
     far = {infrared_sees(0.205, seed, "infrared_noise") for seed in SEEDS}
     assert (near, far) == ({True}, {False})
@@ -256,7 +262,7 @@ def echo_us(arena: Arena, seed: int, *without: str) -> float:
 
 def test_echoes_are_exact_and_heard(monkeypatch: pytest.MonkeyPatch) -> None:
     """t = 2 d / c with c = 343.5 m/s at 20 degrees Celsius; 18.5 ms where none is heard."""
-    monkeypatch.setattr(parts, "PING_MISS", 0.5)
+    monkeypatch.setitem(parts.parameters(), "PING_MISS", 0.5)
     wall = arena_of([(1.06, -3), (1.2, -3), (1.2, 3), (1.06, 3)])
     exact = pytest.approx(2 / 343.5 * 1e6, abs=0.1)
     assert all(echo_us(wall, seed, "ping_noise", "ping_misses") == exact for seed in SEEDS)
@@ -309,7 +315,7 @@ def test_supply_is_ideal() -> None:
 def test_battery_is_measured_exactly() -> None:
     def noise_v(*without: str) -> float:
         assert SHIELDBOT.supply is not None
-        return float(parts.battery_parameters(SHIELDBOT.supply, 2.0, drawn(1, *without)).noise_v)
+        return float(battery_model.battery_parameters(SHIELDBOT.supply, 2.0, drawn(1, *without)).noise_v)
 
     assert noise_v("battery_noise") == 0.0 < noise_v()
 
@@ -403,16 +409,16 @@ class Both:
 
 def test_every_switch_changes_something_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of constants: the part with the switch off is the part of a module in which they are neutral."""
-    monkeypatch.setattr(parts, "ENCODER_BOUNCES", 1)  # none, unless somebody says so
-    constants = {key for switch in SWITCHES.values() for key in switch.neutral if "." not in key}
-    for name, switch in SWITCHES.items():
+    monkeypatch.setitem(parts.parameters(), "ENCODER_BOUNCES", 1)  # none, unless somebody says so
+    constants = {key for switch in switches().values() for key in switch.neutral if "." not in key}
+    for name, switch in switches().items():
         draw = drawn(1, name)
         assert switch.neutral
         for key in constants:
-            expected = switch.neutral.get(key, getattr(parts, key))
+            expected = switch.neutral.get(key, parts.parameters()[key])
             assert draw[key] == expected, (name, key)
         for key in switch.neutral.keys() & constants:
-            assert draw[key] != getattr(parts, key), (name, key)
+            assert draw[key] != parts.parameters()[key], (name, key)
 
 
 def bend(result: RunResult) -> float:
@@ -454,5 +460,5 @@ def test_a_real_robot_keeps_its_own() -> None:
 
 
 def test_the_host_knows_the_names() -> None:
-    assert imperfections() == {name: switch.what for name, switch in SWITCHES.items()}
-    assert all(len(name) <= 20 and len(switch.what) <= 80 for name, switch in SWITCHES.items())
+    assert imperfections() == {name: switch.what for name, switch in switches().items()}
+    assert all(len(name) <= 20 and len(switch.what) <= 80 for name, switch in switches().items())

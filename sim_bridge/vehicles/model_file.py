@@ -1,7 +1,7 @@
 """Models of vehicles from robots' files: what `boebot run --robot arsim` drives, and what scripts drive by themselves.
 
 protocol/robots/arsim.toml is the one source of the notes' default robot; `arsim()` builds it. Keys and defaults of the
-devices are those of boebot.devices.vehicle_devices.
+devices are those in boebot/devices.
 """
 
 from __future__ import annotations
@@ -15,22 +15,15 @@ import msgspec
 
 from boebot.arguments import shown
 from boebot.description import robots
-from boebot.devices.accelerometer import Accelerometer
-from boebot.devices.battery import Energy
-from boebot.devices.compass import HeadingCompass
-from boebot.devices.device import Device
 from boebot.devices.infrared import InfraredProximity
-from boebot.devices.laser import Laser
-from boebot.devices.light import Phototransistor
 from boebot.devices.motor import DcMotor, Motor, RegulatedMotor
-from boebot.devices.odometer import Odometer
-from boebot.devices.ping import Sonar
-from boebot.devices.whisker import TouchWhisker
 from boebot.errors import RobotError
+from sim_bridge.devices.catalogue import add_to
+from sim_bridge.devices.motor import dc_parameters, regulated_parameters
 from sim_bridge.robots import imperfections
 from sim_bridge.robots.switches import idealised
 from sim_bridge.vehicles.checked_structs import FINITE, number
-from sim_bridge.vehicles.model import SIDES, VehicleModel, beam
+from sim_bridge.vehicles.model import SIDES, VehicleModel
 
 STEP_S: Final = 0.01  # notes, section 3.2.6
 
@@ -65,8 +58,8 @@ def vehicle_model(
     model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
     _drive(model, described)
     for name, device in described.device.items():
-        if device.on and not isinstance(device, Motor):
-            _add(model, name, device)
+        if device.on and not isinstance(device, Motor) and not add_to(model, name, device):
+            raise RobotError(f"device.{name} is no device of a robot without a board")
     return model
 
 
@@ -94,127 +87,13 @@ def _body(body: robots.Body) -> dict[str, Any]:
 def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
     match tuple(robot.device[f"motor_{side}"] for side in SIDES):
         case (DcMotor() as left, DcMotor() as right):
-            model.dc_motors(_dc(left), _dc(right), full=left.full or right.full)
+            model.dc_motors(dc_parameters(left), dc_parameters(right), full=left.full or right.full)
         case (RegulatedMotor() as left, RegulatedMotor() as right):
             most = robot.body.wheel_speed_maximum_m_s
-            model.regulated_motors(_regulated(left, most), _regulated(right, most))
+            model.regulated_motors(regulated_parameters(left, most), regulated_parameters(right, most))
         case motors:
             kinds = [motor.__struct_config__.tag for motor in motors]
             raise RobotError(f"robot {robot.name!r}: motors of types {kinds}; expected two of one type")
-
-
-def _dc(motor: DcMotor) -> dict[str, float]:
-    return {
-        "torque_constant": motor.torque_constant_n_m_a,
-        "emf_constant": motor.emf_constant_v_s,
-        "resistance_ohm": motor.resistance_ohm,
-        "inductance_h": motor.inductance_h if motor.full else 0.0,
-        "coulomb_n_m": motor.coulomb_friction_n_m,
-        "viscous_n_m_s": motor.viscous_friction_n_m_s,
-        "gear": motor.gear,
-        "efficiency": motor.efficiency,
-        "torque_maximum_n_m": motor.torque_maximum_n_m,
-        "voltage_maximum": motor.voltage_maximum_v,
-    }
-
-
-def _regulated(motor: RegulatedMotor, most: float) -> dict[str, float]:
-    return {
-        "gain_n_s": motor.gain_n_s,
-        "torque_maximum_n_m": motor.torque_maximum_n_m,
-        "speed_maximum_m_s": most,
-    }
-
-
-def _look(device: InfraredProximity | Sonar) -> dict[str, float]:
-    return beam(*device.position_m, device.heading_rad, device.beam_rad, device.rays, device.height_m)
-
-
-def _add(model: VehicleModel, name: str, device: Device) -> None:
-    """Adds a sensor or a battery."""
-    match device:
-        case InfraredProximity():
-            model.infrared_proximity(
-                name,
-                period=device.period_s,
-                beam=_look(device),
-                range=device.range_m,
-                c1=device.c1_m2,
-                c2=device.c2,
-                sigma=device.sigma,
-            )
-        case Sonar():
-            model.sonar(
-                name,
-                period=device.period_s,
-                beam=_look(device),
-                range_minimum=device.range_min_m,
-                range_maximum=device.range_max_m,
-                sigma=device.sigma,
-                miss=device.miss,
-            )
-        case Laser():
-            x, y = device.position_m
-            model.laser(
-                name,
-                period=device.period_s,
-                x=x,
-                y=y,
-                heading=device.heading_rad,
-                height=device.height_m,
-                first=-device.step_rad * (device.rays - 1) / 2,
-                step=device.step_rad,
-                rays=device.rays,
-                range=device.range_m,
-                sigma=device.sigma,
-            )
-        case Odometer():
-            model.odometer(
-                name,
-                sigma_step=device.sigma_step_m,
-                factor_left=device.factor_left,
-                factor_right=device.factor_right,
-            )
-        case HeadingCompass():
-            model.compass(name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
-        case Accelerometer():
-            model.accelerometer(
-                name,
-                period=device.period_s,
-                mass=device.proof_mass_kg,
-                stiffness=device.stiffness_n_m,
-                damping=device.damping_n_s_m,
-                range=device.range_m_s2,
-                sigma=device.sigma_m_s2,
-                bias=device.bias_m_s2,
-            )
-        case Phototransistor():
-            x, y = device.position_m
-            model.light(
-                name,
-                period=device.period_s,
-                x=x,
-                y=y,
-                heading=device.heading_rad,
-                height=device.height_m,
-                near_distance=device.near_distance_m,
-                ambient=device.ambient,
-                sigma=device.sigma,
-            )
-        case TouchWhisker():
-            model.whisker(name, device.root_m, device.tip_m)
-        case Energy():
-            model.battery(
-                name,
-                empty=device.empty_v,
-                full=device.full_v,
-                sigma=device.sigma_v,
-                idle_per_s=device.idle_per_s,
-                signal_per_s=device.signal_per_s,
-                charger_per_s=device.charger_per_s,
-            )
-        case _:
-            raise RobotError(f"device.{name} is no device of a robot without a board")
 
 
 # ---- the notes' default robot ----------------------------------------------------------------------------------------

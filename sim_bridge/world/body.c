@@ -103,3 +103,9 @@ double body_wheel_hold(const body *self, double dt) {
   const double turning = 0.5 * self->inertia / (p->half_track * p->half_track) + self->spin;
   return (straight < turning ? straight : turning) * p->wheel_radius * p->wheel_radius / dt;
 }
+
+void body_widen_reach(body *self, double x, double y) {
+  const double distance = sqrt(x * x + y * y);
+  if (distance > self->reach) self->reach = distance;
+  self->near.slack = -1.0; /* look around again */
+}

@@ -107,6 +107,9 @@ static inline double body_reach_of(const body_parameters *p) {
 void body_init(body *self, const body_parameters *parameters, double reach);
 
 /* Puts the body at a pose, at rest; wheel angles and distance stay. */
+/* What touches on the body reaches as far as this point of its frame. */
+void body_widen_reach(body *self, double x, double y);
+
 void body_place(body *self, double x, double y, double heading);
 
 /* How others see it. Reflectances are 1. */

@@ -1,11 +1,11 @@
-/* light_sensor.h: a phototransistor that discharges a capacitor: one pin charges it and times its decay.
+/* light.h: a phototransistor that discharges a capacitor: one pin charges it and times its decay.
  *
  * The board raises the pin: the capacitor charges through a resistor. The board lets go: the current of the
  * phototransistor (world/sensors/light), in proportion to the light, takes the charge away, and the pin reads low once
  * the voltage is below the input's threshold. The more light, the shorter. What was not charged in full decays sooner.
  */
-#ifndef PART_LIGHT_SENSOR_H
-#define PART_LIGHT_SENSOR_H
+#ifndef PART_LIGHT_H
+#define PART_LIGHT_H
 
 #include "../world/sensors/light.h"
 #include "part.h"
@@ -31,8 +31,9 @@ typedef struct {
   double irradiance;  /* at the last reading */
 } light_sensor;
 
-/* Returns 0, or -1 for bad parameters. */
-int light_sensor_init(light_sensor *self, const part_place *place, uint8_t pin,
-                      const light_sensor_parameters *parameters);
+/* python: begin */
+/* Parameters: light_sensor_parameters. Pin: the capacitor. */
+extern const part_kind *const light_kind;
+/* python: end */
 
 #endif

@@ -1,8 +1,7 @@
-/* light_sensor.c: see light_sensor.h. */
-#include "light_sensor.h"
+/* light.c: see light.h. */
+#include "light.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "geometry/numbers.h"
 
@@ -62,14 +61,16 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
 
 static const part_operations OPERATIONS = {.edge = edge};
 
-int light_sensor_init(light_sensor *self, const part_place *place, uint8_t pin,
-                      const light_sensor_parameters *parameters) {
-  memset(self, 0, sizeof *self);
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  light_sensor *self = (light_sensor *)base;
   const light_sensor_parameters *p = parameters;
   if (phototransistor_init(&self->phototransistor, &p->light) != 0) return -1;
   if (!(p->decay_s > 0.0 && p->maximum_s >= p->decay_s && isfinite(p->maximum_s) && p->charge_s >= 0.0)) return -1;
   if (!(p->threshold_v > 0.0 && p->threshold_v < BOARD_NOMINAL_VOLTS)) return -1;
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
+  part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS | PART_DRIVES}, 1);
   self->parameters = *p;
   return 0;
 }
+
+static const part_kind KIND = {.size = sizeof(light_sensor), .noise = 71, .pins = 1, .init = init};
+const part_kind *const light_kind = &KIND;

@@ -1,0 +1,28 @@
+"""The accelerometer of a robot without a board (Fig. 1.10)."""
+
+from __future__ import annotations
+
+from boebot.devices.accelerometer import Accelerometer
+from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.vehicles.model import VehicleModel
+
+SWITCHES = {
+    "accelerometer_errors": off(
+        "the accelerometer has no noise and no bias", "Accelerometer.sigma_m_s2", "Accelerometer.bias_m_s2"
+    ),
+}
+
+
+@modelled(Accelerometer)
+def accelerometer(device: Accelerometer, name: str, model: VehicleModel) -> None:
+    """A proof mass on a spring."""
+    model.accelerometer(
+        name,
+        period=device.period_s,
+        mass=device.proof_mass_kg,
+        stiffness=device.stiffness_n_m,
+        damping=device.damping_n_s_m,
+        range=device.range_m_s2,
+        sigma=device.sigma_m_s2,
+        bias=device.bias_m_s2,
+    )

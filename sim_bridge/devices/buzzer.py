@@ -1,0 +1,13 @@
+"""The buzzer: its tones are logged."""
+
+from __future__ import annotations
+
+from boebot.devices.buzzer import PiezoBuzzer
+from sim_bridge._core import ffi
+from sim_bridge.devices.catalogue import At, Part, joined
+
+
+@joined(PiezoBuzzer)
+def part(device: PiezoBuzzer, at: At) -> Part:
+    """Its tones."""
+    return Part("buzzer_kind", at.number, [device.pin], ffi.NULL)

@@ -1,0 +1,63 @@
+"""Infra-red sensors: pairs of LED and receiver at pins, and the notes' proximity sensor (3.9) to (3.14)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from boebot.devices.infrared import InfraredPair, InfraredProximity
+from sim_bridge._core import ffi
+from sim_bridge.devices.beam import beam_of
+from sim_bridge.devices.catalogue import At, Part, joined, modelled, off
+from sim_bridge.robots.imperfections import AS_BUILT, Draw
+from sim_bridge.vehicles.model import VehicleModel
+
+INFRARED_RAYS = 5
+INFRARED_HEIGHT_M = 0.06
+INFRARED_DIRECT_M = 2.0  # from where another robot's LED lights the receiver (chosen)
+INFRARED_SPREAD = 0.03  # of the range from burst to burst (chosen)
+INFRARED_FALSE_HIT = 0.001  # per burst (chosen)
+
+SWITCHES = {
+    "infrared_noise": off(
+        "infra-red sensors tell the same each time, and never falsely",
+        "INFRARED_SPREAD",
+        "INFRARED_FALSE_HIT",
+        "InfraredProximity.sigma",
+    ),
+    "cross_talk": off("an infra-red receiver sees its own LED only", "INFRARED_DIRECT_M"),
+}
+
+
+@joined(InfraredPair)
+def part(device: InfraredPair, at: At) -> Part:
+    """LED and receiver."""
+    pins = [device.led_pin, device.receiver_pin]
+    return Part("infrared_kind", at.number, pins, infrared_parameters(device, at.draw))
+
+
+@modelled(InfraredProximity)
+def proximity(device: InfraredProximity, name: str, model: VehicleModel) -> None:
+    """A reading from 0 to 1."""
+    model.infrared_proximity(
+        name,
+        period=device.period_s,
+        beam=beam_of(device.position_m, device.heading_rad, device.beam_rad, device.height_m, device.rays),
+        range=device.range_m,
+        c1=device.c1_m2,
+        c2=device.c2,
+        sigma=device.sigma,
+    )
+
+
+def infrared_parameters(pair: InfraredPair, draw: Draw = AS_BUILT) -> Any:
+    """The IR pair in C."""
+    return ffi.new(
+        "infrared_pair_parameters *",
+        {
+            "beam": beam_of(pair.position_m, pair.heading_rad, pair.beam_rad, INFRARED_HEIGHT_M, INFRARED_RAYS),
+            "range": pair.range_m,
+            "range_sigma": draw["INFRARED_SPREAD"],
+            "false_hit": draw["INFRARED_FALSE_HIT"],
+            "direct": draw["INFRARED_DIRECT_M"],
+        },
+    )
