@@ -181,10 +181,10 @@ def test_a_program_that_hangs_at_each_opening_is_given_up(
 def test_a_program_that_never_lets_a_session_begin_is_told_with_its_place(
     tmp_path: Path, command: Callable[..., tuple[object, str]]
 ) -> None:
-    code, error = command(as_shieldbot(planted(tmp_path, "link_take_frame", JUMP_TO_ITSELF)))
+    code, error = command(as_shieldbot(planted(tmp_path, "receive_frame", JUMP_TO_ITSELF)))
     assert code == 1
     assert "there is no session within 2 s; its last reset was by its watchdog" in error
-    assert re.search(r"found at address 0x[0-9A-F]{4} in cycle \d+ in link_take_frame \(\w+\.[ch]:\d+\)", error)
+    assert re.search(r"found at address 0x[0-9A-F]{4} in cycle \d+ in receive_frame \(\w+\.[ch]:\d+\)", error)
 
 
 def test_a_hang_has_its_place_where_the_image_is_measured(tmp_path: Path) -> None:

@@ -3,10 +3,10 @@
 
 #include <stdbool.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #define SETTLE_CYCLES (200u * HAL_CYCLES_PER_US) /* bandgap 70 us, and the sampling capacitor (24.6, 28.8) */
@@ -108,7 +108,7 @@ static void grow_older(uint8_t device) {
 
 /* Takes what the converter has, or does all else: so no slot has both, however long the converter has been kept waiting. */
 void analog_task(void) {
-  if (schedule_tick_begins()) {
+  if (clock_tick_begins()) {
     tick_begins = true;
   }
   if (converting && !hal_analog_busy()) {

@@ -4,8 +4,8 @@
 #include <stddef.h>
 
 #include "bounds.h"
+#include "clock.h"
 #include "generated/values.h"
-#include "schedule.h"
 
 #define QUEUE 4u
 
@@ -41,7 +41,7 @@ static void put_later(event *what) {
 }
 
 void events_raise(uint8_t kind, uint16_t value) {
-  event what = {.time = schedule_time(), .value = value, .kind = kind};
+  event what = {.time = clock_time(), .value = value, .kind = kind};
   if (count < QUEUE) {
     put(&what);
   } else {

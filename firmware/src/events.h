@@ -12,7 +12,7 @@ extern "C" {
 #endif
 
 typedef struct {
-  uint32_t time;  /* schedule_time() */
+  uint32_t time;  /* clock_time() */
   uint16_t value; /* what it is for each kind: messages.toml */
   uint8_t kind;   /* EVENT_KIND_... */
 } event;

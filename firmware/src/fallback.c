@@ -9,17 +9,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "clock.h"
 #include "events.h"
 #include "generated/values.h"
 #include "infrared.h"
 #include "motion.h"
 #include "parameters.h"
 #include "safety.h"
-#include "schedule.h"
 #include "tasks.h"
 #include "whisker.h"
 
-#define TICK_MS (SCHEDULE_TICK_US / 1000u)
+#define TICK_MS (CLOCK_TICK_US / 1000u)
 
 /* Motor signals in eighths. */
 #define SLOW 3

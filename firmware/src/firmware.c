@@ -3,6 +3,7 @@
 
 #include "analog.h"
 #include "buzzer.h"
+#include "clock.h"
 #include "compass.h"
 #include "encoder.h"
 #include "events.h"
@@ -12,6 +13,7 @@
 #include "light.h"
 #include "link/identity.h"
 #include "link/link.h"
+#include "link/receive.h"
 #include "parameters.h"
 #include "pin_changes.h"
 #include "ping.h"
@@ -59,7 +61,7 @@ void firmware_start(void) {
 }
 
 void firmware_poll(void) {
-  if (schedule_waiting() != 0) {
+  if (clock_waiting() != 0) {
     schedule_poll();
     return;
   }
@@ -68,4 +70,4 @@ void firmware_poll(void) {
 }
 
 /* Asked after each interrupt that ends the sleep, so it is quick. */
-uint8_t firmware_due(void) { return schedule_waiting() | pin_changes_due() | link_due(); }
+uint8_t firmware_due(void) { return clock_waiting() | pin_changes_due() | receive_due(); }

@@ -3,11 +3,11 @@
 
 #include <stdbool.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #define BURST_TOGGLES 76u /* 1 ms at 38 kHz */

@@ -3,11 +3,11 @@
 
 #include <stdbool.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #if defined(PIN_LIGHT_LEFT) && !defined(LIGHT_LEFT_IS_CAPTURED)
@@ -26,7 +26,7 @@ _Static_assert(
 #define AGE_NEVER 255u
 
 static enum { IDLE, CHARGING, DECAYING } state;
-static uint32_t released[SIDES];      /* schedule_now() */
+static uint32_t released[SIDES];      /* clock_now() */
 static volatile uint32_t edge[SIDES]; /* the same of the fall */
 static volatile bool has_fallen[SIDES];
 static uint16_t readings[SIDES];
@@ -65,7 +65,7 @@ void light_on_pin_change(uint8_t bits, uint32_t time) {
 }
 
 void light_on_left_fall(uint16_t time) {
-  edge[LEFT] = schedule_cycles_at(time);
+  edge[LEFT] = clock_cycles_at(time);
   has_fallen[LEFT] = true;
   hal_capture_stop();
 }
@@ -77,7 +77,7 @@ void light_mask(uint8_t pins) {
 }
 
 void light_on_change(uint16_t time) {
-  edge[RIGHT] = schedule_cycles_at(time);
+  edge[RIGHT] = clock_cycles_at(time);
   has_fallen[RIGHT] = true;
   hal_watch_port_d(0);
 }
@@ -101,13 +101,13 @@ static void release(void) {
 #ifdef PIN_LIGHT_LEFT
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_LEFT);
-    released[LEFT] = schedule_now();
+    released[LEFT] = clock_now();
   }
 #endif
   hal_watch_port_d(HAL_PIN_BIT(LIGHT_RIGHT));
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_RIGHT);
-    released[RIGHT] = schedule_now();
+    released[RIGHT] = clock_now();
   }
   state = DECAYING;
 }
@@ -131,9 +131,7 @@ static bool must_wait(void) {
 }
 
 /* A line that is still high may fall until the longest decay is over. */
-static bool is_too_early(void) {
-  return schedule_now() - released[RIGHT] < LIGHT_LONGEST * (uint32_t)HAL_CYCLES_PER_US;
-}
+static bool is_too_early(void) { return clock_now() - released[RIGHT] < LIGHT_LONGEST * (uint32_t)HAL_CYCLES_PER_US; }
 
 static void collect(void) {
 #ifdef PIN_LIGHT_LEFT
@@ -146,8 +144,8 @@ static void collect(void) {
 
 /* In every slot. */
 void light_task(void) {
-  const uint8_t slot = schedule_frame_slot();
-  if (schedule_tick_begins() && age < AGE_NEVER) {
+  const uint8_t slot = clock_frame_slot();
+  if (clock_tick_begins() && age < AGE_NEVER) {
     age++;
   }
   if (!parameters_device_in_use(DEVICES_LIGHT)) {

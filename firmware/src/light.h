@@ -20,7 +20,7 @@ void light_start(void);
 /* The pin of port C whose changes are wanted now; 0: none. */
 uint8_t light_pins(void);
 
-/* It has changed at schedule_now() `time`; `bits` are the levels of the port. Main loop only. */
+/* It has changed at clock_now() `time`; `bits` are the levels of the port. Main loop only. */
 void light_on_pin_change(uint8_t bits, uint32_t time);
 
 /* These pins are noise: their edge is awaited no more. */

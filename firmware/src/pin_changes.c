@@ -2,11 +2,11 @@
 #include "pin_changes.h"
 
 #include "bounds.h"
+#include "clock.h"
 #include "encoder.h"
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "light.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #define RING 64u
@@ -32,7 +32,7 @@ static uint8_t close_row; /* changes in a row that were close */
 
 /* Main loop only. */
 static uint8_t before;  /* levels after the last change that was worked off */
-static uint32_t polled; /* schedule_now() at the last poll */
+static uint32_t polled; /* clock_now() at the last poll */
 static uint8_t watched; /* pins whose changes count */
 static uint8_t unseen;  /* interrupts since the slot's begin of which no change was seen: pulses too short */
 
@@ -151,7 +151,7 @@ static void listen(void) {
 void pin_changes_poll(void) {
   const bool stop = stopped != 0; /* before the head is read: after a stop no change comes */
   const uint8_t end = head;
-  const uint32_t now = schedule_now() | (ENCODER_TIME_UNIT - 1u);
+  const uint32_t now = clock_now() | (ENCODER_TIME_UNIT - 1u);
   if (now - polled > UINT16_MAX) { /* stamps may be of the time before */
     encoder_lose_time();
   }
@@ -174,7 +174,7 @@ void pin_changes_poll(void) {
 void pin_changes_begin_slot(void) {
   pin_changes_poll();
   unseen = 0;
-  if (schedule_tick_begins()) {
+  if (clock_tick_begins()) {
     encoder_mask(wanted() & (uint8_t)~watched); /* those that could not be listened to yet */
     encoder_lift_masks();
     listen();

@@ -3,17 +3,17 @@
 
 #include <stdbool.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #define GIVE_UP_TICKS 2u /* 20 ms after the trigger: the sensor ends its pulse 19.3 ms after it at the latest */
 #define AGE_NEVER 255u
 #define AGE_UNIT 256u /* cycles; a tick has TICK_UNITS of them, so that 16 bits are divided */
-#define TICK_UNITS ((uint16_t)(HAL_SLOT_CYCLES * (uint32_t)SCHEDULE_SLOTS_PER_TICK / AGE_UNIT))
+#define TICK_UNITS ((uint16_t)(HAL_SLOT_CYCLES * (uint32_t)CLOCK_SLOTS_PER_TICK / AGE_UNIT))
 /* The sensor raises the line 750 us after the trigger (its manual gives no tolerance). An edge more than 2 % sooner, or more
  * than twice as late, is noise: a board that hears noise for an echo is worse than one that hears none. */
 #define HOLD_OFF_MIN (735u * HAL_CYCLES_PER_US)
@@ -26,11 +26,11 @@
 enum { IDLE, RISING, FALLING, ENDED, CUT }; /* what is awaited; CUT: the pulse had ended before that was awaited */
 static volatile uint8_t state;
 static volatile uint16_t triggered, rise, fall;  /* hal_time() */
-static volatile uint8_t trigger_slot, rise_slot; /* schedule_slot then */
-static volatile uint32_t fall_slot_cycles;       /* schedule_slot_cycles then */
+static volatile uint8_t trigger_slot, rise_slot; /* clock_slot then */
+static volatile uint32_t fall_slot_cycles;       /* clock_slot_cycles then */
 static volatile uint8_t noise_left;              /* edges at other times than the sensor's that are still taken */
 
-static uint32_t triggered_cycles; /* schedule_now() */
+static uint32_t triggered_cycles; /* clock_now() */
 static uint8_t status;
 static uint16_t echo;
 static uint8_t age;
@@ -71,12 +71,12 @@ void ping_start(void) {
 void ping_on_edge(uint16_t time) {
   if (state == FALLING) {
     fall = time;
-    fall_slot_cycles = schedule_slot_cycles;
+    fall_slot_cycles = clock_slot_cycles;
     state = ENDED;
     hal_capture_stop();
   } else if ((uint16_t)(time - triggered - HOLD_OFF_MIN) <= HOLD_OFF_MAX - HOLD_OFF_MIN) {
     rise = time;
-    rise_slot = schedule_slot;
+    rise_slot = clock_slot;
     hal_capture_falling();
     state = FALLING;
     if (is_low()) {
@@ -103,9 +103,9 @@ static void take(void) {
     return;
   }
   const uint32_t up = triggered_cycles + (uint16_t)(rise - triggered);
-  const uint32_t down = state == CUT ? up : schedule_cycles_in(fall_slot_cycles, fall);
+  const uint32_t down = state == CUT ? up : clock_cycles_in(fall_slot_cycles, fall);
   const uint32_t us = (down - up + HAL_CYCLES_PER_US / 2u) / HAL_CYCLES_PER_US;
-  age = (uint8_t)((uint16_t)((schedule_now() - down) / AGE_UNIT) / TICK_UNITS);
+  age = (uint8_t)((uint16_t)((clock_now() - down) / AGE_UNIT) / TICK_UNITS);
   if (us < ECHO_MIN) {
     tell(PING_STATUS_TOO_NEAR, 0);
   } else if (us > ECHO_MAX) {
@@ -153,9 +153,9 @@ static void trigger(void) {
   hal_ping_raise();
   HAL_ATOMIC { /* the sensor counts from the pulse's end, and so does HOLD_OFF: no interrupt in between */
     hal_ping_release();
-    triggered_cycles = schedule_now();
+    triggered_cycles = clock_now();
     triggered = (uint16_t)triggered_cycles;
-    trigger_slot = schedule_slot;
+    trigger_slot = clock_slot;
     state = RISING;
     hal_capture_start();
   }

@@ -8,7 +8,7 @@
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "storage.h"
-#include "task_times.h"
+#include "tasks.h"
 
 #define MAGIC 0x626Fu
 #define NONCE_MASK 0x1FFFFFul

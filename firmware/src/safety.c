@@ -2,18 +2,18 @@
 #include "safety.h"
 
 #include "buzzer.h"
+#include "clock.h"
 #include "events.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "motion.h"
 #include "parameters.h"
 #include "reset.h"
-#include "schedule.h"
 #include "supply.h"
 #include "tasks.h"
 #include "turret.h"
 
-#define AGE_MAX ((uint16_t)(SAFETY_TIME_TO_LIVE_MAX * 1000ul / SCHEDULE_TICK_US)) /* ticks; all older ones are late */
+#define AGE_MAX ((uint16_t)(SAFETY_TIME_TO_LIVE_MAX * 1000ul / CLOCK_TICK_US)) /* ticks; all older ones are late */
 
 typedef struct {
   uint8_t latch;         /* LATCH_... */
@@ -28,7 +28,7 @@ typedef struct {
   uint16_t last_over;  /* the tick in which the motors were armed, or that of a set-point that has outlived itself */
 
   /* The last set-point that was accepted: */
-  uint32_t deadline;  /* schedule_time() at which it ends */
+  uint32_t deadline;  /* clock_time() at which it ends */
   uint16_t last_tick; /* the tick that it answers */
   uint8_t last_sequence;
 } safety_state;
@@ -73,13 +73,13 @@ safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8
   if (own.latch != LATCH_NONE || time_to_live > SAFETY_TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVOS)) {
     return SAFETY_REFUSED;
   }
-  const uint16_t ticks = (uint16_t)((uint16_t)schedule_tick() - answers_tick);
+  const uint16_t ticks = (uint16_t)((uint16_t)clock_tick() - answers_tick);
   if (ticks > AGE_MAX) { /* a tick to come is one of long ago */
     return SAFETY_LATE;
   }
-  const uint32_t start = schedule_tick_time() - ticks * (uint32_t)SCHEDULE_TICK_US;
+  const uint32_t start = clock_tick_time() - ticks * (uint32_t)CLOCK_TICK_US;
   /* Vast before a tick that has not begun although its tasks are awaited. */
-  const uint32_t age = schedule_time() - start;
+  const uint32_t age = clock_time() - start;
   const uint32_t life = (time_to_live != 0 ? time_to_live : parameters_u16(PARAMETER_TIME_TO_LIVE)) * 1000ul;
   if (age >= life || has_newer(answers_tick, sequence) ||
       (own.ticks_are_over && (int16_t)(answers_tick - own.last_over) <= 0)) {
@@ -132,7 +132,7 @@ uint8_t safety_arm(uint8_t known_latches) {
   if (own.latch != LATCH_NONE) {
     own.latch = LATCH_NONE;
     own.fallback_allowed = true;
-    end_ticks(schedule_begun_tick());
+    end_ticks(clock_begun_tick());
     events_raise(EVENT_KIND_LATCH, LATCH_NONE);
   }
   return ANSWER_STATUS_OK;
@@ -157,7 +157,7 @@ void safety_end_fallback(void) {
 
 /* In every slot: ends set-points that have outlived themselves, latches when the supply is low. */
 void safety_task(void) {
-  if ((uint16_t)((uint16_t)schedule_tick() - own.last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
+  if ((uint16_t)((uint16_t)clock_tick() - own.last_over) > AGE_MAX + 1u) { /* before the difference rolls over */
     own.ticks_are_over = false;
   }
   if (supply_low()) {
@@ -172,7 +172,7 @@ void safety_task(void) {
   if (!parameters_device_on(DEVICES_SERVOS)) {
     own.state = 0;
     motion_off();
-  } else if ((int32_t)(schedule_time() - own.deadline) >= 0) {
+  } else if ((int32_t)(clock_time() - own.deadline) >= 0) {
     stop_all();
     own.state = STATUS_DEAD_MAN;
     events_raise(EVENT_KIND_DEAD_MAN, own.last_tick);

@@ -5,10 +5,10 @@
 
 #include <string.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "supply.h"
 #include "tasks.h"
 
@@ -37,7 +37,7 @@ typedef struct {
 #define BOOT_ADDRESS 0x100u
 #define COPY_DISTANCE 0x100u /* the boot counter's ring lies between them */
 #define BOOT_RECORDS 16u
-#define RUN_SLOTS (10u * SCHEDULE_TICK_RATE * SCHEDULE_SLOTS_PER_TICK) /* of a start that counts */
+#define RUN_SLOTS (10u * CLOCK_TICK_RATE * CLOCK_SLOTS_PER_TICK) /* of a start that counts */
 #define SLOTS_PER_CALL 2u
 
 _Static_assert(sizeof(copy_record) <= COPY_ROOM && sizeof(copy_record) == 6u + 2u * PARAMETER_COUNT, "a copy has room");

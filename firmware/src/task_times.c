@@ -1,12 +1,12 @@
 /* task_times.c: see task_times.h. */
 #include "task_times.h"
 
-#include "hal/hal.h"
+#include "clock.h"
 #include "reset.h"
-#include "schedule.h"
+#include "tasks.h"
 
 static uint16_t longest[TASKS];
-static uint32_t began;  /* schedule_now() */
+static uint32_t began;  /* clock_now() */
 static uint8_t running; /* the task that runs */
 
 void task_times_start(void) {
@@ -18,11 +18,11 @@ void task_times_start(void) {
 void task_begins(uint8_t task) {
   running = task;
   reset_note_running((uint8_t)(task + 1u));
-  began = schedule_now();
+  began = clock_now();
 }
 
 void task_has_ended(void) {
-  const uint32_t took = schedule_now() - began;
+  const uint32_t took = clock_now() - began;
   uint16_t *const most = &longest[running];
   if (took > *most) {
     *most = took < TASK_TIME_LONGEST ? (uint16_t)took : TASK_TIME_LONGEST;

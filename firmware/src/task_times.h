@@ -10,12 +10,6 @@
 extern "C" {
 #endif
 
-enum {
-#define TASK(name, period, phase, budget) TASK_##name,
-#include "tasks.def"
-  TASKS
-};
-
 /* The longest times start anew. */
 void task_times_start(void);
 

@@ -10,6 +10,13 @@ extern "C" {
 #define TASK(name, period, phase, budget) void name##_task(void) __attribute__((noinline));
 #include "tasks.def"
 
+/* Their numbers, in the order of tasks.def. */
+enum {
+#define TASK(name, period, phase, budget) TASK_##name,
+#include "tasks.def"
+  TASKS
+};
+
 /* The constants that the analysis needs; who defines one asserts that it is the same. */
 enum {
 #define CONSTANT(name, value) CONSTANT_##name = (value),

@@ -15,7 +15,7 @@
 #include "hal/native/machine.h"
 #include "host_frame.h"
 #include "link/frame.h"
-#include "link/session.h"
+#include "link/session_seed.h"
 #include "pins.h"
 #include "schedule.h"
 

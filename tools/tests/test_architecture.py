@@ -32,9 +32,9 @@ def imported(source: Path) -> Iterator[str]:
 
 def included(folder: str) -> Iterator[tuple[Path, str]]:
     """Each C file below a folder with each header that it includes, our own ones as path from the repository's root."""
-    for source in sorted((ROOT / folder).rglob("*.[ch]")):
+    for source in sorted(path for kind in ("[ch]", "def") for path in (ROOT / folder).rglob(f"[!_]*.{kind}")):
         for name in INCLUDE.findall(source.read_text()):
-            for base in (source.parent, ROOT / "sim_bridge", ROOT / "firmware" / "src"):
+            for base in (source.parent, ROOT / "sim_bridge", ROOT / "host/boebot/arenas", ROOT / "firmware" / "src"):
                 if (base / name).is_file():
                     yield source, str((base / name).resolve().relative_to(ROOT))
                     break
@@ -70,6 +70,7 @@ def test_brains_touch_only_what_is_meant_for_them() -> None:
         ("sim_bridge/world", ("sim_bridge/boards/", "sim_bridge/parts/", "firmware/", "sim_bridge/loop")),
         ("sim_bridge/boards", ("sim_bridge/world/", "sim_bridge/parts/", "sim_bridge/loop")),
         ("sim_bridge/parts", ("firmware/", "sim_bridge/loop")),
+        ("host/boebot/arenas", ("sim_bridge/", "firmware/")),
     ],
 )
 def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str, ...]) -> None:
@@ -106,6 +107,69 @@ def closure(start: str, includes: dict[str, set[str]]) -> set[str]:
     return found
 
 
+def circles(knows: dict[str, set[str]]) -> list[str]:
+    """Those that lead back to themselves, directly or by others."""
+    return sorted(name for name in knows if name in closure(name, knows))
+
+
+@pytest.mark.parametrize("folder", ["firmware/src", "sim_bridge", "host"])
+def test_modules_in_c_make_no_circle(folder: str) -> None:
+    """A module is a .c file with the header of its name."""
+    knows: dict[str, set[str]] = {}
+    for source, name in included(folder):
+        if not {"tests", "fuzz"} & set(source.parts):
+            knows.setdefault(str(source.relative_to(ROOT).with_suffix("")), set()).add(str(Path(name).with_suffix("")))
+    for module, others in knows.items():
+        others.discard(module)
+    assert knows
+    assert not circles(knows)
+
+
+PYTHON_FOLDERS = [*(path.parent for path in (ROOT / "host").glob("*/__init__.py")), ROOT / "sim_bridge", ROOT / "tools"]
+
+
+def modules() -> dict[str, Path]:
+    """Our Python modules but tests and what only builds: full name -> file."""
+    found = {}
+    for folder in (*PYTHON_FOLDERS, ROOT / "hil_tests"):
+        for source in folder.rglob("*.py"):
+            if "tests" not in source.parts and not source.name.startswith("build_"):
+                parts = source.relative_to(folder.parent).with_suffix("").parts
+                found[".".join(parts).removesuffix(".__init__")] = source
+    return found
+
+
+def for_type_checkers(tree: ast.Module) -> list[ast.stmt]:
+    """What stands under `if TYPE_CHECKING:`."""
+    tests = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
+    return [line for node in tests if ast.unparse(node.test) == "TYPE_CHECKING" for line in node.body]
+
+
+def needed(source: Path, known: dict[str, Path], *, types: bool) -> set[str]:
+    """Modules that a file imports, also within functions; with `types` those for type checkers as well."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    left_out = set() if types else set(for_type_checkers(tree))
+    found = set()
+    for node in ast.walk(tree):
+        if node in left_out:
+            continue
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                found.add(name if name in known else node.module)
+    return found & known.keys()
+
+
+def test_python_modules_make_no_circle() -> None:
+    """The library may point back for type checkers alone: a run's result saves itself by what draws results."""
+    known = modules()
+    assert not circles({name: needed(source, known, types=False) - {name} for name, source in known.items()})
+    ours = {name: source for name, source in known.items() if not name.startswith("boebot") or ".arenas" in name}
+    assert not circles({name: needed(source, known, types=True) - {name} for name, source in ours.items()})
+
+
 @pytest.fixture(scope="module")
 def firmware_includes() -> dict[str, set[str]]:
     """What each C file of the firmware includes directly."""
@@ -125,10 +189,6 @@ def test_below_the_link_nothing_knows_it(firmware_includes: dict[str, set[str]])
         if name.startswith(link) and not source.startswith(above)
     ]
     assert not guilty
-
-
-def test_includes_of_the_firmware_make_no_circle(firmware_includes: dict[str, set[str]]) -> None:
-    assert not [name for name in firmware_includes if name in closure(name, firmware_includes)]
 
 
 @pytest.mark.parametrize("source", ["link/frame.c", "link/frame.h", "link/crc21.h"])

@@ -1,4 +1,4 @@
-/* counters.h: what this end of the link has counted; its message, and those of the tasks' times, one after another. */
+/* counters.h: what this end of the link has counted. */
 #ifndef LINK_COUNTERS_H
 #define LINK_COUNTERS_H
 
@@ -10,13 +10,16 @@
 extern "C" {
 #endif
 
-/* Counted where it happens, modulo 65536; good, bad, unknown and resynchronised are the decoder's (link.h). */
+/* Counted where it happens, modulo 65536; good, bad, unknown and resynchronised are the decoder's (receive.h). */
 extern msg_counters counters;
 
 void counters_start(void);
 
-/* Received bytes were lost: it is counted in this tick, and told in the next telemetry. */
+/* Received bytes were lost: it is counted in this tick, and the next telemetry says so. */
 void counters_lose_bytes(void);
+
+/* In every tick: counts whether bytes were lost, here or in the chip. */
+void counters_end_tick(void);
 
 /* Whether it was counted since the last call. */
 bool counters_bytes_lost(void);

@@ -5,17 +5,17 @@
 
 #include "analog.h"
 #include "buzzer.h"
+#include "clock.h"
 #include "compass.h"
 #include "generated/messages.h"
 #include "infrared.h"
 #include "light.h"
 #include "link/frame.h"
-#include "link/link.h"
+#include "link/receive.h"
 #include "link/send.h"
-#include "link/session.h"
+#include "link/session_seed.h"
 #include "parameters.h"
 #include "pins.h"
-#include "schedule.h"
 #include "servo.h"
 #include "supply.h"
 #include "tasks.h"
@@ -44,14 +44,14 @@ void devices_task(void) {
     since++;
   }
   /* Neither must it take the room that a message waits for, nor that of the next telemetry. */
-  if (!session_is_open() || link_room != 0 || since < line_period || since < parameters_u16(PARAMETER_DEVICES_PERIOD) ||
-      !any_on() || !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
+  if (!session_is_open() || receive_room != 0 || since < line_period ||
+      since < parameters_u16(PARAMETER_DEVICES_PERIOD) || !any_on() || !send_has_room(MSG_DEVICES_TELEMETRY_LENGTH)) {
     return;
   }
   since = 0;
   const compass_reading *compass = compass_read();
   const msg_devices_telemetry message = {
-      .tick = schedule_tick(),
+      .tick = clock_tick(),
       .supply = supply_voltage(),
       .infrared_zone_left = infrared_zone(LEFT),
       .infrared_zone_right = infrared_zone(RIGHT),

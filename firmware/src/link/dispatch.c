@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "buzzer.h"
+#include "clock.h"
 #include "generated/messages.h"
 #include "link/counters.h"
 #include "link/event_delivery.h"
@@ -11,10 +12,10 @@
 #include "link/requests.h"
 #include "link/send.h"
 #include "link/session.h"
+#include "link/session_seed.h"
 #include "motion.h"
 #include "parameters.h"
 #include "safety.h"
-#include "schedule.h"
 #include "turret.h"
 
 /* Whether a set-point may be put in force; counts the late ones. What is late was not wrong to ask. */
@@ -135,7 +136,7 @@ SENDS stop(const uint8_t *payload) {
 }
 
 SENDS clock_probe(const uint8_t *payload) {
-  msg_clock_answer answer = {.time = schedule_time()};
+  msg_clock_answer answer = {.time = clock_time()};
   memcpy(&answer.token, payload, sizeof answer.token);
   send_message(MSG_CLOCK_ANSWER_ID, &answer, sizeof answer);
 }

@@ -4,18 +4,18 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "clock.h"
 #include "events.h"
 #include "generated/messages.h"
 #include "link/counters.h"
-#include "link/link.h"
+#include "link/receive.h"
 #include "link/send.h"
-#include "link/session.h"
+#include "link/session_seed.h"
 #include "parameters.h"
-#include "schedule.h"
 #include "tasks.h"
 
 #define RETRY_BYTES 200u /* on the line, besides two ticks */
-#define TICK (SCHEDULE_TICK_US / 500u)
+#define TICK (CLOCK_TICK_US / 500u)
 #define CALL (TICK / 2u) /* from one call of the task to the next */
 
 static uint16_t number; /* of the event under way, or of the next one */
@@ -55,7 +55,7 @@ void events_task(void) {
   }
   const event *const first = events_first();
   /* Repetitions must not take the room that a message waits for. */
-  if (first == NULL || !session_is_open() || link_room != 0 || !send_has_room(MSG_EVENT_LENGTH)) {
+  if (first == NULL || !session_is_open() || receive_room != 0 || !send_has_room(MSG_EVENT_LENGTH)) {
     return;
   }
   const msg_event message = {.number = number, .kind = first->kind, .value = first->value, .time = first->time};

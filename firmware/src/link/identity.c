@@ -3,14 +3,14 @@
 
 #include <string.h>
 
+#include "clock.h"
 #include "generated/messages.h"
 #include "hal/hal.h"
 #include "link/send.h"
-#include "link/session.h"
+#include "link/session_seed.h"
 #include "link/telemetry.h"
 #include "parameters.h"
 #include "reset.h"
-#include "schedule.h"
 #include "storage.h"
 #include "version.h"
 
@@ -54,7 +54,7 @@ bool identity_send_hello(void) {
       .schema_hash = SCHEMA_HASH,
       .board_nonce = session_board_nonce(),
       .session = session_is_open() ? session_seed() : 0u,
-      .tick_rate = SCHEDULE_TICK_RATE,
+      .tick_rate = CLOCK_TICK_RATE,
       .session_time_out = parameters_u16(PARAMETER_SESSION_TIME_OUT),
       .telemetry_period = telemetry_period(),
       .boot_counter = storage_boot_counter(),

@@ -1,10 +1,10 @@
 /* send.c: see send.h. */
 #include "link/send.h"
 
+#include "clock.h"
 #include "hal/hal.h"
 #include "link/counters.h"
-#include "link/session.h"
-#include "schedule.h"
+#include "link/session_seed.h"
 
 #define HALF_MS_PER_BYTE 200u /* 10 bits at 100 bit/s are 100 ms */
 
@@ -33,7 +33,7 @@ uint8_t send_ticks(uint16_t bytes) {
   const uint16_t bits = (uint16_t)(bytes * 10u);
   return (uint8_t)((uint16_t)(bits + baud_rate - 1u) / baud_rate); /* so many bits fit in a tick */
 }
-_Static_assert(SCHEDULE_TICK_RATE == 100u, "a tick's bits are the rate in 100 bit/s");
+_Static_assert(CLOCK_TICK_RATE == 100u, "a tick's bits are the rate in 100 bit/s");
 
 uint16_t send_half_ms(uint8_t bytes) { return (uint16_t)(bytes * HALF_MS_PER_BYTE) / baud_rate; }
 _Static_assert(UINT8_MAX *HALF_MS_PER_BYTE <= UINT16_MAX, "in 16 bits");

@@ -2,33 +2,31 @@
 #include "link/session.h"
 
 #include "buzzer.h"
+#include "clock.h"
 #include "events.h"
 #include "fallback.h"
 #include "hal/hal.h"
 #include "link/event_delivery.h"
 #include "link/frame.h"
 #include "link/identity.h"
-#include "link/link.h"
+#include "link/receive.h"
 #include "link/requests.h"
 #include "link/send.h"
+#include "link/session_seed.h"
 #include "link/telemetry.h"
 #include "parameters.h"
-#include "reset.h"
 #include "safety.h"
-#include "schedule.h"
 #include "task_times.h"
 #include "tasks.h"
 
-#define TICK_MS (SCHEDULE_TICK_US / 1000u)
+#define TICK_MS (CLOCK_TICK_US / 1000u)
 #define HELLO_PERIOD_ALONE 10u /* ticks */
 #define HELLO_PERIOD_OPEN 20u  /* or, if that is longer, */
 #define HELLO_TELEMETRIES 4u   /* of the shortest periods of telemetry that the line allows */
 
-static uint32_t seed;        /* of the session, or FRAME_NO_SESSION */
-static uint32_t board_nonce; /* that the next opening must name */
-static uint16_t silence;     /* ms since a frame of the session came, in whole ticks */
-static uint8_t hello_in;     /* ticks until the next hello; 0: it waits for the task, or for room */
-static bool identify;        /* the host has asked for the identity */
+static uint16_t silence; /* ms since a frame of the session came, in whole ticks */
+static uint8_t hello_in; /* ticks until the next hello; 0: it waits for the task, or for room */
+static bool identify;    /* the host has asked for the identity */
 
 /* Says hello or, where that would leave no room for the next telemetry, does so in a later tick. */
 static void say_hello(void) {
@@ -48,9 +46,8 @@ static void say_hello(void) {
 
 /* Begins anew, with a session or without (FRAME_NO_SESSION). Hello is due. */
 static void begin(uint32_t new_seed) {
-  seed = new_seed;
-  board_nonce = reset_nonce();
-  link_use_seed(new_seed);
+  session_use_seed(new_seed);
+  receive_use_seed(new_seed);
   requests_start();
   events_forget_touches();
   event_delivery_start();
@@ -72,9 +69,9 @@ bool session_open(const msg_open *message) {
   if (wanted == 0 || (wanted & ~FRAME_SEED_MAX) != 0 || wanted == FRAME_SEED) {
     return false;
   }
-  const bool is_new = wanted != seed;
+  const bool is_new = wanted != session_seed();
   if (is_new && (PROTOCOL_MAJOR(message->protocol_version) != PROTOCOL_MAJOR(PROTOCOL_VERSION) ||
-                 message->board_nonce != board_nonce)) {
+                 message->board_nonce != session_board_nonce())) {
     return false;
   }
   fallback_host_spoke();
@@ -88,7 +85,7 @@ bool session_open(const msg_open *message) {
 }
 
 bool session_close(uint32_t of) {
-  if (of != seed) {
+  if (of != session_seed()) {
     return false;
   }
   safety_latch(LATCH_SESSION_ENDED);
@@ -97,12 +94,6 @@ bool session_close(uint32_t of) {
 }
 
 void session_identify(void) { identify = true; }
-
-uint32_t session_seed(void) { return seed; }
-
-bool session_is_open(void) { return seed != FRAME_NO_SESSION; }
-
-uint32_t session_board_nonce(void) { return board_nonce; }
 
 void session_heard(void) {
   silence = 0;

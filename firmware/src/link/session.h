@@ -1,5 +1,5 @@
 /* session.h: what one start of the board and one opening by a host have in common (protocol/PROTOCOL.md, "Session"). Its
- * seed separates its frames from those of all others. */
+ * seed (session_seed.h) separates its frames from those of all others. */
 #ifndef LINK_SESSION_H
 #define LINK_SESSION_H
 
@@ -23,13 +23,6 @@ bool session_close(uint32_t seed);
 
 /* The host asks for the identity: it follows. */
 void session_identify(void);
-
-/* Its seed; FRAME_NO_SESSION: none is open. */
-uint32_t session_seed(void);
-bool session_is_open(void);
-
-/* The board's half of the next session's seed. */
-uint32_t session_board_nonce(void);
 
 /* A frame of the session was accepted. */
 void session_heard(void);

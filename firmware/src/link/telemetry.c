@@ -1,13 +1,14 @@
 /* telemetry.c: see telemetry.h. */
 #include "link/telemetry.h"
 
+#include "clock.h"
 #include "encoder.h"
 #include "generated/messages.h"
 #include "infrared.h"
 #include "link/counters.h"
 #include "link/frame.h"
 #include "link/send.h"
-#include "link/session.h"
+#include "link/session_seed.h"
 #include "parameters.h"
 #include "ping.h"
 #include "pins.h"
@@ -75,8 +76,8 @@ void telemetry_task(void) {
   }
   due_in = telemetry_period();
   const msg_telemetry telemetry = {
-      .tick = schedule_tick(),
-      .time = schedule_tick_time(),
+      .tick = clock_tick(),
+      .time = clock_tick_time(),
       .encoder_left = left->count,
       .encoder_right = right->count,
       .edge_period_left = left->period,

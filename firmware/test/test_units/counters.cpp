@@ -10,6 +10,7 @@
 #include "link/telemetry.h"
 #include "native_bench.h"
 #include "task_times.h"
+#include "tasks.h"
 
 namespace {
 

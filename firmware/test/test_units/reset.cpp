@@ -7,6 +7,7 @@
 #include "memory_bench.h"
 #include "reset.h"
 #include "task_times.h"
+#include "tasks.h"
 
 namespace {
 

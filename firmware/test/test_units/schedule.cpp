@@ -3,9 +3,9 @@
 
 #include <random>
 
+#include "clock.h"
 #include "generated/parameters.h"
 #include "native_bench.h"
-#include "schedule.h"
 
 TEST_CASE("in a session one telemetry each tick, in order, with the tick's time") {
   native_bench bench;
@@ -177,7 +177,7 @@ TEST_CASE("a stamp of 16 bits becomes the board's cycles, from just before the s
       const uint64_t since_start = (slot + 1) * SLOT + static_cast<uint64_t>(beside);
       CAPTURE(slot);
       CAPTURE(beside);
-      CHECK(schedule_cycles_at(static_cast<uint16_t>(since_start)) == static_cast<uint32_t>(since_start));
+      CHECK(clock_cycles_at(static_cast<uint16_t>(since_start)) == static_cast<uint32_t>(since_start));
     }
   }
 }

@@ -18,7 +18,7 @@
 #include <util/atomic.h>
 
 #include "bounds.h"
-#include "hal/avr/serial.h"
+#include "hal/avr/receive_ring.h"
 
 #define HAL_ATOMIC ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 

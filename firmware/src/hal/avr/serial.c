@@ -1,5 +1,5 @@
 /* serial.c: the UART by interrupts, a ring each way. A byte lasts 320 cycles at 500,000 baud. */
-#include "hal/avr/serial.h"
+#include "hal/avr/receive_ring.h"
 
 #include "hal/hal.h"
 

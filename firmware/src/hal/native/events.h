@@ -25,7 +25,7 @@ typedef enum {
 extern native_machine *native;
 extern uint64_t native_next[EVENTS]; /* NATIVE_NEVER: none */
 
-/* hal_native.c: pins as the two-wire unit has them, its lines low or let go with the pull-up, and their level. */
+/* chip.c: pins as the two-wire unit has them, its lines low or let go with the pull-up, and their level. */
 void native_pull(uint8_t pin, bool low);
 bool native_level(uint8_t pin);
 

@@ -1,7 +1,7 @@
-/* serial.h: the receiver's ring, in line for its own interrupt and for those that take a byte on their way: the UART holds two
+/* receive_ring.h: the receiver's ring, in line for its own interrupt and for those that take a byte on their way: the UART holds two
  * bytes and the one that comes in, and an interrupt that waits for an exact edge keeps the receiver's waiting for longer. */
-#ifndef HAL_AVR_SERIAL_H
-#define HAL_AVR_SERIAL_H
+#ifndef HAL_AVR_RECEIVE_RING_H
+#define HAL_AVR_RECEIVE_RING_H
 
 #include <avr/io.h>
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-/* hal_native.c: the microcontroller as an event queue. Each source of interrupts has the cycle of its next event; the
+/* chip.c: the microcontroller as an event queue. Each source of interrupts has the cycle of its next event; the
  * earliest comes first, the firmware's interrupt runs at that cycle, and then its main loop if the event would have
  * woken it with something to do. Between events nothing happens, so nothing is spent. */
 #include <string.h>

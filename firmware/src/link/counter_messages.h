@@ -1,0 +1,15 @@
+/* counter_messages.h: the counters' message and those of the tasks' times, one after another. */
+#ifndef LINK_COUNTER_MESSAGES_H
+#define LINK_COUNTER_MESSAGES_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void counter_messages_start(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,40 @@
+/* receive.h: what comes over the serial line: bytes into frames. */
+#ifndef LINK_RECEIVE_H
+#define LINK_RECEIVE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "generated/messages.h"
+#include "link/frame.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Forgets everything; no session is open. */
+void receive_start(void);
+
+/* From now on frames of that session are accepted; FRAME_NO_SESSION: only the handshake's. What waits for room is
+ * forgotten. */
+void receive_use_seed(uint32_t seed);
+
+/* Takes received bytes, up to the end of one frame; false unless it is accepted. A part of link_poll(). */
+bool receive_frame(void) __attribute__((noinline));
+
+extern frame_decoder receive_decoder; /* the frame that was accepted last */
+
+extern uint8_t
+    receive_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */
+
+/* Not 0: there is something for link_poll() to do. */
+uint8_t receive_due(void);
+
+/* Frames accepted, refused and of unknown messages, and times that a good one followed bad ones, into the counters. */
+void receive_count(msg_counters *into);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
