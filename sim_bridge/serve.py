@@ -241,7 +241,7 @@ def carry(session: SimSession, port: Port, running: Callable[[], bool]) -> None:
         while data := port.read():
             heard += data
         cycles = pace.due()
-        sim.run(cycles)  # first: the board must not hear, let alone answer, before it was told
+        sim.run(cycles)  # first: bytes that came meanwhile reach the board at the end of that time
         if heard:
             session.robot.send(heard)
             brisk_until = time.monotonic() + BRISK_FOR_S

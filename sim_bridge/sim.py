@@ -182,7 +182,7 @@ class Sim:
         if number in self.members:
             raise BoardError(f"robot number {number} is taken")
         if board is not None and board.is_in_use():
-            raise BoardError(f"the {board.description} is in a simulation already; expected one of its own")
+            raise BoardError(f"the {board.description} is in a simulation already; expected another one")
         if len(self.members) == lib.BODY_MAXIMUM:
             raise BoardError(f"a simulation takes {len(self.members)} robots at most")
         if description.has_board != (board is not None):
@@ -590,7 +590,7 @@ class SimRobot:
         return float(lib.sim_supply_voltage(self._handle, self.number))
 
     def body(self) -> Any:
-        """The body's state now (a C struct body_state of its own): pose, speeds, wheel angles, distance, contact."""
+        """The body's state now (a copy, as C struct body_state): pose, speeds, wheel angles, distance, contact."""
         body = ffi.new("body_state *")
         lib.sim_body(self._handle, self.number, body)
         return body

@@ -1,7 +1,7 @@
 /* inputs.c: see loop.h. Here: what comes from outside is noted with its cycle, and played again.
  *
  * A run is a function of the simulation as it was built and of these inputs, so that playing them again leads to the same
- * state, bit for bit. An input stands in the notes as
+ * state, bit for bit. An input is noted as
  *
  *     cycle (8 bytes), robot (4), kind (4), count of words (4), count of bytes (4), words (8 each), bytes
  *

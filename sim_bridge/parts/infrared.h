@@ -35,7 +35,7 @@ typedef struct {
   uint64_t lit_until;                       /* by the own burst: the output is low until then */
   infrared_light foreign[INFRARED_FOREIGN]; /* by increasing time */
   int foreign_count;
-  /* what the LED sent since others were last told */
+  /* what the LED sent since others last heard of it */
   uint64_t sent_from, sent_until; /* the same cycle: nothing */
 } infrared;
 

@@ -23,7 +23,7 @@
 #define PART_NO_PIN 255u
 #define PART_PINS 2 /* at most, of one part */
 
-/* What a part does with a pin of its own. */
+/* What a part does with its pin. */
 enum {
   PART_HEARS = 1,     /* `edge` is called for what the board does to it */
   PART_DRIVES = 2,    /* the part drives it */

@@ -28,7 +28,7 @@ def parameters() -> dict[str, Any]:
     return own | catalogue.parameters()
 
 
-_DRAW = 1000  # the draws that make a robot have device numbers of their own
+_DRAW = 1000  # the draws that make a robot have other device numbers
 
 
 class Draw:

@@ -144,7 +144,7 @@ class BoardKind:
         self._find, self._make = find, make
 
     def __call__(self, request: BoardRequest) -> SimSession:
-        """Opens one robot in a world of its own."""
+        """Opens one robot in a world that is its alone."""
         sim = new_sim(request, STEP_S)
         try:
             robot = self.add(sim, request)

@@ -86,7 +86,7 @@ class DirectKind:
     """Robots without boards (VehicleFactory and TogetherFactory of boebot.boards)."""
 
     def __call__(self, request: BoardRequest) -> DirectSession:
-        """Opens one in a world of its own. Raises as `add_vehicle`, and an ArenaError where there is no such arena."""
+        """Opens one, alone in its world. Raises as `add_vehicle`, and an ArenaError where there is no such arena."""
         sim = new_sim(_in_arena(request), STEP_S)
         try:
             return DirectSession(add_vehicle(sim, request), alone(sim))

@@ -225,11 +225,11 @@ WAY = [Waypoint(0, 0, 0), Waypoint(1, 1, 0)]
         ),
         (
             {"moving": [Moving(WAY, radius_m=1, name="cart"), Moving(WAY, radius_m=1, name="cart")]},
-            "moving[1].name is 'cart', as that of moving[0]; expected a name of its own, or none",
+            "moving[1].name is 'cart', as that of moving[0]; expected another name, or none",
         ),
         (
             {"disc": [Disc(0, 0, 1, name="it")], "moving": [Moving(WAY, radius_m=1, name="it")]},
-            "moving[0].name is 'it', as that of disc[0]; expected a name of its own, or none",
+            "moving[0].name is 'it', as that of disc[0]; expected another name, or none",
         ),
         (
             {"moving": [Moving([Waypoint(0, 0, 0), Waypoint(1e-118, 1, 0)], radius_m=1)]},

@@ -60,7 +60,7 @@ def distributions(run: Run) -> list[Distribution]:
 
 
 def _only_counted(one: Distribution) -> Distribution:
-    """Without limits: where frames are dropped nothing is promised of how soon something is told."""
+    """Without limits: where frames are dropped nothing is promised of how soon something is reported."""
     return replace(one, least=None, most=None)
 
 
@@ -94,13 +94,13 @@ def servo_pulses(run: Run) -> list[Distribution]:
 
 
 def echo_lengths(run: Run) -> Distribution:
-    """How far an echo's told length is off."""
-    told = [
+    """How far an echo's reported length is off."""
+    errors = [
         heard.message.ping_echo * CYCLES_PER_US - (fall - rise)
         for (rise, fall), heard in echoes_told(run)
         if run.begun < rise < run.ended
     ]
-    return _of(run, "echo length", "as told, in whole microseconds, less that of the pulse", told, limits.ECHO)
+    return _of(run, "echo length", "as reported, in whole microseconds, less that of the pulse", errors, limits.ECHO)
 
 
 def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:

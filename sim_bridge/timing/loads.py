@@ -123,7 +123,7 @@ class Bench:
                 look()
 
     def run(self, cycles: int) -> None:
-        """Lets so many cycles pass."""
+        """Lets `cycles` pass."""
         self.run_until(self.now + cycles)
 
     def pulses(self, pin: int, since: int = 0) -> np.ndarray:

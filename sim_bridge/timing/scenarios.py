@@ -1,7 +1,7 @@
 """What a board has to bear while its times are measured.
 
 A scenario is a function of its seed alone: the seed stands for a handful of numbers, the phases of all that comes from
-outside and what the host asks for, so that a search may change one of them at a time, and whoever has the seed sees the
+outside and what the host asks for, so that a search may change one of them at a time, and the same seed gives the
 same run again.
 
 Periods share no factor with the control tick, so that a longer run sweeps the phases by itself.
@@ -254,7 +254,7 @@ def turn(bench: Bench, robot: RobotDescription, scenario: str, numbers: Numbers,
 def load(
     bench: Bench, line: Line, robot: RobotDescription, scenario: str, numbers: Numbers, cycles: int
 ) -> list[list[PulseTrain]]:
-    """Begins what the scenario does to a board that is prepared, for so many cycles from now.
+    """Begins what the scenario does to a board that is prepared, for that many cycles from now.
 
     Returns the encoder lines of each wheel; a noisy wheel has none.
     """

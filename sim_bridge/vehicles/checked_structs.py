@@ -1,6 +1,6 @@
 """A caller's keywords, checked, as C structs of sim_bridge/world; an error is one sentence.
 
-Which keys a struct has is read from its C declaration; what a key may be stands in `RANGES`, beside what several keys
+Which keys a struct has is read from its C declaration; what a key may be is in `RANGES`, beside what several keys
 must be to each other. Every message says where, which key, what it was and what was expected.
 """
 

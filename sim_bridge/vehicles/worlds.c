@@ -26,7 +26,7 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   return NULL;
 }
 
-/* Frees what a world has of its own. */
+/* Frees what belongs to one world. */
 static void leave(vehicle *w) {
   free(w->own.movers);
   laser_destroy(w->laser);

@@ -2,7 +2,7 @@
  *
  * Motion follows (2.25)-(2.32) with the full A and B, by semi-implicit Euler steps (3.16)-(3.22): speeds, then heading,
  * then position. The wheels roll without slip as long as the tyres hold; beyond that they spin or slide (ground.h), and
- * their speed is a state of its own. What a body meets it slides along; contact takes the velocity into it (restitution
+ * their speed is another state. What a body meets it slides along; contact takes the velocity into it (restitution
  * 0), turns a body met off its centre, and gives no energy, lets nothing sink in and nothing through (contact.h).
  */
 #ifndef WORLD_BODY_H

@@ -15,7 +15,7 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
 /* The same for one robot. */
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
 
-/* The same for ROW robots of one model, each alone in a world of its own; torques are finite, dt as it has to be. */
+/* The same for ROW robots of one model, each alone in its world; torques are finite, dt as it has to be. */
 void body_advance_row(body *const bodies[], const scene around[], const double torques_left[],
                       const double torques_right[], double dt);
 

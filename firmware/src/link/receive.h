@@ -24,8 +24,7 @@ bool receive_frame(void) __attribute__((noinline));
 
 extern frame_decoder receive_decoder; /* the frame that was accepted last */
 
-extern uint8_t
-    receive_room; /* not 0: a message waits in the decoder for so many bytes of room; for 0 there always is */
+extern uint8_t receive_room; /* bytes of room that a message in the decoder waits for; 0: none waits */
 
 /* Not 0: there is something for link_poll() to do. */
 uint8_t receive_due(void);

@@ -31,7 +31,7 @@ bool send_has_room(uint8_t length) { return hal_serial_room((uint8_t)(length + S
 
 uint8_t send_ticks(uint16_t bytes) {
   const uint16_t bits = (uint16_t)(bytes * 10u);
-  return (uint8_t)((uint16_t)(bits + baud_rate - 1u) / baud_rate); /* so many bits fit in a tick */
+  return (uint8_t)((uint16_t)(bits + baud_rate - 1u) / baud_rate); /* the rate is the bits of a tick */
 }
 _Static_assert(CLOCK_TICK_RATE == 100u, "a tick's bits are the rate in 100 bit/s");
 

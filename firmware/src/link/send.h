@@ -24,7 +24,7 @@ bool send_message(uint8_t id, const void *payload, uint8_t length);
 #define SEND_RESERVE (MSG_TELEMETRY_LENGTH + 2u * FRAME_OVERHEAD) /* beside the payload */
 bool send_has_room(uint8_t length);
 
-/* Time that so many bytes take on the line: in ticks, rounded up, */
+/* Time that `bytes` take on the line: in ticks, rounded up, */
 uint8_t send_ticks(uint16_t bytes);
 
 /* and in half milliseconds, rounded down. */

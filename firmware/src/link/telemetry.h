@@ -11,7 +11,7 @@ extern "C" {
 /* Finds how often the line can carry it; after send_start(). */
 void telemetry_start_line(void);
 
-/* A new session: the next tick is told. */
+/* A new session: the next tick is sent. */
 void telemetry_start(void);
 
 /* Ticks from one to the next: as the parameter wants it, but no more often than every telemetry_line_period() ticks, so

@@ -236,5 +236,5 @@ def _check_names(description: ArenaDescription) -> None:
             place = f"{key}[{i}]"
             if shape.name and (owner := owners.setdefault(shape.name, place)) != place:
                 raise DescriptionError(
-                    f"{place}.name", f" is {shape.name!r}, as that of {owner}; expected a name of its own, or none"
+                    f"{place}.name", f" is {shape.name!r}, as that of {owner}; expected another name, or none"
                 )

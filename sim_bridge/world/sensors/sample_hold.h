@@ -1,4 +1,4 @@
-/* sample_hold.h: a sensor with a rate of its own: between samples it gives the held value (notes, section 3.2.2: the limited
+/* sample_hold.h: a sensor with its own rate: between samples it gives the held value (notes, section 3.2.2: the limited
  * frequency of readings is another source of noise). */
 #ifndef SENSORS_SAMPLE_HOLD_H
 #define SENSORS_SAMPLE_HOLD_H

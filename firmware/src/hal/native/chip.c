@@ -176,7 +176,7 @@ static native_event next_event(void) {
   return earliest;
 }
 
-/* Bursts are three thousand edges a second: a loop of their own, until something else comes. */
+/* Bursts are three thousand edges a second: their own loop, until something else comes. */
 static void run_carrier(uint64_t until) {
   const uint64_t start = native_next[EVENT_CARRIER];
   native_next[EVENT_CARRIER] = NATIVE_NEVER;
