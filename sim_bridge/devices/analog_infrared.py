@@ -7,7 +7,8 @@ from typing import Any
 from boebot.devices.analog_infrared import SharpSensor
 from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import At, Part, joined, off
+from sim_bridge.devices.catalogue import joined, off
+from sim_bridge.devices.part import At, Part
 from sim_bridge.robots.imperfections import Draw
 
 SHARP_HEIGHT_M = 0.08

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from boebot.devices.buzzer import PiezoBuzzer
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import At, Part, joined
+from sim_bridge.devices.catalogue import joined
+from sim_bridge.devices.part import At, Part
 
 
 @joined(PiezoBuzzer)

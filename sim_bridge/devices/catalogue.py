@@ -8,16 +8,11 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
-
-if TYPE_CHECKING:
-    from boebot.description.robots import Body
-    from sim_bridge.robots.imperfections import Draw
-    from sim_bridge.vehicles.model import VehicleModel
+from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -37,31 +32,8 @@ def off(what: str, *parameters: str, **others: float) -> Switch:
     return Switch(what, dict.fromkeys(parameters, 0.0) | others)
 
 
-class At(NamedTuple):
-    """Where a device is on its robot."""
-
-    side: int
-    """0 left, 1 right, by its name"""
-    number: int
-    """of the robot's devices of this kind that come before it"""
-    body: Body
-    draw: Draw
-
-
-class Part(NamedTuple):
-    """What stands for a device at its board's pins (sim_add_part in loop.h)."""
-
-    kind: str
-    """name of its part_kind"""
-    number: int
-    """among those of its kind; of what has a side that"""
-    pins: Sequence[int | str]
-    parameters: Any
-    """in C, as the kind says"""
-
-
-_JOINED: dict[type, Callable[[Any, At], Part]] = {}
-_MODELLED: dict[type, Callable[[Any, str, VehicleModel], None]] = {}
+_JOINED: dict[type, Callable[[Any, Any], Any]] = {}
+_MODELLED: dict[type, Callable[[Any, str, Any], None]] = {}
 
 
 def joined(*kinds: type) -> Callable[[Function], Function]:
@@ -92,14 +64,14 @@ def modules() -> tuple[ModuleType, ...]:
     return tuple(importlib.import_module(f"{__package__}.{name}") for name in names)
 
 
-def part_of(device: object, at: At) -> Part | None:
-    """The device's part, or None: it has none in the world."""
+def part_of(device: object, at: Any) -> Any:
+    """The device's `Part` at that `At` (part.py), or None: it has none in the world."""
     modules()
     function = _JOINED.get(type(device))
     return None if function is None else function(device, at)
 
 
-def add_to(model: VehicleModel, name: str, device: object) -> bool:
+def add_to(model: Any, name: str, device: object) -> bool:
     """Adds the device to the model of a robot without a board; False: there is none for it."""
     modules()
     function = _MODELLED.get(type(device))

@@ -8,7 +8,8 @@ from typing import Any
 from boebot.devices.ping import PingSensor, Sonar
 from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import At, Part, joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.part import At, Part
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.model import VehicleModel
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from boebot.devices.turret import PositionServo
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import At, Part, joined, off
+from sim_bridge.devices.catalogue import joined, off
+from sim_bridge.devices.part import At, Part
 from sim_bridge.robots.imperfections import Draw
 
 TURRET_CENTRE_SPREAD_US = 10.0  # (chosen)

@@ -6,7 +6,8 @@ from typing import Any
 
 from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import At, Part, joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.part import At, Part
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.model import VehicleModel
 
