@@ -101,7 +101,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
     """Each sets another value and reads it back: nothing lost, nothing twice, nothing swapped. At 1e-4, 99 of 100
     commands are answered within three ticks."""
     line = BadLine(board, bit_errors, copies)
-    link = Link(line, record=False)
+    link = Link(line)
     link.open()
     latencies = []
     draw = random.Random(5)
@@ -128,7 +128,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
 def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float) -> None:
     """A whisker is pressed and let go: every change is told, once."""
     line = BadLine(board, bit_errors, seed=2)
-    link = Link(line, record=False)
+    link = Link(line)
     link.open()
     listen(link, 0.2)
     link.events()
@@ -150,7 +150,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     """The line to the board stalls with motion commands queued, and lets them go: whether the board has ended the
     session meanwhile (2 s) or not, no pulse comes of them."""
     line = BadLine(board)
-    link = Link(line, record=False)
+    link = Link(line)
     link.open()
     link.set_parameter("session_time_out", 1000)
     link.arm()
@@ -181,7 +181,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
 @pytest.mark.parametrize("at_s", [0.0, 0.011, 0.137, 0.5])
 def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s: float) -> None:
     line = BadLine(board)
-    link = Link(line, record=False)
+    link = Link(line)
     link.open()
     link.arm()
     listen(link, at_s)

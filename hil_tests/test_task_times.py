@@ -136,7 +136,7 @@ def test_an_interrupt_that_hung_is_told_as_what_it_interrupted(tmp_path: Path) -
 def linked(url: str, image: str | None = None) -> Iterator[Link]:
     board = open_board(url, BoardRequest(robot=load_robot("shieldbot"), noise=False, record=False, image=image))
     try:
-        link = Link(board.transport, record=False)
+        link = Link(board.transport)
         link.open()
         yield link
         link.close()

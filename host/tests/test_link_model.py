@@ -32,7 +32,7 @@ class LinkModel(RuleBasedStateMachine):
         super().__init__()
         self.peer = Peer(protections=self.protections)
         self.session = InProcess(self.peer, Channel())
-        self.link = Link(self.session, record=False)
+        self.link = Link(self.session)
         self.asked: list[tuple[int, Request]] = []
         self.heard: list[int] = []
         self.told = 0
@@ -105,7 +105,7 @@ class LinkModel(RuleBasedStateMachine):
         for _, request in self.asked:
             if not request.done:
                 request.error = SessionLostError("that host is no more")
-        self.link = Link(self.session, record=False)
+        self.link = Link(self.session)
         self.link._draw.seed(f"{self.seed} {self.session.now()}")
         self.link._wanted = True
 

@@ -14,6 +14,7 @@ from boebot.link.counters import HostCounters
 from boebot.link.delivery import LatchedAgainError, LinkTimes, SessionLostError, TakenOverError
 from boebot.link.frame import encode
 from boebot.link.session import Link, text
+from boebot.record.record import Memory
 from peer import InProcess, Peer, without
 
 Latch = messages.Latch
@@ -23,14 +24,28 @@ def joined(peer: Peer | None = None, channel: Channel | None = None, **options: 
     """A link with an open session, its board, and what is between them."""
     peer = peer or Peer()
     session = InProcess(peer, channel)
-    link = Link(session, **options)  # type: ignore[arg-type]
+    link = Recorded(session, **options)
     link.open()
     return link, peer, session
 
 
+class Recorded(Link):
+    """A link that keeps what it sends."""
+
+    def __init__(self, session: InProcess, **options: object) -> None:
+        self.memory = Memory()
+        super().__init__(session, self.memory.append, **options)  # type: ignore[arg-type]
+
+
+def sent(link: Link) -> list[tuple[float, bytes]]:
+    """(time, frame) of all that a recorded link has sent."""
+    assert isinstance(link, Recorded)
+    return list(link.memory.rows("to_board"))
+
+
 def sent_kinds(link: Link) -> list[str]:
     """Names of the messages that the host sent."""
-    return [messages.MESSAGES[frame[2]].NAME for _, frame in link.sent]
+    return [messages.MESSAGES[frame[2]].NAME for _, frame in sent(link)]
 
 
 def listen(link: Link, seconds: float) -> list[int]:
@@ -56,10 +71,10 @@ def test_host_is_silent_until_the_hello() -> None:
     peer.answers = False
     peer.reset()
     session = InProcess(peer)
-    link = Link(session)
+    link = Recorded(session)
     with pytest.raises(BoardError, match="nothing answers"):
         link.open(0.5)
-    assert link.sent == []
+    assert sent(link) == []
 
 
 @pytest.mark.parametrize("ran_for_s", [0.0, 0.25, 3.0])
@@ -67,7 +82,7 @@ def test_opening_at_any_time(ran_for_s: float) -> None:
     peer = Peer()
     session = InProcess(peer)
     session.read(ran_for_s, ran_for_s)
-    link = Link(session)
+    link = Recorded(session)
     hello = link.open()
     assert hello.session == peer.session == peer.openings[-1]
     assert text(hello.robot) == "shieldbot"
@@ -84,13 +99,13 @@ def test_lost_open_and_lost_hello_are_made_good() -> None:
     losses = {"board": 3, "host": 2}
 
     def lossy(way: str, frame: bytes, at_s: float) -> list[tuple[float, bytes]]:
-        if losses[way] and link.sent:
+        if losses[way] and sent(link):
             losses[way] -= 1
             return []
         return whole(way, frame, at_s)
 
     session.channel.carry = lossy  # type: ignore[method-assign]
-    link = Link(session)
+    link = Recorded(session)
     link.open()
     assert losses == {"board": 0, "host": 0}
     assert len(peer.openings) == 1, "an open that comes again confirms"
@@ -121,7 +136,7 @@ def test_host_talks_to_a_board_that_has_more_messages(monkeypatch: pytest.Monkey
         return tell()._replace(ping_status=9)
 
     monkeypatch.setattr(peer, "_telemetry", telemetry)
-    link = Link(session)
+    link = Recorded(session)
     link.open()
     seen = listen(link, 0.5)
     assert len(seen) >= 45 and link.get_parameter("track_width") > 0
@@ -250,7 +265,7 @@ def test_session_of_another_host_is_waited_for() -> None:
 def test_board_that_another_host_keeps_is_busy() -> None:
     peer = Peer()
     session = InProcess(peer)
-    link = Link(session)
+    link = Recorded(session)
     session.read(0.05, 0.05)
     peer._open(messages.Open(messages.PROTOCOL_VERSION, peer.nonce, 12345))
 
@@ -260,7 +275,7 @@ def test_board_that_another_host_keeps_is_busy() -> None:
     session.before_tick = keep
     with pytest.raises(TakenOverError, match="the board at peer is busy: another program drives it"):
         link.open()
-    assert link.sent == [], "and is not disturbed"
+    assert sent(link) == [], "and is not disturbed"
     taking = Link(session, take_over=True)
     taking.open()
     assert peer.session == taking.hello.session  # type: ignore[union-attr]
@@ -327,7 +342,7 @@ def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
     link.set_parameter("session_time_out", time_out_ms)
     before = len([kind for kind in sent_kinds(link) if kind == "clock_probe"])
     listen(link, 6 + 20 * time_out_ms / 1000)
-    probes = [at for at, frame in link.sent if frame[2] == messages.ClockProbe.ID][before:]
+    probes = [at for at, frame in sent(link) if frame[2] == messages.ClockProbe.ID][before:]
     late = [b - a for a, b in itertools.pairwise(probes)]
     assert link.sessions == 1
     assert max(late) <= time_out_ms / 4000, "at least four in that time"
@@ -348,7 +363,7 @@ def test_frames_of_an_earlier_session_are_refused() -> None:
     link, peer, _session = joined()
     link.arm()
     link.send_signal(1.0, 1.0, 2000, peer.ticks)
-    old = [frame for _, frame in link.sent if frame[2] not in (messages.Open.ID,)]
+    old = [frame for _, frame in sent(link) if frame[2] not in (messages.Open.ID,)]
     peer.reset()
     listen(link, 0.1)
     link.arm()
@@ -373,7 +388,7 @@ def test_frames_of_an_earlier_session_would_count_without_the_seed(monkeypatch: 
     monkeypatch.setattr(module, "Decoder", Seedless)
     link, peer, _session = joined(Peer(protections=without(seed=False)))
     link.arm()
-    old = [frame for _, frame in link.sent if frame[2] == messages.Arm.ID]
+    old = [frame for _, frame in sent(link) if frame[2] == messages.Arm.ID]
     peer.reset()
     listen(link, 0.1)
     good = peer.decoder.good
@@ -440,7 +455,7 @@ def test_request_numbers_roll_over() -> None:
     peer = Peer()
     peer.first_number = 65533
     session = InProcess(peer)
-    link = Link(session)
+    link = Recorded(session)
     link._requests._number = 65533
     link._requests.new_session = lambda: None  # type: ignore[method-assign]
     link.open()

@@ -145,7 +145,9 @@ def test_it_can_be_gone_back_to_again_and_again() -> None:
 def digest(result: RunResult) -> str:
     """Of every byte with its time, every command and the true path of a run."""
     assert result.error is None and result.truth is not None
-    heap = hashlib.sha256(repr((result.sent, result.received, result.record.steps)).encode())
+    heap = hashlib.sha256(
+        repr((result.record.rows("to_board"), result.record.rows("to_host"), result.record.steps)).encode()
+    )
     heap.update(result.truth.x.tobytes() + result.truth.heading.tobytes() + result.truth.contact.tobytes())
     return heap.hexdigest()
 

@@ -15,6 +15,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.link.session import Link
+from boebot.record.record import Memory
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.sessions.with_board import SimSession, open_native
 
@@ -33,7 +34,8 @@ def session() -> Iterator[SimSession]:
 
 def drive(session: SimSession, left: float, right: float, seconds: float) -> bytes:
     """Opens a link, arms and sends motor signals every 50 ms; returns what the board said."""
-    link = Link(session.transport)
+    memory = Memory()
+    link = Link(session.transport, memory.append)
     link.open()
     link.arm()
     end = session.transport.now() + seconds
@@ -41,7 +43,7 @@ def drive(session: SimSession, left: float, right: float, seconds: float) -> byt
         payload = link.poll(0.05, 0.045)[-1][0]
         link.send_signal(left, right, 250, messages.Telemetry.unpack(payload).tick)
     link.close()
-    return b"".join(data for _, data in link.received)
+    return b"".join(data for _, data in memory.rows("to_host"))
 
 
 def test_board_says_hello_and_sends_a_message_per_tick(session: SimSession) -> None:

@@ -48,7 +48,7 @@ def stand(robot: Robot) -> None:
 def digest(result: RunResult) -> str:
     """Of all that the run of one robot consists of: every byte with its time, every command, the true path."""
     heap = hashlib.sha256()
-    for stamp, data in (*result.sent, *result.received):
+    for stamp, data in (*result.record.rows("to_board"), *result.record.rows("to_host")):
         heap.update(repr((stamp, data)).encode())
     heap.update(repr(result.record.steps).encode())
     pose = result.true_pose

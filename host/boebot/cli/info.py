@@ -25,7 +25,7 @@ def info(
     """Say who is at a port: firmware, compiler, image, devices."""
     session = open_board(url, BoardRequest(robot=load_robot(robot), record=False))
     try:
-        link = Link(session.transport, record=False)
+        link = Link(session.transport)
         hello = link.open()
         identity = link.identity()
         values: dict[str, Any] = {

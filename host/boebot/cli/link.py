@@ -32,7 +32,7 @@ def link(
     """Watch the link: counters of both ends, round trips, the board's clock. Ctrl-C ends it; nothing moves."""
     session = open_board(on, BoardRequest(robot=load_robot(robot), record=False, realtime=True))
     try:
-        watched = Link(session.transport, record=False)
+        watched = Link(session.transport)
         watched.open()
         for notice in watched.notices:
             output.say(notice)

@@ -32,7 +32,7 @@ def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
     begun_s = time.monotonic()
     session = open_board(on, BoardRequest(robot=load_robot(robot), record=False))
     try:
-        link = Link(session.transport, record=False)
+        link = Link(session.transport)
         link.open()
         for notice in link.notices:
             output.say(notice)

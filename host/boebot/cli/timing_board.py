@@ -39,7 +39,7 @@ def maxima(
     )
     session = open_board(port, request)
     try:
-        link = Link(session.transport, record=False)
+        link = Link(session.transport)
         link.open()
         for notice in link.notices:
             output.say(notice)

@@ -20,6 +20,9 @@ _BAUD = 500_000  # assumed for time-outs where the transport cannot tell
 _BITS_PER_BYTE = 10
 
 
+Append = Callable[[str, float, bytes], None]
+
+
 class Line(ABC):
     """A transport, a decoder, and what crossed the wire.
 
@@ -29,16 +32,13 @@ class Line(ABC):
         hello: what the board said of itself last.
         byte_s: time that a byte needs on the line (s).
         line_s: the same as far as the transport knows it for certain, else 0.
-        sent, received: (time in s on the transport's clock, bytes), oldest first, if recorded.
     """
 
-    def __init__(self, transport: Transport, record: bool) -> None:
-        """`record`: keep all that crosses the wire."""
+    def __init__(self, transport: Transport, record: Append | None) -> None:
+        """`record`: takes all that crosses the wire: ("to_board" or "to_host", s on the transport's clock, bytes)."""
         self.transport = transport
         self.decoder = Decoder(NO_SESSION)
         self.hello: messages.Hello | None = None
-        self.sent: list[tuple[float, bytes]] = []
-        self.received: list[tuple[float, bytes]] = []
         self._record = record
         self._sequence = 0
         self._session = 0  # seed of the frames that are sent
@@ -73,15 +73,15 @@ class Line(ABC):
         frame = encode(message_id, self._sequence, payload, self._session)
         self._sequence = (self._sequence + 1) & 0xFF
         self.transport.write(frame)
-        if self._record:
-            self.sent.append((self._now(), frame))
+        if self._record is not None:
+            self._record("to_board", self._now(), frame)
 
     def _receive(self, wait_s: float, quiet_s: float) -> None:
         """Reads what arrived, and hands each message to who heeds it."""
         handlers = self._handlers
         for stamp, data in self._read(wait_s, quiet_s):
-            if self._record:
-                self.received.append((stamp, data))
+            if self._record is not None:
+                self._record("to_host", stamp, data)
             if self.hello is None:
                 self._heard.take(data)
             for message_id, _, payload in self.decoder.feed(data):

@@ -22,7 +22,7 @@ from boebot.link import finding, messages, mismatch
 from boebot.link.clock import BoardClock
 from boebot.link.delivery import LinkTimes, RoundTrips, TakenOverError
 from boebot.link.frame import NO_SESSION, SEED
-from boebot.link.line import NEVER, SHORTEST_S, Line
+from boebot.link.line import NEVER, SHORTEST_S, Append, Line
 from boebot.link.transport import BaudSelectable, Transport
 
 _M = TypeVar("_M")
@@ -49,7 +49,7 @@ class Opening(Line):
         notices: what a user should be told, in sentences; whoever shows them takes them out.
     """
 
-    def __init__(self, transport: Transport, record: bool, times: LinkTimes, take_over: bool) -> None:
+    def __init__(self, transport: Transport, record: Append | None, times: LinkTimes, take_over: bool) -> None:
         self.times = times
         self.is_open = False
         self.sessions = 0

@@ -16,7 +16,7 @@ from boebot.devices.buzzer import next_token
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch
 from boebot.link.delivery import BoardEvent, LatchedAgainError, LinkTimes, RequestKind
-from boebot.link.line import SHORTEST_S
+from boebot.link.line import SHORTEST_S, Append
 from boebot.link.parameter_values import parameter_counts, parameter_spec
 from boebot.link.traffic import Telemetry, Traffic
 from boebot.link.transport import Transport
@@ -46,7 +46,11 @@ class Link(Traffic):
     and `Line`."""
 
     def __init__(
-        self, transport: Transport, record: bool = True, times: LinkTimes | None = None, take_over: bool = False
+        self,
+        transport: Transport,
+        record: Append | None = None,
+        times: LinkTimes | None = None,
+        take_over: bool = False,
     ) -> None:
         """Nothing is sent yet: see `open`.
 

@@ -7,7 +7,7 @@ from boebot.errors import BoardError
 from boebot.link import messages, reset_cause
 from boebot.link.counters import BoardCounters, HostCounters
 from boebot.link.delivery import Events, LinkTimes, Request, RequestKind, Requests, Stopping
-from boebot.link.line import NEVER
+from boebot.link.line import NEVER, Append
 from boebot.link.opening import Opening
 from boebot.link.probes import ClockProbes
 from boebot.link.transport import CountsOverruns, Transport
@@ -44,7 +44,7 @@ class Traffic(Opening):
             0.8 s where the line is fast.
     """
 
-    def __init__(self, transport: Transport, record: bool, times: LinkTimes, take_over: bool) -> None:
+    def __init__(self, transport: Transport, record: Append | None, times: LinkTimes, take_over: bool) -> None:
         super().__init__(transport, record, times, take_over)
         self.board_resets = 0
         self.latest: bytes | None = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from boebot import brains
 from boebot.errors import BoebotError
-from boebot.link.messages import Telemetry
+from boebot.link.messages import DevicesTelemetry, Telemetry
 from boebot.record.result import RunResult
 from boebot.robot import Command, Equipment, Observation, Robot
 
@@ -70,7 +70,7 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
     Raises:
         BoebotError: a run without a board, or of a board with slow devices, whose messages have no step of their own.
     """
-    if result.record.devices:
+    if result.record.rows(DevicesTelemetry.NAME):
         raise BoebotError(f"robot {result.robot.name!r} has slow devices; only telemetry can be replayed")
     loaded = brains.load_brain(brain)
     robot = Robot(result.robot.name, result.period, result.seed)

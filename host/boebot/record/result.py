@@ -16,7 +16,7 @@ from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
-from boebot.link.messages import EventKind, Identity, Status
+from boebot.link.messages import DevicesTelemetry, EventKind, Identity, Status
 from boebot.link.session import text
 from boebot.record import figures
 from boebot.record.brain_record import BrainRecord
@@ -46,7 +46,6 @@ class RunResult:
             those included.
         lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
         run_time: length of the run by the board's clock. wall_time: by the wall clock.
-        sent, received: (stamp in s on the transport's clock, bytes), oldest first.
         link: what the two ends of the link counted, "host" and "board".
         without: imperfections of the simulated robot that were switched off.
         odometry_source: what the brain's own poses came from, where it kept any: "odometer", "encoders", or "commands"
@@ -77,8 +76,6 @@ class RunResult:
     bad_frames: int
     run_time: float
     wall_time: float
-    sent: list[tuple[float, bytes]]
-    received: list[tuple[float, bytes]]
     sessions_lost: int = 0
     identity: Identity | None = None
     link: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -150,12 +147,12 @@ class RunResult:
     @property
     def bytes_from_board(self) -> bytes:
         """Every byte that came from the board."""
-        return b"".join(data for _, data in self.received)
+        return b"".join(data for _, data in self.record.rows("to_host"))
 
     @property
     def bytes_to_board(self) -> bytes:
         """Every byte that went to the board."""
-        return b"".join(data for _, data in self.sent)
+        return b"".join(data for _, data in self.record.rows("to_board"))
 
     # ---- figures -------------------------------------------------------------------------------------------
 
@@ -234,7 +231,7 @@ class RunResult:
     def slow_reading_age(self) -> float | None:
         """The greatest age (s) that a slow device's reading (light, compass, battery, ...) had at a step of the brain,
         once it had said something; None without such a device."""
-        if self.layout is not None or not self.record.devices:
+        if self.layout is not None or not self.record.rows(DevicesTelemetry.NAME):
             return None
         steps = np.array([index for index, *_ in self.record.steps], dtype=np.intp)
         slow = [name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)]
@@ -275,7 +272,7 @@ class RunResult:
             "unrealisable": self.unrealisable,
             **self._behavior_figures(),
             "ticks": self.ticks,
-            "slow_readings": None if slow_age is None else len(self.record.devices),
+            "slow_readings": None if slow_age is None else len(self.record.rows(DevicesTelemetry.NAME)),
             "slow_reading_age_ms": None if slow_age is None else round(slow_age * 1000, 3),
             "lost_frames": self.lost_frames if on_board else None,
             "bad_frames": self.bad_frames if on_board else None,

@@ -36,7 +36,7 @@ class TelemetrySeries(Series):
 
     def __init__(self, record: Record, robot: RobotDescription, tick_s: float) -> None:
         super().__init__(record, robot, tick_s, None)
-        self._messages = record.devices
+        self._record = record
         self.raw: NDArray[np.void] = np.frombuffer(b"".join(record.telemetry), dtype=TELEMETRY_DTYPE)
         self.status = self.raw["status"]
 
@@ -54,7 +54,7 @@ class TelemetrySeries(Series):
     def held(self, kind: Any) -> Held:
         """See `boebot.devices.device.Run`."""
         if kind not in self._held:
-            rows = [(row, kind.unpack(payload)) for row, number, payload in self._messages if number == kind.ID]
+            rows = self._record.messages(kind)
             found = [message for _, message in rows]
             newest, ticks = newest_messages([row for row, _ in rows], found, self.raw["tick"], self._restarted)
             self._held[kind] = Held(found, newest, ticks * self._tick_s)

@@ -94,7 +94,8 @@ class BoardDriver:
         self.session = session
         self.task = task
         request = task.request
-        self.link = Link(session.transport)
+        self.record = Record()
+        self.link = Link(session.transport, self.record.append)
         hello = self.link.open()
         self.tick_s = 1.0 / hello.tick_rate
         self.notices = self.link.notices
@@ -113,9 +114,9 @@ class BoardDriver:
         self.description = request.robot
         self.equipment = Equipment(request.robot, self.tick_s)
         self.robot = Robot(request.robot.name, self.period_s, task.brain_seed)
-        self.record = Record()
         self.resets = 0
         self.late_steps = 0
+        self._last_s = -1.0  # time of the newest telemetry of the run
         self.clock_offset_s = 0.0  # transport's clock at the run's time 0
         self._session = 0  # of the link that was configured and armed
         self._first_session = 0
@@ -241,11 +242,9 @@ class BoardDriver:
         return Latest(self._messages, tick)
 
     def _put_devices_aside(self) -> None:
-        row = len(self.record.times) - 1
-        if row >= 0:
-            self.record.devices += [
-                (row, messages.DevicesTelemetry.ID, payload) for payload in self.link.fetch_devices()
-            ]
+        if self._last_s >= 0.0:
+            for payload in self.link.fetch_devices():
+                self.record.append(messages.DevicesTelemetry.NAME, self._last_s, payload)
 
     def _heed_latch(self, payload: bytes) -> None:
         """The board has latched its motors off: a reason to end the run, unless a new session mends it.
@@ -269,13 +268,12 @@ class BoardDriver:
         link, robot, transport = self.link, self.robot, self.session.transport
         poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK.unpack_from
         make, waiting_events = _Telemetry._make, link.waiting_events
-        telemetry_log, times, steps = self.record.telemetry, self.record.times, self.record.steps
+        put_aside, command_given = self.record.append_telemetry, self.record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
         paced = self.task.request.realtime and not transport.realtime
         time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
 
         period = self.telemetry_ticks
-        host_stamps = self.record.stamps
         last = due = -1
         time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
         end_s = seconds - tick_s / 2
@@ -310,14 +308,12 @@ class BoardDriver:
                 elif restarted or tick <= last:  # the board was reset: its ticks begin afresh
                     restarted = False
                     due = tick + -tick % n
-                    time_zero = self._time_after_reset(times, host_s) - tick * tick_s
+                    time_zero = self._time_after_reset(host_s) - tick * tick_s
                     self.resets = link.board_resets
                 last = tick
-                if tick >= due or times:
-                    time_s = tick * tick_s + time_zero
-                    telemetry_log.append(payload)
-                    times.append(time_s)
-                    host_stamps.append((host_s, bound_s))
+                if tick >= due or self._last_s >= 0.0:
+                    self._last_s = time_s = tick * tick_s + time_zero
+                    put_aside(time_s, payload, host_s, bound_s)
             if payload[_LATCH] and last > self._armed_tick:
                 self._heed_latch(payload)
             if waiting_events:
@@ -353,7 +349,7 @@ class BoardDriver:
                     link.send_speed(left, right, time_to_live_ms, last)
                 else:
                     link.send_coast(time_to_live_ms, last)
-                steps.append((len(times) - 1, kind, left, right))
+                command_given(time_s, kind, left, right)
                 due = last - last % n + n
             ahead_ticks = min(due - last, (seconds - time_s) / tick_s)
             # looked for too early: it is about to come
@@ -373,16 +369,16 @@ class BoardDriver:
         """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
         for event in self.link.events():
             if not event.earlier or self.link.sessions != self._first_session:
-                self.record.events.append(event)
+                self.record.append_event(event)
             elif event.kind in _UNASKED or (event.kind, event.value) == _SUPPLY_LOW:
                 self.notices.append(
                     f"before this run, by the clock of the board at {self.link.transport.name}: {event}"
                 )
 
-    def _time_after_reset(self, times: list[float], host_s: float) -> float:
+    def _time_after_reset(self, host_s: float) -> float:
         """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
         passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
-        return max(passed_s, times[-1] + self.tick_s) if times else 0.0
+        return max(passed_s, self._last_s + self.tick_s) if self._last_s >= 0.0 else 0.0
 
     def end(self) -> None:
         """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
@@ -417,10 +413,8 @@ class BoardDriver:
             sessions_lost=link.sessions_lost,
             lost_frames=link.decoder.lost,
             bad_frames=link.decoder.bad,
-            run_time=self.record.times[-1] if self.record.times else 0.0,
+            run_time=max(self._last_s, 0.0),
             wall_time=elapsed_s,
-            sent=link.sent,
-            received=link.received,
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
             notices=self.notices,

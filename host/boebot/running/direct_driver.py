@@ -48,15 +48,14 @@ class DirectDriver:
         """See `boebot.running.driver.Driver`."""
         session, robot, equipment, n = self.session, self.robot, self.equipment, self.period_ticks
         tick_s, progress = session.tick_s, self.task.progress
-        times, log, steps = self.record.times, self.record.readings, self.record.steps
+        put_aside, command_given = self.record.append_readings, self.record.append_command
         end_s = self.task.seconds - tick_s / 2
         paced = self.task.request.realtime
         started = next_progress = wall.perf_counter()
         left = right = 0.0
         tick, time_s = 0, 0.0
         sample = self._sample(tick, time_s)
-        times.append(time_s)
-        log.append((sample, left, right))
+        put_aside(time_s, sample, left, right)
         while time_s < end_s:
             if paced and (ahead := time_s - (wall.perf_counter() - started)) > 0:
                 wall.sleep(ahead)
@@ -69,15 +68,14 @@ class DirectDriver:
             if paced:
                 self.late_steps += int((wall.perf_counter() - shown) / self.period_s)
             command = robot.command
-            steps.append((len(times) - 1, *command))
+            command_given(time_s, *command)
             left, right = (0.0, 0.0) if robot.latched else self._signals(command)
             for _ in range(n):
                 session.step(left, right)
                 tick += 1
                 time_s = tick * tick_s
                 sample = self._sample(tick, time_s)
-                times.append(time_s)
-                log.append((sample, left, right))
+                put_aside(time_s, sample, left, right)
                 if time_s >= end_s:
                     break
             if ended := session.ended:
@@ -126,8 +124,6 @@ class DirectDriver:
             bad_frames=0,
             run_time=self.record.times[-1] if self.record.times else 0.0,
             wall_time=elapsed_s,
-            sent=[],
-            received=[],
             counters=dict(self.session.counters()),
             layout=self.session.layout,
             without=request.without,

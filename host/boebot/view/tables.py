@@ -94,7 +94,7 @@ def write_summary(result: RunResult, path: Path) -> Path:
 def write_wire(result: RunResult, folder: Path) -> list[Path]:
     """to_board.bin and to_host.bin; wire.csv tells when which of their bytes were sent or read (transport's clock)."""
     rows: list[tuple[float, str, int, int]] = []
-    for name, chunks in (("to_board", result.sent), ("to_host", result.received)):
+    for name, chunks in ((name, result.record.rows(name)) for name in ("to_board", "to_host")):
         (folder / f"{name}.bin").write_bytes(b"".join(data for _, data in chunks))
         first = 0
         for stamp, data in chunks:
