@@ -406,7 +406,7 @@ class BoardDriver:
             record=self.record,
             truth=self.session.truth(),
             clock_offset=self.clock_offset_s,
-            steps=len(self.record.steps),
+            steps=len(self.record.rows("command")),
             late_steps=self.late_steps,
             odometry_source=self.task.brain.odometry,
             resets=self.resets,
