@@ -36,7 +36,7 @@ FORBIDDEN = (
     "sim_bridge",
     "boebot.boards",
     "boebot.experiments",
-    "boebot.arenas.floor_plan",
+    "boebot.arenas",
     "boebot.record",
     "boebot.running",
     "boebot.view",
