@@ -81,7 +81,7 @@ def builder() -> FFI:
         sources=[*arena.SOURCES, *sorted(path.as_posix() for pattern in SOURCES for path in ROOM.glob(pattern))],
         include_dirs=[ROOM.as_posix(), arena.HERE.as_posix(), "firmware/src"],
         extra_compile_args=arena.COMPILE,
-        extra_link_args=[*arena.LINK, *LIBRARIES],
+        extra_link_args=LIBRARIES,
     )
     return built
 

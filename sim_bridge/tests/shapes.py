@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,15 @@ class Shapes:
         item = ffi.new("uint32_t *", 0)
         distance = lib.arena_ray(self.handle, x, y, math.cos(angle), math.sin(angle), reach, height, item)
         return (distance, item[0]) if distance >= 0 else (-1.0, -1)
+
+    def fan(self, x: float, y: float, looks: Sequence[float], reach: float = 1e3, height: float = 0.0) -> list[float]:
+        """Distances of rays that are asked together."""
+        fan = ffi.new("ray_fan *")
+        lib.ray_fan_set(fan, [math.cos(look) for look in looks], [math.sin(look) for look in looks], len(looks))
+        distances = ffi.new("double[]", len(looks) + 3)
+        question = ffi.new("fan_question *", (self.handle, fan, x, y, 1.0, 0.0, reach, height, distances))
+        lib.arena_fans(question, 1)
+        return list(distances)[: len(looks)]
 
 
 def surface_of(height: float | None) -> Any:

@@ -42,16 +42,11 @@ def test_rays_asked_together_get_the_same_bits(
     toward = [math.atan2(ring.coords[0][1] - y, ring.coords[0][0] - x) for ring in scene.rings]
     for middle in (turn, 0.0, math.pi / 2, *toward):
         looks = [middle + opening * (k / (rays - 1) - 0.5) if rays > 1 else middle for k in range(rays)]
-        cosines, sines = [math.cos(look) for look in looks], [math.sin(look) for look in looks]
-        fan, together = ffi.new("ray_fan *"), ffi.new("double[]", 12)
-        lib.ray_fan_set(fan, cosines, sines, rays)
         for index in INDEXES:
             scene.build(index)
             for height in (0.0, 0.1):
                 alone = [scene.ray(x, y, look, reach, height)[0] for look in looks]
-                question = ffi.new("fan_question *", (scene.handle, fan, x, y, 1.0, 0.0, reach, height, together))
-                lib.arena_fans(question, 1)
-                assert list(together)[:rays] == alone
+                assert scene.fan(x, y, looks, reach, height) == alone
 
 
 @given(scenes(), coordinates, coordinates)
@@ -184,8 +179,7 @@ def test_lists_beyond_what_a_cell_looks_at() -> None:
             for row in range(50):
                 scene.polygon(square(column + 0.3 * (row % 3), row, 0.2))
         scene.build(index)
-        lib.arena_ray(scene.handle, 0.5, 0.5, 1.0, 0.0, 1.0, 0.0, ffi.NULL)
-        answers.append([scene.ray(0.5 + 0.37 * k, 0.5, 0.9 * k, 200.0) for k in range(100)])
+        answers.append([scene.fan(0.5 + 0.37 * k, 0.5, [0.9 * k, 0.9 * k + 0.5], 200.0) for k in range(100)])
     assert answers[0] == answers[1] == answers[2]
 
 
@@ -193,11 +187,11 @@ def test_threads_share_an_arena_while_it_makes_its_lists() -> None:
     scene = Shapes()
     for k in range(40):
         scene.polygon(ring_of(k % 7, k // 7, 0.3, 30))
-    looks = [(0.5 + (k % 60) / 10, 0.5 + (k // 60) / 10, k * 0.7) for k in range(3000)]
-    expected = [scene.build(lib.ARENA_INDEX_NONE).ray(*look, 3.0) for look in looks[:200]]
+    looks = [(0.5 + (k % 60) / 10, 0.5 + (k // 60) / 10, [k * 0.7, k * 0.7 + 0.3]) for k in range(3000)]
+    expected = [scene.build(lib.ARENA_INDEX_NONE).fan(*look, 3.0) for look in looks[:200]]
     scene.build(lib.ARENA_INDEX_LISTS_AT_ONCE)
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda _: [scene.ray(*look, 3.0) for look in looks], range(4)))
+        found = list(pool.map(lambda _: [scene.fan(*look, 3.0) for look in looks], range(4)))
     assert found[0] == found[1] == found[2] == found[3]
     assert found[0][:200] == expected
 

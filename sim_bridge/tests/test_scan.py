@@ -30,14 +30,10 @@ class Scan:
         self.scene = ffi.new("scene *", {"arena": shapes.build().handle, **moving})
 
     def look(self, x: float, y: float, heading: float, reach: float, height: float = 0.1, self_id: int = 0) -> Floats:
-        """By two lanes, and by as many as the processor has: the same bits."""
-        narrow, wide = (np.full(self.count, np.nan) for _ in range(2))
+        distances = np.full(self.count, np.nan)
         pose = (x, y, math.cos(heading), math.sin(heading))
-        for use, distances in enumerate((narrow, wide)):
-            lib.scan_fan_use_wide(self.fan, use)
-            lib.scan_look(self.fan, self.scene, *pose, reach, height, self_id, ffi.from_buffer("double[]", distances))
-        assert np.array_equal(narrow.view(np.uint64), wide.view(np.uint64))
-        return wide
+        lib.scan_look(self.fan, self.scene, *pose, reach, height, self_id, ffi.from_buffer("double[]", distances))
+        return distances
 
     def rays(self, x: float, y: float, heading: float, reach: float, height: float = 0.1, aside: float = 0) -> Floats:
         bearings = heading + np.linspace(self.first, self.last, self.count) + aside
@@ -131,22 +127,6 @@ def test_a_sensor_in_line_with_edges_and_close_to_one() -> None:
     ahead = np.abs(angle) < math.pi / 2 - 1e-5
     assert before_it[ahead] == pytest.approx(1e-6 / np.cos(angle[ahead]), abs=1e-12)
     assert (before_it[~ahead] == -1).all()
-
-
-@given(
-    st.lists(st.tuples(st.one_of(st.just(-1.0), st.floats(0, 5)), st.floats(-6, 6)), max_size=40),
-    st.sampled_from([0.0, 0.01, 0.5]),
-    st.sampled_from([0.5, 4.0]),
-)
-def test_noise_of_distances_is_3_1(pairs: list[tuple[float, float]], sigma: float, reach: float) -> None:
-    """Bit for bit d (1 + sigma draw), clamped; -1 stays; what stands beside the array as well."""
-    distances = np.array([d for d, _ in pairs] + [math.pi])
-    draws = np.array([draw for _, draw in pairs] + [9.0])
-    expected = np.where(distances < 0, distances, np.clip(distances * (1.0 + sigma * draws), 0.0, reach))
-    lib.scan_spread(
-        ffi.from_buffer("double[]", distances), ffi.from_buffer("double[]", draws), len(pairs), sigma, reach
-    )
-    assert np.array_equal(distances[:-1], expected[:-1]) and distances[-1] == math.pi
 
 
 def test_no_crack_opens_between_neighbours() -> None:

@@ -59,7 +59,7 @@ static uint64_t hash_sensor(uint64_t sum, const vehicle_sensor *s) {
     case SENSOR_INFRARED_PROXIMITY: {
       const infrared_proximity *p = &s->as.infrared_proximity;
       sum = hash_word(hash_beam(sum, &p->beam), p->reflectance != 0);
-      sum = hash_numbers(sum, p->c1, (size_t)p->beam.rays);
+      sum = hash_numbers(sum, &p->c1, 1);
       return HASH_NUMBERS(sum, p->range, p->c2, p->sigma);
     }
     case SENSOR_SHARP_INFRARED: {

@@ -119,18 +119,10 @@ static vehicle_sensor *added(vehicle_model *self, int kind, double period, size_
   return sensor;
 }
 
-static int is_eye(const vehicle_sensor *sensor) {
-  return sensor->kind == SENSOR_INFRARED_PROXIMITY && !sensor->as.infrared_proximity.reflectance;
-}
-
 /* What adding a sensor returns; one that is not `usable` leaves again. */
 static int done(vehicle_model *self, const vehicle_sensor *sensor, int usable, size_t readings) {
   if (sensor == NULL) return self->sensors_count == VEHICLE_SENSORS ? VEHICLE_TOO_MANY : VEHICLE_BAD_NUMBER;
-  if (usable) {
-    sensor_list *list = is_eye(sensor) ? &self->eyes : &self->others;
-    list->number[list->count++] = (uint8_t)(sensor - self->sensors);
-    return (int)sensor->first;
-  }
+  if (usable) return (int)sensor->first;
   self->sensors_count--;
   self->readings -= readings;
   return VEHICLE_BAD_NUMBER;

@@ -142,11 +142,6 @@ typedef struct {
   } as;
 } vehicle_sensor;
 
-/* Numbers of some of the sensors. */
-typedef struct {
-  uint8_t count, number[VEHICLE_SENSORS];
-} sensor_list;
-
 struct vehicle_model {
   body_parameters body;
   double reach; /* of body and whiskers, m */
@@ -161,8 +156,6 @@ struct vehicle_model {
   int noise, ends_at_collision;
   size_t sensors_count, readings;
   vehicle_sensor sensors[VEHICLE_SENSORS];
-  sensor_list eyes;   /* IR proximity sensors without `reflectance`: asked all at once */
-  sensor_list others; /* one by one */
 };
 
 /* A hash of all parameters: equal for two models only if their worlds go on alike from the same state. */

@@ -120,41 +120,6 @@ static void key_noise(noise_source *noise, const sensor_slot *slot, uint64_t ste
   noise_at(noise, step);
 }
 
-/* The IR proximity sensors that are due: first all questions, then all answers. */
-static void read_eyes(const sensing *s, sensor_slot *slots, noise_source *noise, double *readings) {
-  const vehicle_model *m = s->all->model;
-  const vehicle_sensor *sensors[VEHICLE_SENSORS];
-  const infrared_proximity *eyes[VEHICLE_SENSORS];
-  fan_question asked[VEHICLE_SENSORS];
-  double distances[VEHICLE_SENSORS * BEAM_RAYS];
-  double sums[VEHICLE_SENSORS];
-  double *room = distances;
-  size_t count = 0;
-  for (size_t k = 0; k < m->eyes.count; k++) {
-    const size_t number = m->eyes.number[k];
-    const vehicle_sensor *sensor = &m->sensors[number];
-    if (!due(sensor, &slots[number], s->time)) continue;
-    sensors[count] = sensor;
-    eyes[count] = &sensor->as.infrared_proximity;
-    asked[count] = infrared_proximity_ask(eyes[count], &s->from, room);
-    room += ((size_t)eyes[count]->beam.rays + RAY_FAN_GROUP - 1u) / RAY_FAN_GROUP * RAY_FAN_GROUP;
-    count++;
-  }
-  if (count == 0) return;
-  arena_fans(asked, count);
-  if (s->from.around->movers_count > 0) {
-    for (size_t k = 0; k < count; k++) scene_fan_movers(s->from.around, &asked[k], s->from.id);
-  }
-  infrared_proximity_sums(eyes, asked, count, sums);
-  for (size_t k = 0; k < count; k++) {
-    sensor_slot *slot = &slots[sensors[k] - m->sensors];
-    double *out = &readings[sensors[k]->first];
-    key_noise(noise, slot, s->world->state.step);
-    *out = infrared_proximity_finish(eyes[k], sums[k], noise);
-    if (sensors[k]->period > 0.0) sample_hold_take(&slot->hold, s->time, *out);
-  }
-}
-
 static void read_one(const sensing *s, size_t number, sensor_slot *slots, noise_source *noise, double *readings) {
   const vehicle_model *m = s->all->model;
   const vehicle_state *state = &s->world->state;
@@ -184,7 +149,6 @@ void vehicle_sense(vehicles *self, size_t i) {
   double *readings = &self->readings[i * m->readings];
   sensor_slot *slots = &self->slots[i * m->sensors_count];
   noise_source noise = {.keyed = 1, .on = m->noise != 0};
-  read_eyes(&s, slots, &noise, readings);
-  for (size_t k = 0; k < m->others.count; k++) read_one(&s, m->others.number[k], slots, &noise, readings);
+  for (size_t number = 0; number < m->sensors_count; number++) read_one(&s, number, slots, &noise, readings);
   w->state.sensed = w->state.step + 1;
 }

@@ -5,33 +5,30 @@
 #include <string.h>
 
 #include "../world/body_step.h"
-#include "../world/noise_block.h"
 #include "../world/row.h"
-#include "geometry/lanes.h"
 #include "sense.h"
 
 #define DRAWS (VEHICLE_SENSORS + 1u) /* sensors draw one number each, an odometer two */
 
 /* ---- moving -------------------------------------------------------------------------------------------------------- */
 
-LANES_INLINE void dc_torques_inline(const vehicle_model *m, vehicle *const worlds[], double left[], double right[]) {
+static void dc_torques(const vehicle_model *m, vehicle *const worlds[], double left[], double right[]) {
   const motor_dc_parameters motors[2] = {m->dc[0], m->dc[1]}; /* here, where no result can be */
   const double radius = m->body.wheel_radius;
   const double stopping[2] = {motor_dc_stopping(&motors[0], worlds[0]->hold),
                               motor_dc_stopping(&motors[1], worlds[0]->hold)};
   double signals[2][ROW], rims[2][ROW];
-  ROW_GATHER(signals[0], k, worlds[k]->state.signals[0])
-  ROW_GATHER(signals[1], k, worlds[k]->state.signals[1])
-  ROW_GATHER(rims[0], k, worlds[k]->body.state.rim_left)
-  ROW_GATHER(rims[1], k, worlds[k]->body.state.rim_right)
+  for (size_t k = 0; k < ROW; k++) {
+    signals[0][k] = worlds[k]->state.signals[0];
+    signals[1][k] = worlds[k]->state.signals[1];
+    rims[0][k] = worlds[k]->body.state.rim_left;
+    rims[1][k] = worlds[k]->body.state.rim_right;
+  }
   for (size_t k = 0; k < ROW; k++)
     left[k] = vehicle_dc_torque(&motors[0], radius, signals[0][k], rims[0][k], stopping[0]);
   for (size_t k = 0; k < ROW; k++)
     right[k] = vehicle_dc_torque(&motors[1], radius, signals[1][k], rims[1][k], stopping[1]);
 }
-
-LANES_FUNCTION(static, dc_torques, (const vehicle_model *m, vehicle *const worlds[], double left[], double right[]),
-               (m, worlds, left, right))
 
 static void torques(const vehicles *self, vehicle *const worlds[], double left[], double right[]) {
   if (self->model->drive == DRIVE_DC && !self->model->full) {
@@ -89,41 +86,31 @@ static unsigned draws_of(const vehicle_sensor *sensor) {
 /* All draws that the row's sensors take together; 0 without noise. */
 static void draw(sensing_row *s) {
   const vehicle_model *m = s->all->model;
-  uint64_t keys[DRAWS][ROW];
   unsigned count = 0;
   for (size_t number = 0; number < m->sensors_count; number++) {
     const unsigned draws = draws_of(&m->sensors[number]);
     for (unsigned i = 0; i < draws; i++, count++) {
-      for (size_t k = 0; k < ROW; k++)
-        keys[count][k] = s->slots[k][number].key ^ (noise_first(s->worlds[k]->state.step) + i);
+      for (size_t k = 0; k < ROW; k++) {
+        const uint64_t step = noise_first(s->worlds[k]->state.step) + i;
+        s->draws[count][k] = m->noise ? noise_normal_of(hash_mix(s->slots[k][number].key ^ step)) : 0.0;
+      }
     }
-  }
-  if (m->noise) {
-    noise_block_normals(keys[0], s->draws[0], count * ROW);
-  } else {
-    memset(s->draws, 0, sizeof s->draws);
   }
 }
 
-LANES_INLINE void finish_eyes_inline(const infrared_proximity *eye, const double (*distances)[BEAM_RAYS],
-                                     const double draws[], double readings[]) {
+static void finish_eyes(const infrared_proximity *eye, const double (*distances)[BEAM_RAYS], const double draws[],
+                        double readings[]) {
   double sums[ROW] = {0.0};
   double seen[ROW];
   for (int i = 0; i < eye->beam.rays; i++) {
-    const double c1 = eye->c1[i];
     const double inward = eye->beam.inward[i];
     double distance[ROW];
-    ROW_GATHER(distance, k, distances[k][i])
-    for (size_t k = 0; k < ROW; k++) sums[k] += infrared_proximity_ray(c1, eye->c2, distance[k], inward);
+    for (size_t k = 0; k < ROW; k++) distance[k] = distances[k][i];
+    for (size_t k = 0; k < ROW; k++) sums[k] += infrared_proximity_ray(eye->c1, eye->c2, distance[k], inward);
   }
   for (size_t k = 0; k < ROW; k++) seen[k] = infrared_proximity_of(eye, sums[k], draws[k]);
   memcpy(readings, seen, sizeof seen);
 }
-
-LANES_FUNCTION(static, finish_eyes,
-               (const infrared_proximity *eye, const double (*distances)[BEAM_RAYS], const double draws[],
-                double readings[]),
-               (eye, distances, draws, readings))
 
 static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
   const infrared_proximity *eye = &sensor->as.infrared_proximity;
@@ -139,18 +126,16 @@ static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const 
   for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
 }
 
-LANES_INLINE void read_compasses_inline(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+static void read_compasses(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
   double readings[ROW];
-  ROW_GATHER(readings, k, s->from[k].heading)
+  for (size_t k = 0; k < ROW; k++) readings[k] = s->from[k].heading;
   for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(&sensor->as.compass, readings[k], draws[k]);
   for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
 }
 
-LANES_FUNCTION(static, read_compasses, (const sensing_row *s, const vehicle_sensor *sensor, const double draws[]),
-               (s, sensor, draws))
-
-LANES_INLINE void read_odometers_inline(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
-  const odometer_parameters *p = &sensor->as.odometer;
+static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+  const odometer_parameters parameters = sensor->as.odometer;
+  const odometer_parameters *p = &parameters; /* here, where no result can be */
   const size_t number = (size_t)(sensor - s->all->model->sensors);
   const double spread = p->sigma_step > 0.0 ? odometer_spread(p, s->all->model->dt) : 0.0;
   const double share = odometer_share(p);
@@ -161,12 +146,14 @@ LANES_INLINE void read_odometers_inline(const sensing_row *s, const vehicle_sens
     states[k] = &s->slots[k][number].as.odometer;
     bodies[k] = &s->worlds[k]->body.state;
   }
-  ROW_GATHER(left, k, bodies[k]->wheel_left - states[k]->wheel_left)
-  ROW_GATHER(right, k, bodies[k]->wheel_right - states[k]->wheel_right)
-  ROW_GATHER(x, k, states[k]->x)
-  ROW_GATHER(y, k, states[k]->y)
-  ROW_GATHER(heading, k, states[k]->heading)
-  ROW_GATHER(distance, k, states[k]->distance)
+  for (size_t k = 0; k < ROW; k++) {
+    left[k] = bodies[k]->wheel_left - states[k]->wheel_left;
+    right[k] = bodies[k]->wheel_right - states[k]->wheel_right;
+    x[k] = states[k]->x;
+    y[k] = states[k]->y;
+    heading[k] = states[k]->heading;
+    distance[k] = states[k]->distance;
+  }
   for (size_t k = 0; k < ROW; k++) {
     left[k] = odometer_travel(p, left[k], p->factor_left) + spread * draws[k];
     right[k] = odometer_travel(p, right[k], p->factor_right) + spread * draws[ROW + k];
@@ -183,9 +170,6 @@ LANES_INLINE void read_odometers_inline(const sensing_row *s, const vehicle_sens
     state->distance = distance[k];
   }
 }
-
-LANES_FUNCTION(static, read_odometers, (const sensing_row *s, const vehicle_sensor *sensor, const double draws[]),
-               (s, sensor, draws))
 
 static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
   const vehicle_model *m = self->model;

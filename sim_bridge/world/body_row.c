@@ -4,7 +4,6 @@
 
 #include "body_drive.h"
 #include "body_step.h"
-#include "geometry/lanes.h"
 
 /* Bodies of a row side by side, as numbers that wait for each other's turn in no order. */
 typedef struct {
@@ -14,19 +13,14 @@ typedef struct {
   double rim_left[ROW], rim_right[ROW], wheel_left[ROW], wheel_right[ROW];
 } motion;
 
-LANES_INLINE void speed_up_row_inline(body *const bodies[], const double left[], const double right[], double dt,
-                                      motion *all) {
+static void speed_up_row(body *const bodies[], const double left[], const double right[], double dt, motion *all) {
   double speed[ROW], turn_rate[ROW];
-  ROW_GATHER(speed, k, bodies[k]->state.speed)
-  ROW_GATHER(turn_rate, k, bodies[k]->state.turn_rate)
+  for (size_t k = 0; k < ROW; k++) speed[k] = bodies[k]->state.speed;
+  for (size_t k = 0; k < ROW; k++) turn_rate[k] = bodies[k]->state.turn_rate;
   for (size_t k = 0; k < ROW; k++) body_speed_up(bodies[0], left[k], right[k], dt, &speed[k], &turn_rate[k]);
   memcpy(all->speed, speed, sizeof speed);
   memcpy(all->turn_rate, turn_rate, sizeof turn_rate);
 }
-
-LANES_FUNCTION(static, speed_up_row,
-               (body *const bodies[], const double left[], const double right[], double dt, motion *all),
-               (bodies, left, right, dt, all))
 
 /* What drive does. Tyres that may slip, and what drifts sideways, are looked at for each body alone. */
 static void drive_row(body *const bodies[], const scene around[], const double left[], const double right[], double dt,
@@ -44,18 +38,20 @@ static void drive_row(body *const bodies[], const scene around[], const double l
 }
 
 /* What move_freely and turn_wheels do for bodies that do not slip. */
-LANES_INLINE void go_row_inline(body *const bodies[], double dt, motion *all) {
+static void go_row(body *const bodies[], double dt, motion *all) {
   const double half_track = bodies[0]->parameters.half_track;
   const double angle = bodies[0]->per_radius * dt;
-  ROW_GATHER(all->x, k, bodies[k]->state.x)
-  ROW_GATHER(all->y, k, bodies[k]->state.y)
-  ROW_GATHER(all->heading, k, bodies[k]->state.heading)
-  ROW_GATHER(all->speed, k, bodies[k]->state.speed)
-  ROW_GATHER(all->turn_rate, k, bodies[k]->state.turn_rate)
-  ROW_GATHER(all->lateral, k, bodies[k]->state.lateral)
-  ROW_GATHER(all->distance, k, bodies[k]->state.distance)
-  ROW_GATHER(all->wheel_left, k, bodies[k]->state.wheel_left)
-  ROW_GATHER(all->wheel_right, k, bodies[k]->state.wheel_right)
+  for (size_t k = 0; k < ROW; k++) {
+    all->x[k] = bodies[k]->state.x;
+    all->y[k] = bodies[k]->state.y;
+    all->heading[k] = bodies[k]->state.heading;
+    all->speed[k] = bodies[k]->state.speed;
+    all->turn_rate[k] = bodies[k]->state.turn_rate;
+    all->lateral[k] = bodies[k]->state.lateral;
+    all->distance[k] = bodies[k]->state.distance;
+    all->wheel_left[k] = bodies[k]->state.wheel_left;
+    all->wheel_right[k] = bodies[k]->state.wheel_right;
+  }
   for (size_t k = 0; k < ROW; k++) {
     all->heading[k] = number_wrap(all->heading[k] + all->turn_rate[k] * dt);
     number_sincos(all->heading[k], &all->sine[k], &all->cosine[k]);
@@ -67,8 +63,6 @@ LANES_INLINE void go_row_inline(body *const bodies[], double dt, motion *all) {
     all->wheel_right[k] += all->rim_right[k] * angle;
   }
 }
-
-LANES_FUNCTION(static, go_row, (body *const bodies[], double dt, motion *all), (bodies, dt, all))
 
 static void give(const motion *all, size_t k, body_state *s) {
   s->x = all->x[k];

@@ -77,8 +77,6 @@ const double noise_layer_edges[NOISE_LAYERS + 1] = {
 
 double noise_layer_edge(int i) { return i >= 0 && i <= NOISE_LAYERS ? noise_layer_edges[i] : 0.0; }
 
-double noise_layer_height(int i) { return i >= 0 && i <= NOISE_LAYERS ? noise_layer_heights[i] : 0.0; }
-
 uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
   return hash_mix(noise_key(seed, robot, device) ^ step);
 }
@@ -100,31 +98,20 @@ static double tail(uint64_t bits, int negative) {
   return negative ? -(begin + x) : begin + x;
 }
 
-/* y < bell(x), for x between the edges of a layer with the bell at `low` at the outer one, `edge`. There bell(x) is
- * low e^r with a small r > 0, of which four terms and what the others amount to at most settle nearly every case. */
-static int below_bell(double y, double x, double edge, double low) {
-  const double size = x < 0.0 ? -x : x;
-  const double r = 0.5 * (edge - size) * (edge + size);
-  if (r < 0.25) {
-    const double least = low * (1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0)))));
-    const double rest = low * (r * r * r * r * r * (1.0 / 90.0) + 1e-12); /* r^5 e^0.25 / 120, and rounding */
-    if (y < least - rest) return 1;
-    if (y > least + rest) return 0;
-  }
-  return y < number_exp(-0.5 * x * x);
-}
+/* How high the bell is, 1 in its middle. */
+static double bell(double x) { return number_exp(-0.5 * x * x); }
 
 double noise_normal_outside(uint64_t bits) {
   for (;;) {
     const unsigned layer = (unsigned)(bits & (NOISE_LAYERS - 1));
     const double *edge = &noise_layer_edges[layer];
     const double x = ((double)(int64_t)(bits >> 11) * 0x1p-52 - 1.0) * edge[0];
-    if (x < edge[1] && x > -edge[1]) return x;
+    if (fabs(x) < edge[1]) return x;
     if (layer == 0) return tail(bits, x < 0.0);
     /* Within the layer, from its lower border, where the bell is at edge[0], to its upper one. */
-    const double *height = &noise_layer_heights[layer];
+    const double low = bell(edge[0]);
     bits = hash_mix(bits);
-    if (below_bell(height[0] + noise_unit(bits) * (height[1] - height[0]), x, edge[0], height[0])) return x;
+    if (low + noise_unit(bits) * (bell(edge[1]) - low) < bell(x)) return x;
     bits = hash_mix(bits);
   }
 }

@@ -7,6 +7,8 @@
 #ifndef WORLD_NOISE_H
 #define WORLD_NOISE_H
 
+#include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "geometry/hash.h"
@@ -23,9 +25,6 @@ double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
 /* Layer i of the bell is as wide as edge i, [0, 256]; edge 256 is 0. */
 double noise_layer_edge(int i);
 
-/* How high the bell, 1 in its middle, is there. */
-double noise_layer_height(int i);
-
 /* A device's own sequence: each draw takes the next step. */
 typedef struct {
   uint64_t seed;
@@ -41,9 +40,6 @@ typedef struct {
 /* Right edges of the layers, the widest first. */
 extern const double noise_layer_edges[NOISE_LAYERS + 1];
 
-/* The bell's heights there. */
-extern const double noise_layer_heights[NOISE_LAYERS + 1];
-
 /* What the steps of one device are mixed with. */
 static inline uint64_t noise_key(uint64_t seed, uint32_t robot, uint32_t device) {
   return hash_mix(hash_mix(seed) ^ (((uint64_t)robot << 32) | device));
@@ -58,7 +54,7 @@ double noise_normal_outside(uint64_t bits);
 static inline double noise_normal_of(uint64_t bits) {
   const double *edge = &noise_layer_edges[bits & (NOISE_LAYERS - 1)];
   const double x = ((double)(int64_t)(bits >> 11) * 0x1p-52 - 1.0) * edge[0];
-  if (x < edge[1] && x > -edge[1]) return x;
+  if (fabs(x) < edge[1]) return x;
   return noise_normal_outside(bits);
 }
 
@@ -76,6 +72,13 @@ static inline double noise_next_uniform(noise_source *self) {
 
 static inline double noise_next_normal(noise_source *self) {
   return self->on ? noise_normal_of(noise_next_bits(self)) : 0.0;
+}
+
+/* What `count` calls of noise_next_normal give. */
+static inline void noise_next_normals(noise_source *self, double *draws, size_t count) {
+  noise_source source = *self; /* which no draw can overwrite */
+  for (size_t i = 0; i < count; i++) draws[i] = noise_next_normal(&source);
+  *self = source;
 }
 
 #endif

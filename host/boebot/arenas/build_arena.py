@@ -7,13 +7,8 @@ extension's arenas as they are.
 
 from __future__ import annotations
 
-import os
 import re
-import shlex
-import subprocess
 import sys
-import sysconfig
-import tempfile
 from pathlib import Path
 
 from cffi import FFI
@@ -21,36 +16,18 @@ from cffi import FFI
 HERE = Path("host/boebot/arenas")
 HEADERS = ["numbers.h", "paths.h", "arena.h", "scene.h", "scan.h"]
 WINDOWS = sys.platform == "win32"
-WHOLE_PROGRAM = "-flto=auto"
-
-
-def links_whole_program() -> bool:
-    """Whether the compiler optimises across files when it links; the sanitizers' build goes without."""
-    if WINDOWS or os.environ.get("BOEBOT_SANITIZE") == "1":
-        return False
-    compiler = shlex.split(os.environ.get("CC") or str(sysconfig.get_config_var("CC") or "cc"))
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder, "probe.c")
-        source.write_text("int probe(void) { return 0; }\n", encoding="utf-8")
-        command = [*compiler, WHOLE_PROGRAM, "-shared", "-fPIC", str(source), "-o", str(source.with_suffix(".so"))]
-        try:
-            return subprocess.run(command, capture_output=True, check=False).returncode == 0
-        except OSError:
-            return False
-
-
 # Nothing but the module's entry is seen from outside: what is called within the library may be inlined there. Nobody
-# asks for errno or floating-point traps: without them loops become vectors, with the same results.
+# asks for errno or floating-point traps: without them loops become vectors, with the same results. So do loops of any
+# length where that makes them faster, which gcc's -O2 leaves out.
 INSIDE = [
     "-std=gnu11",
     "-fvisibility=hidden",
     "-fno-math-errno",
     "-fno-trapping-math",
-    *([WHOLE_PROGRAM] if links_whole_program() else []),
+    "-fvect-cost-model=dynamic",
 ]
 # No fused multiply-add: the same bits on every machine.
 COMPILE = ["/O2", "/fp:precise"] if WINDOWS else [*INSIDE, "-O2", "-ffp-contract=off"]
-LINK = [] if WINDOWS else COMPILE  # code is made when linking, and by the same rules
 SOURCES = sorted(path.as_posix() for path in (HERE / "geometry").glob("*.c"))
 
 
@@ -69,7 +46,6 @@ def builder() -> FFI:
         sources=SOURCES,
         include_dirs=[HERE.as_posix()],
         extra_compile_args=COMPILE,
-        extra_link_args=LINK,
     )
     return built
 

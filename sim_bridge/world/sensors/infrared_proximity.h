@@ -21,8 +21,7 @@ typedef struct {
 
 typedef struct {
   beam beam;
-  double range, c2, sigma;
-  double c1[32]; /* by ray */
+  double range, c1, c2, sigma;
   int reflectance;
 } infrared_proximity;
 
@@ -33,15 +32,12 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise);
 /* python: end */
 
-/* The same in parts, for readings of many sensors at once, all without `reflectance`: the question that arena_fans is to
- * answer, the sums of the rays' readings for `count` questions that were answered, and the reading. */
+/* The same in parts, for many sensors at once, all without `reflectance`: the question that arena_fans is to answer, what
+ * each ray adds, and the reading. */
 static inline fan_question infrared_proximity_ask(const infrared_proximity *self, const viewpoint *from,
                                                   double *distances) {
   return beam_question(&self->beam, from, self->range, distances);
 }
-
-void infrared_proximity_sums(const infrared_proximity *const sensors[], const fan_question answered[], size_t count,
-                             double sums[]);
 
 /* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. `inward`:
  * cos(kappa). */
@@ -58,10 +54,6 @@ NUMBERS_INLINE double infrared_proximity_of(const infrared_proximity *self, doub
   const double noisy = exact * (1.0 + self->sigma * draw); /* (3.1) */
   const double least = noisy > 0.0 ? noisy : 0.0;          /* each a single operation, no branch */
   return least < 1.0 ? least : 1.0;
-}
-
-static inline double infrared_proximity_finish(const infrared_proximity *self, double sum, noise_source *noise) {
-  return infrared_proximity_of(self, sum, self->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
 }
 
 #endif

@@ -4,10 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "../noise_block.h"
 #include "geometry/numbers.h"
-
-#define DRAWS 256u /* at once */
 
 struct laser {
   laser_parameters parameters;
@@ -54,10 +51,14 @@ void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double 
     scan_look(self->fan, from->around, at.x, at.y, cosine, sine, p->range, p->height, from->id, distances);
   }
   if (p->sigma <= 0.0 || !noise->on) return;
-  double draws[DRAWS];
-  for (size_t i = 0; i < rays; i += DRAWS) {
-    const size_t some = rays - i < DRAWS ? rays - i : DRAWS;
-    noise_block_next(noise, draws, some); /* also where nothing is seen: each ray keeps its own sequence */
-    scan_spread(&distances[i], draws, some, p->sigma, p->range);
+  double draws[LASER_RAYS];
+  noise_next_normals(noise, draws, rays); /* also where nothing is seen: each ray keeps its own sequence */
+  const double sigma = p->sigma;
+  const double range = p->range;
+  for (size_t i = 0; i < rays; i++) {
+    const double noisy = distances[i] * (1.0 + sigma * draws[i]); /* (3.1) */
+    const double positive = noisy > 0.0 ? noisy : 0.0;
+    const double seen = positive < range ? positive : range;
+    distances[i] = distances[i] >= 0.0 ? seen : distances[i];
   }
 }

@@ -1,27 +1,14 @@
-/* arena_rays.c: the nearest item along a ray, see arena.h: from a list, by a walk through the grid, or among all items. */
+/* arena_rays.c: the nearest item along a ray, see arena.h: by a walk through the grid, or among all items. */
 #include "rays.h"
 
 #include "arena_data.h"
 
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
-
-/* The way of most rays is straight: cell, sector, first entry, edge. */
-#ifdef __GNUC__
-#define INLINE static inline __attribute__((always_inline))
-#define NOT_INLINE __attribute__((noinline))
-#else
-#define INLINE static inline
-#define NOT_INLINE
-#endif
-
-NOT_INLINE static void ask_disc(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
+static void ask_disc(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
   const arena_disc *d = &self->disc[item - self->edge_count];
   if (d->height >= height) ray_take(nearest, ray_disc(d, r), item);
 }
 
-INLINE void ask_item(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
+static void ask_item(const arena *self, const ray *r, double height, uint32_t item, ray_nearest *nearest) {
   if (item >= self->edge_count) {
     ask_disc(self, r, height, item, nearest);
     return;
@@ -30,7 +17,7 @@ INLINE void ask_item(const arena *self, const ray *r, double height, uint32_t it
   if (e->height >= height) ray_take(nearest, ray_edge(e, r, nearest->distance), item);
 }
 
-NOT_INLINE static void ask_all(const arena *self, const ray *r, double height, ray_nearest *nearest) {
+static void ask_all(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   const uint32_t count = (uint32_t)(self->edge_count + self->disc_count);
   for (uint32_t i = 0; i < count; i++) ask_item(self, r, height, i, nearest);
 }
@@ -61,7 +48,7 @@ static int in_box(const grid *g, const ray *r, double *enter, double *leave) {
 
 /* Walks the cells that the ray crosses, in order, until what was met lies before the next cell. The ring of empty cells
  * around the grid takes the last step. */
-NOT_INLINE static void walk(const arena *self, const ray *r, double height, ray_nearest *nearest) {
+static void walk(const arena *self, const ray *r, double height, ray_nearest *nearest) {
   const grid *g = &self->grid;
   const double far = 1e300;
   double enter = 0.0;
@@ -95,79 +82,6 @@ NOT_INLINE static void walk(const arena *self, const ray *r, double height, ray_
   }
 }
 
-#ifdef __GNUC__
-
-/* How far to the left of the ray's line each corner of a strip lies: bit i of `left` is set where corner i surely does,
- * of `right` where it surely lies to the right. */
-static inline void sides(const ray_lists *lists, const ray *r, uint32_t first, uint32_t corners, uint32_t *left,
-                         uint32_t *right) {
-  const double surely = 1e-9; /* m */
-  const double *x = &lists->start_x[first];
-  const double *y = &lists->start_y[first];
-  *left = *right = 0;
-#ifdef __SSE2__
-  const __m128d from_x = _mm_set1_pd(r->x);
-  const __m128d from_y = _mm_set1_pd(r->y);
-  const __m128d cosine = _mm_set1_pd(r->cosine);
-  const __m128d sine = _mm_set1_pd(r->sine);
-  for (uint32_t i = 0; i < corners; i += 2) {
-    const __m128d dx = _mm_sub_pd(_mm_loadu_pd(x + i), from_x);
-    const __m128d dy = _mm_sub_pd(_mm_loadu_pd(y + i), from_y);
-    const __m128d aside = _mm_sub_pd(_mm_mul_pd(cosine, dy), _mm_mul_pd(sine, dx));
-    *left |= (uint32_t)_mm_movemask_pd(_mm_cmpgt_pd(aside, _mm_set1_pd(surely))) << i;
-    *right |= (uint32_t)_mm_movemask_pd(_mm_cmplt_pd(aside, _mm_set1_pd(-surely))) << i;
-  }
-#else
-  for (uint32_t i = 0; i < corners; i++) {
-    const double aside = r->cosine * (y[i] - r->y) - r->sine * (x[i] - r->x);
-    *left |= (uint32_t)(aside > surely) << i;
-    *right |= (uint32_t)(aside < -surely) << i;
-  }
-#endif
-}
-
-/* Asks those edges of a strip whose ends do not both lie on the same side of the ray. */
-NOT_INLINE static void ask_strip(const arena *self, const ray *r, double height, uint32_t first, uint32_t count,
-                                 ray_nearest *nearest) {
-  uint32_t left, right;
-  sides(self->lists, r, first, count + 1, &left, &right);
-  uint32_t wanted = ~((left & left >> 1) | (right & right >> 1)) & ((1u << count) - 1u);
-  for (; wanted != 0; wanted &= wanted - 1) {
-    ask_item(self, r, height, first + (uint32_t)__builtin_ctz(wanted), nearest);
-  }
-}
-
-/* Asks the list of the ray's cell and sector. Returns 0 if that does not settle the answer. */
-INLINE int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
-  ray_lists *lists = self->lists;
-  size_t number;
-  const ray_list_cell *cell = ray_lists_at(lists, r->x, r->y, &number);
-  if (cell == NULL && (number == SIZE_MAX || (cell = ray_lists_visit(lists, number)) == NULL)) return 0;
-  const unsigned sector = ray_sector(lists, r->cosine, r->sine);
-  if (sector >= RAY_SECTORS_MOST) return 0;
-  const ray_list_entry *entry = &cell->entry[cell->start[sector]];
-  for (; (double)entry->bound <= nearest->distance; entry++) {
-    if (entry->strip == RAY_LIST_END) return 0;
-    const uint32_t first = ray_strip_first(entry->strip);
-    const uint32_t count = ray_strip_count(entry->strip);
-    if (count == 1) {
-      ask_item(self, r, height, first, nearest);
-    } else {
-      ask_strip(self, r, height, first, count, nearest);
-    }
-  }
-  return 1;
-}
-
-#else
-
-static int ask_list(const arena *self, const ray *r, double height, ray_nearest *nearest) {
-  (void)self, (void)r, (void)height, (void)nearest;
-  return 0;
-}
-
-#endif
-
 double arena_ray(const arena *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t *item) {
   const double length = cosine * cosine + sine * sine;
@@ -177,7 +91,7 @@ double arena_ray(const arena *self, double x, double y, double cosine, double si
   ray_nearest nearest = {limit, 0};
   if (self->grid.columns == 0) {
     ask_all(self, &r, height, &nearest);
-  } else if (self->lists == NULL || !ask_list(self, &r, height, &nearest)) {
+  } else {
     walk(self, &r, height, &nearest);
   }
   if (!(nearest.distance < limit)) return -1.0;

@@ -22,16 +22,10 @@ typedef struct scan_fan scan_fan;
 scan_fan *scan_fan_new(double first, double last, size_t count);
 void scan_fan_destroy(scan_fan *self);
 
-/* Whether the widest registers of the processor are used, as they are from the start. The distances are the same. */
-void scan_fan_use_wide(scan_fan *self, int wide);
-
 /* Distances from (x, y) along all beams, the sensor's x axis pointing to (cosine, sine): -1 where nothing is nearer than
  * `reach`. Things lower than `height` and the mover `self_id` are not seen. */
 void scan_look(scan_fan *self, const scene *around, double x, double y, double cosine, double sine, double reach,
                double height, uint32_t self_id, double *distances);
-
-/* Noise by (3.1), from normal draws: d (1 + sigma draw), clamped to [0, reach]; -1 stays -1. Of `count` distances. */
-void scan_spread(double *distances, const double *draws, size_t count, double sigma, double reach);
 /* python: end */
 
 #endif

@@ -2,25 +2,19 @@
  *
  * In the sensor's frame, turned so that the fan's middle lies on the x axis, an edge from a with direction e meets the
  * beam (c, s) at the distance K / (e_y c - e_x s) with K = a_x e_y - a_y e_x, from (3.6). The beams keep the reciprocal
- * of the least distance: it is linear in c and s, needs no division, and the largest one wins.
+ * of the least distance: it is linear in c and s, needs no division, and the largest one wins. Loops over edges and beams
+ * have no branches, so that the compiler can make vectors of them.
  */
-#include "scan_fan.h"
-
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
-
 #include "numbers.h"
-#include "scan_lanes.h"
-
-#ifndef SCAN_KERNELS
-#define SCAN_KERNELS scan_kernels_any
-#endif
+#include "scan_fan.h"
 
 #define GRAZING 1e-9 /* m: edges whose line passes the sensor so closely are asked beam by beam */
 #define NEARLY_PI (NUMBERS_PI - 1e-3)
 
-enum { UNSEEN, SWEPT, AWKWARD };
+/* Kinds of edges; numbers as the others, for the same loop. */
+#define UNSEEN 0.0
+#define SWEPT 1.0
+#define AWKWARD 2.0
 
 /* What is known of each edge of a block in the fan's frame. */
 typedef struct {
@@ -29,111 +23,83 @@ typedef struct {
   double low[SCAN_BLOCK], high[SCAN_BLOCK];                /* bearings of its ends */
   int32_t first[SCAN_BLOCK], last[SCAN_BLOCK];             /* beams that surely meet it */
   int32_t outer_first[SCAN_BLOCK], outer_last[SCAN_BLOCK]; /* beams that may meet it */
-  int32_t kind[SCAN_BLOCK];
+  double kind[SCAN_BLOCK];
 } spans;
 
+/* The larger and the smaller one; b where neither is. */
+static inline double larger(double a, double b) { return a > b ? a : b; }
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+
+/* To the nearest whole number below and above, |x| < 2^51: rounded by a sum, then corrected. */
+static inline double below(double x) {
+  const double whole = (x + 0x1.8p52) - 0x1.8p52;
+  return whole > x ? whole - 1.0 : whole;
+}
+static inline double above(double x) {
+  const double whole = (x + 0x1.8p52) - 0x1.8p52;
+  return whole < x ? whole + 1.0 : whole;
+}
+
 /* Direction of (x, y) in [-pi, pi], to 1e-5: Abramowitz and Stegun, 4.4.49 on the smaller of both ratios. */
-static inline lanes bearing(lanes x, lanes y) {
-  const lanes ax = lanes_size(x);
-  const lanes ay = lanes_size(y);
-  const lanes larger = lanes_larger(ax, ay);
-  const lanes ratio = lanes_smaller(ax, ay) / lanes_larger(larger, lanes_all(0x1p-1000)); /* 0 for (0, 0) */
-  const lanes z = ratio * ratio;
-  const lanes sum = 0.9998660 + z * (-0.3302995 + z * (0.1801410 + z * (-0.0851330 + z * 0.0208351)));
-  lanes angle = ratio * sum;
-  angle = lanes_pick(ax > ay, angle, 0.5 * NUMBERS_PI - angle);
-  angle = lanes_pick(x < 0.0, NUMBERS_PI - angle, angle);
-  return lanes_with_sign(angle, y);
+static inline double bearing(double x, double y) {
+  const double ax = fabs(x);
+  const double ay = fabs(y);
+  const double ratio = smaller(ax, ay) / larger(larger(ax, ay), 0x1p-1000); /* 0 for (0, 0) */
+  const double z = ratio * ratio;
+  const double sum = 0.9998660 + z * (-0.3302995 + z * (0.1801410 + z * (-0.0851330 + z * 0.0208351)));
+  const double steep = ax > ay ? ratio * sum : 0.5 * NUMBERS_PI - ratio * sum;
+  return copysign(x < 0.0 ? NUMBERS_PI - steep : steep, y);
 }
 
-/* Beams between the bearings low and high: first and last of those that surely lie between, and of those that may. They
- * stay between -1 and the number of beams, so that none is asked that is not there. */
-static inline void measure_beams(const scan_fan *self, lanes low, lanes high, size_t i, spans *to) {
-  const lanes zero = lanes_all(0.0);
-  const lanes before = lanes_all(-1.0);
-  const lanes most = lanes_all((double)(self->count - 1));
-  const lanes from = (low + self->half) * self->per_radian;
-  const lanes until = (high + self->half) * self->per_radian;
-  const lanes first = lanes_smaller(lanes_ceil(lanes_larger(from + self->margin, zero)), most + 1.0);
-  const lanes last = lanes_floor(lanes_smaller(lanes_larger(until - self->margin, before), most));
-  const lanes outer_first = lanes_smaller(lanes_ceil(lanes_larger(from - self->margin, zero)), most + 1.0);
-  const lanes outer_last = lanes_floor(lanes_smaller(lanes_larger(until + self->margin, before), most));
-  lanes_store_int(&to->first[i], lanes_whole(first));
-  lanes_store_int(&to->last[i], lanes_whole(last));
-  lanes_store_int(&to->outer_first[i], lanes_whole(outer_first));
-  lanes_store_int(&to->outer_last[i], lanes_whole(outer_last));
-}
-
-/* Spans of the edges `i` and on, one to a lane. */
-static inline void measure(const scan_fan *self, const scan_edges *edges, size_t i, spans *to) {
-  const lanes ax = lanes_load(&edges->ax[i]) * edges->c + lanes_load(&edges->ay[i]) * edges->s;
-  const lanes ay = lanes_load(&edges->ay[i]) * edges->c - lanes_load(&edges->ax[i]) * edges->s;
-  const lanes bx = lanes_load(&edges->bx[i]) * edges->c + lanes_load(&edges->by[i]) * edges->s;
-  const lanes by = lanes_load(&edges->by[i]) * edges->c - lanes_load(&edges->bx[i]) * edges->s;
-  const lanes ex = bx - ax;
-  const lanes ey = by - ay;
-  const lanes k = ax * ey - ay * ex;
-  const lanes of_a = bearing(ax, ay);
-  const lanes of_b = bearing(bx, by);
-  const lanes low = lanes_smaller(of_a, of_b);
-  const lanes high = lanes_larger(of_a, of_b);
-  const lanes square = k * k;
-  const lanes length_squared = ex * ex + ey * ey;
-  const lanes_mask smooth = (high - low < NEARLY_PI) & (square > GRAZING * GRAZING * length_squared);
-  const lanes_mask far = square > edges->reach * edges->reach * length_squared;
-  const lanes kind = lanes_pick(smooth, lanes_all(SWEPT), lanes_all(AWKWARD));
-  measure_beams(self, low, high, i, to);
-  lanes_store(&to->ax[i], ax);
-  lanes_store(&to->ay[i], ay);
-  lanes_store(&to->ex[i], ex);
-  lanes_store(&to->ey[i], ey);
-  lanes_store(&to->a[i], ey / k);
-  lanes_store(&to->b[i], lanes_all(0.0) - ex / k);
-  lanes_store(&to->low[i], low);
-  lanes_store(&to->high[i], high);
-  lanes_store_int(&to->kind[i], lanes_whole(lanes_pick(far, lanes_all(UNSEEN), kind)));
-}
-
-/* Of the register that begins with beam i, the beams `first` to `last`. */
-static inline lanes_mask within(long i, long first, long last) {
-  static const int64_t window[] = {
-#if LANES == 4
-    0,
-    0,
-    0,
-    -1,
-    -1,
-    -1,
-    -1,
-    0,
-    0,
-    0
-#elif LANES == 2
-    0,
-    -1,
-    -1,
-    0
-#else
-    -1
-#endif
-  };
-  const long before = first > i ? first - i : 0;
-  const long behind = i + LANES - 1 > last ? i + LANES - 1 - last : 0;
-  return lanes_load_mask(&window[LANES - 1 - before]) & lanes_load_mask(&window[LANES - 1 + behind]);
-}
-
-static inline void take(scan_fan *self, long i, lanes inverse) {
-  lanes_store(&self->inverse[i], lanes_larger(inverse, lanes_load(&self->inverse[i])));
+/* Spans of all edges. Beams stay between -1 and the number of beams, so that none is asked that is not there. */
+static void measure(const scan_fan *self, const scan_edges *restrict edges, spans *restrict to) {
+  const double c = edges->c;
+  const double s = edges->s;
+  const double reach_squared = edges->reach * edges->reach;
+  const double half = self->half;
+  const double per_radian = self->per_radian;
+  const double margin = self->margin;
+  const double most = (double)(self->count - 1);
+  for (size_t i = 0; i < edges->count; i++) {
+    const double ax = edges->ax[i] * c + edges->ay[i] * s;
+    const double ay = edges->ay[i] * c - edges->ax[i] * s;
+    const double bx = edges->bx[i] * c + edges->by[i] * s;
+    const double by = edges->by[i] * c - edges->bx[i] * s;
+    const double ex = bx - ax;
+    const double ey = by - ay;
+    const double k = ax * ey - ay * ex;
+    const double of_a = bearing(ax, ay);
+    const double of_b = bearing(bx, by);
+    const double low = smaller(of_a, of_b);
+    const double high = larger(of_a, of_b);
+    const double from = (low + half) * per_radian;
+    const double until = (high + half) * per_radian;
+    const double square = k * k;
+    const double length_squared = ex * ex + ey * ey;
+    const double wide = high - low < NEARLY_PI ? SWEPT : AWKWARD;
+    const double grazed = square > GRAZING * GRAZING * length_squared ? wide : AWKWARD;
+    to->first[i] = (int32_t)smaller(above(larger(from + margin, 0.0)), most + 1.0);
+    to->last[i] = (int32_t)below(smaller(larger(until - margin, -1.0), most));
+    to->outer_first[i] = (int32_t)smaller(above(larger(from - margin, 0.0)), most + 1.0);
+    to->outer_last[i] = (int32_t)below(smaller(larger(until + margin, -1.0), most));
+    to->kind[i] = square > reach_squared * length_squared ? UNSEEN : grazed;
+    to->ax[i] = ax;
+    to->ay[i] = ay;
+    to->ex[i] = ex;
+    to->ey[i] = ey;
+    to->a[i] = ey / k;
+    to->b[i] = -ex / k;
+    to->low[i] = low;
+    to->high[i] = high;
+  }
 }
 
 /* Where an edge's line lies nearest in beams `first` to `last`: the greatest of a c + b s. */
 static inline void sweep(scan_fan *self, long first, long last, double a, double b) {
   const double *c = self->cosine;
   const double *s = self->sine;
-  long i = first - first % LANES;
-  take(self, i, lanes_keep(within(i, first, last), a * lanes_load(&c[i]) + b * lanes_load(&s[i])));
-  for (i += LANES; i + LANES <= last + 1; i += LANES) take(self, i, a * lanes_load(&c[i]) + b * lanes_load(&s[i]));
-  if (i <= last) take(self, i, lanes_keep(within(i, first, last), a * lanes_load(&c[i]) + b * lanes_load(&s[i])));
+  double *restrict inverse = self->inverse;
+  for (long i = first; i <= last; i++) inverse[i] = larger(a * c[i] + b * s[i], inverse[i]);
 }
 
 /* Beams one by one, so that no crack opens between neighbours. */
@@ -185,17 +151,10 @@ static void see_awkward(scan_fan *self, const spans *of, size_t edge) {
   }
 }
 
-static void see(scan_fan *self, scan_edges *edges) {
+void scan_see(scan_fan *self, scan_edges *edges) {
   spans found;
-  const size_t count = edges->count;
-  for (size_t i = count; i % LANES != 0; i++) { /* what fills the last register is the last edge again */
-    edges->ax[i] = edges->ax[count - 1];
-    edges->ay[i] = edges->ay[count - 1];
-    edges->bx[i] = edges->bx[count - 1];
-    edges->by[i] = edges->by[count - 1];
-  }
-  for (size_t i = 0; i < count; i += LANES) measure(self, edges, i, &found);
-  for (size_t i = 0; i < count; i++) {
+  measure(self, edges, &found);
+  for (size_t i = 0; i < edges->count; i++) {
     if (found.kind[i] == SWEPT) {
       cover(self, &found, i, found.outer_first[i], found.first[i], found.last[i], found.outer_last[i]);
     } else if (found.kind[i] == AWKWARD) {
@@ -205,31 +164,23 @@ static void see(scan_fan *self, scan_edges *edges) {
   edges->count = 0;
 }
 
-/* ray_circle for the beams of a register; a reciprocal of 0 where it is missed. */
-static inline lanes ask_circle(lanes along, lanes beside, double radius) {
-  const lanes square = radius * radius - beside * beside;
-  const lanes half = lanes_root(lanes_larger(square, lanes_all(0.0)));
-  const lanes before = along - half;
-  const lanes behind = along + half;
-  const lanes distance = lanes_pick(along >= half, before, behind);
-  return lanes_keep((square >= 0.0) & (distance >= 0.0), 1.0 / distance);
+/* ray_circle without branches; a reciprocal of 0 where it is missed. */
+static inline double ask_circle(double along, double beside, double radius) {
+  const double square = radius * radius - beside * beside;
+  const double half = sqrt(larger(square, 0.0));
+  const double distance = along >= half ? along - half : along + half;
+  return (square >= 0.0) & (distance >= 0.0) ? 1.0 / distance : 0.0;
 }
 
-static double one_bearing(double x, double y) {
-  double angle[LANES];
-  lanes_store(angle, bearing(lanes_all(x), lanes_all(y)));
-  return angle[0];
-}
-
-static void see_circle(scan_fan *self, double dx, double dy, double radius, const scan_edges *edges) {
+void scan_see_circle(scan_fan *self, double dx, double dy, double radius, const scan_edges *edges) {
   const double x = dx * edges->c + dy * edges->s;
   const double y = dy * edges->c - dx * edges->s;
   const double square = x * x + y * y;
   double low = -NUMBERS_PI;
   double high = NUMBERS_PI;
   if (square > radius * radius * (1.0 + 1e-9)) {
-    const double middle = one_bearing(x, y);
-    const double half = one_bearing(sqrt(square - radius * radius), radius);
+    const double middle = bearing(x, y);
+    const double half = bearing(sqrt(square - radius * radius), radius);
     low = middle - half;
     high = middle + half;
   }
@@ -238,58 +189,29 @@ static void see_circle(scan_fan *self, double dx, double dy, double radius, cons
     long first, last;
     scan_beams_within(self, (low + shift) * self->per_radian - 2.0 * self->margin,
                       (high + shift) * self->per_radian + 2.0 * self->margin, &first, &last);
-    for (long i = first - first % LANES; i <= last; i += LANES) {
-      const lanes c = lanes_load(&self->cosine[i]);
-      const lanes s = lanes_load(&self->sine[i]);
-      take(self, i, lanes_keep(within(i, first, last), ask_circle(x * c + y * s, x * s - y * c, radius)));
+    double *restrict inverse = self->inverse;
+    for (long i = first; i <= last; i++) {
+      const double c = self->cosine[i];
+      const double s = self->sine[i];
+      inverse[i] = larger(ask_circle(x * c + y * s, x * s - y * c, radius), inverse[i]);
     }
   }
 }
 
-static double farthest(const scan_fan *self) {
-  const size_t whole = self->count / LANES * LANES;
-  lanes smallest = lanes_all(INFINITY);
-  for (size_t i = 0; i < whole; i += LANES) smallest = lanes_smaller(lanes_load(&self->inverse[i]), smallest);
-  double values[LANES];
-  lanes_store(values, smallest);
-  double least = values[0];
-  for (size_t i = 1; i < LANES; i++) least = values[i] < least ? values[i] : least;
-  for (size_t i = whole; i < self->count; i++) least = self->inverse[i] < least ? self->inverse[i] : least;
-  return 1.0 / least;
-}
-
-static void distances_of(scan_fan *self, double nothing, double *distances) {
-  const size_t count = self->count;
-  for (size_t i = 0; i < count; i += LANES) {
-    const lanes inverse = lanes_load(&self->inverse[i]);
-    const lanes found = lanes_pick(inverse > nothing, 1.0 / inverse, lanes_all(-1.0));
-    lanes_store(&self->inverse[i], lanes_all(0.0));
-    if (i + LANES <= count) {
-      lanes_store(&distances[i], found);
-    } else {
-      double rest[LANES];
-      lanes_store(rest, found);
-      memcpy(&distances[i], rest, (count - i) * sizeof *rest);
-    }
-  }
-}
-
-static inline lanes spread_of(lanes distance, lanes draw, double sigma, double reach) {
-  const lanes noisy = distance * (1.0 + sigma * draw); /* (3.1) */
-  const lanes kept = lanes_smaller(lanes_larger(noisy, lanes_all(0.0)), lanes_all(reach));
-  return lanes_pick(distance < 0.0, distance, kept);
-}
-
-static void spread(double *distances, const double *draws, size_t count, double sigma, double reach) {
+double scan_farthest(const scan_fan *self) {
+  double least[4] = {INFINITY, INFINITY, INFINITY, INFINITY}; /* side by side: none waits for the one before */
   size_t i = 0;
-  for (; i + LANES <= count; i += LANES)
-    lanes_store(&distances[i], spread_of(lanes_load(&distances[i]), lanes_load(&draws[i]), sigma, reach));
-  if (i == count) return;
-  double rest[2][LANES] = {{0.0}};
-  memcpy(rest[0], &distances[i], (count - i) * sizeof *distances);
-  memcpy(rest[1], &draws[i], (count - i) * sizeof *draws);
-  lanes_store(rest[0], spread_of(lanes_load(rest[0]), lanes_load(rest[1]), sigma, reach));
-  memcpy(&distances[i], rest[0], (count - i) * sizeof *distances);
+  for (; i + 4 <= self->count; i += 4) {
+    for (size_t k = 0; k < 4; k++) least[k] = smaller(self->inverse[i + k], least[k]);
+  }
+  for (; i < self->count; i++) least[0] = smaller(self->inverse[i], least[0]);
+  return 1.0 / smaller(smaller(least[0], least[1]), smaller(least[2], least[3]));
 }
 
-const scan_kernels SCAN_KERNELS = {see, see_circle, farthest, distances_of, spread};
+void scan_distances(scan_fan *self, double nothing, double *restrict distances) {
+  double *restrict inverse = self->inverse;
+  for (size_t i = 0; i < self->count; i++) {
+    distances[i] = inverse[i] > nothing ? 1.0 / inverse[i] : -1.0;
+    inverse[i] = 0.0;
+  }
+}

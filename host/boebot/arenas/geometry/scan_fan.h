@@ -5,7 +5,7 @@
 #include "rays.h"
 #include "scan.h"
 
-#define SCAN_BLOCK 64u          /* edges that are looked at together; a multiple of the lanes */
+#define SCAN_BLOCK 64u          /* edges that are looked at together */
 #define SCAN_BEARING_ERROR 2e-5 /* rad: what bearings of ends may err, and some more */
 
 /* Edges in a row of one frame, from the sensor. */
@@ -16,20 +16,17 @@ typedef struct {
   double ax[SCAN_BLOCK], ay[SCAN_BLOCK], bx[SCAN_BLOCK], by[SCAN_BLOCK]; /* both ends */
 } scan_edges;
 
-/* What is done to many numbers at once: for every processor, and for those with AVX2. */
-typedef struct {
-  /* Lets the fan see the edges, and forgets them. */
-  void (*see)(scan_fan *self, scan_edges *edges);
-  /* A circle around (dx, dy) from the sensor, in the frame of `edges`. */
-  void (*circle)(scan_fan *self, double dx, double dy, double radius, const scan_edges *edges);
-  /* Distance beyond which nothing can come first in any beam any more. */
-  double (*farthest)(const scan_fan *self);
-  /* From reciprocals to distances: -1 where nothing is nearer than 1 / `nothing`. Forgets the reciprocals. */
-  void (*distances)(scan_fan *self, double nothing, double *distances);
-  void (*spread)(double *distances, const double *draws, size_t count, double sigma, double reach);
-} scan_kernels;
+/* Lets the fan see the edges, and forgets them. */
+void scan_see(scan_fan *self, scan_edges *edges);
 
-extern const scan_kernels scan_kernels_any, scan_kernels_avx2;
+/* A circle around (dx, dy) from the sensor, in the frame of `edges`. */
+void scan_see_circle(scan_fan *self, double dx, double dy, double radius, const scan_edges *edges);
+
+/* Distance beyond which nothing can come first in any beam any more. */
+double scan_farthest(const scan_fan *self);
+
+/* From reciprocals to distances: -1 where nothing is nearer than 1 / `nothing`. Forgets the reciprocals. */
+void scan_distances(scan_fan *self, double nothing, double *distances);
 
 struct scan_fan {
   size_t count;
@@ -37,9 +34,8 @@ struct scan_fan {
   double half;                   /* of the angle that the fan covers */
   double per_radian;             /* beams */
   double margin;                 /* beams */
-  double *cosine, *sine;         /* of each beam, from the fan's middle; 0 in what fills the last register */
+  double *cosine, *sine;         /* of each beam, from the fan's middle */
   double *inverse;               /* 1 / distance found so far; 0 before a scan */
-  const scan_kernels *kernels;
   double values[];
 };
 

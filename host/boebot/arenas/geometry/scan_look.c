@@ -10,26 +10,15 @@
 #include "numbers.h"
 #include "scan_fan.h"
 
-#define REGISTER 4u /* numbers in the widest register that is used */
-
-static const scan_kernels *kernels(void) {
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(WORLD_PLAIN_LANES) /* the macro: for tests */
-  if (__builtin_cpu_supports("avx2")) return &scan_kernels_avx2;
-#endif
-  return &scan_kernels_any;
-}
-
 scan_fan *scan_fan_new(double first, double last, size_t count) {
   if (count < 2 || count > (1u << 20) || !(first < last) || !(last - first <= 2.0 * NUMBERS_PI + 1e-9)) return NULL;
   if (!(fabs(first) < 1e4)) return NULL;
-  const size_t padded = (count + REGISTER - 1) / REGISTER * REGISTER;
-  scan_fan *self = calloc(1, sizeof *self + 3 * padded * sizeof *self->values);
+  scan_fan *self = calloc(1, sizeof *self + 3 * count * sizeof *self->values);
   if (self == NULL) return NULL;
   self->count = count;
-  self->kernels = kernels();
   self->cosine = self->values;
-  self->sine = self->values + padded;
-  self->inverse = self->values + 2 * padded;
+  self->sine = self->values + count;
+  self->inverse = self->values + 2 * count;
   self->half = 0.5 * (last - first);
   self->per_radian = (double)(count - 1) / (last - first);
   self->margin = SCAN_BEARING_ERROR * self->per_radian + 1e-6;
@@ -41,8 +30,6 @@ scan_fan *scan_fan_new(double first, double last, size_t count) {
 }
 
 void scan_fan_destroy(scan_fan *self) { free(self); }
-
-void scan_fan_use_wide(scan_fan *self, int wide) { self->kernels = wide ? kernels() : &scan_kernels_any; }
 
 /* Corners in a row, every `stride` numbers, and where the sensor is in their frame. */
 typedef struct {
@@ -82,8 +69,8 @@ static int visible_side(const outline *o) {
 
 /* Shortens the reach as well, once each beam has met something. */
 static void see_block(scan_fan *self, scan_edges *edges) {
-  self->kernels->see(self, edges);
-  const double farthest = self->kernels->farthest(self) * (1.0 + 1e-9);
+  scan_see(self, edges);
+  const double farthest = scan_farthest(self) * (1.0 + 1e-9);
   if (farthest < edges->reach) edges->reach = farthest;
 }
 
@@ -116,7 +103,7 @@ static void see_shape(scan_fan *self, const arena *where, const arena_shape *sha
                       scan_edges *edges) {
   if (shape->kind == ARENA_DISC) {
     const arena_disc *d = &where->disc[shape->first];
-    self->kernels->circle(self, d->x - x, d->y - y, d->radius, edges);
+    scan_see_circle(self, d->x - x, d->y - y, d->radius, edges);
     return;
   }
   const arena_edge *first = &where->edge[shape->first];
@@ -148,7 +135,7 @@ static void see_arena(scan_fan *self, const arena *where, double x, double y, do
       if (due && shape->surface.height >= height) see_shape(self, where, shape, x, y, edges);
     }
   }
-  self->kernels->see(self, edges);
+  scan_see(self, edges);
 }
 
 static void see_mover(scan_fan *self, const mover *m, double x, double y, const scan_edges *of_arena) {
@@ -157,7 +144,7 @@ static void see_mover(scan_fan *self, const mover *m, double x, double y, const 
   const double far = of_arena->reach + m->radius;
   if (dx * dx + dy * dy > far * far) return;
   if (m->outline == NULL) {
-    self->kernels->circle(self, -dx, -dy, m->radius, of_arena);
+    scan_see_circle(self, -dx, -dy, m->radius, of_arena);
     return;
   }
   scan_edges edges;
@@ -173,7 +160,7 @@ static void see_mover(scan_fan *self, const mover *m, double x, double y, const 
                      .x = dx * m->cosine + dy * m->sine,
                      .y = dy * m->cosine - dx * m->sine};
   see_outline(self, &o, &edges);
-  self->kernels->see(self, &edges);
+  scan_see(self, &edges);
 }
 
 void scan_look(scan_fan *self, const scene *around, double x, double y, double cosine, double sine, double reach,
@@ -194,9 +181,5 @@ void scan_look(scan_fan *self, const scene *around, double x, double y, double c
     const mover *m = &around->movers[i];
     if ((self_id == 0 || m->id != self_id) && m->height >= height) see_mover(self, m, x, y, &edges);
   }
-  self->kernels->distances(self, 1.0 / limit, distances);
-}
-
-void scan_spread(double *distances, const double *draws, size_t count, double sigma, double reach) {
-  kernels()->spread(distances, draws, count, sigma, reach);
+  scan_distances(self, 1.0 / limit, distances);
 }

@@ -1,4 +1,4 @@
-"""Normal draws in blocks: each is, bit for bit, the draw that noise.h gives for it alone, and together they are normal.
+"""Normal draws: each is, bit for bit, what its definition gives, and together they are normal.
 
 The definition is written once more below, in numpy's and Python's own integers and doubles.
 """
@@ -6,6 +6,7 @@ The definition is written once more below, in numpy's and Python's own integers 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from sim_bridge._core import ffi, lib
+from sim_bridge._core import lib
 
 Words = NDArray[np.uint64]
 Floats = NDArray[np.float64]
@@ -27,7 +28,7 @@ halves = st.one_of(st.integers(0, 2**32 - 1), st.sampled_from([0, 2**32 - 1]))
 
 
 def mixed(x: Words) -> Words:
-    """noise_mix, element by element."""
+    """hash_mix, element by element."""
     with np.errstate(over="ignore"):
         x = x + np.uint64(0x9E3779B97F4A7C15)
         x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -68,53 +69,22 @@ def tail(bits: int, negative: bool) -> float:
             return float(-(EDGES[1] + x) if negative else EDGES[1] + x)
 
 
-def block(keys: Words, offset: int = 0) -> Floats:
-    """Draws of the keys, both arrays `offset` words behind a register's border; the words around stay as they are."""
-    given_keys = np.zeros(keys.size + offset, dtype=np.uint64)
-    given_keys[offset:] = keys
-    draws = np.full(keys.size + offset + 1, np.inf)
-    lib.noise_block_normals(
-        ffi.from_buffer("uint64_t[]", given_keys) + offset, ffi.from_buffer("double[]", draws) + offset, keys.size
-    )
-    assert np.isinf(draws[:offset]).all() and np.isinf(draws[-1])
-    return draws[offset:-1]
+KEY = mix(mix(0))  # of seed, robot and device 0
+
+
+def draws_of(keys: Iterable[int]) -> Floats:
+    """The draws whose keys, mixed with their steps, are these."""
+    return np.array([lib.noise_normal(0, 0, 0, KEY ^ key) for key in keys])
 
 
 def same_bits(a: Any, b: Any) -> bool:
     return bool(np.array_equal(np.asarray(a).view(np.uint64), np.asarray(b).view(np.uint64)))
 
 
-@given(words, halves, halves, words, st.integers(0, 150), st.integers(0, 3))
-def test_a_source_gives_what_single_draws_give(
-    seed: int, robot: int, device: int, step: int, count: int, offset: int
-) -> None:
-    """Any length, any place in memory, steps that roll over."""
-    source, single = (
-        ffi.new("noise_source *", {"seed": seed, "robot": robot, "device": device, "step": step, "on": 1})
-        for _ in range(2)
-    )
-    draws = np.full(count + offset + 1, np.inf)
-    lib.noise_block_next(source, ffi.from_buffer("double[]", draws) + offset, count)
-    alone = [lib.noise_normal(seed, robot, device, (step + i) % WORD) for i in range(count)]
-    assert same_bits(draws[offset:-1], np.array(alone, dtype=float))
-    assert source.step == (step + count) % WORD and np.isinf(draws[:offset]).all() and np.isinf(draws[-1])
-    # A second block goes on where the first one ended, whatever the lengths.
-    lib.noise_block_next(single, ffi.from_buffer("double[]", draws), count // 3)
-    lib.noise_block_next(single, ffi.from_buffer("double[]", draws) + count // 3, count - count // 3)
-    assert same_bits(draws[:count], np.array(alone, dtype=float))
-
-
-def test_a_source_that_is_off_gives_zeros_and_keeps_its_step() -> None:
-    source = ffi.new("noise_source *", {"seed": 1, "step": 9, "on": 0})
-    draws = np.full(10, np.inf)
-    lib.noise_block_next(source, ffi.from_buffer("double[]", draws), 9)
-    assert draws.tolist() == [0.0] * 9 + [math.inf] and source.step == 9
-
-
-@given(st.lists(words, max_size=70), st.integers(0, 3))
-def test_draws_of_keys_are_those_of_the_definition(keys: list[int], offset: int) -> None:
-    asked = np.array(keys, dtype=np.uint64)
-    assert same_bits(block(asked, offset), np.array([ziggurat(mix(key)) for key in keys]))
+@given(words, halves, halves, words)
+def test_a_draw_is_that_of_the_definition(seed: int, robot: int, device: int, step: int) -> None:
+    key = mix(mix(seed) ^ (robot << 32 | device))
+    assert lib.noise_normal(seed, robot, device, step) == ziggurat(mix(key ^ step))
 
 
 def test_the_rare_draws_are_those_of_the_definition() -> None:
@@ -124,7 +94,7 @@ def test_the_rare_draws_are_those_of_the_definition() -> None:
     layer = (bits & np.uint64(255)).astype(int)
     x = ((bits >> np.uint64(11)).astype(float) * 2.0**-52 - 1.0) * EDGES[layer]
     inside = np.abs(x) < EDGES[layer + 1]
-    draws = block(keys)
+    draws = draws_of(keys.tolist())
     assert same_bits(draws[inside], x[inside])
     rare = np.flatnonzero(~inside)
     assert 3000 < rare.size < 6000 and np.unique(layer[rare]).size > 250
@@ -132,7 +102,7 @@ def test_the_rare_draws_are_those_of_the_definition() -> None:
 
 
 def unmixed(bits: int) -> int:
-    """The key of which noise_mix makes these bits: each of its steps can be undone."""
+    """The key of which hash_mix makes these bits: each of its steps can be undone."""
 
     def undo_shift(y: int, by: int) -> int:
         x = y
@@ -161,12 +131,7 @@ def test_extreme_places_in_every_layer() -> None:
             bits.append(min(max(place, 0), 2**53 - 1) << 11 | layer)
     keys = [unmixed(word) for word in bits]
     assert mixed(np.array(keys, dtype=np.uint64)).tolist() == bits
-    assert same_bits(block(np.array(keys, dtype=np.uint64)), np.array([ziggurat(word) for word in bits]))
-
-
-def test_heights_are_the_bell_at_the_edges() -> None:
-    assert [lib.noise_layer_height(i) for i in range(257)] == [lib.number_exp(-0.5 * x * x) for x in EDGES]
-    assert [lib.noise_layer_height(i) for i in (-1, 257)] == [0.0, 0.0]
+    assert same_bits(draws_of(keys), np.array([ziggurat(word) for word in bits]))
 
 
 # ---- together they are normal ----------------------------------------------------------------------------------------
@@ -175,13 +140,7 @@ def test_heights_are_the_bell_at_the_edges() -> None:
 @pytest.fixture(scope="module")
 def many() -> Floats:
     """Four million draws of one device."""
-    draws = np.empty(4_000_000)
-    lib.noise_block_next(
-        ffi.new("noise_source *", {"seed": 11, "robot": 1, "device": 7, "on": 1}),
-        ffi.from_buffer("double[]", draws),
-        draws.size,
-    )
-    return draws
+    return np.array([lib.noise_normal(11, 1, 7, step) for step in range(4_000_000)])
 
 
 def test_distribution_by_kolmogorov_and_smirnov(many: Floats) -> None:
@@ -211,8 +170,6 @@ def test_shape_within_the_tail(many: Floats) -> None:
     assert stats.kstest(beyond, lambda x: 1.0 - stats.norm.sf(x) / stats.norm.sf(begin)).pvalue > 1e-3
 
 
-def test_neighbours_and_lanes_are_not_correlated(many: Floats) -> None:
+def test_neighbours_are_not_correlated(many: Floats) -> None:
     for lag in (1, 2, 3, 4, 64):
         assert abs(np.mean(many[lag:] * many[:-lag])) < 4 / math.sqrt(many.size)
-    for lane in range(4):
-        assert stats.kstest(many[lane:1_000_000:4], "norm").pvalue > 1e-3
