@@ -186,7 +186,7 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
         rig.send(messages.Turret(5000, 1))
         rig.send(messages.Buzzer(8000, 255, 3))
         rig.listen(0.1)
-        for i, pin in enumerate((16, 17) if on & Devices.ENCODERS else ()):
+        for i, pin in enumerate((16, 17) if on & Devices.ENCODER else ()):
             start = access.now + 1000
             for edge in range(1100):
                 access.drive(pin, Level(edge % 2), start + edge * (CYCLES_PER_S // 3000 + 7 * i))

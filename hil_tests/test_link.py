@@ -29,7 +29,7 @@ def test_handshake_names_version_schema_and_robot(rig: Rig) -> None:
     assert text(hello.robot) == "shieldbot"
     assert hello.session == rig.seed
     assert hello.session_time_out == 1000
-    expected = messages.Devices.SERVOS | messages.Devices.ENCODERS | messages.Devices.WHISKERS
+    expected = messages.Devices.SERVO | messages.Devices.ENCODER | messages.Devices.WHISKER
     assert hello.devices == expected | messages.Devices.INFRARED | messages.Devices.PING
 
 

@@ -68,7 +68,7 @@ def around() -> Iterator[Surroundings]:
     for pin in (WHISKER, 7, RECEIVER, 3):
         board.drive(pin, Level.HIGH)
     here.begin(
-        Devices.WHISKERS | Devices.INFRARED | Devices.PING | Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED
+        Devices.WHISKER | Devices.INFRARED | Devices.PING | Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED
     )
     here.line.set("infrared_sweep", 1)
     lights = [LightSensor(pin, DECAYS_US) for pin in LIGHTS]
@@ -78,7 +78,7 @@ def around() -> Iterator[Surroundings]:
             one.shine(bench, bright)
 
     start = bench.now + 20 * TICK_CYCLES
-    here.change("whiskers", start, 643_009, lambda on: board.drive(WHISKER, Level(not on)))
+    here.change("whisker", start, 643_009, lambda on: board.drive(WHISKER, Level(not on)))
     here.change("receiver", start, 2_416_001, lambda on: None)
     here.change("ping", start, 1_620_947, lambda on: None)
     here.change("battery", start, 642_003, lambda on: board.analog(BATTERY_CHANNEL, BATTERY_V[on]))
@@ -109,7 +109,7 @@ def volts(told: int) -> float:
 
 
 def test_whiskers(around: Surroundings) -> None:
-    check(around.ages("whiskers", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whiskers", 0.5)
+    check(around.ages("whiskers", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whisker", 0.5)
 
 
 def test_infrared(around: Surroundings) -> None:
@@ -160,9 +160,9 @@ def test_encoders() -> None:
     """Four lines of 4 kHz. The row is the slot, of which telemetry takes but a part unless its tasks are at their
     budgets: how near the ages come says how busy this board is, nothing of the row."""
     around = Surroundings(ENCODER_IMAGE)
-    row = next(row for row in read_table(ENCODER_IMAGE).sensors if row.name == "encoders")
+    row = next(row for row in read_table(ENCODER_IMAGE).sensors if row.name == "encoder")
     try:
-        around.begin(Devices.ENCODERS)
+        around.begin(Devices.ENCODER)
         trains = wheels([(14, 15), (16, 17)], 4000, around.bench.now + TICK_CYCLES)
         around.bench.sources += [train for wheel in trains for train in wheel]
         base = around.line.newest

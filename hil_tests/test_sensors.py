@@ -158,7 +158,7 @@ def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: Rig) -> None:
     rig.board.square_wave(16, period=2 * expected * CYCLES_PER_US, seconds=1.0)
     rig.listen(0.1)
     everything = rig.request(messages.GetParameter, devices.id).value
-    rig.request(messages.SetParameter, devices.id, everything & ~int(messages.Devices.ENCODERS))
+    rig.request(messages.SetParameter, devices.id, everything & ~int(messages.Devices.ENCODER))
     rig.listen(0.1)
     assert rig.latest().edge_period_left == 0
     rig.request(messages.SetParameter, devices.id, everything)

@@ -27,6 +27,7 @@ bare.__path__ = [str(ROOT / "host" / "boebot")]
 sys.modules["boebot"] = bare
 
 import can_database  # noqa: E402
+import device_header  # noqa: E402
 import reference_frame  # noqa: E402
 import schema  # noqa: E402
 
@@ -575,6 +576,7 @@ def outputs() -> dict[Path, str]:
         generated / "crc21_table.h": crc21_header(),
         generated / "messages.h": messages_header(spec),
         generated / "parameters.h": parameters_header(spec),
+        generated / "devices.h": device_header.devices_header(spec, STATUS_NOTE),
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module(spec),
         HERE / "vectors" / "frames.json": json.dumps(golden, indent=1) + "\n",
         ROOT / "firmware" / "test" / "vectors.h": vectors_header(golden),

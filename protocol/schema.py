@@ -16,7 +16,7 @@ TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
 # Keys that both ends need not agree on. The firmware checks a parameter's range.
-NOT_ON_THE_WIRE = ("doc", "device", "default", "default_from", "each_task", "since", "docs")
+NOT_ON_THE_WIRE = ("doc", "device", "devices", "default", "default_from", "each_task", "since", "docs")
 MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
@@ -80,6 +80,7 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     doc: str
     fields: list[Field]
     since: int = 0
+    devices: list[str] = []  # of the firmware, that fill it (device_header.py)
 
     @property
     def length(self) -> int:

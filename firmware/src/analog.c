@@ -1,8 +1,6 @@
 /* analog.c: see analog.h. */
 #include "analog.h"
 
-#include <stdbool.h>
-
 #include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
@@ -62,8 +60,7 @@ static uint8_t next_input(void) {
   return last_device;
 }
 
-/* A pin is pulled up unless it is measured. */
-static void connect(uint8_t device, bool connected) {
+void analog_connect(uint8_t device, bool connected) {
 #ifdef PIN_BATTERY
   if (device == ANALOG_BATTERY && connected) {
     HAL_PIN_INPUT(BATTERY);
@@ -81,11 +78,6 @@ static void connect(uint8_t device, bool connected) {
   (void)device, (void)connected;
 }
 
-void analog_start_pins(void) {
-  connect(ANALOG_BATTERY, false);
-  connect(ANALOG_INFRARED, false);
-}
-
 void analog_start(void) {
   for (uint8_t i = 0; i < ANALOG_INPUTS; i++) {
     results[i] = 0;
@@ -97,7 +89,7 @@ void analog_start(void) {
 }
 
 static void grow_older(uint8_t device) {
-  connect(device, is_on(device));
+  analog_connect(device, is_on(device));
   if (!is_on(device)) {
     ages[device] = AGE_NEVER;
     results[device] = 0;

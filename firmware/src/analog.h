@@ -5,6 +5,7 @@
 #ifndef ANALOG_H
 #define ANALOG_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -13,8 +14,9 @@ extern "C" {
 
 enum { ANALOG_BANDGAP, ANALOG_BATTERY, ANALOG_INFRARED, ANALOG_INPUTS };
 
-/* The pins, and later all else. */
-void analog_start_pins(void);
+/* Its pin is measured, or pulled up. */
+void analog_connect(uint8_t input, bool connected);
+
 void analog_start(void);
 
 /* The last result of an input, in 1/1024 of the supply, rounded down; 0 before the first. */

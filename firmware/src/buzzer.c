@@ -107,4 +107,7 @@ void buzzer_task(void) {
   connect(left != 0 || parameters_device_in_use(DEVICES_BUZZER));
 }
 
-uint8_t buzzer_token(void) { return token; }
+bool buzzer_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->buzzer_token = token;
+  return parameters_device_on(DEVICES_BUZZER);
+}

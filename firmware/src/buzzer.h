@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -27,8 +29,8 @@ bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t token);
 /* Ends a tone. */
 void buzzer_silence(void);
 
-/* Token of the last tone of this session. */
-uint8_t buzzer_token(void);
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool buzzer_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -24,6 +24,12 @@ _Static_assert(sizeof settings <= TWO_WIRE_WRITE_MAX && DATA_BYTES <= TWO_WIRE_R
 enum { OFF, WAITING, SETTING, READING, FREEING };
 
 typedef struct {
+  int16_t x, y, z; /* raw counts; -4096: overflow */
+  uint8_t age;     /* ticks since they were read; 255: never or older */
+  uint8_t status;  /* COMPASS_STATUS_... */
+} compass_reading;
+
+typedef struct {
   uint8_t state;
   bool is_set;    /* the device has its settings */
   uint8_t wait;   /* ticks until the next transfer */
@@ -151,4 +157,11 @@ void compass_task(void) {
   }
 }
 
-const compass_reading *compass_read(void) { return &own.reading; }
+bool compass_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->compass_x = own.reading.x;
+  message->compass_y = own.reading.y;
+  message->compass_z = own.reading.z;
+  message->compass_age = own.reading.age;
+  message->compass_status = own.reading.status;
+  return parameters_device_on(DEVICES_COMPASS);
+}

@@ -5,21 +5,19 @@
 #ifndef COMPASS_H
 #define COMPASS_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "generated/messages.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef struct {
-  int16_t x, y, z; /* raw counts; -4096: overflow */
-  uint8_t age;     /* ticks since they were read; 255: never or older */
-  uint8_t status;  /* COMPASS_STATUS_... */
-} compass_reading;
-
 void compass_start(void);
 
-const compass_reading *compass_read(void);
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool compass_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus
 }

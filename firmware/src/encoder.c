@@ -37,6 +37,12 @@ enum { LINE_LEFT_A, LINE_LEFT_B, LINE_RIGHT_A, LINE_RIGHT_B, LINES };
 static const uint8_t line_pins[LINES] = {LEFT_A, LEFT_B, RIGHT_A, RIGHT_B};
 
 typedef struct {
+  int32_t count;   /* edges since reset */
+  uint16_t period; /* time between the last two edges in 16 us; 0: none within 0.5 s */
+  bool masked;     /* a line of this wheel was masked in the tick that ended */
+} encoder_reading;
+
+typedef struct {
   int16_t steps;      /* by which the count has changed in this tick */
   uint16_t last, gap; /* time of the last edge that counts, and since the one before; 16 us */
   uint8_t edges;      /* that count, in this tick, at most 2 */
@@ -53,7 +59,7 @@ static uint8_t was_masked;        /* in the tick that ended */
 static bool time_lost;            /* in this tick */
 
 uint8_t encoder_pins(void) {
-  if (!parameters_device_on(DEVICES_ENCODERS)) {
+  if (!parameters_device_on(DEVICES_ENCODER)) {
     return 0;
   }
   return ALL_PINS & (uint8_t)~masked;
@@ -170,7 +176,7 @@ static void close_tick(wheel *w, bool not_listening) {
 
 /* Once per tick: closes the readings of the tick that ended. */
 void encoder_task(void) {
-  const bool off = !parameters_device_on(DEVICES_ENCODERS);
+  const bool off = !parameters_device_on(DEVICES_ENCODER);
   close_tick(&wheels[LEFT], off || (was_masked & LEFT_PINS) != 0);
   close_tick(&wheels[RIGHT], off || (was_masked & RIGHT_PINS) != 0);
   wheels[LEFT].reading.masked &= !off;
@@ -178,4 +184,17 @@ void encoder_task(void) {
   begin_tick();
 }
 
-const encoder_reading *encoder_read(uint8_t side) { return &wheels[side].reading; }
+void encoder_report_telemetry(msg_telemetry *message) {
+  const encoder_reading *left = &wheels[LEFT].reading;
+  const encoder_reading *right = &wheels[RIGHT].reading;
+  message->encoder_left = left->count;
+  message->encoder_right = right->count;
+  message->edge_period_left = left->period;
+  message->edge_period_right = right->period;
+  if (left->masked) {
+    message->status |= STATUS_ENCODER_LEFT_MASKED;
+  }
+  if (right->masked) {
+    message->status |= STATUS_ENCODER_RIGHT_MASKED;
+  }
+}

@@ -15,15 +15,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-typedef struct {
-  int32_t count;   /* edges since reset */
-  uint16_t period; /* time between the last two edges in 16 us; 0: none within 0.5 s */
-  bool masked;     /* a line of this wheel was masked in the tick that ended */
-} encoder_reading;
 
 #define ENCODER_TIME_UNIT 256u /* cycles in 16 us */
 
@@ -47,8 +43,8 @@ void encoder_mask(uint8_t pins);
 /* A tick begins: all pins count again. Once, before encoder_task(), which tells what was masked. */
 void encoder_lift_masks(void);
 
-/* The reading at the start of this tick. */
-const encoder_reading *encoder_read(uint8_t side);
+/* What it says in telemetry: the readings at the start of this tick. */
+void encoder_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -137,7 +137,7 @@ static bool senses_obstacles(void) {
   if (parameters_device_on(DEVICES_INFRARED)) {
     return infrared_age() <= INFRARED_AGE_MAX && parameters_u16(PARAMETER_INFRARED_PERIOD) <= INFRARED_AGE_MAX;
   }
-  return parameters_device_on(DEVICES_WHISKERS);
+  return parameters_device_on(DEVICES_WHISKER);
 }
 
 static void take_over(void) {

@@ -4,42 +4,26 @@
 #include "analog.h"
 #include "buzzer.h"
 #include "clock.h"
-#include "compass.h"
-#include "encoder.h"
 #include "events.h"
 #include "fallback.h"
+#include "generated/devices.h"
 #include "hal/hal.h"
-#include "infrared.h"
-#include "light.h"
 #include "link/identity.h"
 #include "link/link.h"
 #include "link/receive.h"
 #include "parameters.h"
 #include "pin_changes.h"
-#include "ping.h"
 #include "reset.h"
 #include "safety.h"
 #include "schedule.h"
-#include "servo.h"
 #include "storage.h"
 #include "supply.h"
-#include "turret.h"
-#include "whisker.h"
 
 /* First the pins, so that no servo moves by a floating line; the image's hash, which takes 0.17 s, comes after them. */
 void firmware_start(void) {
-  servo_start();
+  devices_start();
   HAL_PIN_PULL_UP(UART_RECEIVE); /* the line is high while nobody speaks */
   HAL_PIN_PULL_UP(UART_TRANSMIT);
-  encoder_start();
-  whisker_start();
-  infrared_start();
-  ping_start();
-  light_start();
-  compass_start();
-  buzzer_start();
-  turret_start();
-  analog_start_pins();
   reset_start();
   storage_start();
   parameters_start();

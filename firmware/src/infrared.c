@@ -149,10 +149,18 @@ void infrared_task(void) {
   }
 }
 
-uint8_t infrared_zone(uint8_t side) { return own.zones[side]; }
-
-uint8_t infrared_zone_age(void) { return own.zone_age; }
-
 uint8_t infrared_read(void) { return own.reading; }
 
 uint8_t infrared_age(void) { return own.age; }
+
+void infrared_report_telemetry(msg_telemetry *message) {
+  message->infrared = own.reading;
+  message->infrared_age = own.age;
+}
+
+bool infrared_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->infrared_zone_left = own.zones[LEFT];
+  message->infrared_zone_right = own.zones[RIGHT];
+  message->infrared_zone_age = own.zone_age;
+  return parameters_device_on(DEVICES_INFRARED) && parameters_u16(PARAMETER_INFRARED_SWEEP) != 0;
+}

@@ -7,7 +7,10 @@
 #ifndef INFRARED_H
 #define INFRARED_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "generated/messages.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -21,12 +24,14 @@ uint8_t infrared_read(void);
 /* Its age in ticks; 255: none yet, or older. */
 uint8_t infrared_age(void);
 
-/* Zone of a side in the last whole sweep, and the age of its last burst in ticks; 255: none yet, or older. */
-uint8_t infrared_zone(uint8_t side);
-uint8_t infrared_zone_age(void);
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool infrared_report_devices_telemetry(msg_devices_telemetry *message);
 
 /* In an interrupt: a side's slot begins. */
 void infrared_begin(uint8_t side);
+
+/* What it says in telemetry. */
+void infrared_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -166,6 +166,9 @@ void light_task(void) {
   }
 }
 
-uint16_t light_read(uint8_t side) { return readings[side]; }
-
-uint8_t light_age(void) { return age; }
+bool light_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->light_left = readings[LEFT];
+  message->light_right = readings[RIGHT];
+  message->light_age = age;
+  return parameters_device_on(DEVICES_LIGHT);
+}

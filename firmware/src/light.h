@@ -7,7 +7,10 @@
 #ifndef LIGHT_H
 #define LIGHT_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "generated/messages.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -26,11 +29,8 @@ void light_on_pin_change(uint8_t bits, uint32_t time);
 /* These pins are noise: their edge is awaited no more. */
 void light_mask(uint8_t pins);
 
-/* Decay time of a side in us, 1 to LIGHT_LONGEST (so long or longer); 0: none, or no sensor. */
-uint16_t light_read(uint8_t side);
-
-/* Ticks since the end of the measurement; 255: none yet, or older. */
-uint8_t light_age(void);
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool light_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -115,7 +115,8 @@ static void take(void) {
   }
 }
 
-void ping_collect(void) {
+/* Once per tick, before the telemetry: takes over a measurement that has ended. */
+void ping_echo_task(void) {
   if (state >= ENDED) {
     take();
   }
@@ -161,7 +162,7 @@ static void trigger(void) {
   }
 }
 
-/* Once per tick: ends readings and triggers the next one. Nobody else drives the line from 20 ms after a trigger on. */
+/* Once per tick: gives up a measurement and triggers the next one. From 20 ms after a trigger the line is the board's. */
 void ping_task(void) {
   if (since_trigger < 255u) {
     since_trigger++;
@@ -179,8 +180,8 @@ void ping_task(void) {
   }
 }
 
-uint8_t ping_status(void) { return status; }
-
-uint16_t ping_echo(void) { return echo; }
-
-uint8_t ping_age(void) { return age; }
+void ping_report_telemetry(msg_telemetry *message) {
+  message->ping_echo = echo;
+  message->ping_age = age;
+  message->ping_status = status;
+}

@@ -14,23 +14,16 @@
 
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 void ping_start(void);
 
-/* Once per tick, before the next three: takes over a measurement that has ended. */
-void ping_collect(void);
-
-/* PING_STATUS_... of the last measurement. */
-uint8_t ping_status(void);
-
-/* Length of its echo in us; 0: none. */
-uint16_t ping_echo(void);
-
-/* Ticks since it ended or was given up; 255: never or older. */
-uint8_t ping_age(void);
+/* What it says in telemetry. */
+void ping_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -70,7 +70,7 @@ static bool has_newer(uint16_t answers_tick, uint8_t sequence) {
 }
 
 safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence) {
-  if (own.latch != LATCH_NONE || time_to_live > SAFETY_TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVOS)) {
+  if (own.latch != LATCH_NONE || time_to_live > SAFETY_TIME_TO_LIVE_MAX || !parameters_device_on(DEVICES_SERVO)) {
     return SAFETY_REFUSED;
   }
   const uint16_t ticks = (uint16_t)((uint16_t)clock_tick() - answers_tick);
@@ -141,7 +141,7 @@ uint8_t safety_arm(uint8_t known_latches) {
 uint8_t safety_latched(void) { return own.latch; }
 
 bool safety_accept_fallback(void) {
-  if (!own.fallback_allowed || (own.state & STATUS_MOTORS_ENABLED) != 0 || !parameters_device_on(DEVICES_SERVOS) ||
+  if (!own.fallback_allowed || (own.state & STATUS_MOTORS_ENABLED) != 0 || !parameters_device_on(DEVICES_SERVO) ||
       supply_low() || supply_voltage() == 0) {
     return false;
   }
@@ -169,7 +169,7 @@ void safety_task(void) {
   if ((own.state & STATUS_MOTORS_ENABLED) == 0) {
     return;
   }
-  if (!parameters_device_on(DEVICES_SERVOS)) {
+  if (!parameters_device_on(DEVICES_SERVO)) {
     own.state = 0;
     motion_off();
   } else if ((int32_t)(clock_time() - own.deadline) >= 0) {

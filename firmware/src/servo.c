@@ -87,3 +87,8 @@ void servo_on_edge(void) {
   edge_time = (uint16_t)(edge_time + late + in_force[active]); /* a late pulse keeps its width */
   hal_edge_arm(edge_time);
 }
+
+void servo_report_telemetry(msg_telemetry *message) {
+  message->pulse_left = servo_pulse(LEFT);
+  message->pulse_right = servo_pulse(RIGHT);
+}

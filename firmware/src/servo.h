@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
 #include "pins.h"
 
 #ifdef __cplusplus
@@ -35,6 +36,9 @@ uint16_t servo_pulse(uint8_t servo);
 /* In an interrupt: a frame begins; a servo's slot begins at hal_time() `start`. */
 void servo_frame(void);
 void servo_begin(uint8_t servo, uint16_t start);
+
+/* What it says in telemetry. */
+void servo_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus
 }

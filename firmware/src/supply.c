@@ -48,4 +48,11 @@ void supply_task(void) {
 
 uint16_t supply_voltage(void) { return voltage; }
 
+void supply_report_telemetry(msg_telemetry *message) { message->supply = voltage; }
+
+bool supply_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->supply = voltage;
+  return false;
+}
+
 bool supply_low(void) { return low; }

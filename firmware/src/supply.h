@@ -6,6 +6,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -14,6 +16,10 @@ void supply_start(void);
 
 /* mV; 0: not yet measured. */
 uint16_t supply_voltage(void);
+
+/* What it says in telemetry, and in devices_telemetry, for the sake of the others there: false. */
+void supply_report_telemetry(msg_telemetry *message);
+bool supply_report_devices_telemetry(msg_devices_telemetry *message);
 
 /* Two measurements in a row were below the parameter supply_minimum, and none since was 100 mV above it. */
 bool supply_low(void);

@@ -34,3 +34,8 @@ void turret_task(void) {
     servo_connect_turret(in_use);
   }
 }
+
+bool turret_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->turret_pulse = servo_pulse(SERVO_TURRET);
+  return parameters_device_on(DEVICES_TURRET);
+}

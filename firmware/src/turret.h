@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -20,6 +22,9 @@ void turret_hold(int16_t angle);
 
 /* No pulses from the next servo frame on. */
 void turret_release(void);
+
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool turret_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -43,8 +43,10 @@ void whisker_task(void) {
 }
 
 uint8_t whisker_read(void) {
-  if (!parameters_device_on(DEVICES_WHISKERS)) {
+  if (!parameters_device_on(DEVICES_WHISKER)) {
     return 0;
   }
   return (uint8_t)((states[LEFT].pressed ? WHISKERS_LEFT : 0u) | (states[RIGHT].pressed ? WHISKERS_RIGHT : 0u));
 }
+
+void whisker_report_telemetry(msg_telemetry *message) { message->whiskers = whisker_read(); }

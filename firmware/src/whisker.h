@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "generated/messages.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -24,6 +26,9 @@ bool whisker_debounce(whisker_state *state, bool touching);
 void whisker_start(void);
 /* WHISKERS_... bits. */
 uint8_t whisker_read(void);
+
+/* What it says in telemetry. */
+void whisker_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus
 }

@@ -15,9 +15,9 @@ def test_values_come_from_the_robot() -> None:
     assert values["wheel_speed_maximum"] == 0.17
     devices = messages.Devices(int(values["devices"]))
     assert devices == (
-        messages.Devices.SERVOS
-        | messages.Devices.ENCODERS
-        | messages.Devices.WHISKERS
+        messages.Devices.SERVO
+        | messages.Devices.ENCODER
+        | messages.Devices.WHISKER
         | messages.Devices.INFRARED
         | messages.Devices.PING
     )
@@ -47,7 +47,7 @@ def test_board_is_told_all_of_them() -> None:
 
 def test_description_gives_way_to_what_the_board_has_saved() -> None:
     robot = load_robot("shieldbot")
-    without_encoders = messages.Devices.SERVOS | messages.Devices.WHISKERS
+    without_encoders = messages.Devices.SERVO | messages.Devices.WHISKER
     real = adapted(robot, {"servo_left_centre": 1512.25, "devices": float(without_encoders), "wheel_radius": 0.034})
     assert real.device["servo_left"].centre_us == 1512.25  # type: ignore[attr-defined]
     assert real.device["servo_right"].centre_us == 1500.0  # type: ignore[attr-defined]

@@ -35,7 +35,7 @@ DEVICES = messages.Devices
 STUCK, NEVER_AGAIN = 1_600_000, 1 << 60  # cycles for which the two-wire bus is held, once
 SILENCE = 5_600_000  # cycles at the end of "everything": the dead man's 250 ms and the tasks that follow
 CHANGED = ("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain")
-FIGURE_DEVICES = DEVICES.SERVOS | DEVICES.ENCODERS | DEVICES.WHISKERS | DEVICES.INFRARED | DEVICES.PING
+FIGURE_DEVICES = DEVICES.SERVO | DEVICES.ENCODER | DEVICES.WHISKER | DEVICES.INFRARED | DEVICES.PING
 FAULT_DEVICES = FIGURE_DEVICES | DEVICES.TURRET | DEVICES.BUZZER
 
 

@@ -10,7 +10,7 @@
 
 #define PROTOCOL_VERSION 0x30u /* 3.0 */
 #define PROTOCOL_MAJOR(version) ((version) / 16u)
-#define SCHEMA_HASH 0x4451FF50ul
+#define SCHEMA_HASH 0x0A648E33ul
 #define MESSAGE_PAYLOAD_MAX_TO_BOARD 9u /* bytes */
 #define MESSAGE_PAYLOAD_MAX_TO_HOST 60u /* bytes */
 
@@ -448,7 +448,7 @@ static inline bool message_is_handshake(uint8_t id) {
   X(0x25, 3, 0xEE5C19C7ul)  \
   X(0x28, 2, 0x306E772Cul)  \
   X(0x30, 2, 0x1011476Bul)  \
-  X(0x80, 44, 0xA76FFC9Bul) \
+  X(0x80, 44, 0xECA6681Bul) \
   X(0x81, 60, 0xF379E8B5ul) \
   X(0x82, 8, 0xACE09C27ul)  \
   X(0x88, 1, 0x24E076A5ul)  \

@@ -2,24 +2,18 @@
 #include "link/telemetry.h"
 
 #include "clock.h"
-#include "encoder.h"
-#include "generated/messages.h"
-#include "infrared.h"
+#include "generated/devices.h"
 #include "link/counters.h"
 #include "link/frame.h"
 #include "link/send.h"
 #include "link/session_seed.h"
 #include "parameters.h"
-#include "ping.h"
-#include "pins.h"
 #include "reset.h"
 #include "safety.h"
 #include "schedule.h"
-#include "servo.h"
 #include "storage.h"
 #include "supply.h"
 #include "tasks.h"
-#include "whisker.h"
 
 static uint8_t line_period; /* ticks */
 static uint8_t due_in;      /* ticks until the next is sent */
@@ -39,14 +33,8 @@ uint8_t telemetry_period(void) {
   return (uint8_t)(wanted > line_period ? wanted : line_period);
 }
 
-static uint16_t status_bits(const encoder_reading *left, const encoder_reading *right) {
+static uint16_t status_bits(void) {
   uint16_t status = safety_status();
-  if (left->masked) {
-    status |= STATUS_ENCODER_LEFT_MASKED;
-  }
-  if (right->masked) {
-    status |= STATUS_ENCODER_RIGHT_MASKED;
-  }
   if (schedule_overran()) {
     status |= STATUS_TICK_OVERRUN;
   }
@@ -68,34 +56,19 @@ static uint16_t status_bits(const encoder_reading *left, const encoder_reading *
 /* In every tick: collects and sends when it is its turn in a session. Latest wins: without room on the line it is left
  * out, and the host sees the gap. */
 void telemetry_task(void) {
-  const encoder_reading *left = encoder_read(LEFT);
-  const encoder_reading *right = encoder_read(RIGHT);
-  ping_collect();
   if (!session_is_open() || --due_in != 0) {
     return;
   }
   due_in = telemetry_period();
-  const msg_telemetry telemetry = {
+  msg_telemetry telemetry = {
       .tick = clock_tick(),
       .time = clock_tick_time(),
-      .encoder_left = left->count,
-      .encoder_right = right->count,
-      .edge_period_left = left->period,
-      .edge_period_right = right->period,
-      .whiskers = whisker_read(),
-      .infrared = infrared_read(),
-      .infrared_age = infrared_age(),
-      .ping_echo = ping_echo(),
-      .ping_age = ping_age(),
-      .ping_status = ping_status(),
-      .pulse_left = servo_pulse(LEFT),
-      .pulse_right = servo_pulse(RIGHT),
-      .supply = supply_voltage(),
-      .status = status_bits(left, right),
+      .status = status_bits(),
       .latch = safety_latched(),
       .latches = safety_latches(),
       .setpoint_sequence = safety_setpoint_sequence(),
       .overruns = schedule_overruns(),
   };
+  devices_report_telemetry(&telemetry);
   send_message(MSG_TELEMETRY_ID, &telemetry, sizeof telemetry);
 }

@@ -19,7 +19,7 @@ int expected(double volts, double supply) {
 
 TEST_CASE("a voltage becomes a ratio of the supply within three ticks") {
   attended_bench bench;
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_BATTERY);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_BATTERY);
   for (double supply : {5.0, 4.6}) {
     for (double volts : {0.0, 0.01, 1.234, 3.3, 4.59, 4.999, 6.0}) {
       bench.volts = supply;
@@ -48,7 +48,7 @@ TEST_CASE("the supply is measured in every tick, whatever else is") {
 #ifdef PIN_ANALOG_INFRARED
 TEST_CASE("both inputs in turn, each its own") {
   attended_bench bench;
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_BATTERY | DEVICES_ANALOG_INFRARED);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_BATTERY | DEVICES_ANALOG_INFRARED);
   for (double volts : {0.4, 1.1, 2.2, 3.1}) {
     bench.analog[BATTERY] = volts;
     bench.analog[PIN_ANALOG_INFRARED - 14] = 4.0 - volts;
@@ -64,10 +64,10 @@ TEST_CASE("both inputs in turn, each its own") {
 TEST_CASE("switched off: no reading") {
   attended_bench bench;
   bench.analog[BATTERY] = 3.0;
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_BATTERY);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_BATTERY);
   bench.run(5 * TICK);
   CHECK(bench.devices().battery_age <= 2);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_TURRET);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_TURRET);
   bench.run(5 * TICK);
   CHECK(bench.devices().battery == 0);
   CHECK(bench.devices().battery_age == 255);

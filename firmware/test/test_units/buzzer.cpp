@@ -83,7 +83,7 @@ TEST_CASE("no such frequency, or switched off: refused") {
   bench.tone(65535, 10, 3);
   bench.run_in_session(2 * TICK);
   CHECK(bench.devices().buzzer_token == 0);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_TURRET);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_TURRET);
   bench.tone(1000, 10, 4);
   bench.run_in_session(2 * TICK);
   CHECK(is_silent(bench));

@@ -15,7 +15,7 @@ class compass_bench : public attended_bench {
 
   compass_bench() {
     field(0, 0, 0);
-    set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_COMPASS);
+    set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_COMPASS);
   }
   void field(int x, int y, int z) {
     const int values[] = {x, z, y};
@@ -137,7 +137,7 @@ TEST_CASE("a clock that is held low stops nothing but the compass") {
 TEST_CASE("switched off: no clock, no reading") {
   compass_bench bench;
   bench.run(10 * TICK);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_TURRET);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_TURRET);
   bench.run(5 * TICK);
   bench.edges.clear();
   bench.run(20 * TICK);

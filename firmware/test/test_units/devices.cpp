@@ -7,12 +7,12 @@
 TEST_CASE("it is sent while one of the slow devices is on, and not otherwise") {
   for (const uint32_t device : {DEVICES_BATTERY, DEVICES_LIGHT, DEVICES_COMPASS, DEVICES_TURRET, DEVICES_BUZZER}) {
     attended_bench bench;
-    bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_WHISKERS | DEVICES_INFRARED | DEVICES_PING);
+    bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_WHISKER | DEVICES_INFRARED | DEVICES_PING);
     bench.run(3 * TICK);
     const size_t before = bench.count(MSG_DEVICES_TELEMETRY_ID);
     bench.run(20 * TICK);
     CHECK(bench.count(MSG_DEVICES_TELEMETRY_ID) == before);
-    bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS | device));
+    bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVO | device));
     bench.run(20 * TICK);
     CHECK(bench.count(MSG_DEVICES_TELEMETRY_ID) - before >= 9);
   }
@@ -20,7 +20,7 @@ TEST_CASE("it is sent while one of the slow devices is on, and not otherwise") {
 
 TEST_CASE("for the zones of the IR sweep as well") {
   attended_bench bench;
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_INFRARED);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_INFRARED);
   bench.set(PARAMETER_INFRARED_SWEEP, 1);
   bench.run(20 * TICK);
   CHECK(bench.count(MSG_DEVICES_TELEMETRY_ID) >= 9);

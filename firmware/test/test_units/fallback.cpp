@@ -313,7 +313,7 @@ TEST_CASE("a host that comes after such a start, and does not arm, has ended it"
 TEST_CASE("after such a start it waits until the supply has been measured") {
   fallback_bench bench;
   start_with(10, true);
-  REQUIRE(parameters_set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_WHISKERS) == ANSWER_STATUS_OK);
+  REQUIRE(parameters_set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_WHISKER) == ANSWER_STATUS_OK);
   bench.run_to(bench.tick(1) + 1);
   REQUIRE(supply_voltage() == 0);
   CHECK_FALSE(bench.has_flag());
@@ -335,8 +335,8 @@ TEST_CASE("it needs the servos, and IR pairs or whiskers; IR pairs that are on m
     bool drives;
   };
   for (const needs &row :
-       {needs{DEVICES_SERVOS, 5, false}, needs{DEVICES_INFRARED | DEVICES_WHISKERS, 5, false},
-        needs{DEVICES_INFRARED, 5, true}, needs{DEVICES_WHISKERS, 5, true}, needs{0, 21, false}, needs{0, 20, true}}) {
+       {needs{DEVICES_SERVO, 5, false}, needs{DEVICES_INFRARED | DEVICES_WHISKER, 5, false},
+        needs{DEVICES_INFRARED, 5, true}, needs{DEVICES_WHISKER, 5, true}, needs{0, 21, false}, needs{0, 20, true}}) {
     fallback_bench bench;
     bench.arm_and_switch_on();
     bench.set(PARAMETER_DEVICES, DEFAULT_DEVICES & ~row.off);

@@ -76,7 +76,7 @@ TEST_CASE("the period is a parameter, odd or even") {
 
 TEST_CASE("switched off: no bursts, no reading") {
   attended_bench bench;
-  bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS));
+  bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVO));
   bench.run_to(bench.tick(8));
   bench.edges.clear();
   bench.run(50 * TICK);
@@ -166,7 +166,7 @@ TEST_CASE("the zone is the number of frequencies at which the object is seen") {
     CHECK(bench.telemetry().infrared == expected); /* the bit stays that of 38 kHz */
     CHECK(bench.telemetry().infrared_age <= 6);
     bench.set(PARAMETER_INFRARED_SWEEP, 0);
-    bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS | DEVICES_INFRARED | DEVICES_TURRET));
+    bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVO | DEVICES_INFRARED | DEVICES_TURRET));
     bench.run(20 * TICK);
     CHECK(bench.devices().infrared_zone_age == 255);
     CHECK(bench.telemetry().infrared == expected);

@@ -134,7 +134,7 @@ TEST_CASE("noise on its line masks no encoder") {
 TEST_CASE("switched off: pulled up, no reading") {
   light_bench bench;
   bench.run(9 * TICK);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_TURRET);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_TURRET);
   bench.run(4 * TICK);
   CHECK(bench.machine.output[PIN_LIGHT_RIGHT] == NATIVE_PULLED_UP);
   bench.edges.clear();

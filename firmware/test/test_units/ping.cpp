@@ -135,7 +135,7 @@ TEST_CASE("triggers keep the period") {
 
 TEST_CASE("switched off: no trigger, no reading") {
   attended_bench bench;
-  bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVOS));
+  bench.set(PARAMETER_DEVICES, static_cast<int32_t>(DEVICES_SERVO));
   bench.run_to(bench.tick(8));
   bench.edges.clear();
   bench.run(50 * TICK);

@@ -211,7 +211,7 @@ TEST_CASE("requests at random, with copies and gaps, are carried out as a list o
 TEST_CASE("a clock probe is answered with the time of its work, to the microsecond") {
   native_bench bench;
   begin(bench);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS); /* without the Ping, whose trigger keeps the CPU for 5 us */
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO); /* without the Ping, whose trigger keeps the CPU for 5 us */
   bench.run(MILLISECOND);
   for (uint16_t i = 0; i < 300; i++) {
     const auto token = static_cast<uint16_t>(0xFF00 + 3 * i);

@@ -110,7 +110,7 @@ TEST_CASE("released by its own message, by its switch; wrong angles are refused"
   CHECK(bench.devices().turret_pulse == 0);
   bench.turn(0);
   bench.run_in_session(6 * TICK);
-  bench.set(PARAMETER_DEVICES, DEVICES_SERVOS | DEVICES_BUZZER);
+  bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_BUZZER);
   bench.run_in_session(8 * TICK);
   CHECK(bench.devices().turret_pulse == 0);
 }

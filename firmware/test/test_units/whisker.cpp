@@ -69,7 +69,7 @@ TEST_CASE("switched off, whiskers are silent") {
   bench.drive(0, PIN_WHISKER_LEFT, NATIVE_LOW);
   bench.run(5 * TICK);
   CHECK(bench.telemetry().whiskers == WHISKERS_LEFT);
-  bench.set(0, static_cast<int32_t>(DEVICES_SERVOS));
+  bench.set(0, static_cast<int32_t>(DEVICES_SERVO));
   bench.run(3 * TICK);
   CHECK(bench.telemetry().whiskers == 0);
 }

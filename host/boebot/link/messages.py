@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, NamedTuple, Self
 
 PROTOCOL_VERSION = 0x30  # 3.0
-SCHEMA_HASH = 0x4451FF50
+SCHEMA_HASH = 0x0A648E33
 
 
 class Whiskers(IntFlag):
@@ -49,9 +49,9 @@ class Status(IntFlag):
 class Devices(IntFlag):
     """Devices switched on."""
 
-    SERVOS = 1 << 0
-    ENCODERS = 1 << 1
-    WHISKERS = 1 << 2
+    SERVO = 1 << 0
+    ENCODER = 1 << 1
+    WHISKER = 1 << 2
     INFRARED = 1 << 3
     PING = 1 << 4
     BATTERY = 1 << 5
@@ -64,9 +64,9 @@ class Devices(IntFlag):
 
 # The robot's device behind each bit.
 DEVICE_OF_BIT: dict[Devices, str] = {
-    Devices.SERVOS: "servo_left",
-    Devices.ENCODERS: "encoder_left",
-    Devices.WHISKERS: "whisker_left",
+    Devices.SERVO: "servo_left",
+    Devices.ENCODER: "encoder_left",
+    Devices.WHISKER: "whisker_left",
     Devices.INFRARED: "infrared_left",
     Devices.PING: "ping",
     Devices.BATTERY: "battery",
@@ -105,18 +105,19 @@ class ResetCause(_Values):
     WATCHDOG_IN_EVENTS = 9
     WATCHDOG_IN_ENCODER = 10
     WATCHDOG_IN_INFRARED = 11
-    WATCHDOG_IN_PING = 12
-    WATCHDOG_IN_TELEMETRY = 13
-    WATCHDOG_IN_REQUESTS = 14
-    WATCHDOG_IN_SESSION = 15
-    WATCHDOG_IN_SUPPLY = 16
-    WATCHDOG_IN_COUNTERS = 17
-    WATCHDOG_IN_STORAGE = 18
-    WATCHDOG_IN_TURRET = 19
-    WATCHDOG_IN_BUZZER = 20
-    WATCHDOG_IN_COMPASS = 21
-    WATCHDOG_IN_DEVICES = 22
-    WATCHDOG_IN_FALLBACK = 23
+    WATCHDOG_IN_PING_ECHO = 12
+    WATCHDOG_IN_PING = 13
+    WATCHDOG_IN_TELEMETRY = 14
+    WATCHDOG_IN_REQUESTS = 15
+    WATCHDOG_IN_SESSION = 16
+    WATCHDOG_IN_SUPPLY = 17
+    WATCHDOG_IN_COUNTERS = 18
+    WATCHDOG_IN_STORAGE = 19
+    WATCHDOG_IN_TURRET = 20
+    WATCHDOG_IN_BUZZER = 21
+    WATCHDOG_IN_COMPASS = 22
+    WATCHDOG_IN_DEVICES = 23
+    WATCHDOG_IN_FALLBACK = 24
 
 
 class Task(_Values):
@@ -129,18 +130,19 @@ class Task(_Values):
     EVENTS = 4
     ENCODER = 5
     INFRARED = 6
-    PING = 7
-    TELEMETRY = 8
-    REQUESTS = 9
-    SESSION = 10
-    SUPPLY = 11
-    COUNTERS = 12
-    STORAGE = 13
-    TURRET = 14
-    BUZZER = 15
-    COMPASS = 16
-    DEVICES = 17
-    FALLBACK = 18
+    PING_ECHO = 7
+    PING = 8
+    TELEMETRY = 9
+    REQUESTS = 10
+    SESSION = 11
+    SUPPLY = 12
+    COUNTERS = 13
+    STORAGE = 14
+    TURRET = 15
+    BUZZER = 16
+    COMPASS = 17
+    DEVICES = 18
+    FALLBACK = 19
 
 
 class Latch(_Values):
@@ -1051,7 +1053,7 @@ HASHES: dict[int, int] = {
     0x01: 0xE0471814,
     0x02: 0xBD434780,
     0x03: 0xDDE1C4B0,
-    0x80: 0xA76FFC9B,
+    0x80: 0xECA6681B,
     0x81: 0xF379E8B5,
     0x82: 0xACE09C27,
     0x08: 0xF533989A,

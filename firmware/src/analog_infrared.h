@@ -1,0 +1,22 @@
+/* analog_infrared.h: the Sharp distance sensor, at the analog converter (analog.h). */
+#ifndef ANALOG_INFRARED_H
+#define ANALOG_INFRARED_H
+
+#include <stdbool.h>
+
+#include "generated/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void analog_infrared_start(void);
+
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool analog_infrared_report_devices_telemetry(msg_devices_telemetry *message);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,22 @@
+/* battery.h: the pack's voltage behind a divider, at the analog converter (analog.h). */
+#ifndef BATTERY_H
+#define BATTERY_H
+
+#include <stdbool.h>
+
+#include "generated/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+void battery_start(void);
+
+/* What it says in devices_telemetry; false: nothing, it is off. */
+bool battery_report_devices_telemetry(msg_devices_telemetry *message);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
