@@ -169,7 +169,7 @@ static inline double ask_circle(double along, double beside, double radius) {
   const double square = radius * radius - beside * beside;
   const double half = sqrt(larger(square, 0.0));
   const double distance = along >= half ? along - half : along + half;
-  return (square >= 0.0) & (distance >= 0.0) ? 1.0 / distance : 0.0;
+  return (square >= 0.0 && distance >= 0.0) ? 1.0 / distance : 0.0;
 }
 
 void scan_see_circle(scan_fan *self, double dx, double dy, double radius, const scan_edges *edges) {
