@@ -109,7 +109,7 @@ def volts(told: int) -> float:
 
 
 def test_whiskers(around: Surroundings) -> None:
-    check(around.ages("whiskers", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whisker", 0.5)
+    check(around.ages("whisker", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whisker", 0.5)
 
 
 def test_infrared(around: Surroundings) -> None:
