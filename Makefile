@@ -12,7 +12,10 @@ SIDE_BY_SIDE := $(MAKE) --no-print-directory --jobs=$(JOBS) --output-sync=target
 PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-check --no-warn-script-location \
 	--constraint requirements.lock
 
-FIRMWARE_SOURCES := $(shell find firmware/src -name '*.[ch]' -o -name '*.def')
+# Made by protocol/generate.py. Of the headers in firmware/src/generated one is named here; it makes them all.
+GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot/devices/attributes.pyi
+GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
+FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
 IMAGES := build/images/shieldbot.elf build/images/shieldbot-basic.elf build/images/shieldbot-quad.elf build/images/boebot.elf
 
@@ -124,6 +127,7 @@ compile_commands.json:
 
 clean:
 	@rm -rf build dist compile_commands.json host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
+	@rm -rf firmware/src/generated $(GENERATED)
 	@find host sim_bridge -name '*.so' -delete
 	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
@@ -154,11 +158,11 @@ check-generated:
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
-ready-run: $(VENV)/.done-boebot build/.done-core $(IMAGES)
+ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
 ready-bench: ready-test build/.done-system-bench build/avr8js/.done
 ready-soak: ready-bench build/.done-system-soak
-ready-check: build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
+ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
 
 build/.done-system-%: tools/setup_system.sh tools/find_python.sh
@@ -221,6 +225,13 @@ build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) bu
 build/platformio-core/appstate.json: tools/prepare_platformio.py $(VENV)/.done-firmware \
 		$(shell find tools/platformio -name '*.py' -o -name '*.json')
 	@$(PYTHON_VENV) tools/prepare_platformio.py
+
+build/.done-generated: $(GENERATED_FROM) build/.done-system-run
+	@$$(tools/find_python.sh) protocol/generate.py
+	@touch $@
+# A file that would be the same keeps its time, and what is made from it is not made again.
+$(sort $(GENERATED) $(filter firmware/src/generated/%,$(FIRMWARE_SOURCES))): build/.done-generated
+	@test -e $@ || $$(tools/find_python.sh) protocol/generate.py
 
 build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES)
 	@echo "Building the firmware images"

@@ -1,15 +1,22 @@
 """Settings for all tests: how many random cases; the same ones each time unless `make fuzz` asks for new. And what
-each folder's tests take, for the table at the end of `make test` (tools/times_table.py)."""
+each folder's tests take, for the table at the end of `make test` (tools/times_table.py). What follows from the
+protocol is made before the first test is read."""
 
 from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+GENERATOR = Path(__file__).parent / "protocol" / "generate.py"
+if GENERATOR.is_file() and subprocess.run([sys.executable, GENERATOR], check=False).returncode:
+    pytest.exit("protocol/generate.py failed", returncode=1)
 
 EXAMPLES = os.environ.get("BOEBOT_EXAMPLES")
 SANITIZED = "BOEBOT_SANITIZED" in os.environ

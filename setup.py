@@ -1,4 +1,5 @@
-"""Builds what is not Python: the simulated world, the emulated boards, the firmware for this computer.
+"""Builds what is not Python: the simulated world, the emulated boards, the firmware for this computer. Before anything
+else it makes what follows from the protocol and the robots' files (protocol/generate.py).
 
 * `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
 * `boebot.link.ports._reader`: the thread that reads a port (host/boebot/link/ports/build_reader.py), MIT.
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -29,6 +31,9 @@ from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
 os.chdir(ROOT)
+
+if subprocess.run([sys.executable, "protocol/generate.py"], check=False).returncode:
+    sys.exit(1)
 
 FIRMWARE = Path("firmware/src")
 LIBRARIES = Path("sim_bridge/images")
@@ -181,7 +186,11 @@ setup(
             exclude=[f"sim_bridge.{folder}*" for folder in ("tests", "fuzz", "world", "parts", "images")],
         ),
     ],
-    package_data={"": ["py.typed", "*.html"], "boebot.brains": ["*.toml"], "boebot.arenas.bundled": ["*.toml"]},
+    package_data={
+        "": ["py.typed", "*.pyi", "*.html"],
+        "boebot.brains": ["*.toml"],
+        "boebot.arenas.bundled": ["*.toml", "*.json"],
+    },
     include_package_data=False,
     cffi_modules=CFFI_MODULES,
     options={"bdist_wheel": {"py_limited_api": "cp311"}},

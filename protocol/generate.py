@@ -1,37 +1,40 @@
-"""Makes everything that follows from messages.toml and robots/*.toml.
+"""Makes everything that follows from messages.toml and robots/*.toml, by Python's standard library alone.
 
-    python protocol/generate.py            writes the files
-    python protocol/generate.py --check    exits 1 and names each file that is stale
+    python protocol/generate.py            makes what is built, and is not in git
+    python protocol/generate.py --pages    writes what is in git, for it is read there
+    python protocol/generate.py --check    exits 1 and names each file in git that is stale
 
-Made: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, the golden vectors
-protocol/vectors/frames.json with their C twin firmware/test/vectors.h, the CAN database protocol/boebot.dbc, and the
-tables of PROTOCOL.md.
+Built: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, and the stub
+host/boebot/devices/attributes.pyi (attributes.py). `make`, setup.py, PlatformIO and pytest begin with it; a file that
+would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json, the CAN database
+protocol/boebot.dbc, and the tables of PROTOCOL.md.
 """
 
 from __future__ import annotations
 
+import sys
+
+if sys.version_info < (3, 11):  # noqa: UP036  # PlatformIO may run on an older one
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    sys.exit(f"protocol/generate.py: expected Python 3.11 or newer; {sys.executable} is {version}")
+
 import argparse
 import json
+import os
 import random
-import sys
 import zlib
 from pathlib import Path
-from types import ModuleType
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path.insert(0, str(HERE))
-# The package `boebot` without its __init__, which needs the module that is made here.
-bare = ModuleType("boebot")
-bare.__path__ = [str(ROOT / "host" / "boebot")]
-sys.modules["boebot"] = bare
 
+import attributes  # noqa: E402
 import can_database  # noqa: E402
 import device_header  # noqa: E402
 import reference_frame  # noqa: E402
+import robot_files  # noqa: E402
 import schema  # noqa: E402
-
-from boebot.description.robots import RobotDescription, load_robot, robot_names  # noqa: E402
 
 DIRECTIONS = ("to_board", "to_host")
 STATUS_NOTE = "Made by protocol/generate.py; do not edit."
@@ -217,27 +220,50 @@ def crc21_header() -> str:
     return "\n".join([*lines, "", "#endif", ""])
 
 
-def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
+def pin_map_header(robots: list[robot_files.Robot]) -> str:
+    """firmware/src/generated/pin_map.h"""
+    lines = [
+        "/* pin_map.h: the pin map that this image is built for, chosen by a -DPIN_MAP_...",
+        f" * {STATUS_NOTE} */",
+    ]
+    for robot in robots:
+        condition = "if" if robot is robots[0] else "elif"
+        lines += [f"#{condition} defined({pin_map_macro(robot)})", f'#include "generated/{pins_file(robot)}"']
+    options = ", ".join(f"-D{pin_map_macro(robot)}" for robot in robots)
+    return "\n".join([*lines, "#else", f'#error "choose a pin map: {options}"', "#endif", ""])
+
+
+def pin_map_macro(robot: robot_files.Robot) -> str:
+    """shieldbot-basic -> PIN_MAP_SHIELDBOT_BASIC"""
+    return f"PIN_MAP_{robot.pin_map.replace('-', '_').upper()}"
+
+
+def pins_file(robot: robot_files.Robot) -> str:
+    """Name of the robot's pin header."""
+    return f"pins_{robot.pin_map.replace('-', '_')}.h"
+
+
+def pins_header(spec: schema.Schema, robot: robot_files.Robot) -> str:
     """firmware/src/generated/pins_<map>.h"""
     guard = f"GENERATED_PINS_{robot.pin_map.upper().replace('-', '_')}_H"
     lines = [
-        f"/* {pins_file(robot)}: pin map and defaults of the {robot.title}, from protocol/robots.",
+        f"/* {pins_file(robot)}: pin map and defaults of the {robot.table['title']}, from protocol/robots.",
         f" * {STATUS_NOTE} */",
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
-        f'#define ROBOT_NAME "{robot.name}"',
+        f'#define ROBOT_NAME "{robot.table["name"]}"',
         f'#define PIN_MAP_NAME "{robot.pin_map}"',
     ]
-    for name, device in robot.device.items():
-        for role, pin in device.pins().items():
+    for name in robot.devices:
+        for role, pin in robot.pins(name).items():
             full = "_".join(part.upper() for part in (name, role) if part)
             port, bit = ("D", pin) if pin < 8 else ("B", pin - 8) if pin < 14 else ("C", pin - 14)
             lines += ["", f"#define PIN_{full} {pin}"]
             lines += [f"#define {full}_PORT PORT{port}", f"#define {full}_DDR DDR{port}"]
             lines += [f"#define {full}_PINR PIN{port}", f"#define {full}_BIT {bit}"]
-    encoder = robot.device.get("encoder_left")
-    lines += ["", f"#define ENCODER_LINES {len(encoder.pins()) if encoder else 0} /* of each wheel */"]
+    encoder_lines = len(robot.pins("encoder_left")) if "encoder_left" in robot.devices else 0
+    lines += ["", f"#define ENCODER_LINES {encoder_lines} /* of each wheel */"]
     lines += [
         "",
         "/* Devices bits of what the map has pins for. */",
@@ -252,34 +278,26 @@ def pins_header(spec: schema.Schema, robot: RobotDescription) -> str:
     return "\n".join(lines)
 
 
-def devices_default(spec: schema.Schema, robot: RobotDescription) -> int:
+def devices_default(spec: schema.Schema, robot: robot_files.Robot) -> int:
     """The devices bits of what the robot has switched on."""
     return sum(1 << i for i, device in enumerate(spec.flags["devices"].device) if robot.has(device))
 
 
-def devices_built(spec: schema.Schema, robot: RobotDescription) -> int:
+def devices_built(spec: schema.Schema, robot: robot_files.Robot) -> int:
     """The devices bits of what the robot's map gives pins to, on or off, on one side at least."""
     sides = [{device, device.replace("_left", "_right")} for device in spec.flags["devices"].device]
-    return sum(1 << i for i, either in enumerate(sides) if either & set(robot.device))
+    return sum(1 << i for i, either in enumerate(sides) if either & set(robot.devices))
 
 
-def default_counts(parameter: schema.Parameter, robot: RobotDescription) -> int:
-    """The parameter's default for that robot in counts: a key of the robot, its body, its supply or one of its
-    devices."""
-    owner_name, key = parameter.default_from.split(".")
-    parts = {"robot": robot, "body": robot.body, "supply": robot.supply, **robot.device}
-    if owner_name not in parts and parameter.default is not None:
-        return parameter.default
-    owner = parts[owner_name]
-    counts = round(float(getattr(owner, key)) / parameter.scale)
+def default_counts(parameter: schema.Parameter, robot: robot_files.Robot) -> int:
+    """The parameter's default for that robot in counts: what the robot says, or else the parameter's own."""
+    value = robot.value(parameter.default_from)
+    counts = parameter.default if value is None else round(value / parameter.scale)
+    if counts is None:
+        raise ValueError(f"{robot.file}: {parameter.default_from} is missing")
     if not parameter.min <= counts <= parameter.max:
-        raise ValueError(f"{robot.name}: {parameter.default_from} is outside parameter {parameter.name}'s range")
+        raise ValueError(f"{robot.file}: {parameter.default_from} is outside the range of parameter {parameter.name}")
     return counts
-
-
-def pins_file(robot: RobotDescription) -> str:
-    """Name of the robot's pin header."""
-    return f"pins_{robot.pin_map.replace('-', '_')}.h"
 
 
 # ---- Python ----------------------------------------------------------------------------------------------------------
@@ -449,12 +467,12 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
 
 
 def vectors_header(rows: list[dict[str, object]]) -> str:
-    """firmware/test/vectors.h"""
+    """firmware/src/generated/vectors.h"""
     lines = [
         "/* vectors.h: the golden frames of protocol/vectors/frames.json for the C tests.",
         f" * {STATUS_NOTE} */",
-        "#ifndef VECTORS_H",
-        "#define VECTORS_H",
+        "#ifndef GENERATED_VECTORS_H",
+        "#define GENERATED_VECTORS_H",
         "",
         "#include <stdint.h>",
         "",
@@ -566,45 +584,74 @@ def protocol_page(spec: schema.Schema) -> str:
 # ---- all together ----------------------------------------------------------------------------------------------------
 
 
-def outputs() -> dict[Path, str]:
-    """Every made file and its text."""
+GENERATED = ROOT / "firmware" / "src" / "generated"
+
+
+def built() -> dict[Path, str]:
+    """Each file that is made when building, and its text."""
     spec = schema.load()
-    golden = vectors(spec)
-    generated = ROOT / "firmware" / "src" / "generated"
-    made = {
-        generated / "values.h": values_header(spec),
-        generated / "crc21_table.h": crc21_header(),
-        generated / "messages.h": messages_header(spec),
-        generated / "parameters.h": parameters_header(spec),
-        generated / "devices.h": device_header.devices_header(spec, STATUS_NOTE),
+    images = [robot for robot in robot_files.load_all() if robot.has_image]
+    headers = {
+        "values.h": values_header(spec),
+        "crc21_table.h": crc21_header(),
+        "messages.h": messages_header(spec),
+        "parameters.h": parameters_header(spec),
+        "devices.h": device_header.devices_header(spec, STATUS_NOTE),
+        "vectors.h": vectors_header(vectors(spec)),
+        "pin_map.h": pin_map_header(images),
+        **{pins_file(robot): pins_header(spec, robot) for robot in images},
+    }
+    return {
+        **{GENERATED / name: text for name, text in headers.items()},
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module(spec),
-        HERE / "vectors" / "frames.json": json.dumps(golden, indent=1) + "\n",
-        ROOT / "firmware" / "test" / "vectors.h": vectors_header(golden),
+        attributes.STUB: attributes.stub(),
+    }
+
+
+def pages() -> dict[Path, str]:
+    """Each made file that is in git, and its text."""
+    spec = schema.load()
+    return {
+        HERE / "vectors" / "frames.json": json.dumps(vectors(spec), indent=1) + "\n",
         HERE / "boebot.dbc": can_database.database(spec),
         HERE / "PROTOCOL.md": protocol_page(spec),
     }
-    for name in robot_names():
-        robot = load_robot(name)
-        if robot.has_board and robot.name == robot.pin_map:  # others run the image of this one
-            made[generated / pins_file(robot)] = pins_header(spec, robot)
-    return made
+
+
+def stale(made: dict[Path, str]) -> list[Path]:
+    """Those of the files that are missing or have another text."""
+    return [path for path, text in made.items() if not path.is_file() or path.read_text("utf-8") != text]
+
+
+def write(path: Path, text: str) -> None:
+    """Writes a file as a whole, for others may read it now."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    partial.write_text(text, "utf-8")
+    partial.replace(path)
 
 
 def main() -> int:
-    """Writes the files, or checks them."""
+    """Makes the files, or checks them."""
     parser = argparse.ArgumentParser(description="Makes everything that follows from the protocol's schema.")
-    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file is stale")
-    check = parser.parse_args().check
-    stale = [path for path, text in outputs().items() if not path.is_file() or path.read_text("utf-8") != text]
-    for path in stale:
-        if check:
-            print(f"{path.relative_to(ROOT)} is stale; run: python protocol/generate.py")
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--pages", action="store_true", help="write the files in git: PROTOCOL.md, vectors, DBC")
+    choice.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file in git is stale")
+    asked = parser.parse_args()
+    made = pages() if asked.pages or asked.check else built()
+    for path in stale(made):
+        if asked.check:
+            print(f"{path.relative_to(ROOT)} is stale; run: python protocol/generate.py --pages")
         else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(outputs()[path], "utf-8")
-            print(f"wrote {path.relative_to(ROOT)}")
-    return 1 if check and stale else 0
+            write(path, made[path])
+    if not asked.pages and not asked.check:
+        for path in set(GENERATED.glob("*.h")) - set(made):  # of a pin map that is no more
+            path.unlink(missing_ok=True)
+    return 1 if asked.check and stale(made) else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except (ValueError, OSError) as error:
+        sys.exit(f"protocol/generate.py: {error}")

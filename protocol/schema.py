@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import tomllib
+import typing
 import zlib
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from types import UnionType
 from typing import Any
-
-import msgspec
 
 HERE = Path(__file__).resolve().parent
 TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
@@ -31,7 +34,8 @@ INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
 }
 
 
-class Field(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Field:
     """One field of a message."""
 
     name: str
@@ -70,7 +74,8 @@ class Field(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return self.max if self.max is not None else INTEGERS[self.type][4]
 
 
-class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Message:
     """One message: a fixed list of fields, hence one exact length."""
 
     name: str
@@ -80,7 +85,7 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     doc: str
     fields: list[Field]
     since: int = 0
-    devices: list[str] = []  # of the firmware, that fill it (device_header.py)
+    devices: list[str] = dataclasses.field(default_factory=list)  # of the firmware, that fill it (device_header.py)
 
     @property
     def length(self) -> int:
@@ -88,29 +93,32 @@ class Message(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return sum(field.size for field in self.fields)
 
 
-class Flags(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Flags:
     """A set of named bits."""
 
     doc: str
     type: str
     bits: list[str]
-    device: list[str] = []  # of the devices flags: the robot's device behind each bit
-    docs: dict[str, str] = {}
-    since: dict[str, int] = {}
+    device: list[str] = dataclasses.field(default_factory=list)  # of the devices flags: the robot's, one for each bit
+    docs: dict[str, str] = dataclasses.field(default_factory=dict)
+    since: dict[str, int] = dataclasses.field(default_factory=dict)
 
 
-class Enum(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Enum:
     """Named values, counted from 0."""
 
     doc: str
-    values: list[str] = []
+    values: list[str] = dataclasses.field(default_factory=list)
     each_task: str = ""  # names of further values, one for each task of the firmware, whose name replaces {}
     tasks: int = 0  # how many of the values, the last ones, are such
-    docs: dict[str, str] = {}
-    since: dict[str, int] = {}
+    docs: dict[str, str] = dataclasses.field(default_factory=dict)
+    since: dict[str, int] = dataclasses.field(default_factory=dict)
 
 
-class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Parameter:
     """A value of the firmware that the host may change at run time."""
 
     name: str
@@ -126,7 +134,8 @@ class Parameter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     since: int = 0
 
 
-class Schema(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+@dataclass(frozen=True)
+class Schema:
     """Everything that messages.toml says."""
 
     version: int
@@ -176,13 +185,15 @@ def _base_values(enums: dict[str, Enum]) -> dict[str, list[str]]:
 
 
 def _crc32(part: Any) -> int:
-    return zlib.crc32(json.dumps(_without_docs(msgspec.to_builtins(part)), sort_keys=True).encode())
+    return zlib.crc32(json.dumps(_without_docs(part), sort_keys=True).encode())
 
 
 def _without_docs(node: Any) -> Any:
+    if dataclasses.is_dataclass(node) and not isinstance(node, type):
+        return _without_docs(dataclasses.asdict(node))
     if isinstance(node, dict):
         return {key: _without_docs(value) for key, value in node.items() if key not in NOT_ON_THE_WIRE}
-    if isinstance(node, list):
+    if isinstance(node, (list, tuple)):
         return [_without_docs(value) for value in node]
     return node
 
@@ -191,9 +202,11 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
     """Reads and checks the schema.
 
     Raises:
-        ValueError: a name or number is used twice, or a field names what is not there.
+        ValueError: no valid TOML, an unknown key, a value of another type, a name or number that is used twice, or a
+            field that names what is not there.
     """
-    schema = _with_tasks(msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Schema))
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    schema: Schema = _with_tasks(_converted(Schema, table, path.name))
     _unique("message", [m.name for m in schema.message], [m.id for m in schema.message])
     _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])
     if [p.id for p in schema.parameter] != list(range(len(schema.parameter))):
@@ -241,17 +254,58 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
     return schema
 
 
+def _converted(kind: Any, value: Any, place: str) -> Any:
+    """A value of TOML as a class of this file, or as the type of one of its fields.
+
+    Raises:
+        ValueError: a key that the class does not have, one that is missing, or a value of another type.
+    """
+    if isinstance(kind, UnionType):  # with None, for a key that may be missing
+        kind = typing.get_args(kind)[0]
+    if kind is float and type(value) is int:
+        return float(value)
+    plain = dict if dataclasses.is_dataclass(kind) else typing.get_origin(kind) or kind
+    if type(value) is not plain:
+        raise ValueError(f"{place}: expected {plain.__name__}, got {value!r}")
+    if dataclasses.is_dataclass(kind):
+        return _instance(kind, value, place)
+    if plain is list:
+        (of,) = typing.get_args(kind)
+        return [_converted(of, one, f"{place}[{i}]") for i, one in enumerate(value)]
+    if plain is dict:
+        _, of = typing.get_args(kind)
+        return {key: _converted(of, one, f"{place}.{key}") for key, one in value.items()}
+    return value
+
+
+def _instance(kind: Any, table: dict[str, Any], place: str) -> Any:
+    types, required = _keys(kind)
+    if unknown := [key for key in table if key not in types]:
+        raise ValueError(f"{place}: there is no key {unknown[0]!r} here; expected {', '.join(types)}")
+    if missing := [key for key in required if key not in table]:
+        raise ValueError(f"{place}: {missing[0]} is missing")
+    return kind(**{key: _converted(types[key], one, f"{place}.{key}") for key, one in table.items()})
+
+
+@cache
+def _keys(kind: Any) -> tuple[dict[str, Any], list[str]]:
+    """The keys of a class with their types, and those of them that have no default."""
+    none = dataclasses.MISSING
+    required = [one.name for one in dataclasses.fields(kind) if one.default is none and one.default_factory is none]
+    return typing.get_type_hints(kind), required
+
+
 def _with_tasks(schema: Schema) -> Schema:
     tasks = re.findall(r"^TASK\((\w+),", TASKS.read_text(encoding="utf-8"), re.MULTILINE)
     enums = {
-        name: msgspec.structs.replace(
+        name: dataclasses.replace(
             enum, values=enum.values + [enum.each_task.format(task) for task in tasks], tasks=len(tasks)
         )
         if enum.each_task
         else enum
         for name, enum in schema.enum.items()
     }
-    return msgspec.structs.replace(schema, enum=enums)
+    return dataclasses.replace(schema, enum=enums)
 
 
 def _check_since(schema: Schema) -> None:

@@ -19,6 +19,8 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 HEAD = re.compile(
     r"(?:/\*|#|;) (?P<file>[\w./-]+\.\w+)(?:: .*|, (?P<how>behind|before|in place of) (?P<text>.*?))(?: \*/)?\n"
 )
+# Tests and what each build makes are left out.
+NOT_COPIED = shutil.ignore_patterns("test", "generated", "messages.py", "attributes.pyi")
 COPIED = ("firmware", "host", "protocol", "tools")
 LINKED = ("sim_bridge", "hil_tests", "build/venv", "build/platformio-core")
 
@@ -34,7 +36,7 @@ class PageFirmware:
         """
         self.folder = folder
         for name in COPIED:
-            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("test"))
+            shutil.copytree(ROOT / name, folder / name, ignore=NOT_COPIED)
         for name in LINKED:
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).symlink_to(ROOT / name)

@@ -98,6 +98,18 @@ def test_devices_without_a_robot_part_are_refused(tmp_path: Path) -> None:
         load(tmp_path, "", text)
 
 
-def test_a_key_that_nobody_reads_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="colour"):
-        load(tmp_path, message("say", '{ name = "x", type = "u8", colour = "red" }'))
+@pytest.mark.parametrize(
+    ("field", "sentence"),
+    [
+        ('{ name = "x", type = "u8", colour = "red" }', "there is no key 'colour' here; expected name, type, unit"),
+        ('{ name = "x" }', "type is missing"),
+        ('{ name = "x", type = 8 }', "type: expected str, got 8"),
+        ('{ name = "x", type = "u8", min = 0.5 }', "min: expected int, got 0.5"),
+        ("8", "expected dict, got 8"),
+    ],
+)
+def test_a_key_that_nobody_reads_or_a_value_of_another_type_is_refused(
+    tmp_path: Path, field: str, sentence: str
+) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        load(tmp_path, message("say", field))

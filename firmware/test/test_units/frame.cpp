@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "generated/vectors.h"
 #include "host_frame.h"
 #include "link/crc21.h"
 #include "link/frame.h"
-#include "vectors.h"
 
 namespace {
 
