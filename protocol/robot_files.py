@@ -120,7 +120,7 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path.name}: no valid TOML: {error}") from None
-    tables = {key: table[key] for key in ("body", "supply", "device") if key in table}
+    tables: dict[str, Any] = {key: table[key] for key in ("body", "supply", "device") if key in table}
     if isinstance(devices := tables.get("device"), dict):
         tables |= {f"device.{name}": device for name, device in devices.items()}
     if wrong := [key for key, value in tables.items() if not isinstance(value, dict)]:
