@@ -16,7 +16,7 @@ from hypothesis import settings
 
 GENERATOR = Path(__file__).parent / "protocol" / "generate.py"
 if GENERATOR.is_file() and subprocess.run([sys.executable, GENERATOR], check=False).returncode:
-    pytest.exit("protocol/generate.py failed", returncode=1)
+    sys.exit(1)  # it has said why
 
 EXAMPLES = os.environ.get("BOEBOT_EXAMPLES")
 SANITIZED = "BOEBOT_SANITIZED" in os.environ

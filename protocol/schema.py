@@ -205,7 +205,10 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
         ValueError: no valid TOML, an unknown key, a value of another type, a name or number that is used twice, or a
             field that names what is not there.
     """
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path.name}: no valid TOML: {error}") from None
     schema: Schema = _with_tasks(_converted(Schema, table, path.name))
     _unique("message", [m.name for m in schema.message], [m.id for m in schema.message])
     _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])

@@ -91,6 +91,11 @@ def test_what_breaks_a_rule_is_refused(tmp_path: Path, extra: str, sentence: str
         load(tmp_path, extra)
 
 
+def test_a_file_that_is_no_toml_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"^messages.toml: no valid TOML: "):
+        load(tmp_path, "\n[flags")
+
+
 def test_devices_without_a_robot_part_are_refused(tmp_path: Path) -> None:
     text = TEXT.replace(', "buzzer"]\n# The', ', "buzzer", "radio"]\n# The')
     assert text != TEXT
