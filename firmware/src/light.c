@@ -8,7 +8,10 @@
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "parameters.h"
+#include "pins.h"
 #include "tasks.h"
+
+#if DEVICES_BUILT & DEVICES_LIGHT
 
 #if defined(PIN_LIGHT_LEFT) && !defined(LIGHT_LEFT_IS_CAPTURED)
 #define LEFT_BIT HAL_PIN_BIT(LIGHT_LEFT)
@@ -76,7 +79,7 @@ void light_mask(uint8_t pins) {
   }
 }
 
-void light_on_change(uint16_t time) {
+void port_d_on_change(uint16_t time) {
   edge[RIGHT] = clock_cycles_at(time);
   has_fallen[RIGHT] = true;
   hal_watch_port_d(0);
@@ -172,3 +175,18 @@ bool light_report_devices_telemetry(msg_devices_telemetry *message) {
   message->light_age = age;
   return parameters_device_on(DEVICES_LIGHT);
 }
+
+#else /* the map has none */
+
+void light_start(void) {}
+uint8_t light_pins(void) { return 0; }
+void light_on_pin_change(uint8_t bits, uint32_t time) { (void)bits, (void)time; }
+void light_mask(uint8_t pins) { (void)pins; }
+void light_task(void) {}
+
+bool light_report_devices_telemetry(msg_devices_telemetry *message) {
+  message->light_age = UINT8_MAX;
+  return false;
+}
+
+#endif

@@ -32,7 +32,7 @@ void servo_on_edge(void) {}
 void ping_on_edge(uint16_t time) { (void)time; }
 void pin_changes_on_change(uint16_t time, uint8_t port_bits) { (void)time, (void)port_bits; }
 void light_on_left_fall(uint16_t time) { (void)time; }
-void light_on_change(uint16_t time) { (void)time; }
+void port_d_on_change(uint16_t time) { (void)time; }
 void two_wire_on_step(void) {}
 """
 

@@ -79,7 +79,7 @@ uint32_t hal_image_hash(void);
  * watched is forgotten. */
 void hal_watch_port_c(uint8_t bits);
 
-/* The pins of port D (0..7) whose next change calls light_on_change(). */
+/* The pins of port D (0..7) whose changes call port_d_on_change(), of the one device of the map that watches them. */
 void hal_watch_port_d(uint8_t bits);
 
 /* ---- serial line ---- */

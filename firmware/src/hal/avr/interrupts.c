@@ -14,7 +14,7 @@ enum {
 #include "tasks.def"
 };
 IS_VECTOR(changes, PCINT1_vect);
-IS_VECTOR(light_edge, PCINT2_vect);
+IS_VECTOR(port_d, PCINT2_vect);
 IS_VECTOR(watchdog, WDT_vect);
 IS_VECTOR(carrier, TIMER2_COMPA_vect);
 IS_VECTOR(capture, TIMER1_CAPT_vect);
@@ -31,7 +31,7 @@ ISR(PCINT1_vect) {
   hal_serial_take_waiting();
 }
 
-ISR(PCINT2_vect) { light_on_change(TCNT1); }
+ISR(PCINT2_vect) { port_d_on_change(TCNT1); }
 
 ISR(WDT_vect) { reset_on_watchdog(); }
 

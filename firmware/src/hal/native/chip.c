@@ -55,7 +55,7 @@ static void settle(uint8_t pin) {
   }
   if (port == &hal_native_port_d && (port_d_bits & bit) != 0) {
     native->interrupts++;
-    light_on_change(hal_time());
+    port_d_on_change(hal_time());
   }
   if (pin == CAPTURE_PIN) {
     native_capture_edge(high);
