@@ -17,7 +17,7 @@ GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host
 GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
-IMAGES := build/images/shieldbot.elf build/images/shieldbot-basic.elf build/images/shieldbot-quad.elf build/images/boebot.elf
+IMAGES := build/images/shieldbot.elf build/images/shieldbot-line.elf build/images/shieldbot-basic.elf build/images/shieldbot-quad.elf build/images/boebot.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis

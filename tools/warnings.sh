@@ -12,7 +12,7 @@ compile() {
 }
 
 for compiler in gcc clang; do
-  for pin_map in SHIELDBOT SHIELDBOT_BASIC SHIELDBOT_QUAD BOEBOT; do
+  for pin_map in SHIELDBOT SHIELDBOT_BASIC SHIELDBOT_QUAD SHIELDBOT_LINE BOEBOT; do
     find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c |
       compile $compiler -DPIN_MAP_$pin_map -Ifirmware/src
   done

@@ -11,15 +11,15 @@
 #include "pins.h"
 #include "tasks.h"
 
-#if DEVICES_BUILT & DEVICES_LIGHT
-
 #if defined(PIN_LIGHT_LEFT) && !defined(LIGHT_LEFT_IS_CAPTURED)
 #define LEFT_BIT HAL_PIN_BIT(LIGHT_LEFT)
 _Static_assert(PIN_LIGHT_LEFT >= 14, "the left light sensor's edge is stamped with the encoders', on port C");
 #else
 #define LEFT_BIT ((uint8_t)0) /* none, or the timer captures its edge */
 #endif
+#ifdef PIN_LIGHT_RIGHT
 _Static_assert(PIN_LIGHT_RIGHT < 8, "the right light sensor's edge is stamped by port D");
+#endif
 
 enum { CHARGE = 7, RELEASE = 0, COLLECT = 6 }; /* slots of a servo frame */
 _Static_assert(
@@ -36,14 +36,16 @@ static uint16_t readings[SIDES];
 static uint8_t age;
 
 static void let_go(void) {
+#ifdef PIN_LIGHT_RIGHT
   hal_watch_port_d(0);
+  HAL_PIN_PULL_UP(LIGHT_RIGHT);
+#endif
 #ifdef LIGHT_LEFT_IS_CAPTURED
   hal_capture_stop();
 #endif
 #ifdef PIN_LIGHT_LEFT
   HAL_PIN_PULL_UP(LIGHT_LEFT);
 #endif
-  HAL_PIN_PULL_UP(LIGHT_RIGHT);
   state = IDLE;
 }
 
@@ -79,19 +81,23 @@ void light_mask(uint8_t pins) {
   }
 }
 
+#ifdef PIN_LIGHT_RIGHT
 void port_d_on_change(uint16_t time) {
   edge[RIGHT] = clock_cycles_at(time);
   has_fallen[RIGHT] = true;
   hal_watch_port_d(0);
 }
+#endif
 
 static void charge(void) {
 #ifdef PIN_LIGHT_LEFT
   HAL_PIN_HIGH(LIGHT_LEFT);
   HAL_PIN_OUTPUT(LIGHT_LEFT);
 #endif
+#ifdef PIN_LIGHT_RIGHT
   HAL_PIN_HIGH(LIGHT_RIGHT);
   HAL_PIN_OUTPUT(LIGHT_RIGHT);
+#endif
   has_fallen[LEFT] = has_fallen[RIGHT] = false;
   state = CHARGING;
 }
@@ -107,14 +113,17 @@ static void release(void) {
     released[LEFT] = clock_now();
   }
 #endif
+#ifdef PIN_LIGHT_RIGHT
   hal_watch_port_d(HAL_PIN_BIT(LIGHT_RIGHT));
   HAL_ATOMIC {
     HAL_PIN_INPUT(LIGHT_RIGHT);
     released[RIGHT] = clock_now();
   }
+#endif
   state = DECAYING;
 }
 
+#ifdef PIN_LIGHT_RIGHT
 /* Decay time in us. Without an edge the line is still high, or it is low and the edge was not seen. */
 static uint16_t decay_time(uint8_t side, uint8_t level) {
   if (!has_fallen[side]) {
@@ -123,6 +132,7 @@ static uint16_t decay_time(uint8_t side, uint8_t level) {
   const uint32_t us = (edge[side] - released[side]) / HAL_CYCLES_PER_US;
   return us == 0 ? 1u : us > LIGHT_LONGEST ? LIGHT_LONGEST : (uint16_t)us;
 }
+#endif
 
 /* Whether the left edge is among the changes that are still to be worked off: the pin is low. */
 static bool must_wait(void) {
@@ -140,7 +150,9 @@ static void collect(void) {
 #ifdef PIN_LIGHT_LEFT
   readings[LEFT] = decay_time(LEFT, HAL_PIN_READ(LIGHT_LEFT));
 #endif
+#ifdef PIN_LIGHT_RIGHT
   readings[RIGHT] = decay_time(RIGHT, HAL_PIN_READ(LIGHT_RIGHT));
+#endif
   age = 0;
   let_go();
 }
@@ -175,18 +187,3 @@ bool light_report_devices_telemetry(msg_devices_telemetry *message) {
   message->light_age = age;
   return parameters_device_on(DEVICES_LIGHT);
 }
-
-#else /* the map has none */
-
-void light_start(void) {}
-uint8_t light_pins(void) { return 0; }
-void light_on_pin_change(uint8_t bits, uint32_t time) { (void)bits, (void)time; }
-void light_mask(uint8_t pins) { (void)pins; }
-void light_task(void) {}
-
-bool light_report_devices_telemetry(msg_devices_telemetry *message) {
-  message->light_age = UINT8_MAX;
-  return false;
-}
-
-#endif

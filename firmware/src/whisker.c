@@ -10,8 +10,6 @@
 #define PRESSED_SAMPLES 2u
 #define RELEASED_SAMPLES 4u
 
-static whisker_state states[SIDES];
-
 bool whisker_debounce(whisker_state *state, bool touching) {
   if (touching == state->pressed) {
     state->streak = 0;
@@ -25,16 +23,22 @@ bool whisker_debounce(whisker_state *state, bool touching) {
   return state->pressed;
 }
 
+static whisker_state states[SIDES];
+
 void whisker_start(void) {
+#ifdef PIN_WHISKER_LEFT
   HAL_PIN_PULL_UP(WHISKER_LEFT);
   HAL_PIN_PULL_UP(WHISKER_RIGHT);
+#endif
   states[LEFT] = states[RIGHT] = (whisker_state){0};
 }
 
 void whisker_task(void) {
   const uint8_t before = whisker_read();
+#ifdef PIN_WHISKER_LEFT
   whisker_debounce(&states[LEFT], HAL_PIN_READ(WHISKER_LEFT) == 0);
   whisker_debounce(&states[RIGHT], HAL_PIN_READ(WHISKER_RIGHT) == 0);
+#endif
   const uint8_t now = whisker_read();
   if (now != before) {
     const uint8_t closed = now & (uint8_t)~before;

@@ -1,0 +1,77 @@
+"""Line sensors that look at the floor: Parallax QTI, an infra-red LED and a phototransistor.
+
+The phototransistor discharges a capacitor; over a bright floor soon, over a dark line late. So a decay time above the
+sensor's threshold is a dark floor.
+
+Wiring: white to 5 V, black to ground, red to the pin (Parallax, "QTI Sensor", document 555-27401).
+
+    [device.line_left]
+    type = "line_sensor"
+    pin = 7
+    position_m = [0.050, 0.019]
+
+    if robot.line_left.dark: ...
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, NamedTuple
+
+import msgspec
+
+from boebot.devices.device import Place, Point, Reader, SlowDevice
+from boebot.devices.drawing import Shape, Spot
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.link.messages import LineTelemetry
+
+FRAME_TICKS = 2  # one reading in each servo frame
+
+
+class Line(NamedTuple):
+    """One line sensor."""
+
+    decay_time: float | None
+    """Seconds that the capacitor took; None if it could not be measured."""
+    dark: bool
+    """The floor below is dark: it took longer than the sensor's threshold."""
+    age: float
+    """Seconds since the measurement; infinite if there was none."""
+    valid: bool
+    """The reading is fresh and could be measured."""
+
+
+class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
+    """QTI sensor, read by its RC decay time."""
+
+    pin: int | str
+    position_m: Point
+    dark_us: Annotated[float, msgspec.Meta(gt=0, lt=14000)] = 1000.0  # a longer decay is a dark floor
+
+    READING: ClassVar = Line
+    GROUP: ClassVar[str] = "lines"
+    NAMES: ClassVar[tuple[str, ...]] = ("line_left", "line_middle", "line_right")
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port D": "line sensors"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": tuple(range(8))}
+    MESSAGE: ClassVar[type] = LineTelemetry
+    COLUMNS: ClassVar = (("decay_time", "", "s", 6),)
+    SHOWN: ClassVar = ("", "ms", 1e3, 3)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        field = LineTelemetry._fields.index(place.name)
+        fresh, tick_s, dark_us = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s, self.dark_us
+
+        def read(_: object, slow: Latest) -> Line:
+            message, since = slow.of(LineTelemetry)
+            us, ticks = message[field], message.line_age + since
+            age = ticks * tick_s if message.line_age < NEVER else float("inf")
+            if message.line_age >= NEVER or us == 0:
+                return Line(None, False, age, False)
+            return Line(us * 1e-6, us > dark_us, age, ticks <= fresh)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """Where it sits."""
+        return [Spot(self.position_m, None)]
