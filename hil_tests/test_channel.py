@@ -12,7 +12,7 @@ import pytest
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.description.robots import load_robot
 from boebot.link import messages
-from boebot.link.session import Link
+from boebot.link.link import Link
 
 pytestmark = pytest.mark.emulated
 
@@ -114,7 +114,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
         if index % 10 == 0:
             assert link.get_parameter("ping_period") == value
     latencies.sort()
-    assert link.sessions == 1
+    assert link.session.count == 1
     assert line.flipped > (10 if bit_errors < 1e-3 else 100), "the line was bad"
     if bit_errors <= 1e-4:
         assert latencies[round(0.99 * len(latencies))] <= 3 * TICK_S, latencies[-10:]
@@ -142,7 +142,7 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
     told = [event for event in link.events() if event.kind == messages.EventKind.WHISKERS]
     assert [event.value & 0xFF for event in told] == pressed
     assert all(a.time < b.time for a, b in itertools.pairwise(told))
-    assert link.sessions == 1
+    assert link.session.count == 1
 
 
 @pytest.mark.parametrize("held_s", [2.0, 0.9])
@@ -155,25 +155,25 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     link.set_parameter("session_time_out", 1000)
     link.arm()
     listen(link, 0.05)
-    assert link.latest is not None
+    assert link.telemetry.latest is not None
     line.stalled = True
-    sessions = link.sessions
+    sessions = link.session.count
     end = line.now() + held_s - 0.3
     tick = 0
     while line.now() < end:
         listen(link, TICK_S)
-        if link.latest is not None:
-            tick = messages.Telemetry.unpack(link.latest).tick
+        if link.telemetry.latest is not None:
+            tick = messages.Telemetry.unpack(link.telemetry.latest).tick
         link.send_signal(1.0, 1.0, 250, tick)
     listen(link, 0.3)  # the last of them has outlived itself
     assert len(line.held) > 500
     line.release()
     listen(link, 0.5)
     assert pulses(board) == 0
-    assert (link.sessions == sessions) is (held_s < 1.0)
+    assert (link.session.count == sessions) is (held_s < 1.0)
     link.arm()
     listen(link, 0.02)
-    link.send_signal(1.0, 1.0, 250, messages.Telemetry.unpack(link.latest).tick)
+    link.send_signal(1.0, 1.0, 250, messages.Telemetry.unpack(link.telemetry.latest).tick)
     listen(link, 0.1)
     assert pulses(board) > 0, "a fresh one moves it"
 
@@ -186,14 +186,14 @@ def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s:
     link.arm()
     listen(link, at_s)
     for cause in ("external", "brown_out", "watchdog"):
-        sessions = link.sessions
+        sessions = link.session.count
         begun = line.now()
         board.board.reset(cause)  # type: ignore[attr-defined]
         link.submit(messages.GetParameter, PING.id, what="tell")  # under way as it happens
-        while link.sessions == sessions or link.latest is None:
+        while link.session.count == sessions or link.telemetry.latest is None:
             link.poll(TICK_S)
             assert line.now() - begun < 1.0
-        assert link.hello is not None
-        assert link.hello.reset_cause == messages.ResetCause[cause.upper()]
-        assert messages.Telemetry.unpack(link.latest).latch == messages.Latch.START
-    assert link.board_resets == link.sessions_lost == 3
+        assert link.session.hello is not None
+        assert link.session.hello.reset_cause == messages.ResetCause[cause.upper()]
+        assert messages.Telemetry.unpack(link.telemetry.latest).latch == messages.Latch.START
+    assert link.telemetry.board_resets == link.session.lost == 3

@@ -384,8 +384,6 @@ def python_message(message: schema.Message) -> list[str]:
     """The class of one message."""
     code = "<" + "".join(field.struct_code for field in message.fields)
     name = class_name(message.name)
-    begins = [sum(field.size for field in message.fields[:place]) for place in range(len(message.fields))]
-    offsets = ", ".join(f'"{field.name}": {at}' for field, at in zip(message.fields, begins, strict=True))
     lines = ["", "", f"class _{name}Fields(NamedTuple):"]
     for field in message.fields:
         comment = field_comment(field)
@@ -407,7 +405,6 @@ def python_message(message: schema.Message) -> list[str]:
         f'    DELIVERY: ClassVar[str] = "{message.delivery}"',
         f"    LENGTH: ClassVar[int] = {message.length}",
         f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{code}")',
-        f"    OFFSETS: ClassVar[dict[str, int]] = {{{offsets}}}",
         "",
         "    def pack(self) -> bytes:",
         '        """The payload."""',

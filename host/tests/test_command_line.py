@@ -22,7 +22,7 @@ from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
 from boebot.link import messages
-from boebot.link.session import Link
+from boebot.link.link import Link
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.tasks import Request
@@ -527,10 +527,10 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     before = link_command.Rates(watched)
     assert link_command.look(watched, before)["clock_bound_us"] < 500
     board.peer.reset()
-    while watched.sessions == 1:
+    while watched.session.count == 1:
         watched.poll(0.001)
     seen = link_command.look(watched, before)
-    assert watched.clock.probes > 0
+    assert watched.clock.estimate.probes > 0
     assert (seen["clock_bound_us"], seen["clock_offset_s"], seen["clock_drift_ppm"]) == (None, None, None)
 
 

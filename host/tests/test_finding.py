@@ -11,7 +11,7 @@ from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
 from boebot.link.finding import RATES
 from boebot.link.frame import SEED, encode
-from boebot.link.session import Link
+from boebot.link.link import Link
 from peer import InProcess, Peer
 
 

@@ -14,8 +14,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.link.delivery import Events, Request, Requests, SessionLostError, TakenOverError
-from boebot.link.session import Link
+from boebot.link.errors import SessionLostError, TakenOverError
+from boebot.link.events import Events
+from boebot.link.link import Link
+from boebot.link.requests import Request, Requests
 from peer import QUEUE, InProcess, Peer, Protections, without
 
 VALUES = messages.PARAMETERS["wheel_radius"]
@@ -106,8 +108,8 @@ class LinkModel(RuleBasedStateMachine):
             if not request.done:
                 request.error = SessionLostError("that host is no more")
         self.link = Link(self.session)
-        self.link._draw.seed(f"{self.seed} {self.session.now()}")
-        self.link._wanted = True
+        self.link.session._draw.seed(f"{self.seed} {self.session.now()}")
+        self.link.session._wanted = True
 
     @rule(seconds=st.sampled_from([0.05, 0.5, 2.0]))
     def host_sleeps(self, seconds: float) -> None:
@@ -146,35 +148,35 @@ class LinkModel(RuleBasedStateMachine):
     def memory_is_bounded(self) -> None:
         link = self.link
         assert (
-            len(link._telemetry) <= 4096
-            and len(link._probes.waiting) <= 64
+            len(link.telemetry.waiting) <= link.telemetry.ROOM
+            and len(link.clock._waiting) <= 64
             and len(link._events.waiting) <= Events.ROOM
         )
         assert len(link._requests._waiting) <= Requests.ROOM and len(self.peer._events) <= QUEUE + len(
             messages.EventKind
         )
-        assert all(len(polygon) < 64 for polygon in link.clock._polygons)
+        assert all(len(polygon) < 64 for polygon in link.clock.estimate._polygons)
 
     def teardown(self) -> None:
         """Once the line works, everything flows within a second."""
         self.session.channel = Channel()
         self.listen(0.6)  # copies of earlier times are still under way
-        self.listen(PATIENCE_S if not self.link.is_open else RESUME_S)
-        assert self.link.is_open
-        assert self.link.hello is not None and self.peer.session == self.link.hello.session
-        sessions = self.link.sessions
+        self.listen(PATIENCE_S if not self.link.session.is_open else RESUME_S)
+        assert self.link.session.is_open
+        assert self.link.session.hello is not None and self.peer.session == self.link.session.hello.session
+        sessions = self.link.session.count
         self.value += 1
         assert self.link.request(messages.SetParameter, VALUES.id, self.value, what="set").value == self.value
         self.something_happens_on_the_board()
-        self.link.forget_telemetry()
+        self.link.telemetry.fetch()
         self.listen(0.5, fetch=False)
-        assert len(self.link.fetch_telemetry()) >= 48
+        assert len(self.link.telemetry.fetch()) >= 48
         self.fetch()
         assert self.heard[-1] == self.told
-        assert self.link.sessions == sessions, "and stays so"
+        assert self.link.session.count == sessions, "and stays so"
         self.peer.reset()
         self.listen(RESUME_S)
-        assert self.link.is_open and self.link.latest is not None
+        assert self.link.session.is_open and self.link.telemetry.latest is not None
 
     # ---- how ---------------------------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from boebot.description.board_parameters import adapted, configure, parameters_of
 from boebot.description.robots import load_robot
 from boebot.link import messages
-from boebot.link.session import Link
+from boebot.link.link import Link
 from peer import InProcess, Peer, name_of
 
 

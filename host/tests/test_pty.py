@@ -14,8 +14,8 @@ import pytest
 
 import boebot
 from boebot.errors import BoardError
+from boebot.link.link import Link
 from boebot.link.ports.serial_port import SerialTransport
-from boebot.link.session import Link
 from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request

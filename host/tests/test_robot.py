@@ -194,7 +194,7 @@ def test_nothing_leads_from_a_robot_to_the_world() -> None:
             continue
         seen.add(id(thing))
         module = type(thing).__module__
-        assert not module.startswith(("sim_bridge", "boebot.link.transport", "boebot.link.session", "boebot.boards"))
+        assert not module.startswith(("sim_bridge", "boebot.link.transport", "boebot.link.link", "boebot.boards"))
         if module.startswith("boebot"):
             for name in dir(thing):
                 with contextlib.suppress(BrainError):  # a device that the robot does not have

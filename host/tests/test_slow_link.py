@@ -20,8 +20,7 @@ from boebot.description.robots import load_robot
 from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
 from boebot.errors import BrainError
 from boebot.link import messages
-from boebot.link.session import Link
-from boebot.link.wanted import Wanted
+from boebot.link.link import Link
 from boebot.record.result import RunResult
 from boebot.record.telemetry_series import newest_messages
 from boebot.robot import Equipment, Observation, Robot
@@ -231,16 +230,6 @@ def test_turret_turns_back_after_a_reset_and_no_tone_is_repeated(monkeypatch: py
     assert np.nanmin(ages) >= 0.0
 
 
-def test_stop_ends_what_is_wanted() -> None:
-    wants = Wanted()
-    wants.turn(messages.Turret(1000, 1), 24_900)
-    wants.sound(messages.Buzzer(440, 10, 1))
-    assert len(wants.due(0.0, 0.1, False, None)) == 2 and wants.due(0.05, 0.1, False, None) == []
-    assert len(wants.due(0.1, 0.1, False, None)) == 2 and wants.retransmitted == 2
-    wants.stopped()
-    assert not wants.any and wants.due(9.0, 0.1, False, None) == []
-
-
 def test_link_counts_lost_messages_of_slow_devices_as_lost_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     peer = Peer(BASIC)
     lost: list[messages.Message] = []
@@ -260,7 +249,7 @@ def test_link_counts_lost_messages_of_slow_devices_as_lost_frames(monkeypatch: p
     while link.transport.now() < end:
         link.poll(0.1)
     assert len(lost) == 7 and link.counters().lost == 7
-    assert len(link.fetch_devices()) > 30 and link.latest_devices is not None and link.fetch_devices() == []
+    assert len(link.devices.fetch()) > 30 and link.devices.latest is not None and link.devices.fetch() == []
 
 
 # ---- what is kept ----------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from boebot.boards import BoardRequest
 from boebot.brains import load_brain
 from boebot.description.robots import load_robot
 from boebot.link import messages
-from boebot.link.session import Link
+from boebot.link.link import Link
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge.boards.board import CLOCK_HZ, Damage

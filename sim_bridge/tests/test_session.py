@@ -14,7 +14,7 @@ from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
-from boebot.link.session import Link
+from boebot.link.link import Link
 from boebot.record.record import Memory
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.sessions.with_board import SimSession, open_native

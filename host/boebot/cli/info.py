@@ -12,7 +12,8 @@ from boebot.cli import options, output
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch, reset_cause
-from boebot.link.session import Link, text
+from boebot.link.fields import text
+from boebot.link.link import Link
 
 
 def info(

@@ -11,7 +11,8 @@ from boebot.boards import BoardRequest, open_board
 from boebot.cli import options, output
 from boebot.description.robots import load_robot
 from boebot.link import reset_cause
-from boebot.link.session import Link, text
+from boebot.link.fields import text
+from boebot.link.link import Link
 from boebot.link.transport import BaudSelectable
 
 _PERIOD_S = 1.0
@@ -71,13 +72,13 @@ class Rates:
 
     def __init__(self, watched: Link) -> None:
         self.at_s = watched.transport.now()
-        self.good = watched.decoder.good
+        self.good = watched.line.decoder.good
         self.events: list[str] = []  # since then
 
 
 def look(watched: Link, before: Rates) -> dict[str, Any]:
     """All there is to be seen, by name, units in the names."""
-    hello, clock, trips = watched.hello, watched.clock, watched.round_trips
+    hello, clock, trips = watched.session.hello, watched.clock.estimate, watched.clock.round_trips
     passed_s = watched.transport.now() - before.at_s
     transport = watched.transport
     return {
@@ -85,11 +86,11 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "board": transport.name,
         "robot": None if hello is None else text(hello.robot),
         "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
-        "session": None if hello is None or not watched.is_open else f"{hello.session:06x}",
+        "session": None if hello is None or not watched.session.is_open else f"{hello.session:06x}",
         "telemetry_period_ms": None if hello is None else round(1000 * hello.telemetry_period / hello.tick_rate, 3),
         "last_reset": None if hello is None else reset_cause.in_words(hello.reset_cause),
         "session_time_out_ms": None if hello is None else hello.session_time_out,
-        "frame_rate_hz": round((watched.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
+        "frame_rate_hz": round((watched.line.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
         "round_trip_p50_ms": _ms(trips.quantile(0.5)),
         "round_trip_p99_ms": _ms(trips.quantile(0.99)),
         "clock_offset_s": round(clock.offset, 6) if clock.bounded else None,

@@ -12,8 +12,9 @@ import typer
 from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import options, output
 from boebot.description.robots import load_robot
+from boebot.link import messages
+from boebot.link.link import Link
 from boebot.link.parameter_values import parameter_counts, parameter_spec
-from boebot.link.session import Link
 
 app = typer.Typer(help="List, read, set, save and reset the board's parameters.", no_args_is_help=True)
 
@@ -50,11 +51,11 @@ def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
 def _was_reset_since(link: Link, begun_s: float) -> bool:
     """Whether a live board's ticks began after that instant of the monotonic clock; False if it sends none."""
     end_s = link.transport.now() + _TELEMETRY_S
-    while link.latest is None and link.transport.now() < end_s:
+    while link.telemetry.latest is None and link.transport.now() < end_s:
         link.poll(_TELEMETRY_S / 20)
-    if link.latest is None or link.hello is None:
+    if link.telemetry.latest is None:
         return False
-    up_s = int.from_bytes(link.latest[:4], "little") / link.hello.tick_rate
+    up_s = messages.Telemetry.unpack(link.telemetry.latest).tick * link.session.tick_s
     return up_s <= link.transport.now() - begun_s
 
 
@@ -96,8 +97,7 @@ def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", 
     """All parameters: value, unit, range, meaning."""
     with _link(on, robot) as link:
         rows = [described(name, link.get_parameter(name)) for name in link.parameters]
-        assert link.hello is not None
-        saved = bool(link.hello.parameters_saved)
+        saved = bool(link.open().parameters_saved)
     if json:
         output.print_json({"saved": saved, "parameters": rows})
         return

@@ -30,7 +30,7 @@ def maxima(
         TimingError: the board runs another image.
     """
     from boebot.boards import BoardRequest, open_board
-    from boebot.link.session import Link
+    from boebot.link.link import Link
     from boebot.timing.elf import read_image
 
     code = read_image(image).code

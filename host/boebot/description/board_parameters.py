@@ -13,8 +13,8 @@ import msgspec
 
 from boebot.description.robots import RobotDescription
 from boebot.devices.infrared import InfraredSchedule
+from boebot.link.link import Link
 from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS, Devices
-from boebot.link.session import Link
 
 # parameter -> the keys of the description that it stands for besides its `default_from`
 _ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",), "infrared_sweep": ("infrared.sweep",)}
@@ -46,9 +46,10 @@ def configure(link: Link, robot: RobotDescription) -> RobotDescription:
     Raises:
         BoardError: the board does not answer, or refuses one.
     """
-    assert link.hello is not None
+    hello = link.session.hello
+    assert hello is not None
     wanted = {name: value for name, value in parameters_of(robot).items() if name in link.parameters}
-    if link.hello.parameters_saved:
+    if hello.parameters_saved:
         return adapted(robot, {name: link.get_parameter(name) for name in wanted})
     for parameter, value in wanted.items():
         if parameter != "baud_rate":  # the board speaks at the right one, or nothing would be heard

@@ -40,9 +40,10 @@ FORBIDDEN = (
     "boebot.record",
     "boebot.running",
     "boebot.view",
+    "boebot.link.link",
     "boebot.link.session",
     "boebot.link.transport",
-    "boebot.link.traffic",
+    "boebot.link.telemetry",
     "serial",
 )
 """Modules of the world, of what opens it, and of what holds a run's truth."""

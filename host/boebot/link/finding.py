@@ -19,66 +19,83 @@ _QUOTED = 40
 _SPOILT_SHARE = 0.2  # of the frames damaged: then that is why there is no session
 
 
-class Heard:
-    """What came from a port before any hello.
+class BoardSearch:
+    """Listens to a port until there is a session: at which rate next, so that each has its turn before the time is
+    over, and what answers there if it is no board of ours.
 
     Attributes:
-        count: bytes, at all rates together.
+        end_s: when the search is over (the transport's clock).
+        asked: the rate that the port was opened with; None: it has none.
+        baud: the rate in use.
     """
 
-    def __init__(self) -> None:
-        self.count = 0
+    def __init__(self, transport: Transport, limit_s: float) -> None:
+        now = transport.now()
+        self.end_s = now + limit_s
+        self.asked = self.baud = transport.baud if isinstance(transport, BaudSelectable) else None
+        self._where = transport.name
+        self._limit_s = limit_s
+        self._count = 0  # bytes, at all rates together
         self._sample = bytearray()  # at the present rate
-        self._samples: list[tuple[int | None, bytes]] = []
+        self._samples: list[tuple[int | None, bytes]] = []  # at earlier rates
+        others = [rate for rate in RATES if rate != self.asked]
+        self._order = others if self.asked is not None else []
+        self._next = 0
+        # silence is waited for at the rate that was asked for, as long as the others leave time
+        self._change_s = max(self.end_s - len(others) * _LISTEN_S - _LOOK_S, now + _LISTEN_S)
+        self._first_byte_s: float | None = None  # when the first came at this rate
 
-    def take(self, data: bytes) -> None:
-        """More bytes."""
-        self.count += len(data)
+    @property
+    def changed(self) -> bool:
+        """Whether the board was found at another rate than asked for."""
+        return self.baud != self.asked
+
+    def listen(self, data: bytes) -> None:
+        """Takes bytes as they come."""
+        self._count += len(data)
         self._sample += data[: _SAMPLE - len(self._sample)]
 
-    def rate_changes(self, baud: int | None) -> None:
-        """What was heard so far was at that rate; from now on at another."""
-        if self._sample:
-            self._samples.append((baud, bytes(self._sample)))
-        self._sample.clear()
+    def next_baud(self, now_s: float) -> int | None:
+        """The rate to change to, or None: stay."""
+        if not self._order or any(map(_looks_like_frame, _pieces(self._sample))):
+            return None
+        if self._first_byte_s is None and self._sample:
+            self._first_byte_s = now_s  # perhaps the beginning of a hello
+        garbage = self._first_byte_s is not None and now_s - self._first_byte_s >= _LISTEN_S
+        if now_s < self._change_s and not garbage:
+            return None
+        self._put_sample_aside()
+        self.baud = self._order[self._next % len(self._order)]
+        self._next += 1
+        if self._next == len(self._order):
+            self._order = [*self._order, self.asked] if self.asked is not None else self._order
+        self._first_byte_s = None
+        self._change_s = now_s + _LISTEN_S
+        return self.baud
 
-    @property
-    def frames(self) -> bool:
-        """Whether something looked like a frame at the present rate, whole or damaged."""
-        return any(
-            _is_frame(piece) or _has_checksum(piece) or _is_damaged_frame(piece) for piece in _pieces(self._sample)
-        )
+    def look_again_s(self, now_s: float) -> float:
+        """When to ask again."""
+        return min(now_s + _LOOK_S, self.end_s)
 
-    @property
-    def bytes_here(self) -> int:
-        """How many bytes came at the present rate."""
-        return len(self._sample)
-
-    def verdict(
-        self, transport: Transport, limit_s: float, hello: messages.Hello | None, counts: tuple[int, int]
-    ) -> BoebotError:
+    def failure(self, hello: messages.Hello | None, whole: int, damaged: int) -> BoebotError:
         """Why there is no session: one sentence.
 
         Args:
-            transport: where it was to be.
-            limit_s: what was waited.
-            hello: the last that the board has said.
-            counts: frames that came whole and damaged at the last rate.
+            hello: the board's last.
+            whole, damaged: frames that came so at the last rate.
         """
-        where = transport.name
-        baud = transport.baud if isinstance(transport, BaudSelectable) else None
-        self.rate_changes(baud)
+        where, limit_s = self._where, self._limit_s
+        self._put_sample_aside()
         if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
             return BoardError(
                 f"the board at {where} says hello, but there is no session within {limit_s:g} s; its last reset was by "
                 f"{reset_cause.hang_in_words(hello.reset_cause)}"
             )
-        whole, damaged = counts
         if hello is not None and damaged > _SPOILT_SHARE * (whole + damaged):
             return _spoilt(where, limit_s, damaged, whole + damaged)
         if hello is not None:
             return BoardError(f"the board at {where} says hello, but does not hear us: no session within {limit_s:g} s")
-        if not self.count:
+        if not self._count:
             return BoardError(f"nothing answers at {where} within {limit_s:g} s: is the robot on and flashed?")
         for rate, sample in self._samples:
             pieces = _pieces(sample)
@@ -98,64 +115,26 @@ class Heard:
                     f"what answers at {where} does not speak this kit's protocol: other firmware, which says "
                     f"{said!r}{_at(rate)}"
                 )
-        tried = "at no usual baud rate" if baud is not None else "or another baud rate"
+        tried = "at no usual baud rate" if self.baud is not None else "or another baud rate"
         return ProtocolError(
-            f"what answers at {where} does not speak this kit's protocol ({self.count} bytes, no valid frame): "
+            f"what answers at {where} does not speak this kit's protocol ({self._count} bytes, no valid frame): "
             f"other firmware, {tried}"
         )
 
-
-class BaudSearch:
-    """Which rate to listen at next, so that each has its turn before the time is over.
-
-    Attributes:
-        end_s: when the search is over (the transport's clock).
-        asked: the rate that the port was opened with; None: it has none.
-        baud: the rate in use.
-    """
-
-    def __init__(self, transport: Transport, limit_s: float) -> None:
-        now = transport.now()
-        self.end_s = now + limit_s
-        self.asked = self.baud = transport.baud if isinstance(transport, BaudSelectable) else None
-        others = [rate for rate in RATES if rate != self.asked]
-        self._order = others if self.asked is not None else []
-        self._next = 0
-        # silence is waited for at the rate that was asked for, as long as the others leave time
-        self._change_s = max(self.end_s - len(others) * _LISTEN_S - _LOOK_S, now + _LISTEN_S)
-        self._first_byte_s: float | None = None  # when the first came at this rate
-
-    @property
-    def changed(self) -> bool:
-        """Whether the board was found at another rate than asked for."""
-        return self.baud != self.asked
-
-    def next_baud(self, now_s: float, heard: Heard) -> int | None:
-        """The rate to change to, or None: stay."""
-        if not self._order or heard.frames:
-            return None
-        if self._first_byte_s is None and heard.bytes_here > 0:
-            self._first_byte_s = now_s  # perhaps the beginning of a hello
-        garbage = self._first_byte_s is not None and now_s - self._first_byte_s >= _LISTEN_S
-        if now_s < self._change_s and not garbage:
-            return None
-        heard.rate_changes(self.baud)
-        self.baud = self._order[self._next % len(self._order)]
-        self._next += 1
-        if self._next == len(self._order):
-            self._order = [*self._order, self.asked] if self.asked is not None else self._order
-        self._first_byte_s = None
-        self._change_s = now_s + _LISTEN_S
-        return self.baud
-
-    def look_again_s(self, now_s: float) -> float:
-        """When to ask again."""
-        return min(now_s + _LOOK_S, self.end_s)
+    def _put_sample_aside(self) -> None:
+        if self._sample:
+            self._samples.append((self.baud, bytes(self._sample)))
+        self._sample.clear()
 
 
 def _pieces(sample: bytes | bytearray) -> list[bytes]:
     """What stands between two delimiters."""
     return [piece for piece in bytes(sample).split(b"\0")[1:-1] if len(piece) >= _SHORTEST]
+
+
+def _looks_like_frame(piece: bytes) -> bool:
+    """Whether it is a frame, whole or damaged."""
+    return _is_frame(piece) or _has_checksum(piece) or _is_damaged_frame(piece)
 
 
 def _is_frame(piece: bytes) -> bool:

@@ -1,314 +1,341 @@
-"""The link to one board: a session that opens itself, delivery of what must arrive, telemetry and set-points
-(protocol/PROTOCOL.md).
+"""The session with one board: it opens itself, and again when the board was reset or lost it
+(protocol/PROTOCOL.md, "Session").
 
-When the board was reset, or has not heard the host for too long, its next hello tells, and the link opens a new session
-by itself: `sessions` counts them, and who configured and armed the board does it again. All of that happens inside
-whatever call waits for the board (boebot.link.opening says how).
+    listening --hello without session--> opening --hello with our session--> open
+        ^                                  |  ^                                |
+        +---------1 s of silence-----------+  +-----hello without session------+
 
-Everything that crossed the wire is kept with its stamp when `record` is true.
+The host is silent until the board's hello. Where another host has the board, the link waits until that one's session
+can have ended; to a host that comes later and takes the board it gives way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import random
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
 
-from boebot.devices.buzzer import next_token
-from boebot.errors import BoardError
-from boebot.link import messages, mismatch
-from boebot.link.delivery import BoardEvent, LatchedAgainError, LinkTimes, RequestKind
-from boebot.link.line import SHORTEST_S, Append
-from boebot.link.parameter_values import parameter_counts, parameter_spec
-from boebot.link.traffic import Telemetry, Traffic
-from boebot.link.transport import Transport
+from boebot.errors import BoardError, ProtocolError
+from boebot.link import finding, messages, mismatch
+from boebot.link.clock_sync import RoundTrips
+from boebot.link.errors import TakenOverError
+from boebot.link.frame import SEED
+from boebot.link.line import NEVER, Handlers, Line
+from boebot.link.transport import BaudSelectable
 
-__all__ = ["Link", "Telemetry", "text"]
+_M = TypeVar("_M", messages.Identity, messages.Description)
 
-_SIGNAL = messages.SetpointSignal
-_SPEED = messages.SetpointSpeed
-_COAST = messages.SetpointCoast
-_BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
-_ROUND_PERIODS = 4 * (len(messages.Task) + 1)  # of telemetry: each task's time and the counters, a message in four
-_ROUNDS = 4  # in which each task was told at least once, or something is wrong
-_LOOK_S = 0.05
-_ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop so much before what was waited for
+_NONCES = 1 << 21
+_LOOK_S = 0.02  # how often the opening looks up
+_OTHER_HOST_S = 0.3  # besides its time-out; the board says hello every 0.2 s
+_PATIENCE_S = 1.0  # without a hello for this long while we ask, the board has gone: silence again until the next
+_DESCRIBE_S = 0.5
 
-_SUPPLY = messages.Telemetry.OFFSETS["supply"]
-_LATCHES = messages.Telemetry.OFFSETS["latches"]
-
-
-def text(field: bytes) -> str:
-    """A text field of a message without its padding."""
-    return field.split(b"\0", 1)[0].decode("utf-8", errors="replace")
+OPEN_LIMIT_S = 2.0
+OPEN_LIMIT_RESET_S = 4.0  # where opening the port resets the board: its boot loader waits first
 
 
-class Link(Traffic):
-    """The host's end of the link to one board: what programs call. Its attributes are those of `Traffic`, `Opening`
-    and `Line`."""
+@dataclass(frozen=True, kw_only=True)
+class SessionHooks:
+    """What a session needs of the link that it belongs to."""
+
+    wait: Callable[[float], None]
+    """lets the link work, at the latest until that time (s), and returns after each piece of bytes"""
+    opened: Callable[[float], None]
+    """called with the time when a session is open"""
+    ended: Callable[[], None]
+    """called when it is over, for whatever reason"""
+
+
+class Session:
+    """The handshake of one link, and what is known by it.
+
+    Attributes:
+        hello: the board's last; None: there was none, or the link was closed.
+        is_open: a session is open, as far as the host knows.
+        count: sessions opened; a change means that the board is latched and may have forgotten everything.
+        lost: sessions that ended without the host's wish.
+        time_out_s: silence of the host after which the board ends the session.
+        handlers: of the handshake's messages.
+        refused: hello of a board that cannot be spoken with; `raise_refusal` says why.
+    """
 
     def __init__(
         self,
-        transport: Transport,
-        record: Append | None = None,
-        times: LinkTimes | None = None,
+        line: Line,
+        hooks: SessionHooks,
+        *,
+        draw: random.Random,
+        round_trips: RoundTrips,
+        notices: list[str],
         take_over: bool = False,
     ) -> None:
-        """Nothing is sent yet: see `open`.
+        """Sends nothing yet: see `open`.
 
         Args:
-            transport: where the board is.
-            record: keep all that crosses the wire.
-            times: time-outs, if not the usual ones.
+            line: to the board.
+            hooks: of the link.
+            draw: gives nonces.
+            round_trips: on this line, which questions have to wait for.
+            notices: gets sentences for the user.
             take_over: take the board even if another host has it.
         """
-        super().__init__(transport, record, times or LinkTimes(), take_over)
-        self.polled_s = 0.0
-
-    # ---- telemetry, events, set-points -------------------------------------------------------------------------------
-
-    def poll(self, wait_s: float, quiet_s: float = 0.0) -> list[Telemetry]:
-        """The telemetry that arrived, oldest first; waits for some as `Transport.read` does, and keeps the session
-        alive meanwhile. Opens a new session if need be: see `sessions`.
-
-        Raises:
-            BoardError: the board has gone, or another program keeps taking it.
-            ProtocolError: a board of another protocol has come in its place.
-        """
-        now = self._now()
-        return self.poll_until(now + quiet_s, now + wait_s)
-
-    def poll_until(self, look_s: float, end_s: float) -> list[Telemetry]:
-        """As `poll`, by the transport's clock: looks for telemetry from `look_s` on, and waits until `end_s` at most.
-        `polled_s` is then the time at which it returned."""
-        now = self._now()
-        while True:
-            if now + _ROUNDING_S >= self._due:
-                self._service(now + _ROUNDING_S)
-            wait = (end_s if end_s < self._due else self._due) - now
-            if wait < SHORTEST_S:
-                wait = SHORTEST_S
-            quiet = look_s - now
-            self._receive(wait, 0.0 if quiet <= 0.0 else quiet if quiet < wait else wait)
-            now = self._now()
-            if (self._telemetry and now >= look_s) or now >= end_s:
-                self.polled_s = now
-                telemetry, self._telemetry = self._telemetry, []
-                return telemetry
-
-    def fetch_telemetry(self) -> list[Telemetry]:
-        """The telemetry that arrived while somebody waited for an answer; does not wait."""
-        telemetry, self._telemetry = self._telemetry, []
-        return telemetry
-
-    def forget_telemetry(self) -> None:
-        """Drops the telemetry that arrived while somebody waited for an answer."""
-        self._telemetry = []
+        self.hello: messages.Hello | None = None
+        self.is_open = False
+        self.count = 0
+        self.lost = 0
+        self.time_out_s = 1.0
+        self.refused: messages.Hello | None = None
+        self._line = line
+        self._hooks = hooks
+        self._draw = draw
+        self._round_trips = round_trips
+        self._notices = notices
+        self._take_over = take_over
+        self._wanted = False
+        self._refusing = False
+        self._number = 0
+        self._own_numbers: deque[int] = deque(maxlen=16)
+        self._opened_with = -1  # the board's nonce that opened the session
+        self._open_payload = b""
+        self._open_due = NEVER
+        self._hello_s = 0.0  # when the last one came
+        self._other_host_since: float | None = None
+        self._replaced_since = NEVER  # a hello said so; a late copy of an old one may have
+        self._answers: list[messages.Identity | messages.Description] = []
+        self.handlers: Handlers = {
+            messages.Hello.ID: self.receive_hello,
+            messages.Identity.ID: lambda payload, _: self._answers.append(messages.Identity.unpack(payload)),
+            messages.Description.ID: lambda payload, _: self._answers.append(messages.Description.unpack(payload)),
+        }
 
     @property
-    def waiting_events(self) -> Collection[BoardEvent]:
-        """What `events` would return: the same object as long as the link lives."""
-        return self._events.waiting
-
-    def events(self) -> list[BoardEvent]:
-        """What happened on the board since the last call, in order; stops of the motors that nobody was told of before
-        this session come first (`earlier`). Events that nobody fetches are, after some, no longer acknowledged, so that
-        the board keeps them."""
-        return list(self._events.fetch()) if self._events.waiting else []
-
-    def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
-        """Motor signals -1..1, in answer to the observation of `tick`."""
-        self._send(
-            _SIGNAL.ID,
-            _SIGNAL.STRUCT.pack(round(left * 10000), round(right * 10000), time_to_live_ms, tick & 0xFFFF),
-        )
-
-    def send_speed(self, left_m_s: float, right_m_s: float, time_to_live_ms: int, tick: int) -> None:
-        """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
-        self._send(
-            _SPEED.ID,
-            _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
-        )
-
-    def send_coast(self, time_to_live_ms: int, tick: int) -> None:
-        """No pulses, in answer to the observation of `tick`; nothing is latched."""
-        self._send(_COAST.ID, _COAST.STRUCT.pack(time_to_live_ms, tick & 0xFFFF))
-
-    # ---- slow devices --------------------------------------------------------------------------------------------
-
-    def fetch_devices(self) -> list[bytes]:
-        """Payloads of the devices_telemetry that arrived since the last call, oldest first; does not wait."""
-        devices, self._devices = self._devices, []
-        return devices
-
-    def want_turret(self, turret: messages.Turret, pulse: int) -> None:
-        """Has the turret so until a stop: told until devices_telemetry shows `pulse` (counts; 0: none), and again when
-        a dead-man stop or a new session has released it. While the motors are latched it does not move."""
-        self._wants.turn(turret, pulse if turret.hold else 0)
-        self._tell_wanted(self._now())
-
-    def want_tone(self, tone: messages.Buzzer) -> None:
-        """Has a tone sound once, in place of the one before; its token is given here. Told until the board has begun
-        it or the session ends."""
-        self._wants.sound(tone._replace(token=next_token(self._wants.token)))
-        self._tell_wanted(self._now())
-
-    # ---- stop --------------------------------------------------------------------------------------------------------
-
-    def stop(self) -> None:
-        """Stops the motors and latches them off until `arm`. Sent again, while anybody waits for the board, until it
-        is confirmed. The turret is free and the buzzer silent from then on, too."""
-        self._wants.stopped()
-        self._stopping.begin()
-        self._service(self._now())
+    def tick_s(self) -> float:
+        """The board's control tick."""
+        return 1.0 / self.hello.tick_rate if self.hello is not None and self.hello.tick_rate else 0.01
 
     @property
-    def stop_under_way(self) -> bool:
-        """Whether a stop was not yet confirmed."""
-        return self._stopping.wanted
+    def telemetry_s(self) -> float:
+        """From one telemetry to the next."""
+        assert self.hello is not None, "a session is open"
+        return self.hello.telemetry_period * self.tick_s
 
-    def stop_and_confirm(self, limit_s: float | None = None) -> bool:
-        """Stops the motors and waits until the board says so. A session that ends meanwhile latches them, too.
+    # ---- opening and ending ------------------------------------------------------------------------------------------
 
-        Returns:
-            Whether it was confirmed within `limit_s` (None: `LinkTimes.stop_limit_s`).
-        """
-        self.stop()
-        end = self._now() + (self.times.stop_limit_s if limit_s is None else limit_s)
-        while self._stopping.wanted and self._now() < end:
-            self._turn(end)
-        return not self._stopping.wanted
+    def open(self, limit_s: float | None = None) -> None:
+        """See `Link.open`."""
+        if self.is_open:
+            return
+        line, transport = self._line, self._line.transport
+        if limit_s is None:
+            limit_s = OPEN_LIMIT_RESET_S if getattr(transport, "resets_board", False) else OPEN_LIMIT_S
+        search = finding.BoardSearch(transport, limit_s)
+        self._wanted = True
+        self._other_host_since = None
+        if transport.realtime and self.hello is None:
+            transport.read(0.0)  # what the port has held is of an earlier time
+        line.listener = search.listen
+        try:
+            while not self.is_open:
+                now = line.now()
+                if self._other_host_since is not None:
+                    self._wait_for_other_host(now)
+                elif now >= search.end_s:
+                    raise search.failure(self.hello, line.decoder.good, line.decoder.bad)
+                elif self.hello is None and (baud := search.next_baud(now)) is not None:
+                    line.change_baud(baud)
+                self._hooks.wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
+        finally:
+            line.listener = None
+        if search.changed:
+            self._report_baud(search)
 
-    # ---- motors and parameters ---------------------------------------------------------------------------------------
+    def close(self) -> None:
+        """Ends the session at once; sends nothing more until `open`."""
+        self._wanted = False
+        if self.is_open:
+            self._line.send(messages.Close.ID, messages.Close.STRUCT.pack(self._number))
+            self._end()
+        self._open_due = NEVER
+        self._use_number(0)
+        self.hello = None
 
-    def arm(self) -> None:
-        """Ends the latch: set-points that answer a later tick move the motors.
+    def restart(self, now_s: float) -> None:
+        """Ends the session and begins another."""
+        self._end()
+        self._begin(now_s)
 
-        Ends the latching that the newest telemetry tells of; a stop that comes meanwhile is not undone.
+    def confirm(self) -> None:
+        """Something of this session came: no other host has replaced it."""
+        self._replaced_since = NEVER
+
+    def service(self, now_s: float) -> float:
+        """While no session is open: sends what is due; returns when it is the next time (s)."""
+        if now_s - self._hello_s > _PATIENCE_S:
+            self._open_due = NEVER
+        elif now_s >= self._open_due:
+            self._line.send(messages.Open.ID, self._open_payload)
+            self._open_due = now_s + self._retry_s
+        return self._open_due
+
+    @property
+    def _retry_s(self) -> float:
+        return 2 * self.tick_s + 100 * self._line.byte_s
+
+    def _begin(self, now_s: float) -> None:
+        """Draws a session for the nonce of the board's last hello; its first open is due at once."""
+        assert self.hello is not None
+        board_nonce = self.hello.board_nonce
+        number = 0
+        while number in (0, SEED) or number in self._own_numbers:
+            host_nonce = self._draw.randrange(_NONCES)
+            number = board_nonce ^ host_nonce
+        self._own_numbers.append(number)
+        self._opened_with = board_nonce
+        self._other_host_since = None
+        self._open_payload = messages.Open(messages.PROTOCOL_VERSION, board_nonce, host_nonce).pack()
+        self._open_due = now_s
+        self._use_number(number)  # the board may use it in the same breath as its hello
+
+    def _use_number(self, number: int) -> None:
+        self._number = number
+        self._line.use_session(number)
+
+    def _opened(self, now_s: float) -> None:
+        """The board has confirmed our session."""
+        decoder = self._line.decoder
+        if self.count == 0:
+            decoder.bad = decoder.lost = decoder.resynchronised = 0  # leftovers of another session
+        self.is_open = True
+        self._other_host_since = None
+        self.count += 1
+        self._open_due = NEVER
+        self._hooks.opened(now_s)
+
+    def _end(self) -> None:
+        self.is_open = False
+        self._hooks.ended()
+
+    def _wait_for_other_host(self, now_s: float) -> None:
+        """Another host has the board: takes it over if so wished, or gives up when that one is still there."""
+        assert self._other_host_since is not None
+        if self._take_over:
+            self._begin(now_s)
+        elif now_s - self._other_host_since > self.time_out_s + _OTHER_HOST_S:
+            raise TakenOverError(f"the board at {self._line.transport.name} is busy: another program drives it")
+
+    def _report_baud(self, search: finding.BoardSearch) -> None:
+        """The board was found at another rate than asked for."""
+        transport = self._line.transport
+        found = f"the board at {transport.name} speaks at {search.baud} baud, not at {search.asked}"
+        if isinstance(transport, BaudSelectable) and transport.baud_given:
+            self.close()
+            raise ProtocolError(f"{found} as asked for")
+        self._notices.append(found)
+
+    # ---- hellos ------------------------------------------------------------------------------------------------------
+
+    def receive_hello(self, payload: bytes, now_s: float) -> None:
+        """Takes a `hello`.
 
         Raises:
-            LatchedAgainError: there has been another since.
-            BoardError: refused while the supply is low; or as `request`.
+            TakenOverError: another host has taken the board.
         """
-        limit_s = self.times.request_limit_s
-        end = self._now() + limit_s
-        latest = self.latest or self._fresh_telemetry(end)
-        while True:
-            answer = self.request(messages.Arm, latest[_LATCHES], what="arm")
-            if answer.status == messages.AnswerStatus.OK:
+        hello = messages.Hello.unpack(payload)
+        if not mismatch.speaks_alike(hello):
+            self.refused = hello
+            return
+        self._hello_s = now_s
+        self.time_out_s = hello.session_time_out / 1000
+        if hello.session and hello.session == self._number:
+            self.hello = hello
+            self.confirm()
+            if not self.is_open:
+                self._opened(now_s)
+        elif hello.session == 0 or hello.session in self._own_numbers:
+            self._receive_no_session(hello, now_s)
+        else:
+            self._receive_other_host(hello, now_s)
+
+    def _receive_no_session(self, hello: messages.Hello, now_s: float) -> None:
+        if self.is_open:
+            if hello.board_nonce == self._opened_with:
+                return  # it was sent before the session was opened, and has come late
+            self.lost += 1
+            self._end()
+        self.hello = hello
+        if self._wanted and (self._open_due == NEVER or hello.board_nonce != self._opened_with):
+            self._begin(now_s)
+
+    def _receive_other_host(self, hello: messages.Hello, now_s: float) -> None:
+        if self.is_open:
+            # a late copy of an earlier hello says the same, but then telemetry of ours goes on
+            self._replaced_since = min(self._replaced_since, now_s)
+            if now_s - self._replaced_since < self.tick_s * max(10, 2 * hello.telemetry_period):
                 return
-            supply_v = int.from_bytes(latest[_SUPPLY : _SUPPLY + 2], "little") / 1000
-            if answer.status != messages.AnswerStatus.SUPPLY_LOW or supply_v > 0 or self._now() >= end:
-                break
-            latest = self._fresh_telemetry(end)  # the supply was not yet measured
-        where = self.transport.name
-        if answer.status == messages.AnswerStatus.LATCHED_AGAIN:
-            self._fresh_telemetry(end)  # who tries again knows of it
-            raise LatchedAgainError(f"the motors of the board at {where} were latched off once more before they armed")
-        if answer.status == messages.AnswerStatus.SUPPLY_LOW:
-            known = f" ({supply_v:.2f} V)" if supply_v else ""
-            raise BoardError(f"the board at {where} does not arm its motors: its supply is low{known}")
-        raise BoardError(f"the board at {where} does not arm its motors: {_reason(answer.status)}")
+            self.lost += 1
+            self._end()
+            self._use_number(0)
+            raise TakenOverError(f"another program has taken the board at {self._line.transport.name}")
+        self.hello = hello
+        self._open_due = NEVER
+        if self._other_host_since is None:
+            self._other_host_since = now_s
 
-    def _fresh_telemetry(self, end: float) -> bytes:
-        """Telemetry of this session that comes from now on."""
-        before, sessions = self.latest, self.sessions
-        while self.latest is None or self.latest is before:
-            if self._now() >= end:
-                raise BoardError(f"the board at {self.transport.name} sends no telemetry")
-            if self.sessions != sessions:
-                before, sessions = None, self.sessions
-            self._turn(end)
-        return self.latest
+    # ---- questions of the handshake ----------------------------------------------------------------------------------
 
-    @property
-    def parameters(self) -> list[str]:
-        """Names of the parameters that the board knows: those of its minor version."""
-        assert self.hello is not None, "a session is open"
-        minor = mismatch.minor_of(self.hello)
-        return [name for name, spec in messages.PARAMETERS.items() if spec.since <= minor]
-
-    def get_parameter(self, name: str) -> float:
-        """The value of a parameter, in its unit."""
-        spec = parameter_spec(name)
-        answer = self.request(messages.GetParameter, spec.id, what=f"tell parameter {name}")
-        return self._parameter(answer, name) * spec.scale
-
-    def set_parameter(self, name: str, value: float) -> float:
-        """Sets a parameter until the board's next reset; returns the value now in force, in its unit."""
-        counts = parameter_counts(name, value)
-        spec = parameter_spec(name)
-        answer = self._request_when_free(messages.SetParameter, spec.id, counts, what=f"set parameter {name}")
-        return self._parameter(answer, name) * spec.scale
-
-    def save_parameters(self) -> None:
-        """Writes all parameters to the board's EEPROM, so that they outlast resets and power cuts.
+    def ask(
+        self,
+        question: messages.Identify | messages.Describe,
+        kind: type[_M],
+        what: str,
+        limit_s: float,
+        accept: Callable[[_M], bool] = lambda _: True,
+    ) -> _M:
+        """Sends a question of the handshake, again and again while it stays unanswered; returns the answer.
 
         Raises:
-            BoardError: the supply is low, what was written does not read back; or as `request`.
+            BoardError: none came within `limit_s`; `what`: what the board did not do then.
         """
-        what = "save its parameters"
-        answer = self._request_when_free(messages.SaveParameters, what=what, limit_s=self.times.save_limit_s)
-        if answer.status != messages.AnswerStatus.OK:
-            raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
+        line = self._line
+        now = line.now()
+        end = now + limit_s
+        self._answers = []
+        while now < end:
+            line.send(question.ID, question.pack())
+            until = min(now + max(self._retry_s, 2 * self._round_trips.longest()), end)
+            while (now := line.now()) < until:
+                self._hooks.wait(until)
+                answers, self._answers = self._answers, []
+                for answer in answers:
+                    if isinstance(answer, kind) and accept(answer):
+                        return answer
+        raise BoardError(f"the board at {line.transport.name} did not {what}")
 
-    def reset_parameters(self) -> None:
-        """All parameters to the image's defaults; what is saved stays."""
-        what = "reset its parameters"
-        answer = self._request_when_free(messages.ResetParameters, what=what)
-        if answer.status != messages.AnswerStatus.OK:
-            raise BoardError(f"the board at {self.transport.name} did not {what}: {_reason(answer.status)}")
+    def raise_refusal(self) -> None:
+        """Raises why the board of `refused` cannot be spoken with, unless that is being found out already."""
+        hello, self.refused = self.refused, None
+        if hello is None or self._refusing:
+            return
+        self._refusing = True
+        try:
+            self._open_due = NEVER
+            if self.is_open:
+                self._end()
+            raise mismatch.refusal(hello, self._line.transport.name, lambda index: self._describe(hello, index))
+        finally:
+            self._refusing = False
 
-    # ---- the board's own timing --------------------------------------------------------------------------------------
-
-    def measure_task_times(
-        self, seconds: float, progress: Callable[[float], object] = lambda _: None
-    ) -> dict[str, int]:
-        """Lets the board work for so long and returns `task_times` then: of all since the session was opened. Telemetry
-        and events that come meanwhile are left aside.
-
-        Args:
-            seconds: by the transport's clock. The board tells one task after another, so that some are told up to 0.8 s
-                later, or more where the line is slow.
-            progress: told how much of it is over, 0 to 1.
-
-        Raises:
-            BoardError: the board has not told all of them, in four times the time that it needs; or as `poll`.
-        """
-        assert self.hello is not None, "a session is open"
-        round_s = _ROUND_PERIODS * self.hello.telemetry_period * self._tick_s
-        begun = self._now()
-        least, most = seconds + round_s, seconds + _ROUNDS * round_s
-        while (passed := self._now() - begun) < least or (None in self.task_times.values() and passed < most):
-            progress(min(passed / least, 1.0))
-            self.poll(_LOOK_S)
-            self.events()
-        missing = [name for name, cycles in self.task_times.items() if cycles is None]
-        if missing:
-            raise BoardError(
-                f"the board at {self.transport.name} did not tell the times of its tasks {', '.join(missing)} within "
-                f"{most:.1f} s; expected one task after another"
-            )
-        return {name: cycles for name, cycles in self.task_times.items() if cycles is not None}
-
-    def _request_when_free(
-        self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None
-    ) -> messages.Answer:
-        """As `request`; asks again while the board writes its EEPROM."""
-        end = self._now() + self.times.save_limit_s
-        while True:
-            answer = self.request(kind, *arguments, what=what, limit_s=limit_s)
-            now = self._now()
-            if answer.status != messages.AnswerStatus.BUSY or now >= end:
-                return answer
-            again = now + _BUSY_AGAIN_S
-            while self._now() < again:
-                self._turn(again)
-
-    def _parameter(self, answer: messages.Answer, name: str) -> int:
-        if answer.status != messages.AnswerStatus.OK:
-            raise BoardError(f"the board at {self.transport.name} refuses parameter {name}: {_reason(answer.status)}")
-        return answer.value
-
-
-def _reason(status: int) -> str:
-    """Why a board refuses."""
-    return messages.AnswerStatus(status).name.lower().replace("_", " ")
+    def _describe(self, hello: messages.Hello, index: int) -> messages.Description:
+        """What the board says of message `index` of its table."""
+        if hello.session:
+            raise BoardError(f"the board at {self._line.transport.name} has a session with another host")
+        return self.ask(
+            messages.Describe(index, hello.board_nonce),
+            messages.Description,
+            f"describe message {index}",
+            _DESCRIBE_S,
+            lambda answer: answer.index == index,
+        )

@@ -20,7 +20,7 @@ from struct import Struct
 from typing import Any, Protocol, TypeVar
 
 from boebot.devices.readings import Readings
-from boebot.link.delivery import BoardEvent
+from boebot.link.events import BoardEvent
 
 Row = tuple[float, bytes]
 Append = Callable[[str, float, bytes], None]

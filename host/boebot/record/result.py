@@ -16,8 +16,8 @@ from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
+from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, EventKind, Identity, Status
-from boebot.link.session import text
 from boebot.record import figures
 from boebot.record.brain_record import BrainRecord
 from boebot.record.readings_series import ReadingsSeries

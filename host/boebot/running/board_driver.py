@@ -14,7 +14,6 @@ import contextlib
 import math
 import time as wall
 from collections.abc import Iterator
-from struct import Struct
 from typing import Any
 
 from boebot.boards import BoardSession
@@ -23,10 +22,11 @@ from boebot.devices.latest import NO_MESSAGES, Latest
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import messages, reset_cause
-from boebot.link.delivery import LatchedAgainError, SessionLostError
+from boebot.link.errors import LatchedAgainError, SessionLostError
+from boebot.link.fields import reader, text
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.link.session import Link, text
-from boebot.link.session import Telemetry as Received
+from boebot.link.link import Link
+from boebot.link.telemetry import StampedTelemetry as Received
 from boebot.record.brain_record import BrainRecord
 from boebot.record.record import Record
 from boebot.record.result import RunResult
@@ -51,10 +51,10 @@ _LINE_SHARE = 4  # messages of slow devices fill a quarter of the line at most (
 _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
-_LATCH = messages.Telemetry.OFFSETS["latch"]
+_LATCH = reader(messages.Telemetry, "latch")
+_TICK = reader(messages.Telemetry, "tick")
 _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
-_TICK = Struct("<I")  # telemetry begins with it
 _NOT_YET = 1 << 32  # no tick is later
 
 
@@ -130,7 +130,7 @@ class BoardDriver:
         self._make_ready()
         self._first_session = self._session
         self._take_events()
-        self.link.forget_telemetry()
+        self.link.telemetry.fetch()
 
     # ---- before the first step, and after each new session ---------------------------------------------------
 
@@ -146,7 +146,7 @@ class BoardDriver:
         return fitting
 
     def _time_to_live_least(self) -> float:
-        return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.byte_s
+        return _PERIODS_TO_LIVE * self.telemetry_ticks * self.tick_s + _BYTES_TO_LIVE * self.link.line.byte_s
 
     def _limit(self) -> StepLimit:
         """In real time the motors stop by the dead-man during a step that outlasts its set-points: that is an error of
@@ -165,12 +165,12 @@ class BoardDriver:
             BoardError: each session ends meanwhile, or the board refuses something.
         """
         link = self.link
-        first = link.sessions
-        while self._session != link.sessions:
+        first = link.session.count
+        while self._session != link.session.count:
             link.open()
-            if link.sessions - first >= _READY_TRIES:
+            if link.session.count - first >= _READY_TRIES:
                 raise self._never_ready()
-            session = link.sessions
+            session = link.session.count
             try:
                 self.description = configure(link, self.task.request.robot)
                 self.equipment = self._equipment()
@@ -181,7 +181,7 @@ class BoardDriver:
             self._session = session
 
     def _never_ready(self) -> BoardError:
-        hello, where = self.link.hello, self.session.transport.name
+        hello, where = self.link.session.hello, self.session.transport.name
         why = ""
         if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
             why = f"; its last reset was by {reset_cause.hang_in_words(hello.reset_cause)}"
@@ -195,7 +195,7 @@ class BoardDriver:
         if not equipment.needs_messages:
             return equipment
         period = int(self.link.get_parameter("devices_period"))
-        ticks = message_ticks(period, self.link.byte_s, self.tick_s)
+        ticks = message_ticks(period, self.link.line.byte_s, self.tick_s)
         return Equipment(self.description, self.tick_s, message_ticks=ticks)
 
     def _arm(self) -> None:
@@ -205,8 +205,8 @@ class BoardDriver:
                 break
         else:
             self.link.arm()
-        if self.link.latest is not None:
-            self._armed_tick = int.from_bytes(self.link.latest[:4], "little")
+        if self.link.telemetry.latest is not None:
+            (self._armed_tick,) = _TICK(self.link.telemetry.latest)
 
     def _heed_emergency_stop(self) -> None:
         """The brain has latched the motors off, or armed them again."""
@@ -215,7 +215,7 @@ class BoardDriver:
             self.link.stop()
         elif self._halted and not self.robot.latched:
             with contextlib.suppress(SessionLostError):  # the new session is made ready in its turn
-                if self.link.is_open:
+                if self.link.session.is_open:
                     self._arm()
             self._halted = False
 
@@ -226,13 +226,13 @@ class BoardDriver:
         if asked.turret is not None:
             servo = self.description.device["turret"]
             assert isinstance(servo, PositionServo)
-            self.link.want_turret(asked.turret, servo.pulse_of(asked.turret))
+            self.link.set_turret(asked.turret, servo.pulse_of(asked.turret))
         if asked.tone is not None:
-            self.link.want_tone(asked.tone)
+            self.link.play_tone(asked.tone)
 
     def _slow(self, tick: int) -> Latest:
         """The newest messages of the slow devices, as of that tick."""
-        payload = self.link.latest_devices
+        payload = self.link.devices.latest
         if payload is None:
             return NO_MESSAGES
         if payload is not self._payload:
@@ -243,7 +243,7 @@ class BoardDriver:
 
     def _put_devices_aside(self) -> None:
         if self._last_s >= 0.0:
-            for payload in self.link.fetch_devices():
+            for payload in self.link.devices.fetch():
                 self.record.append(messages.DevicesTelemetry.NAME, self._last_s, payload)
 
     def _heed_latch(self, payload: bytes) -> None:
@@ -266,7 +266,7 @@ class BoardDriver:
     def steps(self) -> Iterator[float]:
         """See `boebot.running.driver.Driver`."""
         link, robot, transport = self.link, self.robot, self.session.transport
-        poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK.unpack_from
+        poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK
         make, waiting_events = _Telemetry._make, link.waiting_events
         put_aside, command_given = self.record.append_telemetry, self.record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
@@ -278,8 +278,8 @@ class BoardDriver:
         time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
         end_s = seconds - tick_s / 2
         silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
-        on_time = not transport.realtime and link.line_s > 0
-        early_s = _LOOK_EARLY_BYTES * link.line_s if on_time else _LOOK_EARLY * tick_s
+        on_time = not transport.realtime and link.line.known_byte_s > 0
+        early_s = _LOOK_EARLY_BYTES * link.line.known_byte_s if on_time else _LOOK_EARLY * tick_s
         awaited = -1  # the tick that was looked for
         started_s = heard_s = look_s = transport.now()
         wait_until_s = heard_s + (period + 1) * tick_s
@@ -289,11 +289,11 @@ class BoardDriver:
             received = meanwhile + poll(look_s, wait_until_s)
             meanwhile = []
             now_s = link.polled_s
-            if link.sessions != self._session:
+            if link.session.count != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
                 now_s = transport.now()
-            restarted = link.board_resets != self.resets
+            restarted = link.telemetry.board_resets != self.resets
             if not received:
                 if now_s - heard_s > silence_s + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
@@ -309,12 +309,12 @@ class BoardDriver:
                     restarted = False
                     due = tick + -tick % n
                     time_zero = self._time_after_reset(host_s) - tick * tick_s
-                    self.resets = link.board_resets
+                    self.resets = link.telemetry.board_resets
                 last = tick
                 if tick >= due or self._last_s >= 0.0:
                     self._last_s = time_s = tick * tick_s + time_zero
                     put_aside(time_s, payload, host_s, bound_s)
-            if payload[_LATCH] and last > self._armed_tick:
+            if last > self._armed_tick and _LATCH(payload)[0]:
                 self._heed_latch(payload)
             if waiting_events:
                 self._take_events()
@@ -363,12 +363,12 @@ class BoardDriver:
         self._make_ready()
         if self._halted:
             self._armed_tick = -1
-        return [*received, *self.link.fetch_telemetry()]
+        return [*received, *self.link.telemetry.fetch()]
 
     def _take_events(self) -> None:
         """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
         for event in self.link.events():
-            if not event.earlier or self.link.sessions != self._first_session:
+            if not event.earlier or self.link.session.count != self._first_session:
                 self.record.append_event(event)
             elif event.kind in _UNASKED or (event.kind, event.value) == _SUPPLY_LOW:
                 self.notices.append(
@@ -410,9 +410,9 @@ class BoardDriver:
             late_steps=self.late_steps,
             odometry_source=self.task.brain.odometry,
             resets=self.resets,
-            sessions_lost=link.sessions_lost,
-            lost_frames=link.decoder.lost,
-            bad_frames=link.decoder.bad,
+            sessions_lost=link.session.lost,
+            lost_frames=link.line.decoder.lost,
+            bad_frames=link.line.decoder.bad,
             run_time=max(self._last_s, 0.0),
             wall_time=elapsed_s,
             identity=self.identity,

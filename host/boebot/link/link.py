@@ -1,0 +1,558 @@
+"""The host's end of the link to one board (protocol/PROTOCOL.md): what programs call.
+
+`Link` composes the parts: `Line` carries frames, `Session` shakes hands, `Requests`, `Events`, `MotorStop` and
+`SlowDevices` deliver, `ClockSync` follows the board's clock, `TelemetryBuffer` keeps what comes.
+None of them has a thread: all of that happens inside the calls of `Link` that wait for the board.
+
+When the board was reset, or has not heard the host for too long, its next hello says so, and the link opens a new
+session by itself: `session.count` counts them, and the program that configured and armed the board does it again.
+"""
+
+from __future__ import annotations
+
+import random
+import secrets
+from collections.abc import Callable, Collection
+
+from boebot.errors import BoardError
+from boebot.link import messages, mismatch, reset_cause
+from boebot.link.clock_sync import ClockSync
+from boebot.link.counters import BoardCounters, HostCounters
+from boebot.link.errors import LatchedAgainError
+from boebot.link.events import BoardEvent, Events
+from boebot.link.fields import reader
+from boebot.link.line import AT_ONCE, NEVER, Append, Handlers, Line
+from boebot.link.motor_stop import MotorStop
+from boebot.link.parameter_values import parameter_counts, parameter_spec
+from boebot.link.requests import Request, RequestKind, Requests
+from boebot.link.session import Session, SessionHooks
+from boebot.link.slow_devices import SlowDevices
+from boebot.link.telemetry import StampedTelemetry, TelemetryBuffer
+from boebot.link.times import LinkTimes
+from boebot.link.transport import CountsOverruns, Transport
+
+_SIGNAL = messages.SetpointSignal
+_SPEED = messages.SetpointSpeed
+_COAST = messages.SetpointCoast
+_TIME_OUT = messages.PARAMETERS["session_time_out"]
+_PERIOD = messages.PARAMETERS["telemetry_period"]
+_SHORTEST_S = 1e-4  # a wait that rounds to nothing would never end on a clock that only waits advance
+_ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop this much before what was waited for
+_STOP_BYTES = 20
+_FRAME_TICKS = 2  # of the servos: no pulse shows sooner
+_BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
+_ROUND_PERIODS = 4 * (len(messages.Task) + 1)  # of telemetry: each task's time and the counters, a message in four
+_ROUNDS = 4  # in which each task's time came at least once, or something is wrong
+_LOOK_S = 0.05
+_TASKS = tuple(task.name.lower() for task in messages.Task)
+
+_LATCH = reader(messages.Telemetry, "latch")
+_LATCHES = reader(messages.Telemetry, "latches")
+_SUPPLY = reader(messages.Telemetry, "supply")
+
+
+class Link:
+    """The host's end of the link to one board.
+
+    Attributes:
+        transport: where the board is.
+        times: time-outs.
+        notices: sentences for the user; a program that shows them takes them out.
+        line, session, clock, telemetry, devices: the parts, with attributes of their own.
+        board_counters: what the board's end has counted.
+        task_times: the longest time of each task of the firmware since the session was opened, by its name: cycles of
+            1/16 us, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board
+            (where only the Ping's pulse does); None: not yet known. The board sends one after another, all of them in
+            0.8 s where the line is fast.
+        polled_s: when `poll_until` returned last, by the transport's clock.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        record: Append | None = None,
+        times: LinkTimes | None = None,
+        take_over: bool = False,
+    ) -> None:
+        """Nothing is sent yet: see `open`.
+
+        Args:
+            transport: where the board is.
+            record: gets all that crosses the wire, as `Line` says.
+            times: time-outs, if not the usual ones.
+            take_over: take the board even if another host has it.
+        """
+        # in simulated time a run has to be the same each time; on a real line no session's seed may come again
+        draw = random.Random(secrets.randbits(64) if transport.realtime else "link")
+        self.transport = transport
+        self.times = times or LinkTimes()
+        self.notices: list[str] = []
+        self.board_counters = BoardCounters()
+        self.task_times: dict[str, int | None] = dict.fromkeys(_TASKS)
+        self.polled_s = 0.0
+        self.line = line = Line(transport, record)
+        self.clock = ClockSync(line, self.times, draw)
+        self.session = Session(
+            line,
+            SessionHooks(wait=self._turn_at_once, opened=self._session_opened, ended=self._session_ended),
+            draw=draw,
+            round_trips=self.clock.round_trips,
+            notices=self.notices,
+            take_over=take_over,
+        )
+        self.telemetry = TelemetryBuffer(self.clock)
+        self.devices = SlowDevices(line.send)
+        self._requests = Requests(line.send, transport.name, self.session.restart)
+        self._events = Events(line.send, self.clock)
+        self._stop = MotorStop(line.send)
+        self._now = line.now
+        self._due = NEVER  # when something is to be sent next
+        handshake: Handlers = self.session.handlers | {messages.Hello.ID: self._receive_hello}
+        self._handlers = self._handlers_without_session = handshake
+        self._handlers_in_session: Handlers = handshake | {
+            messages.Telemetry.ID: self._receive_telemetry,
+            messages.DevicesTelemetry.ID: self._receive_devices,
+            messages.Answer.ID: self._receive_answer,
+            messages.Event.ID: self._events.receive,
+            messages.Stopped.ID: self._stop.receive,
+            messages.Counters.ID: lambda payload, _: self.board_counters.take(messages.Counters.unpack(payload)),
+            messages.TaskTime.ID: self._receive_task_time,
+            messages.ClockAnswer.ID: self.clock.receive,
+        }
+
+    # ---- the session -------------------------------------------------------------------------------------------------
+
+    def open(self, limit_s: float | None = None) -> messages.Hello:
+        """Waits for the board's hello, checks that both speak the same protocol, and opens a session.
+
+        Finds the baud rate where the transport can change it. Returns at once if a session is open.
+
+        Args:
+            limit_s: by the transport's clock; None: as `LinkTimes.open_limit_s` says.
+
+        Raises:
+            BoardError: nobody answers, or the board has gone.
+            ProtocolError: something else speaks, or another version of this protocol.
+        """
+        if not self.session.is_open:
+            self.session.open(self.times.open_limit_s if limit_s is None else limit_s)
+            self._report_thinning()
+        assert self.session.hello is not None
+        return self.session.hello
+
+    def close(self) -> None:
+        """Ends the session at once, so that the board is free for others; it latches its motors off. The port stays
+        open."""
+        self.session.close()
+        self._due = NEVER
+
+    def identity(self) -> messages.Identity:
+        """Which image runs on the board."""
+        return self.session.ask(
+            messages.Identify(), messages.Identity, "say which image it runs", self.times.request_limit_s
+        )
+
+    def counters(self) -> HostCounters:
+        """What the host's end has counted."""
+        decoder, requests, events, telemetry = self.line.decoder, self._requests, self._events, self.telemetry
+        return HostCounters(
+            good=decoder.good,
+            bad=decoder.bad,
+            unknown=decoder.unknown,
+            resynchronised=decoder.resynchronised,
+            lost=decoder.lost,
+            retransmitted=requests.retransmitted + self._stop.retransmitted + self.devices.retransmitted,
+            duplicate=requests.duplicate + events.duplicate,
+            stray=requests.stray + events.stray,
+            overrun=self.transport.overruns if isinstance(self.transport, CountsOverruns) else 0,
+            dropped=telemetry.dropped + self.devices.dropped,
+            late=telemetry.late,
+            held=events.held,
+            sessions=self.session.count,
+            board_resets=telemetry.board_resets,
+            sessions_lost=self.session.lost,
+        )
+
+    # ---- telemetry, events, set-points -------------------------------------------------------------------------------
+
+    def poll(self, wait_s: float, quiet_s: float = 0.0) -> list[StampedTelemetry]:
+        """The telemetry that arrived, oldest first; waits for some as `Transport.read` does, and keeps the session
+        alive meanwhile. Opens a new session if need be: see `session.count`.
+
+        Raises:
+            BoardError: the board has gone, or another program keeps taking it.
+            ProtocolError: a board of another protocol has come in its place.
+        """
+        now = self._now()
+        return self.poll_until(now + quiet_s, now + wait_s)
+
+    def poll_until(self, look_s: float, end_s: float) -> list[StampedTelemetry]:
+        """As `poll`, by the transport's clock: looks for telemetry from `look_s` on, and waits until `end_s` at most.
+        `polled_s` is then the time at which it returned."""
+        now = self._now()
+        while True:
+            if now + _ROUNDING_S >= self._due:
+                self._service(now + _ROUNDING_S)
+            wait = (end_s if end_s < self._due else self._due) - now
+            if wait < _SHORTEST_S:
+                wait = _SHORTEST_S
+            quiet = look_s - now
+            self._receive(wait, 0.0 if quiet <= 0.0 else quiet if quiet < wait else wait)
+            now = self._now()
+            if (self.telemetry.waiting and now >= look_s) or now >= end_s:
+                self.polled_s = now
+                return self.telemetry.fetch()
+
+    @property
+    def waiting_events(self) -> Collection[BoardEvent]:
+        """What `events` would return: the same object as long as the link lives."""
+        return self._events.waiting
+
+    def events(self) -> list[BoardEvent]:
+        """What happened on the board since the last call, in order; first what happened before this session and had not
+        been acknowledged (`earlier`). Events that nobody fetches are, after some, no longer acknowledged, so that the
+        board keeps them."""
+        return self._events.fetch()
+
+    def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
+        """Motor signals -1..1, in answer to the observation of `tick`."""
+        self.line.send(
+            _SIGNAL.ID,
+            _SIGNAL.STRUCT.pack(round(left * 10000), round(right * 10000), time_to_live_ms, tick & 0xFFFF),
+        )
+
+    def send_speed(self, left_m_s: float, right_m_s: float, time_to_live_ms: int, tick: int) -> None:
+        """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
+        self.line.send(
+            _SPEED.ID,
+            _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
+        )
+
+    def send_coast(self, time_to_live_ms: int, tick: int) -> None:
+        """No pulses, in answer to the observation of `tick`; nothing is latched."""
+        self.line.send(_COAST.ID, _COAST.STRUCT.pack(time_to_live_ms, tick & 0xFFFF))
+
+    # ---- slow devices ------------------------------------------------------------------------------------------------
+
+    def set_turret(self, turret: messages.Turret, pulse: int) -> None:
+        """Sets the turret until a stop: sent until devices_telemetry shows `pulse` (counts; 0: none), and again when a
+        dead-man stop or a new session has released it. While the motors are latched it does not move."""
+        self.devices.set_turret(turret, pulse)
+        self._service_devices(self._now())
+
+    def play_tone(self, tone: messages.Buzzer) -> None:
+        """Plays a tone once, in place of the one before; its token is given here. Sent until the board has begun it or
+        the session ends."""
+        self.devices.play_tone(tone)
+        self._service_devices(self._now())
+
+    # ---- stop --------------------------------------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Stops the motors and latches them off until `arm`. Sent again, while the program waits for the board, until
+        it is confirmed. It frees the turret and silences the buzzer, too."""
+        self.devices.stop()
+        self._stop.begin()
+        self._service(self._now())
+
+    def stop_and_confirm(self, limit_s: float | None = None) -> bool:
+        """Stops the motors and waits until the board says so. A session that ends meanwhile latches them, too.
+
+        Returns:
+            Whether it was confirmed within `limit_s` (None: `LinkTimes.stop_limit_s`).
+        """
+        self.stop()
+        end = self._now() + (self.times.stop_limit_s if limit_s is None else limit_s)
+        while self._stop.pending and self._now() < end:
+            self._turn(end)
+        return not self._stop.pending
+
+    # ---- requests ----------------------------------------------------------------------------------------------------
+
+    def request(self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None) -> messages.Answer:
+        """Asks the board once, for certain, and returns its answer.
+
+        Args:
+            kind: the message; its number is given here.
+            arguments: its other fields, in wire counts.
+            what: what is asked of the board, for the sentence of an error: "arm".
+
+        Raises:
+            SessionLostError: the session ended meanwhile; whether it was done is not known.
+            BoardError: no answer in time.
+        """
+        request = self.submit(kind, *arguments, what=what, limit_s=limit_s)
+        while not request.done:
+            self._turn(NEVER)
+        if request.error is not None:
+            raise request.error
+        assert request.answer is not None
+        return request.answer
+
+    def submit(self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None) -> Request:
+        """As `request`, but does not wait: the answer comes while the program polls.
+
+        Raises:
+            BoardError: too many wait already.
+        """
+        request = Request(kind, arguments, what, self.times.request_limit_s if limit_s is None else limit_s)
+        self._requests.submit(request, self._now())
+        self._due = AT_ONCE
+        return request
+
+    # ---- motors and parameters ---------------------------------------------------------------------------------------
+
+    def arm(self) -> None:
+        """Ends the latch: set-points that answer a later tick move the motors.
+
+        Ends the latching that the newest telemetry shows; a stop that comes meanwhile is not undone.
+
+        Raises:
+            LatchedAgainError: there has been another since.
+            BoardError: refused while the supply is low; or as `request`.
+        """
+        end = self._now() + self.times.request_limit_s
+        latest = self.telemetry.latest or self._fresh_telemetry(end)
+        while True:
+            answer = self.request(messages.Arm, *_LATCHES(latest), what="arm")
+            if answer.status == messages.AnswerStatus.OK:
+                return
+            supply_v = _SUPPLY(latest)[0] / 1000
+            if answer.status != messages.AnswerStatus.SUPPLY_LOW or supply_v > 0 or self._now() >= end:
+                break
+            latest = self._fresh_telemetry(end)  # the supply was not yet measured
+        where = self.transport.name
+        if answer.status == messages.AnswerStatus.LATCHED_AGAIN:
+            self._fresh_telemetry(end)  # the next call knows of it
+            raise LatchedAgainError(f"the motors of the board at {where} were latched off once more before they armed")
+        if answer.status == messages.AnswerStatus.SUPPLY_LOW:
+            known = f" ({supply_v:.2f} V)" if supply_v else ""
+            raise BoardError(f"the board at {where} does not arm its motors: its supply is low{known}")
+        self._check(answer, "does not arm its motors")
+
+    def _fresh_telemetry(self, end: float) -> bytes:
+        """Telemetry of this session that comes from now on."""
+        before, sessions = self.telemetry.latest, self.session.count
+        while self.telemetry.latest is None or self.telemetry.latest is before:
+            if self._now() >= end:
+                raise BoardError(f"the board at {self.transport.name} sends no telemetry")
+            if self.session.count != sessions:
+                before, sessions = None, self.session.count
+            self._turn(end)
+        return self.telemetry.latest
+
+    @property
+    def parameters(self) -> list[str]:
+        """Names of the parameters that the board knows: those of its minor version."""
+        assert self.session.hello is not None, "a session is open"
+        minor = mismatch.minor_of(self.session.hello)
+        return [name for name, spec in messages.PARAMETERS.items() if spec.since <= minor]
+
+    def get_parameter(self, name: str) -> float:
+        """The value of a parameter, in its unit."""
+        spec = parameter_spec(name)
+        answer = self.request(messages.GetParameter, spec.id, what=f"tell parameter {name}")
+        self._check(answer, f"refuses parameter {name}")
+        return answer.value * spec.scale
+
+    def set_parameter(self, name: str, value: float) -> float:
+        """Sets a parameter until the board's next reset; returns the value now in force, in its unit."""
+        counts = parameter_counts(name, value)
+        spec = parameter_spec(name)
+        answer = self._request_when_free(messages.SetParameter, spec.id, counts, what=f"set parameter {name}")
+        self._check(answer, f"refuses parameter {name}")
+        return answer.value * spec.scale
+
+    def save_parameters(self) -> None:
+        """Writes all parameters to the board's EEPROM, so that they outlast resets and power cuts.
+
+        Raises:
+            BoardError: the supply is low, what was written does not read back; or as `request`.
+        """
+        what = "save its parameters"
+        answer = self._request_when_free(messages.SaveParameters, what=what, limit_s=self.times.save_limit_s)
+        self._check(answer, f"did not {what}")
+
+    def reset_parameters(self) -> None:
+        """All parameters to the image's defaults; what is saved stays."""
+        what = "reset its parameters"
+        self._check(self._request_when_free(messages.ResetParameters, what=what), f"did not {what}")
+
+    # ---- the board's own timing --------------------------------------------------------------------------------------
+
+    def measure_task_times(
+        self, seconds: float, progress: Callable[[float], object] = lambda _: None
+    ) -> dict[str, int]:
+        """Lets the board work for a time and returns `task_times` then: of all since the session was opened. Telemetry
+        and events that come meanwhile are dropped.
+
+        Args:
+            seconds: by the transport's clock. The board sends the times of one task after another, so that it takes up
+                to 0.8 s longer, or more where the line is slow.
+            progress: called with the share of it that is over, 0 to 1.
+
+        Raises:
+            BoardError: the board has not sent all of them, in four times the time that it needs; or as `poll`.
+        """
+        round_s = _ROUND_PERIODS * self.session.telemetry_s
+        begun = self._now()
+        least, most = seconds + round_s, seconds + _ROUNDS * round_s
+        while (passed := self._now() - begun) < least or (None in self.task_times.values() and passed < most):
+            progress(min(passed / least, 1.0))
+            self.poll(_LOOK_S)
+            self.events()
+        missing = [name for name, cycles in self.task_times.items() if cycles is None]
+        if missing:
+            raise BoardError(
+                f"the board at {self.transport.name} did not tell the times of its tasks {', '.join(missing)} within "
+                f"{most:.1f} s; expected one task after another"
+            )
+        return {name: cycles for name, cycles in self.task_times.items() if cycles is not None}
+
+    def _request_when_free(
+        self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None
+    ) -> messages.Answer:
+        """As `request`; asks again while the board writes its EEPROM."""
+        end = self._now() + self.times.save_limit_s
+        while True:
+            answer = self.request(kind, *arguments, what=what, limit_s=limit_s)
+            now = self._now()
+            if answer.status != messages.AnswerStatus.BUSY or now >= end:
+                return answer
+            again = now + _BUSY_AGAIN_S
+            while self._now() < again:
+                self._turn(again)
+
+    def _check(self, answer: messages.Answer, what: str) -> None:
+        """Raises unless the board agrees; `what`: what it does, for the sentence."""
+        if answer.status != messages.AnswerStatus.OK:
+            reason = messages.AnswerStatus(answer.status).name.lower().replace("_", " ")
+            raise BoardError(f"the board at {self.transport.name} {what}: {reason}")
+
+    # ---- the loop ----------------------------------------------------------------------------------------------------
+
+    def _turn(self, until: float) -> None:
+        """One step: sends what is due and receives what comes, at the latest until the given time."""
+        now = self._now()
+        if now >= self._due:
+            self._service(now)
+        self._receive(max(min(until, self._due) - now, _SHORTEST_S), 0.0)
+
+    def _turn_at_once(self, until: float) -> None:
+        self._due = AT_ONCE
+        self._turn(until)
+
+    def _service(self, now: float) -> None:
+        """Sends what is due by now, and notes when the next is."""
+        session = self.session
+        if session.is_open:
+            due = min(
+                self._stop.service(now, session.tick_s + _STOP_BYTES * self.line.byte_s),
+                self._requests.service(now, self._retry_s()),
+            )
+            if session.is_open:
+                self._due = min(due, self.clock.service(now, session.time_out_s))
+                return
+        self._due = min(session.service(now), self._requests.service_waiting(now))
+
+    def _retry_s(self) -> float:
+        return self.times.retry_after(self.session.tick_s, self.line.byte_s, self.clock.round_trips.longest())
+
+    def _receive(self, wait_s: float, quiet_s: float) -> None:
+        """Reads what arrived, and hands each message to its handler; without a session only the handshake's."""
+        for stamp, found in self.line.receive(wait_s, quiet_s):
+            for message_id, _, payload in found:
+                handler = self._handlers.get(message_id)
+                if handler is not None:
+                    handler(payload, stamp)
+            self.telemetry.stamp(stamp)
+        if self.session.refused is not None:
+            self.session.raise_refusal()
+
+    def _session_opened(self, now: float) -> None:
+        session = self.session
+        self._handlers = self._handlers_in_session
+        self.clock.session_opened(now)
+        self.telemetry.session_opened(session.telemetry_s)
+        self.devices.session_opened()
+        self._requests.session_opened()
+        self._events.session_opened()
+        self._stop.session_opened()
+        self.task_times = dict.fromkeys(_TASKS)
+        self._due = AT_ONCE
+
+    def _session_ended(self) -> None:
+        self._handlers = self._handlers_without_session
+        for part in (self.clock, self.telemetry, self.devices, self._requests):
+            part.session_ended()
+        self._due = AT_ONCE
+
+    # ---- what comes --------------------------------------------------------------------------------------------------
+
+    def _receive_hello(self, payload: bytes, now: float) -> None:
+        self._due = AT_ONCE  # it may want an answer
+        self.session.receive_hello(payload, now)
+
+    def _receive_telemetry(self, payload: bytes, now: float) -> None:
+        if self.telemetry.latest is None:
+            self._begin_telemetry(payload, now)
+        self.telemetry.receive(payload, now)
+        self.session.confirm()
+
+    def _begin_telemetry(self, payload: bytes, now: float) -> None:
+        """The first of a session shows whether the board was reset before."""
+        hello, telemetry = self.session.hello, self.telemetry
+        assert hello is not None
+        resets = telemetry.board_resets
+        has_started = telemetry.begin(payload, now, self.session.tick_s)
+        if telemetry.board_resets != resets:
+            self.board_counters.restarted()
+        if has_started and reset_cause.by_watchdog(hello.reset_cause):
+            cause = reset_cause.hang_in_words(hello.reset_cause)
+            notice = f"the last reset of the board at {self.transport.name} was by {cause}"
+            if notice not in self.notices:
+                self.notices.append(notice)
+
+    def _receive_devices(self, payload: bytes, now: float) -> None:
+        self.devices.receive(payload)
+        if self.devices.pending:
+            self._service_devices(now)
+
+    def _service_devices(self, now: float) -> None:
+        """Sends what turret and buzzer are to do, unless that was done lately."""
+        if self.session.is_open:
+            latest = self.telemetry.latest
+            latched = latest is None or _LATCH(latest) != (messages.Latch.NONE,)
+            self.devices.service(now, self._retry_s() + _FRAME_TICKS * self.session.tick_s, latched)
+
+    def _receive_answer(self, payload: bytes, _: float) -> None:
+        request = self._requests.receive(payload)
+        if request is None:
+            return
+        assert request.answer is not None
+        self._due = AT_ONCE  # the next may go
+        if request.arguments[:1] == (_TIME_OUT.id,) and request.answer.status == messages.AnswerStatus.OK:
+            self.session.time_out_s = request.answer.value * _TIME_OUT.scale / 1000
+
+    def _receive_task_time(self, payload: bytes, _: float) -> None:
+        task, longest = messages.TaskTime.unpack(payload)
+        if task < len(_TASKS):
+            self.task_times[_TASKS[task]] = longest
+
+    def _report_thinning(self) -> None:
+        """Where the line is slow the board sends telemetry less often than its parameter says."""
+        hello = self.session.hello
+        assert hello is not None
+        ticks = hello.telemetry_period
+        if ticks <= _PERIOD.minimum:
+            return
+        request = self.submit(messages.GetParameter, _PERIOD.id, what="tell parameter telemetry_period")
+        while not request.done:
+            self._turn(NEVER)
+        answer = request.answer  # if there is none, the next request says why
+        if answer is not None and answer.status == messages.AnswerStatus.OK and answer.value < ticks:
+            sent_ms, wanted_ms = (1000 * count * self.session.tick_s for count in (ticks, answer.value))
+            self.notices.append(
+                f"the board at {self.transport.name} sends telemetry every {sent_ms:g} ms, not every {wanted_ms:g} ms "
+                "as its parameter telemetry_period says: its line is slow"
+            )
