@@ -19,7 +19,7 @@ from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from boebot.link.line import NEVER, Line
 from boebot.link.motor_stop import MotorStop
 from boebot.link.requests import Request, Requests
-from boebot.link.session import Session, SessionHooks
+from boebot.link.session import Session
 from boebot.link.slow_devices import SlowDevices
 from boebot.link.telemetry import TelemetryBuffer
 from boebot.link.times import LinkTimes
@@ -59,11 +59,8 @@ class Wire:
         """Nothing to close."""
 
 
-class Sent(list[messages.Message]):
-    """What a part has sent."""
-
-    def send(self, message_id: int, payload: bytes) -> None:
-        self.append(messages.MESSAGES[message_id].unpack(payload))
+Sent = list[messages.Message]
+"""What a part has sent: it sends by `append`."""
 
 
 def at(*times: float, service: Callable[[float], object]) -> None:
@@ -97,7 +94,7 @@ def test_line_sends_and_accepts_frames_of_its_session_only() -> None:
     wire, kept = Wire(time=3.0), []
     line = Line(wire, lambda *row: kept.append(row))
     line.use_session(0x12345)
-    line.send(messages.Stop.ID, b"\7")
+    line.send(messages.Stop(7))
     board = Decoder(0x12345, to_board=True)
     assert board.feed(wire.written) == [(messages.Stop.ID, 0, b"\7")]
     stopped = [encode(messages.Stopped.ID, number, b"\7", seed) for number, seed in enumerate((0x12345, 0x54321))]
@@ -121,21 +118,21 @@ class Alone:
     def __init__(self, take_over: bool = False) -> None:
         self.wire = Wire()
         self.happened: list[str] = []
-        hooks = SessionHooks(
-            wait=lambda _: None,
-            opened=lambda now: self.happened.append(f"opened at {now}"),
-            ended=lambda: self.happened.append("ended"),
-        )
         self.notices: list[str] = []
         self.session = Session(
             Line(self.wire),
-            hooks,
+            lambda until: self.wait(until),
+            lambda now: self.happened.append(f"opened at {now}"),
+            lambda: self.happened.append("ended"),
             draw=random.Random(1),
             round_trips=RoundTrips(),
             notices=self.notices,
             take_over=take_over,
         )
         self.session._wanted = True
+
+    def wait(self, until: float) -> None:
+        self.wire.time = until
 
     def hello(self, now: float, session: int = 0, board_nonce: int = HELLO.board_nonce) -> None:
         hello = HELLO._replace(session=session, board_nonce=board_nonce)
@@ -214,7 +211,7 @@ def test_board_of_another_host_is_left_alone_or_taken_over(take_over: bool) -> N
         opening = next(iter(alone.sent()), None)
         alone.hello(until, session=77 ^ opening.host_nonce if isinstance(opening, messages.Open) else 99)
 
-    session._hooks = SessionHooks(wait=wait, opened=lambda _: None, ended=lambda: None)
+    alone.wait = wait  # type: ignore[method-assign]
     if take_over:
         session.open(2.0)
         assert session.is_open and alone.wire.time < 0.1
@@ -238,11 +235,6 @@ def test_closed_session_is_not_opened_again() -> None:
 
 def test_question_that_nobody_answers_is_asked_again_and_given_up() -> None:
     alone = Alone()
-
-    def wait(until: float) -> None:
-        alone.wire.time = until
-
-    alone.session._hooks = SessionHooks(wait=wait, opened=lambda _: None, ended=lambda: None)
     with pytest.raises(BoardError, match="the board at wire did not say which image it runs"):
         alone.session.ask(messages.Identify(), messages.Identity, "say which image it runs", 0.1)
     assert alone.sent() == [messages.Identify()] * 5
@@ -252,7 +244,7 @@ def test_question_that_nobody_answers_is_asked_again_and_given_up() -> None:
 
 
 def requests_of(sent: Sent, restarts: list[float] | None = None) -> Requests:
-    return Requests(sent.send, "wire", (restarts if restarts is not None else []).append)
+    return Requests(sent.append, "wire", (restarts if restarts is not None else []).append)
 
 
 def get(limit_s: float = 2.0) -> Request:
@@ -343,7 +335,7 @@ def test_retry_time_follows_from_tick_line_and_round_trips() -> None:
 
 def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> None:
     sent = Sent()
-    stop = MotorStop(sent.send)
+    stop = MotorStop(sent.append)
     stop._token = 253
     for _ in range(5):
         stop.begin()
@@ -359,7 +351,7 @@ def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> Non
 
 
 def test_session_begins_latched_so_that_a_stop_is_done() -> None:
-    stop = MotorStop(Sent().send)
+    stop = MotorStop(Sent().append)
     stop.begin()
     stop.session_opened()
     assert not stop.pending
@@ -409,7 +401,10 @@ def test_probe_tokens_roll_over() -> None:
         clock.receive(messages.ClockAnswer(token, 0).pack(), wire.time + 0.9)  # a copy
     assert tokens == [0xFFFE, 0xFFFF, 0, 1, 2]
     assert clock.estimate.probes == 5 and clock.round_trips.longest() == pytest.approx(0.001)
-    assert clock.estimate.bounded and abs(clock.estimate.at(wire.time)[1] - wire.time) < 600e-6
+    assert (
+        clock.estimate.bounded
+        and abs(clock.estimate.observe(round(wire.time * 1e6), wire.time + 0.001)[1] - wire.time) < 600e-6
+    )
 
 
 def test_clock_begins_anew_with_a_session_and_with_another_rate() -> None:
@@ -434,7 +429,7 @@ def events_of(sent: Sent) -> Events:
     """With a clock that knows the board's time."""
     clock = clock_on(Wire())
     clock.begin(1.0, 1_000_000, 0.0)
-    return Events(sent.send, clock)
+    return Events(sent.append, clock)
 
 
 def event(number: int, value: int = 0, time: int = 2_000_000) -> bytes:
@@ -485,7 +480,7 @@ def test_event_of_before_the_session_is_marked_and_waits_until_time_is_known() -
     events.receive(event(1, time=999_999), 0.0)
     (found,) = events.fetch()
     assert found.earlier and found.time == pytest.approx(0.999999)
-    unknown = Events(sent.send, clock_on(Wire()))
+    unknown = Events(sent.append, clock_on(Wire()))
     unknown.receive(event(1), 0.0)
     assert len(sent) == 1 and not unknown.waiting
 
@@ -533,7 +528,7 @@ def test_ticks_that_have_not_gone_on_are_a_reset(tick: int, resets: int) -> None
 
 def test_turret_and_tone_are_sent_until_a_message_shows_them() -> None:
     sent = Sent()
-    devices = SlowDevices(sent.send)
+    devices = SlowDevices(sent.append)
     turret = messages.Turret(1000, 1)
     devices.set_turret(turret, 24_900)
     devices.play_tone(messages.Buzzer(440, 10, 0))
@@ -549,7 +544,7 @@ def test_turret_and_tone_are_sent_until_a_message_shows_them() -> None:
 
 def test_turret_of_a_latched_board_waits_and_its_release_does_not() -> None:
     sent = Sent()
-    devices = SlowDevices(sent.send)
+    devices = SlowDevices(sent.append)
     devices.set_turret(messages.Turret(1000, 1), 24_900)
     devices.service(0.0, 0.1, True)
     assert sent == []
@@ -563,7 +558,7 @@ def test_turret_of_a_latched_board_waits_and_its_release_does_not() -> None:
 @pytest.mark.parametrize("end", ["stop", "session_opened"])
 def test_stop_and_new_session_end_what_is_pending(end: str) -> None:
     sent = Sent()
-    devices = SlowDevices(sent.send)
+    devices = SlowDevices(sent.append)
     devices.set_turret(messages.Turret(1000, 1), 24_900)
     devices.play_tone(messages.Buzzer(440, 10, 0))
     devices.service(0.0, 0.1, False)

@@ -69,13 +69,13 @@ class BoardClock:
         self._known = False
         self._expected = False
         self._us = 0  # newest board time, unwrapped
-        self._heard_s = 0.0  # host time of its receipt
+        self._received_s = 0.0  # host time of its receipt
         self._polygons: list[_Polygon] = []  # older, younger
         self._began: list[float] = []  # board times
 
     @property
     def known(self) -> bool:
-        """Whether anything was heard of the board's time."""
+        """Whether any of the board's times has come."""
         return self._known
 
     @property
@@ -98,23 +98,23 @@ class BoardClock:
         """Whether the newest board time's host time is known from both sides: a probe was answered."""
         return self._known and self._bound < _FAR_S / 4
 
-    def expect(self, board_s: float, heard_s: float) -> None:
+    def expect(self, board_s: float, received_s: float) -> None:
         """The board's time is about this (s) at that host time: from its count of ticks, which rolls over later."""
         if not self._known:
             self._expected = True
-            self._us, self._heard_s = round(board_s * 1e6), heard_s
+            self._us, self._received_s = round(board_s * 1e6), received_s
 
-    def unwrap(self, raw_us: int, heard_s: float) -> int:
-        """Board time (us) since reset from its low 32 bits, heard at that host time: nearest to what is expected."""
+    def unwrap(self, raw_us: int, received_s: float) -> int:
+        """Board time (us) since reset from its low 32 bits, received at that host time: nearest to what is expected."""
         if not (self._known or self._expected):
             return raw_us
-        expected = self._us + int((heard_s - self._heard_s) * 1e6)
+        expected = self._us + int((received_s - self._received_s) * 1e6)
         return raw_us + ((expected - raw_us + _WRAP_US // 2) // _WRAP_US) * _WRAP_US
 
     def probe(self, sent_s: float, raw_us: int, received_s: float) -> None:
         """Takes the board's time from the answer to a probe that was sent and answered at these host times."""
         self.probes += 1
-        board_s = self._hear(raw_us, received_s)
+        board_s = self._note(raw_us, received_s)
         byte_s = self._byte_s
         received_s -= _ANSWER_BYTES * byte_s
         sent_s += _PROBE_BYTES * byte_s - RESOLUTION_S
@@ -131,12 +131,12 @@ class BoardClock:
     def observe(self, raw_us: int, received_s: float) -> Stamp:
         """Takes the time of a telemetry message's tick, received at that host time; returns the tick's stamp."""
         if not self._known:
-            board_s = self._hear(raw_us, received_s)
+            board_s = self._note(raw_us, received_s)
             self._bound_by(board_s, received_s - _TELEMETRY_BYTES * self._byte_s, 1.0)
             self._refresh(board_s)
-        expected = self._us + int((received_s - self._heard_s) * 1e6)
+        expected = self._us + int((received_s - self._received_s) * 1e6)
         us = self._us = raw_us + ((expected - raw_us + 2147483648) // _WRAP_US) * _WRAP_US
-        self._heard_s = received_s
+        self._received_s = received_s
         board_s = us * 1e-6
         since_s = board_s - self._at_s
         latest_s = received_s - _TELEMETRY_BYTES * self._byte_s
@@ -166,21 +166,12 @@ class BoardClock:
         stamps.append(newest)
         return stamps
 
-    def at(self, board_s: float) -> Stamp:
-        """The stamp of a board time (s), unwrapped."""
-        since_s = board_s - self._at_s
-        return (
-            board_s,
-            self._middle + since_s * (1.0 + self._slope),
-            self._bound + abs(since_s) * self._slope_bound,
-        )
-
     # ---- inside --------------------------------------------------------------------------------------------
 
-    def _hear(self, raw_us: int, received_s: float) -> float:
+    def _note(self, raw_us: int, received_s: float) -> float:
         """Notes a board time; returns it unwrapped (s)."""
         us = self.unwrap(raw_us, received_s)
-        self._us, self._heard_s = us, received_s
+        self._us, self._received_s = us, received_s
         board_s = us * 1e-6
         if not self._known:
             self._known = True

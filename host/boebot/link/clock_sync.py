@@ -113,7 +113,7 @@ class ClockSync:
         if len(self._waiting) >= _KEPT:
             del self._waiting[next(iter(self._waiting))]
         self._waiting[self._token] = self._line.now()
-        self._line.send(messages.ClockProbe.ID, messages.ClockProbe.STRUCT.pack(self._token))
+        self._line.send(messages.ClockProbe(self._token))
 
     def _renew_estimate(self) -> None:
         self._byte_s = self._line.known_byte_s

@@ -64,7 +64,7 @@ class BoardCounters:
         self.received = 0
         self._last: messages.Counters | None = None
 
-    def take(self, counters: messages.Counters) -> None:
+    def add(self, counters: messages.Counters) -> None:
         """Adds what was counted since the message before."""
         before = self._last or messages.Counters(*(0,) * len(counters))
         for name, now, then in zip(counters._fields, counters, before, strict=True):

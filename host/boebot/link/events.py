@@ -84,7 +84,7 @@ class Events:
         event = messages.Event.unpack(payload)
         us = self._clock.estimate.unwrap(event.time, now_s)
         if self._accept(event, us * 1e-6, us < began_us):
-            self._send(messages.Acknowledge.ID, messages.Acknowledge.STRUCT.pack(event.number))
+            self._send(messages.Acknowledge(event.number))
 
     def _accept(self, event: messages.Event, time_s: float, earlier: bool) -> bool:
         """Whether it is to be acknowledged."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from boebot.link import messages
 from boebot.link.frame import NO_SESSION, Decoder, encode
 from boebot.link.transport import BaudSelectable, Stamping, Transport
 
@@ -15,8 +16,7 @@ _BAUD = 500_000  # assumed for time-outs where the transport does not know its r
 _BITS_PER_BYTE = 10
 
 Append = Callable[[str, float, bytes], None]
-Send = Callable[[int, bytes], None]
-"""`Line.send`: the id of a message, its payload"""
+Send = Callable[[messages.Message], object]
 Handlers = dict[int, Callable[[bytes, float], object]]
 """The id of a message -> what takes its payload and the time of its receipt"""
 
@@ -50,9 +50,9 @@ class Line:
         self._session = session
         self.decoder.seed = session or NO_SESSION
 
-    def send(self, message_id: int, payload: bytes) -> None:
+    def send(self, message: messages.Message) -> None:
         """Sends one message."""
-        frame = encode(message_id, self._sequence, payload, self._session)
+        frame = encode(message.ID, self._sequence, message.pack(), self._session)
         self._sequence = (self._sequence + 1) & 0xFF
         self.transport.write(frame)
         if self._record is not None:

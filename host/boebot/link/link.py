@@ -25,15 +25,12 @@ from boebot.link.line import AT_ONCE, NEVER, Append, Handlers, Line
 from boebot.link.motor_stop import MotorStop
 from boebot.link.parameter_values import parameter_counts, parameter_spec
 from boebot.link.requests import Request, RequestKind, Requests
-from boebot.link.session import Session, SessionHooks
+from boebot.link.session import Session
 from boebot.link.slow_devices import SlowDevices
 from boebot.link.telemetry import StampedTelemetry, TelemetryBuffer
 from boebot.link.times import LinkTimes
 from boebot.link.transport import CountsOverruns, Transport
 
-_SIGNAL = messages.SetpointSignal
-_SPEED = messages.SetpointSpeed
-_COAST = messages.SetpointCoast
 _TIME_OUT = messages.PARAMETERS["session_time_out"]
 _PERIOD = messages.PARAMETERS["telemetry_period"]
 _SHORTEST_S = 1e-4  # a wait that rounds to nothing would never end on a clock that only waits advance
@@ -94,7 +91,9 @@ class Link:
         self.clock = ClockSync(line, self.times, draw)
         self.session = Session(
             line,
-            SessionHooks(wait=self._turn_at_once, opened=self._session_opened, ended=self._session_ended),
+            self._turn,
+            self._session_opened,
+            self._session_ended,
             draw=draw,
             round_trips=self.clock.round_trips,
             notices=self.notices,
@@ -115,7 +114,7 @@ class Link:
             messages.Answer.ID: self._receive_answer,
             messages.Event.ID: self._events.receive,
             messages.Stopped.ID: self._stop.receive,
-            messages.Counters.ID: lambda payload, _: self.board_counters.take(messages.Counters.unpack(payload)),
+            messages.Counters.ID: lambda payload, _: self.board_counters.add(messages.Counters.unpack(payload)),
             messages.TaskTime.ID: self._receive_task_time,
             messages.ClockAnswer.ID: self.clock.receive,
         }
@@ -216,21 +215,17 @@ class Link:
 
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
         """Motor signals -1..1, in answer to the observation of `tick`."""
-        self.line.send(
-            _SIGNAL.ID,
-            _SIGNAL.STRUCT.pack(round(left * 10000), round(right * 10000), time_to_live_ms, tick & 0xFFFF),
-        )
+        counts = round(left * 10000), round(right * 10000)
+        self.line.send(messages.SetpointSignal(*counts, time_to_live_ms, tick & 0xFFFF))
 
     def send_speed(self, left_m_s: float, right_m_s: float, time_to_live_ms: int, tick: int) -> None:
         """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
-        self.line.send(
-            _SPEED.ID,
-            _SPEED.STRUCT.pack(round(left_m_s * 10000), round(right_m_s * 10000), time_to_live_ms, tick & 0xFFFF),
-        )
+        counts = round(left_m_s * 10000), round(right_m_s * 10000)
+        self.line.send(messages.SetpointSpeed(*counts, time_to_live_ms, tick & 0xFFFF))
 
     def send_coast(self, time_to_live_ms: int, tick: int) -> None:
         """No pulses, in answer to the observation of `tick`; nothing is latched."""
-        self.line.send(_COAST.ID, _COAST.STRUCT.pack(time_to_live_ms, tick & 0xFFFF))
+        self.line.send(messages.SetpointCoast(time_to_live_ms, tick & 0xFFFF))
 
     # ---- slow devices ------------------------------------------------------------------------------------------------
 
@@ -434,13 +429,8 @@ class Link:
     def _turn(self, until: float) -> None:
         """One step: sends what is due and receives what comes, at the latest until the given time."""
         now = self._now()
-        if now >= self._due:
-            self._service(now)
+        self._service(now)
         self._receive(max(min(until, self._due) - now, _SHORTEST_S), 0.0)
-
-    def _turn_at_once(self, until: float) -> None:
-        self._due = AT_ONCE
-        self._turn(until)
 
     def _service(self, now: float) -> None:
         """Sends what is due by now, and notes when the next is."""

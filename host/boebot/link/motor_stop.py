@@ -36,7 +36,7 @@ class MotorStop:
         if self._sent_s is None or now_s >= self._sent_s + retry_s:
             self.retransmitted += self._sent_s is not None
             self._sent_s = now_s
-            self._send(messages.Stop.ID, messages.Stop.STRUCT.pack(self._token))
+            self._send(messages.Stop(self._token))
         return self._sent_s + retry_s
 
     def receive(self, payload: bytes, _: float) -> None:

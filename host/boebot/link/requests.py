@@ -94,7 +94,7 @@ class Requests:
             self._under_way = None
             self._restart(now_s)
             return NEVER
-        self._send(request.kind.ID, request.kind.STRUCT.pack(request.number, *request.arguments))
+        self._send(request.kind(request.number, *request.arguments))
         if request.tries:
             self.retransmitted += 1
         else:

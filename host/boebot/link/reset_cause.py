@@ -1,4 +1,4 @@
-"""Why a board started, in words: what its hello tells of the last reset."""
+"""Why a board started, in words: the last reset by its hello."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ def by_watchdog(cause: int) -> bool:
 
 
 def hang_in_words(cause: int) -> str:
-    """What a reset by the watchdog tells of the firmware. An interrupt that hung is told as what it interrupted."""
+    """Where the firmware hung, as the watchdog found it: an interrupt that hung counts as what it interrupted."""
     name = in_words(cause).removeprefix("watchdog, ")
     also = "an interrupt meanwhile" if name.startswith("in task") else "the link, the main loop or an interrupt"
     return f"its watchdog, {name}: the firmware hung there, in {also}, or fell behind for good"
 
 
 def in_words(cause: int) -> str:
-    """As in "watchdog, in task encoder"; a cause that this kit does not know is told by its number."""
+    """As in "watchdog, in task encoder"; a cause that this kit does not know has its number as its name."""
     name = messages.ResetCause(cause).name
     if name.startswith(_IN_TASK):
         return f"watchdog, in task {name.removeprefix(_IN_TASK).lower()}"

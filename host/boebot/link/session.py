@@ -14,7 +14,6 @@ from __future__ import annotations
 import random
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
 from boebot.errors import BoardError, ProtocolError
@@ -37,18 +36,6 @@ OPEN_LIMIT_S = 2.0
 OPEN_LIMIT_RESET_S = 4.0  # where opening the port resets the board: its boot loader waits first
 
 
-@dataclass(frozen=True, kw_only=True)
-class SessionHooks:
-    """What a session needs of the link that it belongs to."""
-
-    wait: Callable[[float], None]
-    """lets the link work, at the latest until that time (s), and returns after each piece of bytes"""
-    opened: Callable[[float], None]
-    """called with the time when a session is open"""
-    ended: Callable[[], None]
-    """called when it is over, for whatever reason"""
-
-
 class Session:
     """The handshake of one link, and what is known by it.
 
@@ -65,7 +52,9 @@ class Session:
     def __init__(
         self,
         line: Line,
-        hooks: SessionHooks,
+        wait: Callable[[float], None],
+        opened: Callable[[float], None],
+        ended: Callable[[], None],
         *,
         draw: random.Random,
         round_trips: RoundTrips,
@@ -76,9 +65,11 @@ class Session:
 
         Args:
             line: to the board.
-            hooks: of the link.
+            wait: lets the link work, at the latest until that time (s); returns after each piece of bytes.
+            opened: called with the time when a session is open.
+            ended: called when it is over, for whatever reason.
             draw: gives nonces.
-            round_trips: on this line, which questions have to wait for.
+            round_trips: on this line; questions wait for them.
             notices: gets sentences for the user.
             take_over: take the board even if another host has it.
         """
@@ -89,7 +80,7 @@ class Session:
         self.time_out_s = 1.0
         self.refused: messages.Hello | None = None
         self._line = line
-        self._hooks = hooks
+        self._wait, self._opened, self._ended = wait, opened, ended
         self._draw = draw
         self._round_trips = round_trips
         self._notices = notices
@@ -99,7 +90,7 @@ class Session:
         self._number = 0
         self._own_numbers: deque[int] = deque(maxlen=16)
         self._opened_with = -1  # the board's nonce that opened the session
-        self._open_payload = b""
+        self._opening = messages.Open(0, 0, 0)
         self._open_due = NEVER
         self._hello_s = 0.0  # when the last one came
         self._other_host_since: float | None = None
@@ -146,7 +137,7 @@ class Session:
                     raise search.failure(self.hello, line.decoder.good, line.decoder.bad)
                 elif self.hello is None and (baud := search.next_baud(now)) is not None:
                     line.change_baud(baud)
-                self._hooks.wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
+                self._wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
         finally:
             line.listener = None
         if search.changed:
@@ -156,7 +147,7 @@ class Session:
         """Ends the session at once; sends nothing more until `open`."""
         self._wanted = False
         if self.is_open:
-            self._line.send(messages.Close.ID, messages.Close.STRUCT.pack(self._number))
+            self._line.send(messages.Close(self._number))
             self._end()
         self._open_due = NEVER
         self._use_number(0)
@@ -176,7 +167,7 @@ class Session:
         if now_s - self._hello_s > _PATIENCE_S:
             self._open_due = NEVER
         elif now_s >= self._open_due:
-            self._line.send(messages.Open.ID, self._open_payload)
+            self._line.send(self._opening)
             self._open_due = now_s + self._retry_s
         return self._open_due
 
@@ -195,7 +186,7 @@ class Session:
         self._own_numbers.append(number)
         self._opened_with = board_nonce
         self._other_host_since = None
-        self._open_payload = messages.Open(messages.PROTOCOL_VERSION, board_nonce, host_nonce).pack()
+        self._opening = messages.Open(messages.PROTOCOL_VERSION, board_nonce, host_nonce)
         self._open_due = now_s
         self._use_number(number)  # the board may use it in the same breath as its hello
 
@@ -203,7 +194,7 @@ class Session:
         self._number = number
         self._line.use_session(number)
 
-    def _opened(self, now_s: float) -> None:
+    def _confirmed(self, now_s: float) -> None:
         """The board has confirmed our session."""
         decoder = self._line.decoder
         if self.count == 0:
@@ -212,11 +203,11 @@ class Session:
         self._other_host_since = None
         self.count += 1
         self._open_due = NEVER
-        self._hooks.opened(now_s)
+        self._opened(now_s)
 
     def _end(self) -> None:
         self.is_open = False
-        self._hooks.ended()
+        self._ended()
 
     def _wait_for_other_host(self, now_s: float) -> None:
         """Another host has the board: takes it over if so wished, or gives up when that one is still there."""
@@ -253,7 +244,7 @@ class Session:
             self.hello = hello
             self.confirm()
             if not self.is_open:
-                self._opened(now_s)
+                self._confirmed(now_s)
         elif hello.session == 0 or hello.session in self._own_numbers:
             self._receive_no_session(hello, now_s)
         else:
@@ -304,10 +295,10 @@ class Session:
         end = now + limit_s
         self._answers = []
         while now < end:
-            line.send(question.ID, question.pack())
+            line.send(question)
             until = min(now + max(self._retry_s, 2 * self._round_trips.longest()), end)
             while (now := line.now()) < until:
-                self._hooks.wait(until)
+                self._wait(until)
                 answers, self._answers = self._answers, []
                 for answer in answers:
                     if isinstance(answer, kind) and accept(answer):

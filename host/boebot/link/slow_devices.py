@@ -87,14 +87,14 @@ class SlowDevices:
         if self._tone is not None and (self._tone_sent_s is None or now_s >= self._tone_sent_s + retry_s):
             self.retransmitted += self._tone_sent_s is not None
             self._tone_sent_s = now_s
-            self._send(self._tone.ID, self._tone.pack())
+            self._send(self._tone)
         turret, sent_s = self._turret, self._turret_sent_s
         if turret is None or (latched and turret.hold):
             return
         if sent_s is None or (now_s >= sent_s + retry_s and not self._turret_is_shown()):
             self.retransmitted += sent_s is not None
             self._turret_sent_s = now_s
-            self._send(turret.ID, turret.pack())
+            self._send(turret)
 
     def fetch(self) -> list[bytes]:
         """Payloads that came since the last call, oldest first."""
