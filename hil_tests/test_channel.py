@@ -114,7 +114,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
         if index % 10 == 0:
             assert link.get_parameter("ping_period") == value
     latencies.sort()
-    assert link.session.count == 1
+    assert link.counts.sessions == 1
     assert line.flipped > (10 if bit_errors < 1e-3 else 100), "the line was bad"
     if bit_errors <= 1e-4:
         assert latencies[round(0.99 * len(latencies))] <= 3 * TICK_S, latencies[-10:]
@@ -131,7 +131,7 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
     link = Link(line)
     link.open()
     listen(link, 0.2)
-    link.events()
+    link.events.fetch()
     pressed = []
     for _ in range(60):
         for level, flags in ((0, 1), (2, 0)):
@@ -139,10 +139,10 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
             listen(link, 0.15)
             pressed.append(flags)
     listen(link, 0.5)
-    told = [event for event in link.events() if event.kind == messages.EventKind.WHISKERS]
+    told = [event for event in link.events.fetch() if event.kind == messages.EventKind.WHISKERS]
     assert [event.value & 0xFF for event in told] == pressed
     assert all(a.time < b.time for a, b in itertools.pairwise(told))
-    assert link.session.count == 1
+    assert link.counts.sessions == 1
 
 
 @pytest.mark.parametrize("held_s", [2.0, 0.9])
@@ -157,7 +157,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     listen(link, 0.05)
     assert link.telemetry.latest is not None
     line.stalled = True
-    sessions = link.session.count
+    sessions = link.counts.sessions
     end = line.now() + held_s - 0.3
     tick = 0
     while line.now() < end:
@@ -170,7 +170,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     line.release()
     listen(link, 0.5)
     assert pulses(board) == 0
-    assert (link.session.count == sessions) is (held_s < 1.0)
+    assert (link.counts.sessions == sessions) is (held_s < 1.0)
     link.arm()
     listen(link, 0.02)
     link.send_signal(1.0, 1.0, 250, messages.Telemetry.unpack(link.telemetry.latest).tick)
@@ -186,14 +186,14 @@ def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s:
     link.arm()
     listen(link, at_s)
     for cause in ("external", "brown_out", "watchdog"):
-        sessions = link.session.count
+        sessions = link.counts.sessions
         begun = line.now()
         board.board.reset(cause)  # type: ignore[attr-defined]
         link.submit(messages.GetParameter, PING.id, what="tell")  # under way as it happens
-        while link.session.count == sessions or link.telemetry.latest is None:
+        while link.counts.sessions == sessions or link.telemetry.latest is None:
             link.poll(TICK_S)
             assert line.now() - begun < 1.0
         assert link.session.hello is not None
         assert link.session.hello.reset_cause == messages.ResetCause[cause.upper()]
         assert messages.Telemetry.unpack(link.telemetry.latest).latch == messages.Latch.START
-    assert link.telemetry.board_resets == link.session.lost == 3
+    assert link.counts.board_resets == link.counts.sessions_lost == 3

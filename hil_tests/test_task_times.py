@@ -169,10 +169,10 @@ def test_the_host_says_in_words_where_the_board_hung(tmp_path: Path) -> None:
     """It hangs where a set-point is carried out, in a poll of the link, so that a session comes before."""
     for link in linked("avr", planted(tmp_path, "safety_accept", JUMP_TO_ITSELF)):
         assert not link.notices
-        resets = link.telemetry.board_resets
+        resets = link.counts.board_resets
         link.send_coast(250, 0)
         end = link.transport.now() + 3.0
-        while link.telemetry.board_resets == resets and link.transport.now() < end:
+        while link.counts.board_resets == resets and link.transport.now() < end:
             link.poll(TICK_S)
         assert any("watchdog, outside of its tasks" in notice for notice in link.notices), link.notices
 

@@ -527,7 +527,7 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     before = link_command.Rates(watched)
     assert link_command.look(watched, before)["clock_bound_us"] < 500
     board.peer.reset()
-    while watched.session.count == 1:
+    while watched.counts.sessions == 1:
         watched.poll(0.001)
     seen = link_command.look(watched, before)
     assert watched.clock.estimate.probes > 0

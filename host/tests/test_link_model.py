@@ -150,7 +150,7 @@ class LinkModel(RuleBasedStateMachine):
         assert (
             len(link.telemetry.waiting) <= link.telemetry.ROOM
             and len(link.clock._waiting) <= 64
-            and len(link._events.waiting) <= Events.ROOM
+            and len(link.events.waiting) <= Events.ROOM
         )
         assert len(link._requests._waiting) <= Requests.ROOM and len(self.peer._events) <= QUEUE + len(
             messages.EventKind
@@ -164,7 +164,7 @@ class LinkModel(RuleBasedStateMachine):
         self.listen(PATIENCE_S if not self.link.session.is_open else RESUME_S)
         assert self.link.session.is_open
         assert self.link.session.hello is not None and self.peer.session == self.link.session.hello.session
-        sessions = self.link.session.count
+        sessions = self.link.counts.sessions
         self.value += 1
         assert self.link.request(messages.SetParameter, VALUES.id, self.value, what="set").value == self.value
         self.something_happens_on_the_board()
@@ -173,7 +173,7 @@ class LinkModel(RuleBasedStateMachine):
         assert len(self.link.telemetry.fetch()) >= 48
         self.fetch()
         assert self.heard[-1] == self.told
-        assert self.link.session.count == sessions, "and stays so"
+        assert self.link.counts.sessions == sessions, "and stays so"
         self.peer.reset()
         self.listen(RESUME_S)
         assert self.link.session.is_open and self.link.telemetry.latest is not None
@@ -191,7 +191,7 @@ class LinkModel(RuleBasedStateMachine):
                 self.fetch()
 
     def fetch(self) -> None:
-        self.heard += [event.value for event in self.link.events() if event.kind == messages.EventKind.DEAD_MAN]
+        self.heard += [event.value for event in self.link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
 
 
 LINES = settings(stateful_step_count=25)  # as many examples as the profile says

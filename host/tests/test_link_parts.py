@@ -12,6 +12,7 @@ import pytest
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.clock_sync import ClockSync, RoundTrips
+from boebot.link.counters import HostCounters
 from boebot.link.errors import SessionLostError, TakenOverError
 from boebot.link.events import Events
 from boebot.link.fields import reader, text
@@ -118,15 +119,16 @@ class Alone:
     def __init__(self, take_over: bool = False) -> None:
         self.wire = Wire()
         self.happened: list[str] = []
-        self.notices: list[str] = []
+        self.counts = HostCounters()
         self.session = Session(
             Line(self.wire),
             lambda until: self.wait(until),
             lambda now: self.happened.append(f"opened at {now}"),
             lambda: self.happened.append("ended"),
+            counts=self.counts,
             draw=random.Random(1),
             round_trips=RoundTrips(),
-            notices=self.notices,
+            notices=[],
             take_over=take_over,
         )
         self.session._wanted = True
@@ -159,7 +161,7 @@ def test_session_is_opened_by_two_hellos() -> None:
     alone = Alone()
     assert alone.session.service(0.0) == NEVER and alone.sent() == [], "silent until the hello"
     number = alone.open()
-    assert alone.happened == ["opened at 0.01"] and alone.session.count == 1
+    assert alone.happened == ["opened at 0.01"] and alone.counts.sessions == 1
     assert alone.session.hello == HELLO._replace(session=number) and alone.session.time_out_s == 1.0
 
 
@@ -179,7 +181,7 @@ def test_hello_of_a_reset_board_ends_the_session_and_begins_another() -> None:
     alone.hello(0.5)
     assert alone.session.is_open, "it was sent before the session was opened"
     alone.hello(0.6, board_nonce=78)
-    assert (alone.session.is_open, alone.session.lost, alone.happened[1:]) == (False, 1, ["ended"])
+    assert (alone.session.is_open, alone.counts.sessions_lost, alone.happened[1:]) == (False, 1, ["ended"])
     alone.session.service(0.6)
     (opening,) = alone.sent()
     assert isinstance(opening, messages.Open) and opening.board_nonce == 78 and 78 ^ opening.host_nonce != number
@@ -197,7 +199,7 @@ def test_session_gives_way_to_another_host_unless_its_telemetry_goes_on(telemetr
     else:
         with pytest.raises(TakenOverError, match="another program has taken the board at wire"):
             alone.hello(0.7, session=99)
-        assert not alone.session.is_open and alone.session.lost == 1
+        assert not alone.session.is_open and alone.counts.sessions_lost == 1
 
 
 @pytest.mark.parametrize("take_over", [False, True])
@@ -225,7 +227,7 @@ def test_closed_session_is_not_opened_again() -> None:
     alone = Alone()
     number = alone.open()
     alone.session.close()
-    assert alone.happened[1:] == ["ended"] and alone.session.hello is None and alone.session.lost == 0
+    assert alone.happened[1:] == ["ended"] and alone.session.hello is None and alone.counts.sessions_lost == 0
     frames = Decoder(number, to_board=True).feed(b"\0" + alone.wire.written)
     assert [payload for _, _, payload in frames] == [messages.Close(number).pack()]
     alone.sent()
@@ -244,7 +246,7 @@ def test_question_that_nobody_answers_is_asked_again_and_given_up() -> None:
 
 
 def requests_of(sent: Sent, restarts: list[float] | None = None) -> Requests:
-    return Requests(sent.append, "wire", (restarts if restarts is not None else []).append)
+    return Requests(sent.append, HostCounters(), "wire", (restarts if restarts is not None else []).append)
 
 
 def get(limit_s: float = 2.0) -> Request:
@@ -258,13 +260,16 @@ def test_requests_go_one_at_a_time_and_again_until_they_are_answered() -> None:
     requests.submit(second, 0.0)
     assert requests.service(0.0, 0.1) == 0.1
     at(0.05, 0.1, service=lambda now: requests.service(now, 0.1))
-    assert sent == [messages.GetParameter(1, 7)] * 2 and requests.retransmitted == 1
+    assert sent == [messages.GetParameter(1, 7)] * 2 and requests._counts.retransmitted == 1
     assert requests.receive(messages.Answer(1, 0, 9).pack()) is first and first.answer is not None and first.done
     requests.service(0.12, 0.1)
     assert sent[2:] == [messages.GetParameter(2, 7)] and not second.done
-    assert requests.receive(messages.Answer(1, 0, 9).pack()) is None and (requests.stray, requests.duplicate) == (1, 0)
+    assert requests.receive(messages.Answer(1, 0, 9).pack()) is None and (
+        requests._counts.stray,
+        requests._counts.duplicate,
+    ) == (1, 0)
     requests.receive(messages.Answer(2, 0, 9).pack())
-    assert requests.receive(messages.Answer(2, 0, 9).pack()) is None and requests.duplicate == 1
+    assert requests.receive(messages.Answer(2, 0, 9).pack()) is None and requests._counts.duplicate == 1
     assert requests.service(0.3, 0.1) == NEVER
 
 
@@ -335,7 +340,7 @@ def test_retry_time_follows_from_tick_line_and_round_trips() -> None:
 
 def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> None:
     sent = Sent()
-    stop = MotorStop(sent.append)
+    stop = MotorStop(sent.append, HostCounters())
     stop._token = 253
     for _ in range(5):
         stop.begin()
@@ -345,13 +350,13 @@ def test_stop_tokens_roll_over_and_a_late_confirmation_confirms_nothing() -> Non
         stop.receive(messages.Stopped(token).pack(), 0.0)
         assert stop.pending
     assert stop.service(0.005, 0.01) == 0.01 and stop.service(0.01, 0.01) == 0.02
-    assert len(sent) == 6 and stop.retransmitted == 1
+    assert len(sent) == 6 and stop._counts.retransmitted == 1
     stop.receive(messages.Stopped(2).pack(), 0.0)
     assert not stop.pending and stop.service(1.0, 0.01) == NEVER
 
 
 def test_session_begins_latched_so_that_a_stop_is_done() -> None:
-    stop = MotorStop(Sent().append)
+    stop = MotorStop(Sent().append, HostCounters())
     stop.begin()
     stop.session_opened()
     assert not stop.pending
@@ -429,7 +434,7 @@ def events_of(sent: Sent) -> Events:
     """With a clock that knows the board's time."""
     clock = clock_on(Wire())
     clock.begin(1.0, 1_000_000, 0.0)
-    return Events(sent.append, clock)
+    return Events(sent.append, HostCounters(), clock)
 
 
 def event(number: int, value: int = 0, time: int = 2_000_000) -> bytes:
@@ -448,7 +453,7 @@ def test_events_are_handed_on_once_and_in_order() -> None:
     events = events_of(sent)
     assert receive(events, [event(1, 5), event(1, 5), event(3, 7), event(2, 6), event(3, 7)]) == [5, 6, 7]
     assert [one.number for one in sent] == [1, 1, 2, 3]  # type: ignore[union-attr]
-    assert (events.duplicate, events.stray, list(events.waiting)) == (1, 1, [])
+    assert (events._counts.duplicate, events._counts.stray, list(events.waiting)) == (1, 1, [])
 
 
 def test_event_numbers_roll_over() -> None:
@@ -462,7 +467,7 @@ def test_events_that_nobody_fetches_are_not_acknowledged() -> None:
     events = events_of(sent)
     for number in range(1, Events.ROOM + 2):
         events.receive(event(number, number), 0.0)
-    assert len(sent) == len(events.waiting) == Events.ROOM and events.held == 1
+    assert len(sent) == len(events.waiting) == Events.ROOM and events._counts.held == 1
     assert len(events.fetch()) == Events.ROOM
     assert receive(events, [event(Events.ROOM + 1, 9)]) == [9]
 
@@ -471,7 +476,7 @@ def test_event_that_was_handed_on_and_not_acknowledged_comes_again_and_is_droppe
     events = events_of(Sent())
     assert receive(events, [event(8, 7)]) == [] and receive(events, [event(1, 7)]) == [7]
     events.session_opened()
-    assert receive(events, [event(1, 7), event(2, 8)]) == [8] and events.duplicate == 1
+    assert receive(events, [event(1, 7), event(2, 8)]) == [8] and events._counts.duplicate == 1
 
 
 def test_event_of_before_the_session_is_marked_and_waits_until_time_is_known() -> None:
@@ -480,7 +485,7 @@ def test_event_of_before_the_session_is_marked_and_waits_until_time_is_known() -
     events.receive(event(1, time=999_999), 0.0)
     (found,) = events.fetch()
     assert found.earlier and found.time == pytest.approx(0.999999)
-    unknown = Events(sent.append, clock_on(Wire()))
+    unknown = Events(sent.append, HostCounters(), clock_on(Wire()))
     unknown.receive(event(1), 0.0)
     assert len(sent) == 1 and not unknown.waiting
 
@@ -493,17 +498,17 @@ def telemetry(tick: int) -> bytes:
 
 
 def test_telemetry_that_nobody_fetches_does_not_fill_the_memory() -> None:
-    buffer = TelemetryBuffer(clock_on(Wire()))
+    buffer = TelemetryBuffer(clock_on(Wire()), HostCounters())
     for tick in range(TelemetryBuffer.ROOM + 50):
         buffer.receive(telemetry(tick), tick * 0.01)
         buffer.stamp(tick * 0.01)
     found = buffer.fetch()
-    assert len(found) == TelemetryBuffer.ROOM and buffer.dropped == 50 and buffer.waiting == []
+    assert len(found) == TelemetryBuffer.ROOM and buffer._counts.dropped == 50 and buffer.waiting == []
     assert found[0][0] == telemetry(50) and found[0][1] == pytest.approx(0.5)
 
 
 def test_telemetry_that_came_together_is_stamped_together() -> None:
-    buffer = TelemetryBuffer(clock_on(Wire()))
+    buffer = TelemetryBuffer(clock_on(Wire()), HostCounters())
     for tick in (3, 4):
         buffer.receive(telemetry(tick), 1.0)
     assert buffer.waiting == [] and buffer.latest == telemetry(4)
@@ -515,12 +520,12 @@ def test_telemetry_that_came_together_is_stamped_together() -> None:
 @pytest.mark.parametrize(("tick", "resets"), [(150, 0), (101, 0), (7, 1)])
 def test_ticks_that_have_not_gone_on_are_a_reset(tick: int, resets: int) -> None:
     """A second session begins half a second after tick 100 came, at 100 ticks a second."""
-    buffer = TelemetryBuffer(clock_on(Wire()))
+    buffer = TelemetryBuffer(clock_on(Wire()), HostCounters())
     assert buffer.begin(telemetry(100), 1.0, 0.01), "the board has started before"
     buffer.receive(telemetry(100), 1.0)
     buffer.session_ended()
     assert buffer.latest is None
-    assert buffer.begin(telemetry(tick), 1.5, 0.01) is bool(resets) and buffer.board_resets == resets
+    assert buffer.begin(telemetry(tick), 1.5, 0.01) is bool(resets) and buffer._counts.board_resets == resets
 
 
 # ---- slow devices ----------------------------------------------------------------------------------------------------
@@ -528,12 +533,12 @@ def test_ticks_that_have_not_gone_on_are_a_reset(tick: int, resets: int) -> None
 
 def test_turret_and_tone_are_sent_until_a_message_shows_them() -> None:
     sent = Sent()
-    devices = SlowDevices(sent.append)
+    devices = SlowDevices(sent.append, HostCounters())
     turret = messages.Turret(1000, 1)
     devices.set_turret(turret, 24_900)
     devices.play_tone(messages.Buzzer(440, 10, 0))
     at(0.0, 0.05, 0.1, service=lambda now: devices.service(now, 0.1, False))
-    assert sent == [messages.Buzzer(440, 10, 1), turret] * 2 and devices.retransmitted == 2
+    assert sent == [messages.Buzzer(440, 10, 1), turret] * 2 and devices._counts.retransmitted == 2
     devices.receive(DEVICES._replace(buzzer_token=1, turret_pulse=24_901).pack())
     at(0.2, 0.3, service=lambda now: devices.service(now, 0.1, False))
     assert len(sent) == 4 and devices.pending, "a dead-man stop may release the turret"
@@ -544,7 +549,7 @@ def test_turret_and_tone_are_sent_until_a_message_shows_them() -> None:
 
 def test_turret_of_a_latched_board_waits_and_its_release_does_not() -> None:
     sent = Sent()
-    devices = SlowDevices(sent.append)
+    devices = SlowDevices(sent.append, HostCounters())
     devices.set_turret(messages.Turret(1000, 1), 24_900)
     devices.service(0.0, 0.1, True)
     assert sent == []
@@ -558,7 +563,7 @@ def test_turret_of_a_latched_board_waits_and_its_release_does_not() -> None:
 @pytest.mark.parametrize("end", ["stop", "session_opened"])
 def test_stop_and_new_session_end_what_is_pending(end: str) -> None:
     sent = Sent()
-    devices = SlowDevices(sent.append)
+    devices = SlowDevices(sent.append, HostCounters())
     devices.set_turret(messages.Turret(1000, 1), 24_900)
     devices.play_tone(messages.Buzzer(440, 10, 0))
     devices.service(0.0, 0.1, False)

@@ -315,11 +315,11 @@ def test_reset_at_any_moment_and_the_traffic_resumes(at_ms: int) -> None:
     listen(link, 0.5 + at_ms / 1000)
     reset_s = session.now()
     peer.reset()
-    while link.session.count == 1 or not listen(link, 0.005):
+    while link.counts.sessions == 1 or not listen(link, 0.005):
         listen(link, 0.001)
         assert session.now() - reset_s < 1.0
     assert session.now() - reset_s < 0.05, "the board says hello at once"
-    assert (link.session.count, link.telemetry.board_resets, link.session.lost) == (2, 1, 1)
+    assert (link.counts.sessions, link.counts.board_resets, link.counts.sessions_lost) == (2, 1, 1)
     assert peer.latch == Latch.START
 
 
@@ -339,7 +339,7 @@ def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
     session.read(3.0, 3.0)
     assert peer.session == 0 and peer.latch == Latch.SESSION_ENDED
     assert listen(link, 0.2)
-    assert (link.session.count, link.telemetry.board_resets) == (2, 0)
+    assert (link.counts.sessions, link.counts.board_resets) == (2, 0)
     assert peer.latch == Latch.SESSION_ENDED, "not armed by itself"
 
 
@@ -351,7 +351,7 @@ def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
     listen(link, 6 + 20 * time_out_ms / 1000)
     probes = [at for at, frame in sent(link) if frame[2] == messages.ClockProbe.ID][before:]
     late = [b - a for a, b in itertools.pairwise(probes)]
-    assert link.session.count == 1
+    assert link.counts.sessions == 1
     assert max(late) <= time_out_ms / 4000, "at least four in that time"
     assert len(set(late)) > len(late) / 2, "at irregular intervals"
 
@@ -363,7 +363,7 @@ def test_late_hello_of_the_time_before_does_no_harm() -> None:
     hellos = [frame for _, way, frame in trace if way == "host" and frame[2] == messages.Hello.ID]
     session._schedule(session.now() + 0.03, "host", hellos[0])
     listen(link, 0.5)
-    assert link.session.count == 1
+    assert link.counts.sessions == 1
 
 
 def test_frames_of_an_earlier_session_are_refused() -> None:
@@ -603,10 +603,10 @@ def test_events_come_once_and_in_order_over_a_bad_line() -> None:
         told.append(number)
         for _ in range(12):
             listen(link, 0.01)
-            heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
+            heard += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
     listen(link, 1.0)
-    heard += [event.value for event in link.events() if event.kind == messages.EventKind.DEAD_MAN]
-    assert link.session.count == 1
+    heard += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
+    assert link.counts.sessions == 1
     assert heard == sorted(set(heard)), "each once, in order"
     assert len(heard) == len(told) - peer.counts["deferred"] and heard[-1] == told[-1]
     assert link.counters().duplicate > 0
@@ -702,7 +702,7 @@ def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
     link, peer, session = joined()
     link.arm()
     listen(link, 0.1)
-    link.events()
+    link.events.fetch()
     link.send_signal(0.5, 0.5, 250, peer.ticks - 1)
     listen(link, 0.05)
     asleep = session.now()
@@ -712,7 +712,7 @@ def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
     session._buffer.clear()
     assert not peer.session
     listen(link, 1.0)
-    told = link.events()
+    told = link.events.fetch()
     assert [(event.kind, event.value) for event in told] == [
         (messages.EventKind.DEAD_MAN, peer.accepted[-1].answers_tick),
         (messages.EventKind.LATCH, messages.Latch.SESSION_ENDED),
@@ -722,7 +722,7 @@ def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
     assert times == pytest.approx([0.2, 1.0], abs=0.06)
     link.arm()
     listen(link, 0.1)
-    assert [(event.value, event.earlier) for event in link.events()] == [(messages.Latch.NONE, False)]
+    assert [(event.value, event.earlier) for event in link.events.fetch()] == [(messages.Latch.NONE, False)]
 
 
 def test_overruns_are_those_that_the_transport_knows_of() -> None:

@@ -64,7 +64,7 @@ def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]
         if ended:
             return
         watched.poll(max(min(next_look - now(), _WAIT_S), 0.0))
-        before.events += [str(event) for event in watched.events()]
+        before.events += [str(event) for event in watched.events.fetch()]
 
 
 class Rates:

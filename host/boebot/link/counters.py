@@ -11,11 +11,11 @@ _MODULUS = 65536
 
 @dataclass
 class HostCounters:
-    """What the host's end has counted since the link was made.
+    """What the host's end has counted since the link was made; each part of the link counts into the same object.
 
     Nine of them have the board's names, so that both ends stand side by side: good, bad, unknown, resynchronised,
     retransmitted, duplicate, overrun, dropped, late. Where they are about other things at the other end they say so.
-    The decoder counts good, bad, resynchronised and lost frames, the transport overrun, the session the rest.
+    The decoder counts good, bad, unknown, resynchronised and lost frames, the transport overrun.
     """
 
     good: int = 0
@@ -45,7 +45,7 @@ class HostCounters:
     held: int = 0
     """events left unacknowledged because nobody fetched those before"""
     sessions: int = 0
-    """sessions opened"""
+    """sessions opened; another one means that the board is latched and may have forgotten everything"""
     board_resets: int = 0
     """times that a new session's count of ticks had not gone on from that of the session before"""
     sessions_lost: int = 0

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from boebot.link import messages
 from boebot.link.clock_sync import ClockSync
+from boebot.link.counters import HostCounters
 from boebot.link.line import Send
 
 _NUMBERS = 65536
@@ -45,23 +46,20 @@ class BoardEvent:
 
 
 class Events:
-    """The board's events until they are fetched. Numbers are of one session; an event that was not acknowledged when a
-    session ended comes again in the next.
+    """The board's events until they are fetched: those first that happened before this session and had not been
+    acknowledged (`earlier`). Numbers are of one session; an event that was not acknowledged when it ended comes again.
 
     Attributes:
-        waiting: to be fetched, oldest first.
-        duplicate, stray, held: counted.
+        waiting: to be fetched, oldest first. It is the same object as long as the link lives.
     """
 
     ROOM = 256  # events that wait to be fetched; later ones stay with the board
 
-    def __init__(self, send: Send, clock: ClockSync) -> None:
+    def __init__(self, send: Send, counts: HostCounters, clock: ClockSync) -> None:
         """Acknowledges by `send`; `clock` gives the events' times."""
         self.waiting: deque[BoardEvent] = deque()
-        self.duplicate = 0
-        self.stray = 0
-        self.held = 0
         self._send = send
+        self._counts = counts
         self._clock = clock
         self._last: int | None = None  # number in this session
         self._handed_on: messages.Event | None = None
@@ -89,18 +87,18 @@ class Events:
     def _accept(self, event: messages.Event, time_s: float, earlier: bool) -> bool:
         """Whether it is to be acknowledged."""
         if event.number == self._last:
-            self.duplicate += 1
+            self._counts.duplicate += 1
             return True
         if event.number != ((self._last or 0) + 1) % _NUMBERS:
-            self.stray += 1
+            self._counts.stray += 1
             return False
         if len(self.waiting) >= self.ROOM:
-            self.held += 1
+            self._counts.held += 1
             return False
         again = self._last is None and self._handed_on is not None and event[1:] == self._handed_on[1:]
         self._last, self._handed_on = event.number, event
         if again:
-            self.duplicate += 1
+            self._counts.duplicate += 1
         else:
             self.waiting.append(BoardEvent(event.kind, event.value, time_s, earlier))
         return True

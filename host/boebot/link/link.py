@@ -5,21 +5,21 @@
 None of them has a thread: all of that happens inside the calls of `Link` that wait for the board.
 
 When the board was reset, or has not heard the host for too long, its next hello says so, and the link opens a new
-session by itself: `session.count` counts them, and the program that configured and armed the board does it again.
+session by itself: `counts.sessions` counts them, and the program that configured and armed the board does it again.
 """
 
 from __future__ import annotations
 
 import random
 import secrets
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch, reset_cause
 from boebot.link.clock_sync import ClockSync
 from boebot.link.counters import BoardCounters, HostCounters
 from boebot.link.errors import LatchedAgainError
-from boebot.link.events import BoardEvent, Events
+from boebot.link.events import Events
 from boebot.link.fields import reader
 from boebot.link.line import AT_ONCE, NEVER, Append, Handlers, Line
 from boebot.link.motor_stop import MotorStop
@@ -55,7 +55,8 @@ class Link:
         transport: where the board is.
         times: time-outs.
         notices: sentences for the user; a program that shows them takes them out.
-        line, session, clock, telemetry, devices: the parts, with attributes of their own.
+        line, session, clock, telemetry, devices, events: the parts.
+        counts: what the host's end has counted; `counters` brings the frames' counts up to date.
         board_counters: what the board's end has counted.
         task_times: the longest time of each task of the firmware since the session was opened, by its name: cycles of
             1/16 us, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board
@@ -87,6 +88,7 @@ class Link:
         self.board_counters = BoardCounters()
         self.task_times: dict[str, int | None] = dict.fromkeys(_TASKS)
         self.polled_s = 0.0
+        self.counts = counts = HostCounters()
         self.line = line = Line(transport, record)
         self.clock = ClockSync(line, self.times, draw)
         self.session = Session(
@@ -94,16 +96,17 @@ class Link:
             self._turn,
             self._session_opened,
             self._session_ended,
+            counts=counts,
             draw=draw,
             round_trips=self.clock.round_trips,
             notices=self.notices,
             take_over=take_over,
         )
-        self.telemetry = TelemetryBuffer(self.clock)
-        self.devices = SlowDevices(line.send)
-        self._requests = Requests(line.send, transport.name, self.session.restart)
-        self._events = Events(line.send, self.clock)
-        self._stop = MotorStop(line.send)
+        self.telemetry = TelemetryBuffer(self.clock, counts)
+        self.devices = SlowDevices(line.send, counts)
+        self._requests = Requests(line.send, counts, transport.name, self.session.restart)
+        self.events = Events(line.send, counts, self.clock)
+        self._stop = MotorStop(line.send, counts)
         self._now = line.now
         self._due = NEVER  # when something is to be sent next
         handshake: Handlers = self.session.handlers | {messages.Hello.ID: self._receive_hello}
@@ -112,7 +115,7 @@ class Link:
             messages.Telemetry.ID: self._receive_telemetry,
             messages.DevicesTelemetry.ID: self._receive_devices,
             messages.Answer.ID: self._receive_answer,
-            messages.Event.ID: self._events.receive,
+            messages.Event.ID: self.events.receive,
             messages.Stopped.ID: self._stop.receive,
             messages.Counters.ID: lambda payload, _: self.board_counters.add(messages.Counters.unpack(payload)),
             messages.TaskTime.ID: self._receive_task_time,
@@ -152,31 +155,18 @@ class Link:
         )
 
     def counters(self) -> HostCounters:
-        """What the host's end has counted."""
-        decoder, requests, events, telemetry = self.line.decoder, self._requests, self._events, self.telemetry
-        return HostCounters(
-            good=decoder.good,
-            bad=decoder.bad,
-            unknown=decoder.unknown,
-            resynchronised=decoder.resynchronised,
-            lost=decoder.lost,
-            retransmitted=requests.retransmitted + self._stop.retransmitted + self.devices.retransmitted,
-            duplicate=requests.duplicate + events.duplicate,
-            stray=requests.stray + events.stray,
-            overrun=self.transport.overruns if isinstance(self.transport, CountsOverruns) else 0,
-            dropped=telemetry.dropped + self.devices.dropped,
-            late=telemetry.late,
-            held=events.held,
-            sessions=self.session.count,
-            board_resets=telemetry.board_resets,
-            sessions_lost=self.session.lost,
-        )
+        """`counts`, with those of decoder and transport."""
+        decoder, counts = self.line.decoder, self.counts
+        counts.good, counts.bad, counts.unknown = decoder.good, decoder.bad, decoder.unknown
+        counts.resynchronised, counts.lost = decoder.resynchronised, decoder.lost
+        counts.overrun = self.transport.overruns if isinstance(self.transport, CountsOverruns) else 0
+        return counts
 
     # ---- telemetry, events, set-points -------------------------------------------------------------------------------
 
     def poll(self, wait_s: float, quiet_s: float = 0.0) -> list[StampedTelemetry]:
         """The telemetry that arrived, oldest first; waits for some as `Transport.read` does, and keeps the session
-        alive meanwhile. Opens a new session if need be: see `session.count`.
+        alive meanwhile. Opens a new session if need be: see `counts.sessions`.
 
         Raises:
             BoardError: the board has gone, or another program keeps taking it.
@@ -201,17 +191,6 @@ class Link:
             if (self.telemetry.waiting and now >= look_s) or now >= end_s:
                 self.polled_s = now
                 return self.telemetry.fetch()
-
-    @property
-    def waiting_events(self) -> Collection[BoardEvent]:
-        """What `events` would return: the same object as long as the link lives."""
-        return self._events.waiting
-
-    def events(self) -> list[BoardEvent]:
-        """What happened on the board since the last call, in order; first what happened before this session and had not
-        been acknowledged (`earlier`). Events that nobody fetches are, after some, no longer acknowledged, so that the
-        board keeps them."""
-        return self._events.fetch()
 
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
         """Motor signals -1..1, in answer to the observation of `tick`."""
@@ -327,12 +306,12 @@ class Link:
 
     def _fresh_telemetry(self, end: float) -> bytes:
         """Telemetry of this session that comes from now on."""
-        before, sessions = self.telemetry.latest, self.session.count
+        before, sessions = self.telemetry.latest, self.counts.sessions
         while self.telemetry.latest is None or self.telemetry.latest is before:
             if self._now() >= end:
                 raise BoardError(f"the board at {self.transport.name} sends no telemetry")
-            if self.session.count != sessions:
-                before, sessions = None, self.session.count
+            if self.counts.sessions != sessions:
+                before, sessions = None, self.counts.sessions
             self._turn(end)
         return self.telemetry.latest
 
@@ -395,7 +374,7 @@ class Link:
         while (passed := self._now() - begun) < least or (None in self.task_times.values() and passed < most):
             progress(min(passed / least, 1.0))
             self.poll(_LOOK_S)
-            self.events()
+            self.events.fetch()
         missing = [name for name, cycles in self.task_times.items() if cycles is None]
         if missing:
             raise BoardError(
@@ -466,7 +445,7 @@ class Link:
         self.telemetry.session_opened(session.telemetry_s)
         self.devices.session_opened()
         self._requests.session_opened()
-        self._events.session_opened()
+        self.events.session_opened()
         self._stop.session_opened()
         self.task_times = dict.fromkeys(_TASKS)
         self._due = AT_ONCE
@@ -491,11 +470,11 @@ class Link:
 
     def _begin_telemetry(self, payload: bytes, now: float) -> None:
         """The first of a session shows whether the board was reset before."""
-        hello, telemetry = self.session.hello, self.telemetry
+        hello = self.session.hello
         assert hello is not None
-        resets = telemetry.board_resets
-        has_started = telemetry.begin(payload, now, self.session.tick_s)
-        if telemetry.board_resets != resets:
+        resets = self.counts.board_resets
+        has_started = self.telemetry.begin(payload, now, self.session.tick_s)
+        if self.counts.board_resets != resets:
             self.board_counters.restarted()
         if has_started and reset_cause.by_watchdog(hello.reset_cause):
             cause = reset_cause.hang_in_words(hello.reset_cause)

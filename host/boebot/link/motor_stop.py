@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from boebot.link import messages
+from boebot.link.counters import HostCounters
 from boebot.link.line import NEVER, Send
 
 _TOKENS = 256
@@ -13,13 +14,12 @@ class MotorStop:
 
     Attributes:
         pending: a stop is not yet confirmed.
-        retransmitted: counted.
     """
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, counts: HostCounters) -> None:
         self.pending = False
-        self.retransmitted = 0
         self._send = send
+        self._counts = counts
         self._token = 0
         self._sent_s: float | None = None  # when the stop of this token was last sent
 
@@ -34,7 +34,7 @@ class MotorStop:
         if not self.pending:
             return NEVER
         if self._sent_s is None or now_s >= self._sent_s + retry_s:
-            self.retransmitted += self._sent_s is not None
+            self._counts.retransmitted += self._sent_s is not None
             self._sent_s = now_s
             self._send(messages.Stop(self._token))
         return self._sent_s + retry_s

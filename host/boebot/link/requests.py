@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from boebot.errors import BoardError, BoebotError
 from boebot.link import messages
+from boebot.link.counters import HostCounters
 from boebot.link.errors import SessionLostError
 from boebot.link.line import NEVER, Send
 
@@ -44,21 +45,15 @@ class Request:
 
 
 class Requests:
-    """The requests of one link: one is under way at a time, the others wait.
-
-    Attributes:
-        retransmitted, duplicate, stray: counted.
-    """
+    """The requests of one link: one is under way at a time, the others wait."""
 
     ROOM = 32  # requests that may wait
 
-    def __init__(self, send: Send, where: str, restart: Callable[[float], None]) -> None:
+    def __init__(self, send: Send, counts: HostCounters, where: str, restart: Callable[[float], None]) -> None:
         """Sends by `send` to the board at `where`. `restart` begins another session: a board that does not
         answer a request still expects its number."""
-        self.retransmitted = 0
-        self.duplicate = 0
-        self.stray = 0
         self._send = send
+        self._counts = counts
         self._where = where
         self._restart = restart
         self._under_way: Request | None = None
@@ -96,7 +91,7 @@ class Requests:
             return NEVER
         self._send(request.kind(request.number, *request.arguments))
         if request.tries:
-            self.retransmitted += 1
+            self._counts.retransmitted += 1
         else:
             request.first_s = now_s
         request.tries += 1
@@ -119,9 +114,9 @@ class Requests:
         request = self._under_way
         if request is None or answer.number != request.number:
             if answer.number == self._number:
-                self.duplicate += 1
+                self._counts.duplicate += 1
             else:
-                self.stray += 1
+                self._counts.stray += 1
             return None
         request.answer = answer
         self._under_way = None

@@ -19,6 +19,7 @@ from typing import TypeVar
 from boebot.errors import BoardError, ProtocolError
 from boebot.link import finding, messages, mismatch
 from boebot.link.clock_sync import RoundTrips
+from boebot.link.counters import HostCounters
 from boebot.link.errors import TakenOverError
 from boebot.link.frame import SEED
 from boebot.link.line import NEVER, Handlers, Line
@@ -42,8 +43,6 @@ class Session:
     Attributes:
         hello: the board's last; None: there was none, or the link was closed.
         is_open: a session is open, as far as the host knows.
-        count: sessions opened; a change means that the board is latched and may have forgotten everything.
-        lost: sessions that ended without the host's wish.
         time_out_s: silence of the host after which the board ends the session.
         handlers: of the handshake's messages.
         refused: hello of a board that cannot be spoken with; `raise_refusal` says why.
@@ -56,6 +55,7 @@ class Session:
         opened: Callable[[float], None],
         ended: Callable[[], None],
         *,
+        counts: HostCounters,
         draw: random.Random,
         round_trips: RoundTrips,
         notices: list[str],
@@ -68,6 +68,7 @@ class Session:
             wait: lets the link work, at the latest until that time (s); returns after each piece of bytes.
             opened: called with the time when a session is open.
             ended: called when it is over, for whatever reason.
+            counts: of the link.
             draw: gives nonces.
             round_trips: on this line; questions wait for them.
             notices: gets sentences for the user.
@@ -75,12 +76,11 @@ class Session:
         """
         self.hello: messages.Hello | None = None
         self.is_open = False
-        self.count = 0
-        self.lost = 0
         self.time_out_s = 1.0
         self.refused: messages.Hello | None = None
         self._line = line
         self._wait, self._opened, self._ended = wait, opened, ended
+        self._counts = counts
         self._draw = draw
         self._round_trips = round_trips
         self._notices = notices
@@ -117,8 +117,6 @@ class Session:
 
     def open(self, limit_s: float | None = None) -> None:
         """See `Link.open`."""
-        if self.is_open:
-            return
         line, transport = self._line, self._line.transport
         if limit_s is None:
             limit_s = OPEN_LIMIT_RESET_S if getattr(transport, "resets_board", False) else OPEN_LIMIT_S
@@ -197,11 +195,11 @@ class Session:
     def _confirmed(self, now_s: float) -> None:
         """The board has confirmed our session."""
         decoder = self._line.decoder
-        if self.count == 0:
+        if self._counts.sessions == 0:
             decoder.bad = decoder.lost = decoder.resynchronised = 0  # leftovers of another session
         self.is_open = True
         self._other_host_since = None
-        self.count += 1
+        self._counts.sessions += 1
         self._open_due = NEVER
         self._opened(now_s)
 
@@ -254,7 +252,7 @@ class Session:
         if self.is_open:
             if hello.board_nonce == self._opened_with:
                 return  # it was sent before the session was opened, and has come late
-            self.lost += 1
+            self._counts.sessions_lost += 1
             self._end()
         self.hello = hello
         if self._wanted and (self._open_due == NEVER or hello.board_nonce != self._opened_with):
@@ -266,7 +264,7 @@ class Session:
             self._replaced_since = min(self._replaced_since, now_s)
             if now_s - self._replaced_since < self.tick_s * max(10, 2 * hello.telemetry_period):
                 return
-            self.lost += 1
+            self._counts.sessions_lost += 1
             self._end()
             self._use_number(0)
             raise TakenOverError(f"another program has taken the board at {self._line.transport.name}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from boebot.devices.buzzer import next_token
 from boebot.link import messages
+from boebot.link.counters import HostCounters
 from boebot.link.fields import reader
 from boebot.link.line import Send
 
@@ -19,17 +20,15 @@ class SlowDevices:
     Attributes:
         latest: the newest devices_telemetry of this session, or None: most robots have none.
         pending: a message is to show that turret or buzzer do what they were asked.
-        retransmitted, dropped: counted.
     """
 
     ROOM = 4096  # messages that wait to be fetched
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, counts: HostCounters) -> None:
         self.latest: bytes | None = None
         self.pending = False
-        self.retransmitted = 0
-        self.dropped = 0
         self._send = send
+        self._counts = counts
         self._waiting: list[bytes] = []
         self._turret: messages.Turret | None = None
         self._pulse = 0  # that shows it
@@ -72,7 +71,7 @@ class SlowDevices:
         self.latest = payload
         self._waiting.append(payload)
         if len(self._waiting) > self.ROOM:
-            self.dropped += 1
+            self._counts.dropped += 1
             del self._waiting[0]
         if self.pending:
             if self._tone is not None and _BUZZER_TOKEN(payload) == (self._tone.token,):
@@ -85,14 +84,14 @@ class SlowDevices:
         """Sends what was not yet sent, or was `retry_s` ago and is not shown. A turret does not move while the motors
         are latched off."""
         if self._tone is not None and (self._tone_sent_s is None or now_s >= self._tone_sent_s + retry_s):
-            self.retransmitted += self._tone_sent_s is not None
+            self._counts.retransmitted += self._tone_sent_s is not None
             self._tone_sent_s = now_s
             self._send(self._tone)
         turret, sent_s = self._turret, self._turret_sent_s
         if turret is None or (latched and turret.hold):
             return
         if sent_s is None or (now_s >= sent_s + retry_s and not self._turret_is_shown()):
-            self.retransmitted += sent_s is not None
+            self._counts.retransmitted += sent_s is not None
             self._turret_sent_s = now_s
             self._send(turret)
 

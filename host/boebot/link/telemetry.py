@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from boebot.link import messages
 from boebot.link.clock_sync import ClockSync
+from boebot.link.counters import HostCounters
 from boebot.link.fields import reader
 from boebot.link.line import NEVER
 
@@ -22,20 +23,16 @@ class TelemetryBuffer:
     Attributes:
         latest: the newest of this session, or None.
         waiting: to be fetched, oldest first.
-        board_resets: how many ends of sessions were resets of the board, by its count of ticks.
-        dropped, late: counted.
     """
 
     ROOM = 4096  # messages that wait to be fetched
 
-    def __init__(self, clock: ClockSync) -> None:
+    def __init__(self, clock: ClockSync, counts: HostCounters) -> None:
         """`clock` stamps them."""
         self.latest: bytes | None = None
         self.waiting: list[StampedTelemetry] = []
-        self.board_resets = 0
-        self.dropped = 0
-        self.late = 0
         self._clock = clock
+        self._counts = counts
         self._piece: list[bytes] = []  # not yet stamped
         self._late_after_s = NEVER
         self._latest_s = 0.0
@@ -61,7 +58,7 @@ class TelemetryBuffer:
         passed = (now_s - self._last_s) / tick_s
         is_first = self._last_tick < 0
         was_reset = not is_first and tick < passed + self._last_tick / 2
-        self.board_resets += was_reset
+        self._counts.board_resets += was_reset
         self._clock.begin(tick * tick_s, raw_us, now_s)
         return is_first or was_reset
 
@@ -81,9 +78,9 @@ class TelemetryBuffer:
         stamps = estimate.observe_all([_TIME(payload)[0] for payload in payloads], now_s)
         self.waiting += [(payload, *stamp) for payload, stamp in zip(payloads, stamps, strict=True)]
         if now_s - stamps[-1][1] > self._late_after_s and estimate.bounded:  # the others have come before
-            self.late += 1
+            self._counts.late += 1
         if (excess := len(self.waiting) - self.ROOM) > 0:
-            self.dropped += excess
+            self._counts.dropped += excess
             del self.waiting[:excess]
 
     def fetch(self) -> list[StampedTelemetry]:

@@ -165,12 +165,12 @@ class BoardDriver:
             BoardError: each session ends meanwhile, or the board refuses something.
         """
         link = self.link
-        first = link.session.count
-        while self._session != link.session.count:
+        first = link.counts.sessions
+        while self._session != link.counts.sessions:
             link.open()
-            if link.session.count - first >= _READY_TRIES:
+            if link.counts.sessions - first >= _READY_TRIES:
                 raise self._never_ready()
-            session = link.session.count
+            session = link.counts.sessions
             try:
                 self.description = configure(link, self.task.request.robot)
                 self.equipment = self._equipment()
@@ -267,7 +267,7 @@ class BoardDriver:
         """See `boebot.running.driver.Driver`."""
         link, robot, transport = self.link, self.robot, self.session.transport
         poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK
-        make, waiting_events = _Telemetry._make, link.waiting_events
+        make, waiting_events = _Telemetry._make, link.events.waiting
         put_aside, command_given = self.record.append_telemetry, self.record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
         paced = self.task.request.realtime and not transport.realtime
@@ -289,11 +289,11 @@ class BoardDriver:
             received = meanwhile + poll(look_s, wait_until_s)
             meanwhile = []
             now_s = link.polled_s
-            if link.session.count != self._session:
+            if link.counts.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
                 now_s = transport.now()
-            restarted = link.telemetry.board_resets != self.resets
+            restarted = link.counts.board_resets != self.resets
             if not received:
                 if now_s - heard_s > silence_s + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
@@ -309,7 +309,7 @@ class BoardDriver:
                     restarted = False
                     due = tick + -tick % n
                     time_zero = self._time_after_reset(host_s) - tick * tick_s
-                    self.resets = link.telemetry.board_resets
+                    self.resets = link.counts.board_resets
                 last = tick
                 if tick >= due or self._last_s >= 0.0:
                     self._last_s = time_s = tick * tick_s + time_zero
@@ -367,8 +367,8 @@ class BoardDriver:
 
     def _take_events(self) -> None:
         """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
-        for event in self.link.events():
-            if not event.earlier or self.link.session.count != self._first_session:
+        for event in self.link.events.fetch():
+            if not event.earlier or self.link.counts.sessions != self._first_session:
                 self.record.append_event(event)
             elif event.kind in _UNASKED or (event.kind, event.value) == _SUPPLY_LOW:
                 self.notices.append(
@@ -410,7 +410,7 @@ class BoardDriver:
             late_steps=self.late_steps,
             odometry_source=self.task.brain.odometry,
             resets=self.resets,
-            sessions_lost=link.session.lost,
+            sessions_lost=link.counts.sessions_lost,
             lost_frames=link.line.decoder.lost,
             bad_frames=link.line.decoder.bad,
             run_time=max(self._last_s, 0.0),
