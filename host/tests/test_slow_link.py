@@ -249,7 +249,7 @@ def test_link_counts_lost_messages_of_slow_devices_as_lost_frames(monkeypatch: p
     while link.transport.now() < end:
         link.poll(0.1)
     assert len(lost) == 7 and link.counters().lost == 7
-    assert len(link.devices.fetch()) > 30 and link.devices.latest is not None and link.devices.fetch() == []
+    assert len(link.devices.fetch()) > 30 and link.devices.latest and link.devices.fetch() == []
 
 
 # ---- what is kept ----------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from __future__ import annotations
 import random
 import secrets
 from collections.abc import Callable
+from functools import partial
 
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch, reset_cause
@@ -113,13 +114,13 @@ class Link:
         self._handlers = self._handlers_without_session = handshake
         self._handlers_in_session: Handlers = handshake | {
             messages.Telemetry.ID: self._receive_telemetry,
-            messages.DevicesTelemetry.ID: self._receive_devices,
             messages.Answer.ID: self._receive_answer,
             messages.Event.ID: self.events.receive,
             messages.Stopped.ID: self._stop.receive,
             messages.Counters.ID: lambda payload, _: self.board_counters.add(messages.Counters.unpack(payload)),
             messages.TaskTime.ID: self._receive_task_time,
             messages.ClockAnswer.ID: self.clock.receive,
+            **{kind.ID: partial(self._receive_devices, kind) for kind in messages.DEVICE_MESSAGES},
         }
 
     # ---- the session -------------------------------------------------------------------------------------------------
@@ -482,8 +483,8 @@ class Link:
             if notice not in self.notices:
                 self.notices.append(notice)
 
-    def _receive_devices(self, payload: bytes, now: float) -> None:
-        self.devices.receive(payload)
+    def _receive_devices(self, kind: type[messages.Message], payload: bytes, now: float) -> None:
+        self.devices.receive(payload, kind)
         if self.devices.pending:
             self._service_devices(now)
 

@@ -9,6 +9,8 @@ from boebot.link.counters import HostCounters
 from boebot.link.fields import reader
 from boebot.link.line import Send
 
+Kind = type[messages.Message]
+
 _NEAR = 2  # counts that the board's pulse may lie beside the host's: both round
 _BUZZER_TOKEN = reader(messages.DevicesTelemetry, "buzzer_token")
 _TURRET_PULSE = reader(messages.DevicesTelemetry, "turret_pulse")
@@ -18,18 +20,18 @@ class SlowDevices:
     """The slow devices behind one link.
 
     Attributes:
-        latest: the newest devices_telemetry of this session, or None: most robots have none.
+        latest: the newest message of each kind in this session (payload): most robots send none.
         pending: a message is to show that turret or buzzer do what they were asked.
     """
 
     ROOM = 4096  # messages that wait to be fetched
 
     def __init__(self, send: Send, counts: HostCounters) -> None:
-        self.latest: bytes | None = None
+        self.latest: dict[Kind, bytes] = {}
         self.pending = False
         self._send = send
         self._counts = counts
-        self._waiting: list[bytes] = []
+        self._waiting: list[tuple[Kind, bytes]] = []
         self._turret: messages.Turret | None = None
         self._pulse = 0  # that shows it
         self._turret_sent_s: float | None = None
@@ -62,18 +64,18 @@ class SlowDevices:
 
     def session_ended(self) -> None:
         """What came in it and was not fetched is dropped."""
-        self.latest = None
+        self.latest = {}
         self._waiting = []
 
-    def receive(self, payload: bytes) -> None:
-        """Takes a `devices_telemetry`. A tone that has begun is not sent again, nor is the release of a turret that is
-        free. One that holds an angle still is to: a dead-man stop may release it."""
-        self.latest = payload
-        self._waiting.append(payload)
+    def receive(self, payload: bytes, kind: Kind = messages.DevicesTelemetry) -> None:
+        """Takes a message. A tone that has begun is not sent again, nor is the release of a turret that is free. One
+        that holds an angle still is to: a dead-man stop may release it."""
+        self.latest[kind] = payload
+        self._waiting.append((kind, payload))
         if len(self._waiting) > self.ROOM:
             self._counts.dropped += 1
             del self._waiting[0]
-        if self.pending:
+        if self.pending and kind is messages.DevicesTelemetry:
             if self._tone is not None and _BUZZER_TOKEN(payload) == (self._tone.token,):
                 self._tone = None
             if self._pulse == 0 and self._turret_is_shown():
@@ -95,13 +97,14 @@ class SlowDevices:
             self._turret_sent_s = now_s
             self._send(turret)
 
-    def fetch(self) -> list[bytes]:
-        """Payloads that came since the last call, oldest first."""
+    def fetch(self) -> list[tuple[Kind, bytes]]:
+        """Messages that came since the last call, kind and payload, oldest first."""
         found, self._waiting = self._waiting, []
         return found
 
     def _turret_is_shown(self) -> bool:
-        if self.latest is None:
+        newest = self.latest.get(messages.DevicesTelemetry)
+        if newest is None:
             return False
-        (pulse,) = _TURRET_PULSE(self.latest)
+        (pulse,) = _TURRET_PULSE(newest)
         return bool(pulse == self._pulse or (pulse != 0 != self._pulse and abs(pulse - self._pulse) <= _NEAR))

@@ -122,7 +122,7 @@ class BoardDriver:
         self._first_session = 0
         self._armed_tick = -1
         self._halted = False  # by the brain's emergency stop
-        self._payload: bytes | None = None  # the newest of the slow devices
+        self._payloads: dict[type[messages.Message], bytes] = {}  # the newest of the slow devices
         self._messages: dict[type, Any] = {}  # the newest of each kind
 
     def begin(self) -> None:
@@ -232,19 +232,17 @@ class BoardDriver:
 
     def _slow(self, tick: int) -> Latest:
         """The newest messages of the slow devices, as of that tick."""
-        payload = self.link.devices.latest
-        if payload is None:
-            return NO_MESSAGES
-        if payload is not self._payload:
-            self._payload = payload
-            self._messages = {messages.DevicesTelemetry: messages.DevicesTelemetry.unpack(payload)}
+        newest = self.link.devices.latest
+        if newest != self._payloads:
+            self._payloads = dict(newest)
+            self._messages = {kind: kind.unpack(payload) for kind, payload in newest.items()}
             self._put_devices_aside()
         return Latest(self._messages, tick)
 
     def _put_devices_aside(self) -> None:
         if self._last_s >= 0.0:
-            for payload in self.link.devices.fetch():
-                self.record.append(messages.DevicesTelemetry.NAME, self._last_s, payload)
+            for kind, payload in self.link.devices.fetch():
+                self.record.append(kind.NAME, self._last_s, payload)
 
     def _heed_latch(self, payload: bytes) -> None:
         """The board has latched its motors off: a reason to end the run, unless a new session mends it.
