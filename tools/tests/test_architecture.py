@@ -180,7 +180,8 @@ def firmware_includes() -> dict[str, set[str]]:
 
 
 def test_below_the_link_nothing_knows_it(firmware_includes: dict[str, set[str]]) -> None:
-    link = ("firmware/src/link/", "firmware/src/generated/messages.h")
+    """Devices fill in the messages' layout, which is generated; what calls them and sends it belongs to the link."""
+    link = ("firmware/src/link/", "firmware/src/generated/devices.h")
     above = (*link, "firmware/src/firmware.c")
     guilty = [
         f"{source} includes {name}"
