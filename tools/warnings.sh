@@ -5,24 +5,39 @@ set -eu
 cd "$(dirname "$0")/.."
 warnings="-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
 simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | sed 's|/sim$||' | head -n 1)
+lists=$(mktemp -d)
+trap 'rm -rf "$lists"' EXIT
 
-# compile COMPILER FLAGS...: compiles the files named on standard input
+# compile LIST FLAGS...: compiles the files in the list. clang gives its warnings before it makes code, gcc some of them
+# while it does.
 compile() {
-  xargs -P "$(nproc)" -I{} "$@" $warnings -c {} -o /dev/null
+  list=$lists/$1
+  shift
+  xargs -r -P "$(nproc)" -n 1 gcc $warnings "$@" -c -o /dev/null <"$list"
+  xargs -r -P "$(nproc)" -n 20 clang $warnings "$@" -fsyntax-only <"$list"
 }
 
-for compiler in gcc clang; do
-  for pin_map in SHIELDBOT SHIELDBOT_BASIC SHIELDBOT_QUAD SHIELDBOT_LINE BOEBOT; do
-    find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c |
-      compile $compiler -DPIN_MAP_$pin_map -Ifirmware/src
+# Most files of the firmware are the same for all pin maps: a file is compiled once for each text that the preprocessor
+# makes of it.
+touch "$lists/texts"
+for pin_map in SHIELDBOT SHIELDBOT_BASIC SHIELDBOT_QUAD SHIELDBOT_LINE BOEBOT; do
+  touch "$lists/$pin_map"
+  for source in $(find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c); do
+    text="$source $(gcc -E -P -DPIN_MAP_$pin_map -Ifirmware/src "$source" | cksum)"
+    grep -qxF "$text" "$lists/texts" || echo "$source" >>"$lists/$pin_map"
+    echo "$text" >>"$lists/texts"
   done
-  find host -name '*.c' -not -name '_*.c' | compile $compiler -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
-  find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' | compile $compiler -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
-  if [ -n "$simavr" ]; then
-    find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' |
-      compile $compiler -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
-  fi
+  compile $pin_map -DPIN_MAP_$pin_map -Ifirmware/src
 done
+
+find host -name '*.c' -not -name '_*.c' >"$lists/host"
+compile host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
+find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' >"$lists/simulator"
+compile simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
+if [ -n "$simavr" ]; then
+  find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' >"$lists/avr"
+  compile avr -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
+fi
 
 for end in BOARD HOST; do
   for compiler in gcc clang "avr-gcc -mmcu=atmega328p"; do
