@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
+import copied_process
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("protocol/*.md")])
-BOEBOT = [sys.executable, "-m", "boebot"]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"`(boebot [^`]+)`")
-
-
-def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
 
 
 def blocks(language: str) -> list[tuple[Path, str]]:
@@ -33,9 +28,7 @@ def names(rows: list[tuple[Path, str]]) -> list[str]:
 
 @cache
 def help_of(subcommand: str) -> str:
-    shown = subprocess.run(
-        [*BOEBOT, subcommand, "--help"], capture_output=True, text=True, env={"COLUMNS": "200", "TERM": "dumb"}
-    )
+    shown = copied_process.command([subcommand, "--help"], ROOT, {"COLUMNS": "200", "TERM": "dumb"})
     assert shown.returncode == 0, f"there is no command boebot {subcommand}"
     return re.sub(r"\x1b\[[0-9;]*m", "", shown.stdout)
 
@@ -52,7 +45,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(("page", "code"), blocks("python"), ids=names(blocks("python")))
 def test_python_block_runs(page: Path, code: str, workspace: Path) -> None:
-    done = run([sys.executable, "-c", code], workspace)
+    done = copied_process.python(code, workspace)
     assert done.returncode == 0, f"{page.name}:\n{done.stderr}"
 
 
@@ -66,7 +59,7 @@ SHELL_LINES = [
 
 @pytest.mark.parametrize(("page", "line"), SHELL_LINES, ids=names(SHELL_LINES))
 def test_command_of_a_block_runs(page: Path, line: str, workspace: Path) -> None:
-    done = run([*BOEBOT, *shlex.split(line, comments=True)[1:]], workspace)
+    done = copied_process.command(shlex.split(line, comments=True)[1:], workspace)
     assert done.returncode == 0, f"{page.name}: {line}\n{done.stderr}"
 
 
@@ -94,7 +87,7 @@ def test_picture_is_of_this_kit(tmp_path: Path) -> None:
     """The README's picture says what the same run gives now; `make pictures` renews it."""
     recipe = next(line for line in (ROOT / "Makefile").read_text().splitlines() if "--out build/pictures" in line)
     command = shlex.split(recipe.split("boebot", 1)[1].replace("build/pictures", str(tmp_path)))
-    assert run([*BOEBOT, *command], ROOT).returncode == 0
+    assert copied_process.command(command, ROOT).returncode == 0
     shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / "demo.png", tmp_path / "run.png"))
     assert (shown["Title"], shown["Description"]) == (now["Title"], now["Description"])
 

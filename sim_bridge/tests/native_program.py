@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+from functools import cache
 from pathlib import Path
 
 from sim_bridge._core import ffi, lib
@@ -37,8 +38,9 @@ void two_wire_on_step(void) {}
 """
 
 
-def native_program(source: str) -> BoardAccess:
-    """A native board, powered on, that runs the C program `source`."""
+@cache
+def compiled(source: str) -> bytes:
+    """The library of the C program `source`; several tests use the same one."""
     with tempfile.TemporaryDirectory() as folder:
         program, library = Path(folder, "program.c"), Path(folder, "program.so")
         program.write_text(PREAMBLE + source, encoding="ascii")
@@ -47,5 +49,13 @@ def native_program(source: str) -> BoardAccess:
         command += map(str, sorted((FIRMWARE / "hal" / "native").glob("*.c")))
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         assert result.returncode == 0, result.stderr
-        board = native_board(library)
+        return library.read_bytes()
+
+
+def native_program(source: str) -> BoardAccess:
+    """A native board, powered on, that runs the C program `source`."""
+    with tempfile.NamedTemporaryFile(suffix=".so") as library:
+        library.write(compiled(source))
+        library.flush()
+        board = native_board(Path(library.name))
     return BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)

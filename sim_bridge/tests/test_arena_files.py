@@ -234,6 +234,7 @@ def test_page_shows_every_arena_and_an_example_that_loads(tmp_path: Path) -> Non
     assert told and error_of(tmp_path, example.replace("radius_m = 0.1", "radius_m = 0")) == f"mine.toml{told[1]}"
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("name", ["showcase", "empty"])
 def test_picture_is_written(tmp_path: Path, name: str) -> None:
     assert draw(load_arena(name), tmp_path / "it.png").read_bytes().startswith(b"\x89PNG")

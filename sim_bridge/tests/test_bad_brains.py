@@ -239,6 +239,7 @@ def test_brain_that_catches_everything_is_found_out_once_it_returns(stood_still:
     assert result.run_time == pytest.approx(BAD_FROM_S) and stood_still == [True]
 
 
+@pytest.mark.unsanitized
 def test_step_of_another_thread_and_among_several_robots() -> None:
     """An endless loop is ended there, too, and names the robot."""
     errors: list[BaseException | None] = []
@@ -286,6 +287,7 @@ def test_step_that_somebody_debugs_is_not_interrupted() -> None:
 # ---- at the command line ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize(
     ("on", "deed", "sentence"),
     [

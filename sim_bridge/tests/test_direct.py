@@ -61,6 +61,7 @@ def test_speed_command_is_its_share_of_the_greatest_speed() -> None:
     assert by_speed.truth.heading[-1] < -0.1
 
 
+@pytest.mark.unsanitized
 def test_same_brain_runs_with_and_without_a_board(tmp_path: Path) -> None:
     for robot in ("arsim", "shieldbot", "shieldbot-basic"):
         result = execute(Request.single("wander", robot=robot, seconds=20))

@@ -202,6 +202,7 @@ def test_near_robot_does_change_it() -> None:
 # ---- runs ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.unsanitized
 def test_a_run_of_both_kinds_is_told_and_saved(tmp_path: Path) -> None:
     members = [Member(robot="arsim"), Member(), Member(brain=ahead, robot="arsim", period=0.02)]
     result = boebot.run_together(members, "room", 4.0, out=tmp_path)
@@ -228,6 +229,7 @@ def test_wander_of_three_bumps_nobody_through() -> None:
         assert np.hypot(*(one - two)).min() >= 0.4 - 1e-6
 
 
+@pytest.mark.unsanitized
 def test_command_line_runs_three_without_boards() -> None:
     command = [sys.executable, "-m", "boebot", "run", "wander", "--robots", "3", "--robot", "arsim", "--arena", "arsim"]
     done = subprocess.run([*command, "--seconds", "3", "--json"], capture_output=True, text=True, check=True)
@@ -236,6 +238,7 @@ def test_command_line_runs_three_without_boards() -> None:
     assert all(robot["run_time_s"] == 3.0 and robot["distance_m"] > 0 for robot in robots)
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("robot", ["arsim", "shieldbot"])
 def test_one_robot_starts_where_it_is_told(robot: str) -> None:
     pose = (0.3, -0.4, 1.25)

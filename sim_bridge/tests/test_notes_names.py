@@ -135,6 +135,7 @@ def test_recorder_keeps_a_row_a_step(tmp_path: Path) -> None:
         log["nothing"]
 
 
+@pytest.mark.unsanitized
 def test_view_shows_the_body_where_it_is_and_rays_that_end_at_walls(tmp_path: Path) -> None:
     model = arsim(infrared_rad=(0.0, math.pi / 2))
     view = View(vehicle := Vehicle(model, load_arena("arsim"), pose=(1.2, 0.0, 0.0)))

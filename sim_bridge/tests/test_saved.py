@@ -108,6 +108,7 @@ def test_simulation_goes_on_identically(kind: str, count: int) -> None:
     assert all_of(here) == all_of(there)
 
 
+@pytest.mark.unsanitized
 def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
     here = sim_of()
     here.run(100 * MS)

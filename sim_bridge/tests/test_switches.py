@@ -223,6 +223,7 @@ def infrared_sees(distance: float, seed: int, *without: str) -> bool:
     return len(robot.inputs(RECEIVER)) > 1
 
 
+@pytest.mark.unsanitized
 def test_infrared_range_is_sharp(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(parts.parameters(), "INFRARED_SPREAD", 0.3)
     monkeypatch.setitem(parts.parameters(), "INFRARED_FALSE_HIT", 0.3)
@@ -260,6 +261,7 @@ def echo_us(arena: Arena, seed: int, *without: str) -> float:
     return (fall - rise) / US
 
 
+@pytest.mark.unsanitized
 def test_echoes_are_exact_and_heard(monkeypatch: pytest.MonkeyPatch) -> None:
     """t = 2 d / c with c = 343.5 m/s at 20 degrees Celsius; 18.5 ms where none is heard."""
     monkeypatch.setitem(parts.parameters(), "PING_MISS", 0.5)

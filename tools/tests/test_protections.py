@@ -1,4 +1,4 @@
-"""Each protection of the firmware is tested: with that one taken away a unit test fails.
+"""Each protection of the firmware is tested: without it a unit test fails. Part of `make soak`.
 
 A row names the protection, the file that holds it, the text that is it, what stands there without it, and the file of
 firmware/test/test_units that must notice. The checks of a frame are taken away in test_fuzz.py and test_error_rates.py.
@@ -17,6 +17,8 @@ from typing import NamedTuple
 import pytest
 
 from tools.fuzz import FIRMWARE, TEST, firmware_sources
+
+pytestmark = pytest.mark.soak
 
 # As the environment `native` of platformio.ini, without warnings: what is taken away leaves names that nothing uses.
 FLAGS = ("-DPIN_MAP_SHIELDBOT", "-w", f"-I{FIRMWARE}", f"-I{TEST}")
