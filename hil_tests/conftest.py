@@ -24,7 +24,12 @@ def boards(config: pytest.Config) -> list[str]:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "board_url" in metafunc.fixturenames:
-        metafunc.parametrize("board_url", boards(metafunc.config), scope="session")
+        long = metafunc.definition.get_closest_marker("soak_on_avr") is not None
+        urls = [
+            pytest.param(url, marks=pytest.mark.soak if long and url == "avr" else ())
+            for url in boards(metafunc.config)
+        ]
+        metafunc.parametrize("board_url", urls, scope="session")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

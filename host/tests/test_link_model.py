@@ -201,6 +201,7 @@ def test_link_keeps_its_promises() -> None:
     run_state_machine_as_test(LinkModel, settings=LINES)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("missing", ["numbers", "nonce"])
 def test_model_notices_a_board_without_a_protection(missing: str) -> None:
     """What the protections are good for, and that the model above would tell."""
