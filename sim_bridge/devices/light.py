@@ -70,7 +70,6 @@ def light_parameters(light: LightSensor, side: int, draw: Draw) -> Any:
             },
             "decay_s": LIGHT_DECAY_S,
             "maximum_s": LIGHT_MAXIMUM_S,
-            "charge_s": LIGHT_CHARGE_S,
-            "threshold_v": LIGHT_THRESHOLD_V,
+            "capacitor": {"charge_s": LIGHT_CHARGE_S, "threshold_v": LIGHT_THRESHOLD_V},
         },
     )

@@ -36,7 +36,11 @@ def lit(arena: Arena, heading: float = 0.0, **changes: float) -> Scripted:
     """A robot with one phototransistor at its middle that looks straight ahead."""
     parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
     for name, value in changes.items():
-        setattr(parameters.light if hasattr(parameters.light, name) else parameters, name, value)
+        setattr(
+            next(part for part in (parameters.light, parameters.capacitor, parameters) if hasattr(part, name)),
+            name,
+            value,
+        )
     robot = scripted(arena, pose=(0, 0, heading))
     assert add_part(robot.sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == 0
     return robot
@@ -105,7 +109,7 @@ def test_charging_again_takes_back_the_decay() -> None:
 def test_bad_light_parameters_are_refused() -> None:
     for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
         parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
-        setattr(parameters, name, value)
+        setattr(parameters if hasattr(parameters, name) else parameters.capacitor, name, value)
         assert add_part(scripted().sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == lib.SIM_BAD_ARGUMENT
 
 

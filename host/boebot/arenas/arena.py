@@ -93,6 +93,11 @@ class Arena:
         for patch in self.description.patch:
             corners = np.array(patch.corners_m, dtype=np.float64)
             self._added(lib.arena_add_patch(self.handle, _doubles(corners), len(corners), patch.grip))
+        lib.arena_set_floor(self.handle, self.description.floor_reflectance)
+        for line in self.description.line:
+            points = np.array(line.points_m, dtype=np.float64)
+            look = (line.width_m, line.floor_reflectance)
+            self._added(lib.arena_add_line(self.handle, _doubles(points), len(points), *look))
         for light in self.description.light:
             self._added(lib.arena_add_light(self.handle, light.x_m, light.y_m, light.height_m, light.power_w))
         if (charger := self.description.charger) is not None:
@@ -169,6 +174,15 @@ class Arena:
         otherwise = arguments.number("arena: otherwise", otherwise, ArenaError, least=0.0)
         coefficient: float = lib.arena_grip(self.handle, x, y, otherwise)
         return coefficient
+
+    def floor_reflectance(self, x: float, y: float) -> float:
+        """Share of infrared light that the floor at (x, y) throws back: of the last line painted there, or the floor's.
+
+        Raises:
+            ArenaError: a number is not finite, or too large.
+        """
+        share: float = lib.arena_floor_reflectance(self.handle, *_position(x, y))
+        return share
 
 
 def arena_names() -> list[str]:

@@ -29,6 +29,7 @@ Height = Annotated[
     Meta(gt=0, description="top above the floor; sensors that sit higher do not see it (default: as high as any)"),
 ]
 Infrared = Annotated[float, Meta(ge=0, le=1, description="share of infrared light thrown back; 1: a white wall")]
+FloorReflectance = Annotated[float, Meta(ge=0, le=1, description="share of infrared light that the floor throws back")]
 Sound = Annotated[float, Meta(ge=0, le=1, description="share of sound thrown back; 1: a hard wall, less: cloth")]
 Name = Annotated[str, Meta(description="for people")]
 ShapeName = Annotated[str, Meta(description="for people; no two shapes have the same")]
@@ -88,6 +89,18 @@ class Patch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     name: Name = ""
 
 
+class Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A line that is painted or taped on the floor; later ones lie on top of earlier ones."""
+
+    points_m: Annotated[
+        list[tuple[Position, Position]],
+        Meta(min_length=2, description="x, y of its ends and of the bends between them"),
+    ]
+    width_m: Length = 0.019
+    floor_reflectance: FloorReflectance = 0.05
+    name: Name = ""
+
+
 class Light(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A lamp. Shapes that are higher than the line from lamp to sensor shade it."""
 
@@ -142,6 +155,8 @@ class ArenaDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     wall: list[Wall] = []
     disc: list[Disc] = []
     patch: list[Patch] = []
+    floor_reflectance: FloorReflectance = 0.8
+    line: list[Line] = []
     light: list[Light] = []
     charger: Charger | None = None
     moving: list[Moving] = []
@@ -179,6 +194,7 @@ def _rows(description: ArenaDescription) -> Iterator[tuple[str, list[Point], boo
     for key, shapes in (("outline", description.outline), ("obstacle", description.obstacle)):
         yield from ((f"{key}[{i}].corners_m", shape.corners_m, True) for i, shape in enumerate(shapes))
     yield from ((f"patch[{i}].corners_m", patch.corners_m, True) for i, patch in enumerate(description.patch))
+    yield from ((f"line[{i}].points_m", line.points_m, False) for i, line in enumerate(description.line))
     yield from ((f"wall[{i}].points_m", wall.points_m, False) for i, wall in enumerate(description.wall))
     for i, moving in enumerate(description.moving):
         if moving.corners_m is not None:

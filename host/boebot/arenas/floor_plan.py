@@ -102,6 +102,16 @@ class Patch:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Line:
+    """A line that is painted on the floor."""
+
+    points: Floats
+    width: float
+    is_dark: bool
+    """darker than the floor"""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Lamp:
     """A lamp and its power (W)."""
 
@@ -129,6 +139,7 @@ class FloorPlan:
     title: str = ""
     solids: Sequence[Solid] = field(default=(), repr=False)
     patches: Sequence[Patch] = field(default=(), repr=False)
+    lines: Sequence[Line] = field(default=(), repr=False)
     lamps: Sequence[Lamp] = field(default=(), repr=False)
     charger: Charger | None = None
     moving: Sequence[Moving] = field(default=(), repr=False)
@@ -176,6 +187,14 @@ def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
         solids=list(_solids(arena)),
         patches=[
             Patch(corners=np.array(patch.corners_m), grip=patch.grip, name=patch.name) for patch in described.patch
+        ],
+        lines=[
+            Line(
+                points=np.array(line.points_m),
+                width=line.width_m,
+                is_dark=line.floor_reflectance < described.floor_reflectance,
+            )
+            for line in described.line
         ],
         lamps=[
             Lamp(x=light.x_m, y=light.y_m, height=light.height_m, power=light.power_w, name=light.name)

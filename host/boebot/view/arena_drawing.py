@@ -6,11 +6,13 @@ Filled by kind: solid grey, dull ones darker, low ones hatched; patches by grip;
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.patches import Circle, Patch, PathPatch, Polygon
+from matplotlib.path import Path
 
 from boebot.view import style
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from boebot.arenas.arena import Floats
-    from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
+    from boebot.arenas.floor_plan import FloorPlan, Line, Moving, Solid
 
 GHOSTS_MAXIMUM = 30  # places at which a moving shape is shown along its way
 HATCH = "////"
@@ -87,11 +89,26 @@ def _draw_floor(axes: Axes, plan: FloorPlan) -> None:
     for patch in plan.patches:
         colour = style.ROUGH if patch.grip > plan.grip else style.SMOOTH
         axes.add_patch(Polygon(patch.corners, closed=True, fc=colour, ec=style.FAINT, lw=0.5, ls=":", zorder=0.6))
+    for line in plan.lines:
+        axes.add_patch(_ribbon(line))
     if (charger := plan.charger) is not None:
         axes.add_patch(
             Circle((charger.x, charger.y), charger.radius, fc=style.CHARGER, ec=style.CHARGER, alpha=0.35, zorder=0.7)
         )
         axes.add_patch(Circle((charger.x, charger.y), charger.radius, fill=False, ec=style.CHARGER, lw=1.2, zorder=0.7))
+
+
+def _ribbon(line: Line) -> PathPatch:
+    """A painted line: its segments as rectangles, round where it bends and ends."""
+    shapes = []
+    half = line.width / 2
+    for a, b in pairwise(line.points):
+        along = (b - a) / np.hypot(*(b - a)) * half
+        across = np.array((-along[1], along[0]))
+        shapes.append(Path(np.array((a - across, b - across, b + across, a + across, a - across)), closed=True))
+    shapes += [Path.circle(tuple(point), half) for point in line.points]
+    colour = style.PAINT_DARK if line.is_dark else style.PAINT_BRIGHT
+    return PathPatch(Path.make_compound_path(*shapes), facecolor=colour, edgecolor="none", zorder=0.65)
 
 
 def _draw_solid(axes: Axes, solid: Solid, **changed: Any) -> None:

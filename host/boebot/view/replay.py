@@ -71,6 +71,7 @@ def plan_data(plan: FloorPlan) -> dict[str, Any]:
             {"points": _points(patch.corners), "grip": patch.grip, "rough": patch.grip > plan.grip}
             for patch in plan.patches
         ],
+        "lines": [{"points": _points(line.points), "width": line.width, "dark": line.is_dark} for line in plan.lines],
         "lamps": [[lamp.x, lamp.y] for lamp in plan.lamps],
         "charger": None if charger is None else [charger.x, charger.y, charger.radius],
         "moving": [_moving(moving) for moving in plan.moving],

@@ -101,6 +101,7 @@ def plan_bounds(plan: FloorPlan, places: Sequence[tuple[float, float]]) -> tuple
     if not plan.outlines:
         corners += [np.array(place) for place in places]
         corners += [point for patch in plan.patches for point in patch.corners]
+        corners += [point for line in plan.lines for point in line.points]
         corners += [np.array((lamp.x, lamp.y)) for lamp in plan.lamps]
         corners += [point for moving in plan.moving for point in np.column_stack((moving.x, moving.y))]
     points = np.array(corners)

@@ -18,6 +18,7 @@ EDGE = "#39415a"  # of what is solid
 SOLID = "#c3c9d6"
 DULL = "#8d93a1"  # solids that throw back little
 LOW = "#f1ead9"  # solids that some sensors look over; hatched
+PAINT_DARK, PAINT_BRIGHT = "#4c566a", "#ffffff"  # lines on the floor, darker and brighter than it
 ROUGH, SMOOTH = "#e3d3b0", "#cfe6f4"  # patches that grip more, and less, than the floor
 CHARGER = "#009e73"
 LAMP = "#f0e442"

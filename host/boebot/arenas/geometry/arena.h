@@ -71,6 +71,8 @@ int arena_add_polygon(arena *self, const double *xy, size_t count, int kind, con
 int arena_add_wall(arena *self, const double *xy, size_t count, const arena_surface *surface);
 int arena_add_disc(arena *self, double x, double y, double radius, const arena_surface *surface);
 int arena_add_patch(arena *self, const double *xy, size_t count, double grip);
+/* A line that is painted on the floor: through these points, `width` wide. */
+int arena_add_line(arena *self, const double *xy, size_t count, double width, double reflectance);
 int arena_add_light(arena *self, double x, double y, double height, double power);
 /* `outline` NULL: a disc of `radius`. Nothing of it is faster than ARENA_FASTEST_M_S. */
 int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
@@ -135,6 +137,12 @@ int arena_is_free(const arena *self, double x, double y, double radius);
 
 /* Friction coefficient of the floor at (x, y): of the last patch there, `otherwise` where there is none. */
 double arena_grip(const arena *self, double x, double y, double otherwise);
+
+/* Share of infrared light that the floor throws back where no line is painted; at first 0. */
+void arena_set_floor(arena *self, double reflectance);
+
+/* And at (x, y): of the last line there, or that one. */
+double arena_floor_reflectance(const arena *self, double x, double y);
 
 /* The first of a row's points that is the same as the next (nearer than ARENA_SHORTEST_M), -1 if there is none. `closed`:
  * the last one's next is the first. */

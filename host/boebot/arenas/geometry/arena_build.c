@@ -25,6 +25,7 @@ void arena_destroy(arena *self) {
   if (self == NULL) return;
   index_drop(self);
   for (size_t i = 0; i < self->patch_count; i++) free(self->patch[i].xy);
+  for (size_t i = 0; i < self->line_count; i++) free(self->line[i].xy);
   for (size_t i = 0; i < self->moving_count; i++) {
     free((void *)self->moving[i].outline);
     free((void *)self->moving[i].path.waypoints);
@@ -33,6 +34,7 @@ void arena_destroy(arena *self) {
   free(self->disc);
   free(self->shape);
   free(self->patch);
+  free(self->line);
   free(self->light);
   free(self->moving);
   free(self);
@@ -151,6 +153,20 @@ static void *copied(const void *from, size_t size) {
   return copy;
 }
 
+/* Least and greatest x and y of points, and a margin about them. */
+static void box_of(const double *xy, size_t count, double margin, double box[4]) {
+  box[0] = box[2] = xy[0];
+  box[1] = box[3] = xy[1];
+  for (size_t i = 2; i < 2 * count; i++) {
+    if (xy[i] < box[i % 2]) box[i % 2] = xy[i];
+    if (xy[i] > box[i % 2 + 2]) box[i % 2 + 2] = xy[i];
+  }
+  for (int i = 0; i < 2; i++) {
+    box[i] -= margin;
+    box[i + 2] += margin;
+  }
+}
+
 int arena_add_patch(arena *self, const double *xy, size_t count, double grip) {
   if (count < 3 || !all_finite(xy, 2 * count) || !(grip >= 0.0 && grip < 1e9)) return -1;
   arena_patch *patches = grown(self->patch, self->patch_count, 1, sizeof *patches);
@@ -158,15 +174,26 @@ int arena_add_patch(arena *self, const double *xy, size_t count, double grip) {
   self->patch = patches;
   arena_patch added = {.xy = copied(xy, 2 * count * sizeof *xy), .count = count, .grip = grip};
   if (added.xy == NULL) return -1;
-  added.box[0] = added.box[2] = xy[0];
-  added.box[1] = added.box[3] = xy[1];
-  for (size_t i = 2; i < 2 * count; i++) {
-    if (xy[i] < added.box[i % 2]) added.box[i % 2] = xy[i];
-    if (xy[i] > added.box[i % 2 + 2]) added.box[i % 2 + 2] = xy[i];
-  }
+  box_of(xy, count, 0.0, added.box);
   patches[self->patch_count] = added;
   return (int)self->patch_count++;
 }
+
+int arena_add_line(arena *self, const double *xy, size_t count, double width, double reflectance) {
+  if (count < 2 || !all_finite(xy, 2 * count) || !(width > 0.0 && width < 1e9)) return -1;
+  if (!(reflectance >= 0.0 && reflectance <= 1.0)) return -1;
+  arena_line *lines = grown(self->line, self->line_count, 1, sizeof *lines);
+  if (lines == NULL) return -1;
+  self->line = lines;
+  arena_line added = {.xy = copied(xy, 2 * count * sizeof *xy), .count = count, .half_width = 0.5 * width};
+  if (added.xy == NULL) return -1;
+  added.reflectance = reflectance;
+  box_of(xy, count, added.half_width, added.box);
+  lines[self->line_count] = added;
+  return (int)self->line_count++;
+}
+
+void arena_set_floor(arena *self, double reflectance) { self->floor_reflectance = reflectance; }
 
 int arena_add_light(arena *self, double x, double y, double height, double power) {
   if (!all_finite((const double[]){x, y, height, power}, 4) || !(power >= 0.0)) return -1;

@@ -13,6 +13,13 @@ typedef struct {
   double box[4];
 } arena_patch;
 
+typedef struct {
+  double *xy;
+  size_t count;
+  double half_width, reflectance;
+  double box[4];
+} arena_line;
+
 struct arena {
   arena_edge *edge;
   size_t edge_count;
@@ -22,6 +29,9 @@ struct arena {
   size_t shape_count;
   arena_patch *patch;
   size_t patch_count;
+  arena_line *line;
+  size_t line_count;
+  double floor_reflectance;
   arena_light *light;
   size_t light_count;
   arena_moving *moving;

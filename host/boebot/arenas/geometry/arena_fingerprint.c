@@ -38,6 +38,13 @@ uint64_t arena_compute_fingerprint(const arena *self) {
     const arena_patch *p = &self->patch[i];
     sum = HASH_NUMBERS(hash_numbers(sum, p->xy, 2 * p->count), p->grip);
   }
+  if (self->line_count > 0) { /* what arenas without lines had before there were any stays */
+    sum = HASH_NUMBERS(hash_word(sum, self->line_count), self->floor_reflectance);
+    for (size_t i = 0; i < self->line_count; i++) {
+      const arena_line *l = &self->line[i];
+      sum = HASH_NUMBERS(hash_numbers(sum, l->xy, 2 * l->count), l->half_width, l->reflectance);
+    }
+  }
   sum = hash_word(sum, self->light_count);
   for (size_t i = 0; i < self->light_count; i++) {
     const arena_light *l = &self->light[i];

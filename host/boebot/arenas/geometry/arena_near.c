@@ -159,3 +159,23 @@ double arena_grip(const arena *self, double x, double y, double otherwise) {
   }
   return otherwise;
 }
+
+/* Whether (x, y) is nearer than `reach` to the segment from a to b. */
+static int is_near_segment(double x, double y, const double *a, const double *b, double reach) {
+  const double dx = b[0] - a[0], dy = b[1] - a[1];
+  const double along = ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy);
+  const double share = along > 0.0 ? (along < 1.0 ? along : 1.0) : 0.0;
+  const double ex = x - (a[0] + share * dx), ey = y - (a[1] + share * dy);
+  return ex * ex + ey * ey <= reach * reach;
+}
+
+double arena_floor_reflectance(const arena *self, double x, double y) {
+  for (size_t i = self->line_count; i-- > 0;) {
+    const arena_line *l = &self->line[i];
+    if (!(x >= l->box[0] && y >= l->box[1] && x <= l->box[2] && y <= l->box[3])) continue;
+    for (size_t k = 0; k + 1 < l->count; k++) {
+      if (is_near_segment(x, y, &l->xy[2 * k], &l->xy[2 * k + 2], l->half_width)) return l->reflectance;
+    }
+  }
+  return self->floor_reflectance;
+}
