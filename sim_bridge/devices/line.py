@@ -1,4 +1,4 @@
-"""Line sensors: Parallax QTI at a pin, 10 nF. Over white paper the decay takes some 0.2 ms, over black tape some 3 ms."""
+"""Line sensors: Parallax QTI at a pin, 10 nF. Over white paper the decay takes 0.2 ms, over black tape some 3 ms."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from boebot.behaviors.charge_battery import ChargeBattery
 from boebot.behaviors.escalate import Escalate, LeakyChain
 from boebot.behaviors.escape import Escape
 from boebot.behaviors.evade import Evade
+from boebot.behaviors.follow_line import FollowLine
 from boebot.behaviors.follow_wall import FollowWall
 from boebot.behaviors.homing import Homing
 from boebot.behaviors.kinesis import Kinesis
@@ -21,6 +22,7 @@ __all__ = [
     "Escalate",
     "Escape",
     "Evade",
+    "FollowLine",
     "FollowWall",
     "Homing",
     "Kinesis",
