@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely import LineString, Point
@@ -14,7 +16,7 @@ POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=2, max_size=6)
 
 
 def distinct(points: list[tuple[float, float]]) -> bool:
-    return all(Point(a).distance(Point(b)) > 0.01 for a, b in zip(points, points[1:], strict=False))
+    return all(Point(a).distance(Point(b)) > 0.01 for a, b in pairwise(points))
 
 
 @given(POINTS, POINTS, st.floats(0.01, 0.5), COORDINATE, COORDINATE)
