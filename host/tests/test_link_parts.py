@@ -102,7 +102,8 @@ def test_line_sends_and_accepts_frames_of_its_session_only() -> None:
     heard: list[bytes] = []
     line.listener = heard.append
     wire.coming = [(1.0, b"\0" + stopped[0]), (2.0, stopped[1])]
-    assert list(line.receive(0.1)) == [(1.0, [(messages.Stopped.ID, 0, b"\7")]), (2.0, [])]
+    found = [(stamp, line.decoder.feed(data)) for stamp, data in line.read(0.1)]
+    assert found == [(1.0, [(messages.Stopped.ID, 0, b"\7")]), (2.0, [])]
     assert (line.decoder.good, line.decoder.bad) == (1, 1)
     assert heard == [b"\0" + stopped[0], stopped[1]]
     assert kept == [("to_board", 3.0, wire.written), ("to_host", 1.0, heard[0]), ("to_host", 2.0, heard[1])]
@@ -193,7 +194,7 @@ def test_session_gives_way_to_another_host_unless_its_telemetry_goes_on(telemetr
     alone.open()
     alone.hello(0.5, session=99)
     if telemetry_goes_on:
-        alone.session.confirm()
+        alone.session.confirm(0.6)
         alone.hello(0.7, session=99)
         assert alone.session.is_open
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 from boebot.link import messages
@@ -58,15 +58,16 @@ class Line:
         if self._record is not None:
             self._record("to_board", self.now(), frame)
 
-    def receive(self, wait_s: float, quiet_s: float = 0.0) -> Iterator[tuple[float, list[tuple[int, int, bytes]]]]:
-        """Reads as `Transport.read` does; for each piece of bytes that came together its stamp and its messages: id,
-        sequence number, payload."""
-        for stamp, data in self._read(wait_s, quiet_s):
-            if self._record is not None:
+    def read(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        """Reads as `Stamping.read_stamped` does; `decoder` finds the frames in it."""
+        pieces = self._read(wait_s, quiet_s)
+        if self._record is not None:
+            for stamp, data in pieces:
                 self._record("to_host", stamp, data)
-            if self.listener is not None:
+        if self.listener is not None:
+            for _, data in pieces:
                 self.listener(data)
-            yield stamp, self.decoder.feed(data)
+        return pieces
 
     def change_baud(self, baud: int) -> None:
         """Another rate, for a transport that has one."""

@@ -62,7 +62,7 @@ class Link:
         task_times: the longest time of each task of the firmware since the session was opened, by its name: cycles of
             1/16 us, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board
             (where only the Ping's pulse does); None: not yet known. The board sends one after another, all of them in
-            0.8 s where the line is fast.
+            0.9 s where the line is fast.
         polled_s: when `poll_until` returned last, by the transport's clock.
     """
 
@@ -113,7 +113,6 @@ class Link:
         handshake: Handlers = self.session.handlers | {messages.Hello.ID: self._receive_hello}
         self._handlers = self._handlers_without_session = handshake
         self._handlers_in_session: Handlers = handshake | {
-            messages.Telemetry.ID: self._receive_telemetry,
             messages.Answer.ID: self._receive_answer,
             messages.Event.ID: self.events.receive,
             messages.Stopped.ID: self._stop.receive,
@@ -363,7 +362,7 @@ class Link:
 
         Args:
             seconds: by the transport's clock. The board sends the times of one task after another, so that it takes up
-                to 0.8 s longer, or more where the line is slow.
+                to 0.9 s longer, or more where the line is slow.
             progress: called with the share of it that is over, 0 to 1.
 
         Raises:
@@ -430,8 +429,9 @@ class Link:
 
     def _receive(self, wait_s: float, quiet_s: float) -> None:
         """Reads what arrived, and hands each message to its handler; without a session only the handshake's."""
-        for stamp, found in self.line.receive(wait_s, quiet_s):
-            for message_id, _, payload in found:
+        line = self.line
+        for stamp, data in line.read(wait_s, quiet_s):
+            for message_id, _, payload in line.decoder.feed(data):
                 handler = self._handlers.get(message_id)
                 if handler is not None:
                     handler(payload, stamp)
@@ -441,7 +441,7 @@ class Link:
 
     def _session_opened(self, now: float) -> None:
         session = self.session
-        self._handlers = self._handlers_in_session
+        self._handlers = self._handlers_in_session | {messages.Telemetry.ID: self._receive_first_telemetry}
         self.clock.session_opened(now)
         self.telemetry.session_opened(session.telemetry_s)
         self.devices.session_opened()
@@ -461,16 +461,12 @@ class Link:
 
     def _receive_hello(self, payload: bytes, now: float) -> None:
         self._due = AT_ONCE  # it may want an answer
+        self.session.confirm(self.telemetry.latest_s)
         self.session.receive_hello(payload, now)
 
-    def _receive_telemetry(self, payload: bytes, now: float) -> None:
-        if self.telemetry.latest is None:
-            self._begin_telemetry(payload, now)
-        self.telemetry.receive(payload, now)
-        self.session.confirm()
-
-    def _begin_telemetry(self, payload: bytes, now: float) -> None:
-        """The first of a session shows whether the board was reset before."""
+    def _receive_first_telemetry(self, payload: bytes, now: float) -> None:
+        """It shows whether the board was reset before the session."""
+        self._handlers[messages.Telemetry.ID] = self.telemetry.receive
         hello = self.session.hello
         assert hello is not None
         resets = self.counts.board_resets
@@ -482,6 +478,7 @@ class Link:
             notice = f"the last reset of the board at {self.transport.name} was by {cause}"
             if notice not in self.notices:
                 self.notices.append(notice)
+        self.telemetry.receive(payload, now)
 
     def _receive_devices(self, kind: type[messages.Message], payload: bytes, now: float) -> None:
         self.devices.receive(payload, kind)

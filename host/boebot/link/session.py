@@ -156,9 +156,10 @@ class Session:
         self._end()
         self._begin(now_s)
 
-    def confirm(self) -> None:
-        """Something of this session came: no other host has replaced it."""
-        self._replaced_since = NEVER
+    def confirm(self, latest_s: float) -> None:
+        """Something of this session came then: no other host has replaced it before."""
+        if latest_s >= self._replaced_since:
+            self._replaced_since = NEVER
 
     def service(self, now_s: float) -> float:
         """While no session is open: sends what is due; returns when it is the next time (s)."""
@@ -240,7 +241,7 @@ class Session:
         self.time_out_s = hello.session_time_out / 1000
         if hello.session and hello.session == self._number:
             self.hello = hello
-            self.confirm()
+            self._replaced_since = NEVER
             if not self.is_open:
                 self._confirmed(now_s)
         elif hello.session == 0 or hello.session in self._own_numbers:

@@ -22,6 +22,7 @@ class TelemetryBuffer:
 
     Attributes:
         latest: the newest of this session, or None.
+        latest_s: when the newest of all came.
         waiting: to be fetched, oldest first.
     """
 
@@ -35,7 +36,7 @@ class TelemetryBuffer:
         self._counts = counts
         self._piece: list[bytes] = []  # not yet stamped
         self._late_after_s = NEVER
-        self._latest_s = 0.0
+        self.latest_s = 0.0
         self._last_tick = -1  # of the session before
         self._last_s = 0.0  # when that came
 
@@ -48,7 +49,7 @@ class TelemetryBuffer:
         self.waiting, self._piece = [], []
         if self.latest is not None:
             (self._last_tick,) = _TICK(self.latest)
-            self._last_s = self._latest_s
+            self._last_s = self.latest_s
         self.latest = None
 
     def begin(self, payload: bytes, now_s: float, tick_s: float) -> bool:
@@ -65,7 +66,7 @@ class TelemetryBuffer:
     def receive(self, payload: bytes, now_s: float) -> None:
         """Takes a `telemetry`; `stamp` follows when all that came with it was received."""
         self.latest = payload
-        self._latest_s = now_s
+        self.latest_s = now_s
         self._piece.append(payload)
 
     def stamp(self, now_s: float) -> None:
@@ -73,10 +74,10 @@ class TelemetryBuffer:
         payloads = self._piece
         if not payloads:
             return
-        self._piece = []
         estimate = self._clock.estimate
         stamps = estimate.observe_all([_TIME(payload)[0] for payload in payloads], now_s)
         self.waiting += [(payload, *stamp) for payload, stamp in zip(payloads, stamps, strict=True)]
+        payloads.clear()
         if now_s - stamps[-1][1] > self._late_after_s and estimate.bounded:  # the others have come before
             self._counts.late += 1
         if (excess := len(self.waiting) - self.ROOM) > 0:
