@@ -14,6 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import serial
+
+import copied_process
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 
@@ -42,18 +45,24 @@ def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]
         server.stdout.close()
 
 
-def boebot(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, timeout=60)
-
-
-def test_served_board_answers_no_sooner_than_it_was_asked() -> None:
-    """Else the bounds of its clock would contradict each other."""
+@pytest.fixture(scope="module")
+def native_pty() -> Iterator[str]:
+    """The URL of a robot that several tests drive, one after the other."""
     with served("native", "--pty") as (url, _):
-        done = boebot("link", "--on", url, "--seconds", "3", "--json")
-        assert done.returncode == 0, done.stderr
-        last = json.loads(done.stdout.splitlines()[-1])
-        assert last["clock_restarts"] == 0
-        assert 0 < last["clock_bound_us"] < 10_000
+        yield url
+
+
+def boebot(*arguments: str) -> copied_process.Done:
+    return copied_process.command(arguments, Path.cwd())
+
+
+def test_served_board_answers_no_sooner_than_it_was_asked(native_pty: str) -> None:
+    """Else the bounds of its clock would contradict each other."""
+    done = boebot("link", "--on", native_pty, "--seconds", "3", "--json")
+    assert done.returncode == 0, done.stderr
+    last = json.loads(done.stdout.splitlines()[-1])
+    assert last["clock_restarts"] == 0
+    assert 0 < last["clock_bound_us"] < 10_000
 
 
 @pytest.mark.parametrize(
@@ -72,23 +81,22 @@ def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_pat
         assert json.loads(info.stdout)["pin_map"] == "shieldbot"
 
 
-def late_run(folder: Path, *options: str) -> tuple[subprocess.CompletedProcess[str], list[dict[str, str]]]:
+def late_run(url: str, folder: Path, *options: str) -> tuple[copied_process.Done, list[dict[str, str]]]:
     """Runs a brain, one of whose steps sleeps for 0.8 s, on a served board; what it said, and its record."""
     path = folder / "late.py"
     path.write_text(
         "import time\nslept = []\ndef step(robot):\n    robot.drive(0.5, 0.5)\n"
         "    if robot.time > 0.499 and not slept:\n        slept.append(robot.time)\n        time.sleep(0.8)\n"
     )
-    with served("native", "--pty") as (url, _):
-        out = ["--out", str(folder), "--json"]
-        done = boebot("run", str(path), "--on", url, "--seconds", "2", *out, *options)
+    out = ["--out", str(folder), "--json"]
+    done = boebot("run", str(path), "--on", url, "--seconds", "2", *out, *options)
     with (folder / "run.csv").open() as file:
         return done, list(csv.DictReader(file))
 
 
-def test_dead_man_stops_the_motors_while_the_brain_thinks_and_the_run_goes_on(tmp_path: Path) -> None:
+def test_dead_man_stops_the_motors_while_the_brain_thinks_and_the_run_goes_on(native_pty: str, tmp_path: Path) -> None:
     """Its last set-point came before 0.5 s and lives for 0.25 s; the step ends at 1.3 s at the earliest."""
-    done, rows = late_run(tmp_path, "--step-timeout", "60")
+    done, rows = late_run(native_pty, tmp_path, "--step-timeout", "60")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["dead_man_stops"] >= 1 and summary["late_steps"] >= 14
@@ -97,8 +105,8 @@ def test_dead_man_stops_the_motors_while_the_brain_thinks_and_the_run_goes_on(tm
     assert float(rows[-1]["time_s"]) > 1.9 and float(rows[-1]["pulse_left_us"]) > 0
 
 
-def test_step_that_outlasts_its_set_points_ends_the_run_with_its_place(tmp_path: Path) -> None:
-    done, rows = late_run(tmp_path)
+def test_step_that_outlasts_its_set_points_ends_the_run_with_its_place(native_pty: str, tmp_path: Path) -> None:
+    done, rows = late_run(native_pty, tmp_path)
     assert done.returncode == 1
     assert done.stderr.startswith(
         f"boebot: {tmp_path / 'late.py'}, line 7: a step of the brain has not ended after 0.25 s; the dead-man stops"
@@ -127,37 +135,24 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
     assert (tmp_path / "replay.html").is_file()
 
 
-def test_suite_runs_on_a_board_behind_a_port() -> None:
+def test_suite_runs_on_a_board_behind_a_port(native_pty: str) -> None:
     """Some of what needs no pins, here against a served robot; what needs them is left out."""
     root = Path(__file__).resolve().parents[1]
-    with served("native", "--pty") as (url, _):
-        done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "pytest",
-                "-q",
-                "hil_tests",
-                "--on",
-                url,
-                "-k",
-                "handshake or telemetry_comes",
-            ],
-            cwd=root,
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
+    suite = ["-m", "pytest", "-q", "hil_tests/test_link.py", "hil_tests/test_board_protocol.py", "--on", native_pty]
+    done = subprocess.run(
+        [sys.executable, *suite, "-k", "handshake or telemetry_comes"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert done.returncode == 0, done.stdout
     assert " deselected" in done.stdout and " passed" in done.stdout
 
 
-def test_port_is_opened_by_one_program_only() -> None:
-    with served("native", "--pty") as (url, _):
-        import serial
-
-        with serial.Serial(url, 500_000, exclusive=True):
-            done = boebot("run", "wander", "--on", url, "--seconds", "1")
+def test_port_is_opened_by_one_program_only(native_pty: str) -> None:
+    with serial.Serial(native_pty, 500_000, exclusive=True):
+        done = boebot("run", "wander", "--on", native_pty, "--seconds", "1")
     assert done.returncode == 1 and "busy" in done.stderr
 
 
