@@ -29,7 +29,7 @@ BANDGAP, TRACK_WIDTH, LEFT_CENTRE, RIGHT_GAIN = 17, 12, 2, 5
 VALUES = ({BANDGAP: 1050, TRACK_WIDTH: 10_001, LEFT_CENTRE: 22_500, RIGHT_GAIN: -3100},
           {BANDGAP: 1180, TRACK_WIDTH: 43_210, LEFT_CENTRE: 25_599, RIGHT_GAIN: 1234})  # fmt: skip
 
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 
 OK, SUPPLY_LOW = messages.AnswerStatus.OK, messages.AnswerStatus.SUPPLY_LOW
 

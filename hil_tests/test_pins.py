@@ -18,7 +18,7 @@ from sim_bridge.boards.board import Level, ResetCause
 
 pytestmark = pytest.mark.emulated
 
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 DRIVEN = {Level.LOW, Level.HIGH}
 SERVOS = (13, 12)
 
@@ -62,6 +62,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
     host.ask(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
     host.listen(0.1)
     measured = {"ping", "light_left", "light_right", "battery", "analog_infrared"}
+    measured |= {"line_left", "line_middle", "line_right"}
     seen = levels(host, 0.5)
     for device, pins in device_pins(pin_map).items():
         for pin in pins:

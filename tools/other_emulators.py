@@ -22,7 +22,8 @@ from hil_tests.calibration.avr8js import FOLDER, find_tool
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = [
-    ROOT / "build" / "images" / f"{name}.elf" for name in ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+    ROOT / "build" / "images" / f"{name}.elf"
+    for name in ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 ]
 AVR8JS = Path(__file__).with_name("avr8js_serial.js")
 QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]

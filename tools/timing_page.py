@@ -27,7 +27,7 @@ from tools.timing_promises import PROMISES, Promise
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = ROOT / "tools" / "timing_page.md"
 PICTURE = "timing.svg"
-IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-quad")
+IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad")
 DRAWN = "shieldbot"  # the image whose tick is drawn
 SECONDS, SEED = 1.0, 1  # of each scenario, as `boebot timing` does by itself
 UNMEASURED = "?"

@@ -25,7 +25,7 @@ from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, robot_of, search
 from sim_bridge.timing.scenarios import SILENCE
 
-IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-quad")
+IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad")
 RESULT = Path("build/soak/timing-search.json")
 RUN_S = 0.4  # of the board's time, after the preparations
 

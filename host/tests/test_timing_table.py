@@ -14,7 +14,7 @@ from boebot.errors import TimingError
 from boebot.timing.table import read_table, table_of
 
 
-@pytest.mark.parametrize("pin_map", ["boebot", "shieldbot", "shieldbot-basic", "shieldbot-quad"])
+@pytest.mark.parametrize("pin_map", ["boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad"])
 def test_table_is_that_of_the_section(pin_map: str) -> None:
     image = resources.folder("images") / f"{pin_map}.elf"
     with image.open("rb") as stream:

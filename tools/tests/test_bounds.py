@@ -12,7 +12,7 @@ from elftools.elf.elffile import ELFFile
 from tools.bench.avr_program import SOURCES, flags
 
 IMAGES = Path(__file__).resolve().parents[2] / "build" / "images"
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-quad", "boebot")
+PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 NOT_SAID = 0xFFFFFFFF
 PROGRAM = """
 #include <stdint.h>

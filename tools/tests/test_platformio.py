@@ -7,7 +7,13 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
 IMAGES = PROJECT / "build" / "images"
-IMAGE_OF = {"uno": "shieldbot", "uno_basic": "shieldbot-basic", "uno_quad": "shieldbot-quad", "uno_boebot": "boebot"}
+IMAGE_OF = {
+    "uno": "shieldbot",
+    "uno_basic": "shieldbot-basic",
+    "uno_quad": "shieldbot-quad",
+    "uno_line": "shieldbot-line",
+    "uno_boebot": "boebot",
+}
 
 
 def pio(*arguments: str) -> subprocess.CompletedProcess[str]:
