@@ -126,7 +126,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
 
 @pytest.mark.parametrize("bit_errors", [1e-4, 1e-3])
 def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float) -> None:
-    """A whisker is pressed and let go: every change is told, once."""
+    """A whisker is pressed and let go: every change comes, once."""
     line = BadLine(board, bit_errors, seed=2)
     link = Link(line)
     link.open()
@@ -139,9 +139,9 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
             listen(link, 0.15)
             pressed.append(flags)
     listen(link, 0.5)
-    told = [event for event in link.events.fetch() if event.kind == messages.EventKind.WHISKERS]
-    assert [event.value & 0xFF for event in told] == pressed
-    assert all(a.time < b.time for a, b in itertools.pairwise(told))
+    found = [event for event in link.events.fetch() if event.kind == messages.EventKind.WHISKERS]
+    assert [event.value & 0xFF for event in found] == pressed
+    assert all(a.time < b.time for a, b in itertools.pairwise(found))
     assert link.counts.sessions == 1
 
 
@@ -189,7 +189,7 @@ def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s:
         sessions = link.counts.sessions
         begun = line.now()
         board.board.reset(cause)  # type: ignore[attr-defined]
-        link.submit(messages.GetParameter, PING.id, what="tell")  # under way as it happens
+        link.submit(messages.GetParameter, PING.id, what="send it")  # under way as it happens
         while link.counts.sessions == sessions or link.telemetry.latest is None:
             link.poll(TICK_S)
             assert line.now() - begun < 1.0

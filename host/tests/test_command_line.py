@@ -21,7 +21,7 @@ from boebot.boards import BoardRequest, board_kinds, imperfections
 from boebot.cli import link as link_command
 from boebot.cli import parameters as parameters_command
 from boebot.cli import teleop
-from boebot.link import messages
+from boebot.link import messages, mismatch
 from boebot.link.link import Link
 from boebot.robot import Robot
 from boebot.running import runner
@@ -203,7 +203,11 @@ def test_new_brain_runs_and_is_never_overwritten(
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = boebot(capsys, "--version")
-    assert code == 0 and out.startswith("boebot ") and f"protocol 3.0, schema {messages.SCHEMA_HASH:08x}" in out
+    assert (
+        code == 0
+        and out.startswith("boebot ")
+        and f"protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}" in out
+    )
     code, out, _ = boebot(capsys, "--help")
     assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
 

@@ -22,7 +22,7 @@ from peer import QUEUE, InProcess, Peer, Protections, without
 
 VALUES = messages.PARAMETERS["wheel_radius"]
 RESUME_S = 1.0
-PATIENCE_S = 1.0 + 0.35  # of the board with a host that has gone, and until its next hello was heard
+PATIENCE_S = 1.0 + 0.35  # of the board with a host that has gone, and until its next hello has come
 
 
 class LinkModel(RuleBasedStateMachine):
@@ -36,8 +36,8 @@ class LinkModel(RuleBasedStateMachine):
         self.session = InProcess(self.peer, Channel())
         self.link = Link(self.session)
         self.asked: list[tuple[int, Request]] = []
-        self.heard: list[int] = []
-        self.told = 0
+        self.received: list[int] = []
+        self.happened = 0
         self.value = VALUES.minimum
 
     @initialize(seed=st.integers(0, 1000))
@@ -82,8 +82,8 @@ class LinkModel(RuleBasedStateMachine):
 
     @rule()
     def something_happens_on_the_board(self) -> None:
-        self.told += 1
-        self.peer._happened(messages.EventKind.DEAD_MAN, self.told)
+        self.happened += 1
+        self.peer._happened(messages.EventKind.DEAD_MAN, self.happened)
 
     @rule()
     def host_stops(self) -> None:
@@ -142,7 +142,7 @@ class LinkModel(RuleBasedStateMachine):
     @invariant()
     def events_come_once_and_in_order(self) -> None:
         self.fetch()
-        assert self.heard == sorted(set(self.heard))
+        assert self.received == sorted(set(self.received))
 
     @invariant()
     def memory_is_bounded(self) -> None:
@@ -172,7 +172,7 @@ class LinkModel(RuleBasedStateMachine):
         self.listen(0.5, fetch=False)
         assert len(self.link.telemetry.fetch()) >= 48
         self.fetch()
-        assert self.heard[-1] == self.told
+        assert self.received[-1] == self.happened
         assert self.link.counts.sessions == sessions, "and stays so"
         self.peer.reset()
         self.listen(RESUME_S)
@@ -191,7 +191,8 @@ class LinkModel(RuleBasedStateMachine):
                 self.fetch()
 
     def fetch(self) -> None:
-        self.heard += [event.value for event in self.link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
+        kind = messages.EventKind.DEAD_MAN
+        self.received += [event.value for event in self.link.events.fetch() if event.kind == kind]
 
 
 LINES = settings(stateful_step_count=25)  # as many examples as the profile says
@@ -204,7 +205,7 @@ def test_link_keeps_its_promises() -> None:
 @pytest.mark.soak
 @pytest.mark.parametrize("missing", ["numbers", "nonce"])
 def test_model_notices_a_board_without_a_protection(missing: str) -> None:
-    """What the protections are good for, and that the model above would tell."""
+    """What the protections are good for, and that the model above would notice."""
 
     class Unprotected(LinkModel):
         protections = without(**{missing: False})

@@ -99,14 +99,14 @@ def test_line_sends_and_accepts_frames_of_its_session_only() -> None:
     board = Decoder(0x12345, to_board=True)
     assert board.feed(wire.written) == [(messages.Stop.ID, 0, b"\7")]
     stopped = [encode(messages.Stopped.ID, number, b"\7", seed) for number, seed in enumerate((0x12345, 0x54321))]
-    heard: list[bytes] = []
-    line.listener = heard.append
+    listened: list[bytes] = []
+    line.listener = listened.append
     wire.coming = [(1.0, b"\0" + stopped[0]), (2.0, stopped[1])]
     found = [(stamp, line.decoder.feed(data)) for stamp, data in line.read(0.1)]
     assert found == [(1.0, [(messages.Stopped.ID, 0, b"\7")]), (2.0, [])]
     assert (line.decoder.good, line.decoder.bad) == (1, 1)
-    assert heard == [b"\0" + stopped[0], stopped[1]]
-    assert kept == [("to_board", 3.0, wire.written), ("to_host", 1.0, heard[0]), ("to_host", 2.0, heard[1])]
+    assert listened == [b"\0" + stopped[0], stopped[1]]
+    assert kept == [("to_board", 3.0, wire.written), ("to_host", 1.0, listened[0]), ("to_host", 2.0, listened[1])]
     line.use_session(0)
     assert line.decoder.seed == NO_SESSION
 
@@ -251,7 +251,7 @@ def requests_of(sent: Sent, restarts: list[float] | None = None) -> Requests:
 
 
 def get(limit_s: float = 2.0) -> Request:
-    return Request(messages.GetParameter, (7,), "tell", limit_s)
+    return Request(messages.GetParameter, (7,), "send it", limit_s)
 
 
 def test_requests_go_one_at_a_time_and_again_until_they_are_answered() -> None:
@@ -279,7 +279,7 @@ def test_request_that_is_never_answered_begins_a_new_session() -> None:
     requests, request = requests_of(sent, restarts), get(0.3)
     requests.submit(request, 0.0)
     at(0.0, 0.11, 0.22, 0.33, service=lambda now: requests.service(now, 0.1))
-    assert str(request.error) == "the board at wire did not tell within 0.3 s, though asked 3 times"
+    assert str(request.error) == "the board at wire did not send it within 0.3 s, though asked 3 times"
     assert restarts == [0.33] and len(sent) == 3
 
 
@@ -290,7 +290,7 @@ def test_request_waits_for_a_session_and_is_given_up_without_one() -> None:
     requests.submit(request, 1.0)
     assert requests.service_waiting(1.5) == 3.0 and not request.done
     requests.service_waiting(3.0)
-    assert str(request.error) == "the board at wire was to tell, but no session came about within 2 s" and sent == []
+    assert str(request.error) == "the board at wire was to send it, but no session came about within 2 s" and sent == []
 
 
 def test_end_of_the_session_fails_its_requests_and_numbers_begin_anew() -> None:

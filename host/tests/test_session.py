@@ -140,12 +140,12 @@ def test_host_talks_to_a_board_that_has_more_messages(monkeypatch: pytest.Monkey
     peer = Peer()
     peer.protocol_version += 1
     session = InProcess(peer)
-    tell = peer._telemetry
+    usual = peer._telemetry
 
     def telemetry() -> messages.Telemetry:
         peer._frames.append(encode(ADDED, peer._sequence, b"more", peer.session))
         peer._sequence = (peer._sequence + 1) & 0xFF
-        return tell()._replace(ping_status=9)
+        return usual()._replace(ping_status=9)
 
     monkeypatch.setattr(peer, "_telemetry", telemetry)
     link = Recorded(session)
@@ -257,7 +257,7 @@ class Mute(InProcess):
         (Mute, BoardError, "says hello, but does not hear us: no session within 2 s"),
     ],
 )
-def test_what_does_not_answer_is_told_apart(
+def test_what_does_not_answer_is_distinguished(
     kind: Callable[[Peer], InProcess], error: type[BoebotError], sentence: str
 ) -> None:
     session = kind(Peer())
@@ -428,7 +428,7 @@ def test_request_is_repeated_until_it_is_answered_and_carried_out_once() -> None
     assert link.counters().retransmitted >= 2 and peer.counts["duplicate"] >= 1
 
 
-def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_heard() -> None:
+def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_answered() -> None:
     link, peer, session = joined(times=LinkTimes(request_limit_s=0.5))
     whole = session.channel.carry
     session.channel.carry = lambda way, frame, at_s: (  # type: ignore[method-assign]
@@ -494,7 +494,7 @@ def test_board_that_is_busy_writing_is_asked_again() -> None:
     link, peer, session = joined()
     saving = link.submit(messages.SaveParameters, what="save", limit_s=5.0)
     listen(link, 0.005)
-    request = link.submit(messages.GetParameter, 7, what="tell")
+    request = link.submit(messages.GetParameter, 7, what="send it")
     listen(link, 0.1)
     assert not saving.done and not request.done, "one at a time"
     listen(link, 0.2)
@@ -552,7 +552,7 @@ def test_stop_is_sent_again_until_it_is_confirmed() -> None:
 def test_stop_goes_before_a_request_under_way() -> None:
     link, peer, session = joined()
     session.channel.stalled = True
-    link.submit(messages.GetParameter, 7, what="tell")
+    link.submit(messages.GetParameter, 7, what="send it")
     listen(link, 0.1)
     session.channel.stalled = False
     link.stop()
@@ -602,19 +602,19 @@ def test_events_come_once_and_in_order_over_a_bad_line() -> None:
     link, peer, _session = joined(
         channel=Channel(loss=0.3, duplication=0.3, seed=7), times=LinkTimes(request_limit_s=9)
     )
-    told: list[int] = []
-    heard: list[int] = []
+    sent_values: list[int] = []
+    received: list[int] = []
     for number in range(200):
         peer._happened(messages.EventKind.DEAD_MAN, number)
-        told.append(number)
+        sent_values.append(number)
         for _ in range(12):
             listen(link, 0.01)
-            heard += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
+            received += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
     listen(link, 1.0)
-    heard += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
+    received += [event.value for event in link.events.fetch() if event.kind == messages.EventKind.DEAD_MAN]
     assert link.counts.sessions == 1
-    assert heard == sorted(set(heard)), "each once, in order"
-    assert len(heard) == len(told) - peer.counts["deferred"] and heard[-1] == told[-1]
+    assert received == sorted(set(received)), "each once, in order"
+    assert len(received) == len(sent_values) - peer.counts["deferred"] and received[-1] == sent_values[-1]
     assert link.counters().duplicate > 0
 
 
@@ -661,7 +661,7 @@ def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
 def test_telemetry_that_comes_during_a_request_is_kept() -> None:
     link, _, session = joined()
     session.channel.stalled = True
-    request = link.submit(messages.GetParameter, 7, what="tell")
+    request = link.submit(messages.GetParameter, 7, what="send it")
     while not request.done and session.now() < 0.2:
         link._turn(0.2)
     ticks = [tick_of(payload) for payload, *_ in link.telemetry.fetch()]
@@ -686,16 +686,16 @@ def test_late_telemetry_is_counted() -> None:
 
 
 @pytest.mark.parametrize(("line_ticks", "parameter"), [(1, 1), (5, 1), (5, 2), (2, 5), (5, 5)])
-def test_telemetry_thinner_than_its_parameter_is_told(line_ticks: int, parameter: int) -> None:
+def test_telemetry_thinner_than_its_parameter_is_reported(line_ticks: int, parameter: int) -> None:
     peer = Peer()
     peer.telemetry_period = line_ticks  # as its line allows
     peer.parameters[messages.PARAMETERS["telemetry_period"].id] = parameter
     link, _, _ = joined(peer)
-    told = (
+    notice = (
         f"the board at peer sends telemetry every {10 * line_ticks} ms, not every {10 * parameter} ms as its parameter "
         "telemetry_period says: its line is slow"
     )
-    assert link.notices == ([told] if line_ticks > parameter else [])
+    assert link.notices == ([notice] if line_ticks > parameter else [])
 
 
 def test_both_ends_count_by_the_same_names() -> None:
@@ -703,7 +703,7 @@ def test_both_ends_count_by_the_same_names() -> None:
     assert same == set(HostCounters().as_dict()) & set(messages.Counters._fields)
 
 
-def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
+def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
     """The host sleeps in mid-drive: dead-man, end of the session. Both come with their times, once, and are earlier."""
     link, peer, session = joined()
     link.arm()
@@ -718,13 +718,13 @@ def test_stops_that_nobody_heard_of_are_told_in_the_next_session() -> None:
     session._buffer.clear()
     assert not peer.session
     listen(link, 1.0)
-    told = link.events.fetch()
-    assert [(event.kind, event.value) for event in told] == [
+    found = link.events.fetch()
+    assert [(event.kind, event.value) for event in found] == [
         (messages.EventKind.DEAD_MAN, peer.accepted[-1].answers_tick),
         (messages.EventKind.LATCH, messages.Latch.SESSION_ENDED),
     ]
-    assert all(event.earlier for event in told)
-    times = [event.time - asleep for event in told]
+    assert all(event.earlier for event in found)
+    times = [event.time - asleep for event in found]
     assert times == pytest.approx([0.2, 1.0], abs=0.06)
     link.arm()
     listen(link, 0.1)
@@ -798,7 +798,7 @@ def test_measuring_the_tasks_lasts_as_long_as_asked_and_a_round(period: int) -> 
     assert 1.0 + round_s <= link.transport.now() - begun < 1.0 + round_s + 0.1
 
 
-def test_a_board_that_does_not_tell_of_a_task_is_named_with_it() -> None:
+def test_a_board_that_leaves_out_a_task_is_named_with_it() -> None:
     link, peer, _ = joined()
     peer.untold = {messages.Task.TURRET, messages.Task.DEVICES}
     begun = link.transport.now()

@@ -68,7 +68,7 @@ def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]
 
 
 class Rates:
-    """Counts at one moment, to tell how fast they grow."""
+    """Counts at one moment, to show how fast they grow."""
 
     def __init__(self, watched: Link) -> None:
         self.at_s = watched.transport.now()

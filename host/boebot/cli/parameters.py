@@ -29,7 +29,7 @@ _TELEMETRY_S = 1.0  # how long to wait for the first telemetry
 @contextlib.contextmanager
 def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
     """A session with the board, for as long as the block lasts. Nothing moves. Where parameters are to be changed, a
-    reset by the opening is told: it forgets those that were set before and not saved."""
+    reset by the opening is reported: it forgets those that were set before and not saved."""
     begun_s = time.monotonic()
     session = open_board(on, BoardRequest(robot=load_robot(robot), record=False))
     try:
@@ -65,7 +65,7 @@ def _save(link: Link, on: str) -> None:
         output.say(f"the EEPROM of the emulated board {on!r} ends with this command, and what is saved in it, too")
 
 
-def _tell_how_long(what: str, on: str, saved: bool) -> None:
+def _say_how_long(what: str, on: str, saved: bool) -> None:
     """What is set and not saved does not last."""
     if not saved:
         until = "until the board's next reset" if is_live(on) else "until this command ends, and its emulated board"
@@ -147,7 +147,7 @@ def set_one(
         output.print_json(described(name, now) | {"saved": save})
     else:
         _show(name, now, False)
-    _tell_how_long(f"{name} lasts", on, save)
+    _say_how_long(f"{name} lasts", on, save)
 
 
 @app.command("save")
@@ -174,4 +174,4 @@ def reset_all(
         output.print_json({"reset": True, "saved": save})
     else:
         output.line(f"all parameters are reset{' and saved' if save else ''}")
-    _tell_how_long("the reset of the parameters lasts", on, save)
+    _say_how_long("the reset of the parameters lasts", on, save)

@@ -52,7 +52,7 @@ def configure(link: Link, robot: RobotDescription) -> RobotDescription:
     if hello.parameters_saved:
         return adapted(robot, {name: link.get_parameter(name) for name in wanted})
     for parameter, value in wanted.items():
-        if parameter != "baud_rate":  # the board speaks at the right one, or nothing would be heard
+        if parameter != "baud_rate":  # the board speaks at the right one, or nothing would come
             link.set_parameter(parameter, value)
     return robot
 

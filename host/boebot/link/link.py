@@ -4,8 +4,8 @@
 `SlowDevices` deliver, `ClockSync` follows the board's clock, `TelemetryBuffer` keeps what comes.
 None of them has a thread: all of that happens inside the calls of `Link` that wait for the board.
 
-When the board was reset, or has not heard the host for too long, its next hello says so, and the link opens a new
-session by itself: `counts.sessions` counts them, and the program that configured and armed the board does it again.
+When the board was reset, or has ended the session because the host was silent, its next hello says so, and the link
+opens a new session by itself: `counts.sessions` counts them, and the program configures and arms the board again.
 """
 
 from __future__ import annotations
@@ -325,7 +325,7 @@ class Link:
     def get_parameter(self, name: str) -> float:
         """The value of a parameter, in its unit."""
         spec = parameter_spec(name)
-        answer = self.request(messages.GetParameter, spec.id, what=f"tell parameter {name}")
+        answer = self.request(messages.GetParameter, spec.id, what=f"send parameter {name}")
         self._check(answer, f"refuses parameter {name}")
         return answer.value * spec.scale
 
@@ -378,7 +378,7 @@ class Link:
         missing = [name for name, cycles in self.task_times.items() if cycles is None]
         if missing:
             raise BoardError(
-                f"the board at {self.transport.name} did not tell the times of its tasks {', '.join(missing)} within "
+                f"the board at {self.transport.name} did not send the times of its tasks {', '.join(missing)} within "
                 f"{most:.1f} s; expected one task after another"
             )
         return {name: cycles for name, cycles in self.task_times.items() if cycles is not None}
@@ -513,7 +513,7 @@ class Link:
         ticks = hello.telemetry_period
         if ticks <= _PERIOD.minimum:
             return
-        request = self.submit(messages.GetParameter, _PERIOD.id, what="tell parameter telemetry_period")
+        request = self.submit(messages.GetParameter, _PERIOD.id, what="send parameter telemetry_period")
         while not request.done:
             self._turn(NEVER)
         answer = request.answer  # if there is none, the next request says why

@@ -5,7 +5,8 @@ has reached the next multiple of n, and its command goes out at once. On a live 
 board in this process time stands still while the brain thinks; but where such a run is paced, a step that took longer
 than the period was late, as it would be on a live board: that time passes before its command goes out.
 
-A board that was reset, or that has not heard the host for too long, is configured and armed again, and the run goes on.
+A board that was reset, or has ended the session because the host was silent, is configured and armed again, and the
+run goes on.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ _BYTES_TO_LIVE = 300
 _LINE_SHARE = 4  # messages of slow devices fill a quarter of the line at most (PROTOCOL.md, "Delivery")
 # How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
 # all later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
-# idle; so it is taken when so many bytes of the telemetry are still to come, and ends with the last one.
+# idle; so the look begins when this many bytes of the telemetry are still to come, and ends with the last one.
 _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
@@ -190,7 +191,7 @@ class BoardDriver:
         )
 
     def _equipment(self) -> Equipment:
-        """The devices as the board has them; how often it tells of slow ones it says itself."""
+        """The devices as the board has them, with its own period for messages of slow ones."""
         equipment = Equipment(self.description, self.tick_s)
         if not equipment.needs_messages:
             return equipment
@@ -208,7 +209,7 @@ class BoardDriver:
         if self.link.telemetry.latest is not None:
             (self._armed_tick,) = _TICK(self.link.telemetry.latest)
 
-    def _heed_emergency_stop(self) -> None:
+    def _apply_emergency_stop(self) -> None:
         """The brain has latched the motors off, or armed them again."""
         if self.robot.latched and not self._halted:
             self._halted = True
@@ -219,7 +220,7 @@ class BoardDriver:
                     self._arm()
             self._halted = False
 
-    def _heed_slow_command(self) -> None:
+    def _send_slow_command(self) -> None:
         """The brain has asked something of turret or buzzer."""
         asked, self.robot.slow_command = self.robot.slow_command, None
         assert asked is not None
@@ -244,7 +245,7 @@ class BoardDriver:
             for kind, payload in self.link.devices.fetch():
                 self.record.append(kind.NAME, self._last_s, payload)
 
-    def _heed_latch(self, payload: bytes) -> None:
+    def _check_latch(self, payload: bytes) -> None:
         """The board has latched its motors off: a reason to end the run, unless a new session mends it.
 
         Raises:
@@ -279,8 +280,8 @@ class BoardDriver:
         on_time = not transport.realtime and link.line.known_byte_s > 0
         early_s = _LOOK_EARLY_BYTES * link.line.known_byte_s if on_time else _LOOK_EARLY * tick_s
         awaited = -1  # the tick that was looked for
-        started_s = heard_s = look_s = transport.now()
-        wait_until_s = heard_s + (period + 1) * tick_s
+        started_s = received_s = look_s = transport.now()
+        wait_until_s = received_s + (period + 1) * tick_s
         started = next_progress = wall.perf_counter()
         meanwhile: list[Received] = []  # what came during a late step of a paced run
         while True:
@@ -293,7 +294,7 @@ class BoardDriver:
                 now_s = transport.now()
             restarted = link.counts.board_resets != self.resets
             if not received:
-                if now_s - heard_s > silence_s + period * tick_s:
+                if now_s - received_s > silence_s + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
                 look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s
                 continue
@@ -313,17 +314,17 @@ class BoardDriver:
                     self._last_s = time_s = tick * tick_s + time_zero
                     put_aside(time_s, payload, host_s, bound_s)
             if last > self._armed_tick and _LATCH(payload)[0]:
-                self._heed_latch(payload)
+                self._check_latch(payload)
             if waiting_events:
                 self._take_events()
-            heard_s = now_s
+            received_s = now_s
             if time_s >= end_s:
                 break
             if last >= due:
                 if last - due >= n:
                     self.late_steps += (last - due) // n
                 if paced:
-                    ahead = (heard_s - started_s) - (wall.perf_counter() - started)
+                    ahead = (received_s - started_s) - (wall.perf_counter() - started)
                     if ahead > 0:
                         wall.sleep(ahead)
                 if progress is not None and wall.perf_counter() >= next_progress:
@@ -335,11 +336,11 @@ class BoardDriver:
                 shown = wall.perf_counter()
                 yield time_s
                 if paced and (took_s := wall.perf_counter() - shown) > self.period_s:
-                    meanwhile = poll(heard_s + took_s, heard_s + took_s)
+                    meanwhile = poll(received_s + took_s, received_s + took_s)
                 if robot.latched or self._halted:
-                    self._heed_emergency_stop()
+                    self._apply_emergency_stop()
                 if robot.slow_command is not None:
-                    self._heed_slow_command()
+                    self._send_slow_command()
                 kind, left, right = robot.command
                 if kind == "signal":
                     link.send_signal(left, right, time_to_live_ms, last)
@@ -351,9 +352,9 @@ class BoardDriver:
                 due = last - last % n + n
             ahead_ticks = min(due - last, (seconds - time_s) / tick_s)
             # looked for too early: it is about to come
-            look_s = heard_s if on_time and due == awaited else heard_s + ahead_ticks * tick_s - early_s
+            look_s = received_s if on_time and due == awaited else received_s + ahead_ticks * tick_s - early_s
             awaited = due
-            wait_until_s = heard_s + (ahead_ticks + period + 1) * tick_s
+            wait_until_s = received_s + (ahead_ticks + period + 1) * tick_s
 
     def _in_new_session(self, received: list[Received]) -> list[Received]:
         """Makes the board ready again; returns the telemetry of the new session."""
@@ -364,7 +365,7 @@ class BoardDriver:
         return [*received, *self.link.telemetry.fetch()]
 
     def _take_events(self) -> None:
-        """Puts events aside. Stops of the motors before the run are not of it: its user is told of them."""
+        """Puts events aside. Stops of the motors before the run are not of it: they become notices."""
         for event in self.link.events.fetch():
             if not event.earlier or self.link.counts.sessions != self._first_session:
                 self.record.append_event(event)
