@@ -65,7 +65,7 @@ SANITIZERS = [
     "-fno-sanitize-recover=all",
     "-fno-omit-frame-pointer",
     "-O1",
-    "-g",
+    "-g1",
 ]
 SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
 MSVC = sys.platform == "win32"

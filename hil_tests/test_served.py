@@ -101,8 +101,8 @@ def test_dead_man_stops_the_motors_while_the_brain_thinks_and_the_run_goes_on(na
     summary = json.loads(done.stdout)
     assert summary["dead_man_stops"] >= 1 and summary["late_steps"] >= 14
     asleep = [row for row in rows if 0.85 < float(row["time_s"]) < 1.25]
-    assert len(asleep) > 30 and {float(row["pulse_left_us"]) for row in asleep} == {0.0}
-    assert float(rows[-1]["time_s"]) > 1.9 and float(rows[-1]["pulse_left_us"]) > 0
+    assert len(asleep) > 30 and {float(row["servo_left_pulse_us"]) for row in asleep} == {0.0}
+    assert float(rows[-1]["time_s"]) > 1.9 and float(rows[-1]["servo_left_pulse_us"]) > 0
 
 
 def test_step_that_outlasts_its_set_points_ends_the_run_with_its_place(native_pty: str, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ Python and import it take a minute longer."""
 from __future__ import annotations
 
 import os
+import runpy
 import signal
 import sys
 import tempfile
@@ -38,6 +39,16 @@ def python(code: str, folder: Path) -> Done:
         sys.argv, sys.path[0:0] = ["-c"], [""]
         sys.modules["__main__"] = main = ModuleType("__main__")
         exec(compile(code, "<string>", "exec"), vars(main))
+
+    return copied(work, folder)
+
+
+def module(name: str, arguments: Sequence[str], folder: Path) -> Done:
+    """As `python -m NAME ARGUMENTS` in that folder."""
+
+    def work() -> None:
+        sys.argv = [name, *arguments]
+        runpy.run_module(name, run_name="__main__", alter_sys=True)
 
     return copied(work, folder)
 

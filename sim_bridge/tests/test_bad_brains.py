@@ -46,6 +46,8 @@ def step(robot):
 PROCESS = """import math, time
 from boebot import Command
 from boebot.brain import Brain, MotorBehavior
+
+pytestmark = pytest.mark.unsanitized
 class Naughty(MotorBehavior):
     def step(self, robot):
         robot.drive(0.5, 0.5)
@@ -239,7 +241,6 @@ def test_brain_that_catches_everything_is_found_out_once_it_returns(stood_still:
     assert result.run_time == pytest.approx(BAD_FROM_S) and stood_still == [True]
 
 
-@pytest.mark.unsanitized
 def test_step_of_another_thread_and_among_several_robots() -> None:
     """An endless loop is ended there, too, and names the robot."""
     errors: list[BaseException | None] = []
@@ -287,7 +288,6 @@ def test_step_that_somebody_debugs_is_not_interrupted() -> None:
 # ---- at the command line ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.unsanitized
 @pytest.mark.parametrize(
     ("on", "deed", "sentence"),
     [
@@ -319,7 +319,6 @@ def test_bad_brain_at_the_command_line(
     assert stood_still == [True]
 
 
-@pytest.mark.unsanitized
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_ctrl_c_ends_a_brain_that_hangs(tmp_path: Path) -> None:
     path, begun = tmp_path / "bad.py", tmp_path / "begun"

@@ -24,6 +24,8 @@ from sim_bridge.recorder import Recorder
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, STAGES, Vehicle, VehicleModel, arsim, beam
 
+pytestmark = pytest.mark.unsanitized
+
 
 def odometer(**changes: Any) -> Any:
     usual = {"half_track": 0.2, "wheel_radius": 0.1, "factor_left": 1.0, "factor_right": 1.0}

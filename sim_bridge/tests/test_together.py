@@ -34,6 +34,8 @@ from sim_bridge.sessions.places import places_of
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sessions.with_board import SimSession
 
+pytestmark = pytest.mark.unsanitized
+
 SECONDS = 8.0
 
 
@@ -78,7 +80,6 @@ def test_near_robot_does_change_it() -> None:
     assert first(0.4) != first(50.0)
 
 
-@pytest.mark.unsanitized
 def test_result_does_not_depend_on_which_other_far_robots_there_are() -> None:
     """Each keeps its number; the brains and periods of the others change how often the clock stops for them."""
 
@@ -161,7 +162,6 @@ def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
     assert second.run_time == pytest.approx(4.0, abs=0.011) and second.distance > 0.2
 
 
-@pytest.mark.unsanitized
 def test_same_run_twice_is_the_same() -> None:
     def outcome() -> list[str]:
         return [digest(robot) for robot in boebot.run_together([Member()] * 3, "room", 5.0, seed=2).robots]
@@ -235,7 +235,6 @@ def test_interrupt_in_a_brain_stops_all() -> None:
     assert all(isinstance(robot.error, KeyboardInterrupt) and stopped(robot) for robot in result.robots)
 
 
-@pytest.mark.unsanitized
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 @pytest.mark.parametrize("after_s", [0.0, 0.7])
 def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) -> None:
@@ -265,7 +264,6 @@ def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
         boebot.run_together([Member(), Member(brain=str(brain))])
 
 
-@pytest.mark.unsanitized
 @pytest.mark.parametrize(
     ("members", "wishes", "kind", "sentence"),
     [
@@ -329,7 +327,6 @@ def test_no_place_left_is_told(tmp_path: Path) -> None:
 # ---- files -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.unsanitized
 def test_files_show_all_robots(tmp_path: Path) -> None:
     result = boebot.run_together([Member(), Member(brain=ahead)], "room", 3.0, out=tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"run.png", "replay.html", "robot-1", "robot-2"}

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+import copied_process
 from tools.bench import report, scene
 from tools.bench.figures import Figure, Peer, figure
 
@@ -88,10 +89,8 @@ def test_the_table_shows_value_spread_bound_and_peers() -> None:
     assert "Failed: speed of a thing: RuntimeError: no such thing." in text
 
 
-def run(*options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "tools.bench", *options], cwd=ROOT, capture_output=True, text=True, timeout=300
-    )
+def run(*options: str) -> copied_process.Done:
+    return copied_process.module("tools.bench", options, ROOT)
 
 
 def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
