@@ -33,7 +33,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; longest tasks, SEARCH_SECONDS; the firmware by other options of the compiler, and in other emulators; all experiments"
+	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; each protection taken away; longest tasks, SEARCH_SECONDS; the firmware by other options of the compiler, and in other emulators; all experiments"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"

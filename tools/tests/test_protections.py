@@ -1,4 +1,5 @@
-"""Each protection of the firmware is tested: without it a unit test fails. Part of `make soak`.
+"""Each protection of the firmware is tested: without it a unit test fails. `make soak` compiles and runs that; `make
+test` looks whether each protection is where its row says.
 
 A row names the protection, the file that holds it, the text that is it, what stands there without it, and the file of
 firmware/test/test_units that must notice. The checks of a frame are taken away in test_fuzz.py and test_error_rates.py.
@@ -17,8 +18,6 @@ from typing import NamedTuple
 import pytest
 
 from tools.fuzz import FIRMWARE, TEST, firmware_sources
-
-pytestmark = pytest.mark.soak
 
 # As the environment `native` of platformio.ini, without warnings: what is taken away leaves names that nothing uses.
 FLAGS = ("-DPIN_MAP_SHIELDBOT", "-w", f"-I{FIRMWARE}", f"-I{TEST}")
@@ -198,12 +197,20 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Outcomes]:
         yield runs
 
 
+@pytest.mark.parametrize("row", ROWS, ids=[row.protection for row in ROWS])
+def test_protection_is_where_its_row_says(row: Row) -> None:
+    assert without(row)
+    assert (TEST / "test_units" / f"{row.suite}.cpp").is_file()
+
+
+@pytest.mark.soak
 @pytest.mark.parametrize("suite", SUITES)
 def test_suite_passes_with_every_protection(suite: str, outcomes: Outcomes) -> None:
     done = outcomes[suite].result()
     assert done.returncode == 0, done.stdout[-4000:]
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("row", ROWS, ids=[row.protection for row in ROWS])
 def test_suite_fails_without(row: Row, outcomes: Outcomes) -> None:
     done = outcomes[row.protection].result()
