@@ -34,6 +34,8 @@ from boebot.running.tasks import Request
 from sim_bridge.sessions.with_board import SimSession
 from sim_bridge.sessions.without_board import DirectSession
 
+pytestmark = pytest.mark.unsanitized
+
 BAD_FROM_S = 0.30
 FUNCTION = """import math, time
 from boebot import Command
@@ -46,8 +48,6 @@ def step(robot):
 PROCESS = """import math, time
 from boebot import Command
 from boebot.brain import Brain, MotorBehavior
-
-pytestmark = pytest.mark.unsanitized
 class Naughty(MotorBehavior):
     def step(self, robot):
         robot.drive(0.5, 0.5)

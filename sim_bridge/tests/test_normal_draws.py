@@ -143,11 +143,13 @@ def many() -> Floats:
     return np.array([lib.noise_normal(11, 1, 7, step) for step in range(4_000_000)])
 
 
+@pytest.mark.unsanitized
 def test_distribution_by_kolmogorov_and_smirnov(many: Floats) -> None:
     assert stats.kstest(many[:1_000_000], "norm").pvalue > 1e-3
     assert stats.kstest(many[::4], "norm").pvalue > 1e-3
 
 
+@pytest.mark.unsanitized
 def test_moments(many: Floats) -> None:
     """Mean, variance, skewness and excess within four of their own standard errors."""
     found = (many.mean(), many.var() - 1.0, stats.skew(many), stats.kurtosis(many))
@@ -155,6 +157,7 @@ def test_moments(many: Floats) -> None:
     assert (np.abs(found) < 4 * errors).all()
 
 
+@pytest.mark.unsanitized
 @pytest.mark.parametrize("bound", [2.0, 3.0, 3.654, 3.9106, 4.0, 4.5, 5.0])
 def test_tails_hold_what_the_bell_says(many: Floats, bound: float) -> None:
     """Each side by itself, as an exact binomial test; 3.654 and 3.9106 are the outermost layers' edges."""
@@ -162,6 +165,7 @@ def test_tails_hold_what_the_bell_says(many: Floats, bound: float) -> None:
         assert stats.binomtest(seen, many.size, stats.norm.sf(bound)).pvalue > 1e-3
 
 
+@pytest.mark.unsanitized
 def test_shape_within_the_tail(many: Floats) -> None:
     """Beyond the ziggurat's last edge, as the normal distribution is there."""
     begin = EDGES[1]
@@ -170,6 +174,7 @@ def test_shape_within_the_tail(many: Floats) -> None:
     assert stats.kstest(beyond, lambda x: 1.0 - stats.norm.sf(x) / stats.norm.sf(begin)).pvalue > 1e-3
 
 
+@pytest.mark.unsanitized
 def test_neighbours_are_not_correlated(many: Floats) -> None:
     for lag in (1, 2, 3, 4, 64):
         assert abs(np.mean(many[lag:] * many[:-lag])) < 4 / math.sqrt(many.size)
