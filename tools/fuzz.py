@@ -1,5 +1,5 @@
-"""Coverage-guided fuzzing of the firmware's and the world's C by libFuzzer with sanitizers: `make fuzz`; for seconds in
-`make test`.
+"""Coverage-guided fuzzing of the firmware's and the world's C by libFuzzer with sanitizers: `make fuzz`; for seconds
+in `make soak`, those of the frame in `make test`.
 
     python -m tools.fuzz [--seconds N] [FUZZER ...]
 
