@@ -23,7 +23,7 @@ SANITIZED = "BOEBOT_SANITIZED" in os.environ
 TIMES = os.environ.get("BOEBOT_TEST_TIMES")  # file to which a line per folder is added
 
 # Sanitizers make each example some five times as slow; what they look for shows in a few. `make fuzz` tries thousands.
-settings.register_profile("same every time", max_examples=8 if SANITIZED else 40, deadline=None, derandomize=True)
+settings.register_profile("same every time", max_examples=8 if SANITIZED else 30, deadline=None, derandomize=True)
 settings.register_profile("fuzz", max_examples=int(EXAMPLES or 100), deadline=None, print_blob=True)
 settings.load_profile("fuzz" if EXAMPLES else "same every time")
 

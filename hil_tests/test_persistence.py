@@ -80,6 +80,7 @@ def test_a_save_is_answered_when_it_is_written_and_no_tick_is_missed(board: Boar
     assert sum(message.status & messages.Status.SAVING != 0 for message in telemetry) >= SAVED_BYTES * CELL_S / TICK_S
 
 
+@pytest.mark.soak_on_avr
 @pytest.mark.parametrize("damage", list(Damage))
 def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -> None:
     """Cuts 3 ms apart meet each write of 3.4 ms; after each one the values are all old or all new."""

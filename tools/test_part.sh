@@ -1,7 +1,8 @@
 #!/bin/sh
-# One part of all tests: tools/test_part.sh PART [ARGUMENT OF PYTEST...]. PART is a folder, a folder's tests that look at
-# the wall clock, FOLDER-wall_clock, or `sanitized` (tools/test_sanitized.sh). Before those of `tools` run the firmware's units on this computer, those of the usual pin map
-# with sanitizers: both use PlatformIO, which has one folder. Says how the part ended; more only if it failed.
+# One part of all tests: tools/test_part.sh PART [ARGUMENT OF PYTEST...]. PART is a folder, wall_clock-NAME, those tests
+# of test_NAME.py that look at the wall clock, or `sanitized` (tools/test_sanitized.sh). Before those of `tools` run the
+# firmware's units on this computer, those of the usual pin map with sanitizers: both use PlatformIO, which has one
+# folder. Says how the part ended; more only if it failed.
 set -eu
 cd "$(dirname "$0")/.."
 part=$1
@@ -9,7 +10,7 @@ shift
 log=build/test-$part.log units=build/test-units.log
 
 of_wall_clock() {
-  build/venv/bin/python -m pytest $(grep -rl wall_clock --include='test_*.py' "${part%-wall_clock}") -m wall_clock "$@"
+  build/venv/bin/python -m pytest "$(find host hil_tests -name "test_${part#wall_clock-}.py")" -m wall_clock "$@"
 }
 
 of_folder() { build/venv/bin/python -m pytest "$part" -m "not wall_clock and not soak" "$@"; }
@@ -26,7 +27,7 @@ run() {
       tools/pio test -e native_sanitized -e native_quad -e native_boebot >"$units" 2>&1 || { cat "$units" && return 1; }
       grep ' test cases: ' "$units" && of_folder "$@"
       ;;
-    *-wall_clock) of_wall_clock "$@" ;;
+    wall_clock-*) of_wall_clock "$@" ;;
     sim_bridge) of_simulator "$@" ;;
     *) of_folder "$@" ;;
   esac

@@ -608,25 +608,30 @@ def served() -> Iterator[str]:
 def test_parameter_outlasts_the_reset_at_opening_only_if_it_is_saved_with_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        time.sleep(
+            0.1
+        )  # as long as a program takes to start: the server notices that the one before has closed the port
+        return boebot(capsys, "parameters", *arguments)
+
     def value(url: str) -> float:
-        _, out, _ = boebot(capsys, "parameters", "get", "ping_period", "--on", url, "--json")
-        return float(json.loads(out)["value"])
+        return float(json.loads(run("get", "ping_period", "--on", url, "--json")[1])["value"])
 
     with served() as url:
         default = value(url)
         assert default not in (7, 8)
-        _, _, err = boebot(capsys, "parameters", "set", "ping_period", "7", "--on", url)
+        _, _, err = run("set", "ping_period", "7", "--on", url)
         assert f"opening {url} has reset the board" in err
         assert "ping_period lasts only until the board's next reset; --save keeps it" in err
-        code, _, err = boebot(capsys, "parameters", "save", "--on", url)
+        code, _, err = run("save", "--on", url)
         assert code == 0 and "what was set and not saved is lost" in err
         assert value(url) == default
-        code, _, err = boebot(capsys, "parameters", "set", "ping_period", "8", "--save", "--on", url)
+        code, _, err = run("set", "ping_period", "8", "--save", "--on", url)
         assert code == 0 and "lasts only" not in err and "EEPROM" not in err
         assert value(url) == 8
-        assert boebot(capsys, "parameters", "reset", "--on", url)[0] == 0
+        assert run("reset", "--on", url)[0] == 0
         assert value(url) == 8, "the reset was not saved"
-        assert boebot(capsys, "parameters", "reset", "--save", "--on", url)[0] == 0
+        assert run("reset", "--save", "--on", url)[0] == 0
         assert value(url) == default
 
 
