@@ -28,7 +28,7 @@ SERVO_FRAME = 20 * MS
 SERVO_LEFT, SERVO_RIGHT, WHISKER_LEFT = 13, 12, 5
 
 HANDSHAKE_SEED = 0x155555
-VERSION = 3 * 16  # 3.0
+VERSION = 3 * 16 + 1  # 3.1
 
 # Messages to the board: id and layout (PROTOCOL.md, "Messages"), all little-endian.
 OPEN, IDENTIFY, DESCRIBE, STOP, CLOSE = 0x01, 0x02, 0x03, 0x08, 0x09
@@ -66,7 +66,7 @@ FROM_BOARD: dict[int, tuple[str, str, str]] = {
 MOTORS_ENABLED, DEAD_MAN, LATCHED = 1, 2, 4  # status bits
 START, STOP_COMMAND, SESSION_ENDED = 1, 2, 3  # latch
 OK, UNKNOWN_PARAMETER, OUT_OF_RANGE, LATCHED_AGAIN = 0, 1, 2, 5  # answer_status
-TASKS = 19
+TASKS = 21
 WHISKERS, LATCH, DEAD_MAN_EVENT = 0, 1, 2  # event_kind
 TIME_TO_LIVE, TRACK_WIDTH = 1, 12  # parameters
 

@@ -30,4 +30,4 @@ void task_has_ended(void) {
   reset_note_running(0);
 }
 
-uint16_t task_times_longest(uint8_t task) { return longest[task]; }
+uint16_t task_times_longest(uint8_t task) { return task < TASKS ? longest[task] : 0; }

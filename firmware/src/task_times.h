@@ -19,7 +19,8 @@ void task_has_ended(void);
 
 #define TASK_TIME_LONGEST 0xFFFFu /* so long or longer; no run is so long on purpose */
 
-/* The longest that a task took since task_times_start(); 0: it has not run. Main loop only. */
+/* The longest that a task took since task_times_start(); 0: it has not run, or this image has no such task. Main
+ * loop only. */
 uint16_t task_times_longest(uint8_t task);
 
 #ifdef __cplusplus

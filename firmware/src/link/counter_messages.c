@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "events.h"
+#include "generated/values.h"
 #include "link/counters.h"
 #include "link/receive.h"
 #include "link/send.h"
@@ -35,7 +36,7 @@ void counters_task(void) {
   }
   due_in = (uint8_t)(PERIOD * telemetry_line_period() - 1u); /* 39 on the slowest line */
   const uint8_t task = ++task_time.task;
-  if (task == TASKS) {
+  if (task == TASK_COUNT) { /* of all images, so that every round is the same */
     receive_count(&counters);
     counters.deferred = events_deferred();
     send_message(MSG_COUNTERS_ID, &counters, sizeof counters);
