@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 
 from boebot.brain import Brain, MotorBehavior, Process
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.battery import Energy
-from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
+from boebot.devices.latest import Latest, without_readings
 from boebot.devices.light import Phototransistor
 from boebot.devices.readings import Readings
 from boebot.link import messages
@@ -16,9 +18,16 @@ from boebot.robot import Command, Equipment, Observation, Robot
 SHIELDBOT = load_robot("shieldbot")
 TICK_S = 0.01
 NOTHING = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
-SLOW = set(messages.DevicesTelemetry._fields) - set(messages.Telemetry._fields)
-FULL = msgspec.structs.replace(  # every device of the shieldbot on
-    SHIELDBOT, device={name: msgspec.structs.replace(device, on=True) for name, device in SHIELDBOT.device.items()}
+SLOW: list[Any] = [  # what slow devices say that have measured nothing
+    without_readings(messages.DevicesTelemetry)._replace(supply=5000),
+    without_readings(messages.LineTelemetry),
+]
+FULL = msgspec.structs.replace(  # every device of the shieldbot, and the line sensors, on
+    SHIELDBOT,
+    device={
+        name: msgspec.structs.replace(device, on=True)
+        for name, device in (load_robot("shieldbot-line").device | SHIELDBOT.device).items()
+    },
 )
 QUAD = load_robot("shieldbot-quad")
 _ARSIM = load_robot("arsim")
@@ -59,13 +68,14 @@ class Stepped:
 
     def see(self, **fields: int) -> None:
         """What the sensors say from now on: fields of telemetry, and of the slow devices'."""
-        slow = {name: value for name, value in fields.items() if name in SLOW}
-        fast = {name: value for name, value in fields.items() if name not in SLOW}
-        latest = NO_MESSAGES
-        if slow:
-            kind = messages.DevicesTelemetry
-            latest = Latest({kind: without_readings(kind)._replace(supply=5000, tick=self.steps, **slow)}, self.steps)
-        sample = NOTHING._replace(tick=self.steps, **fast)
+        slow = {}
+        for message in SLOW:
+            given = {
+                name: fields.pop(name) for name in message._fields if name in fields and name not in NOTHING._fields
+            }
+            if given:
+                slow[type(message)] = message._replace(tick=self.steps, **given)
+        sample, latest = NOTHING._replace(tick=self.steps, **fields), Latest(slow, self.steps)
         self.robot.observation = Observation(sample, self._equipment, time=self.time, slow=latest)
 
     @property

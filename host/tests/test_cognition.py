@@ -71,7 +71,7 @@ def test_midpoint_rule_comes_to_the_exact_arc_with_the_square_of_the_step() -> N
 
 
 def test_single_channel_encoders_take_their_sign_from_the_signals() -> None:
-    """Backward counts once the servos have been told so for 0.06 s (docs/decisions/0002): the first of it is lost."""
+    """Backward counts after 0.06 s of backward commands (docs/decisions/0002): the first of it is lost."""
     odometry, stepped = Odometry(use="encoders"), Stepped()
     brain, count = alone(Stop(), odometry), 0
     stepped.step(brain)
@@ -193,7 +193,7 @@ def test_a_robot_that_turns_or_that_is_asked_nothing_is_not_stuck() -> None:
 # ---- battery ------------------------------------------------------------------------------------------------------
 
 
-def told(battery: BatteryLevel, vehicle: SteppedVehicle, brain: Brain, volts: float, steps: int) -> None:
+def measure(battery: BatteryLevel, vehicle: SteppedVehicle, brain: Brain, volts: float, steps: int) -> None:
     for _ in range(steps):
         vehicle.steer(brain, 0, 0, 0, 0, 0, 0, 0, 0, volts)
 
@@ -203,9 +203,9 @@ def told(battery: BatteryLevel, vehicle: SteppedVehicle, brain: Brain, volts: fl
 def test_battery_filter_follows_the_closed_form(tau: float, first: float, then: float, steps: int) -> None:
     battery, vehicle = BatteryLevel(empty=10, full=12, tau=tau, rise=99.0, fall=99.0), SteppedVehicle()
     brain = alone(Stop(), battery)
-    told(battery, vehicle, brain, first, 1)
+    measure(battery, vehicle, brain, first, 1)
     assert battery.level == pytest.approx((first - 10) / 2)
-    told(battery, vehicle, brain, then, steps)
+    measure(battery, vehicle, brain, then, steps)
     assert battery.voltage == pytest.approx(then + (first - then) * math.exp(-steps * 0.01 / tau))
     assert battery.voltage is not None
     assert battery.variable().value(vehicle.robot) == pytest.approx(1 - (battery.voltage - 10) / 2)
@@ -242,22 +242,22 @@ def test_charging_begins_with_a_rise_and_ends_with_a_fall() -> None:
         (11.49, False),
         (11.51, True),
     ):
-        told(battery, vehicle, brain, volts, 2)
+        measure(battery, vehicle, brain, volts, 2)
         assert battery.charging is charging, volts
         assert variable.value(vehicle.robot) == float(charging)
 
 
 def test_a_pack_that_recovers_from_its_load_is_not_charged() -> None:
-    """Motors at full signal pull it down by 0.3 V; the process is told so."""
+    """Motors at full signal pull it down by 0.3 V; the process knows the commands."""
     for sag, charging in ((0.3, False), (0.0, True)):
         battery, vehicle, drive = BatteryLevel(empty=10, full=12, tau=0.05, sag=sag), SteppedVehicle(), Driven()
         brain = alone(drive, battery)
         drive.signals = (1.0, -1.0)
-        told(battery, vehicle, brain, 11.0, 1)  # the first step sees the command of none before it
-        told(battery, vehicle, brain, 10.7, 100)
+        measure(battery, vehicle, brain, 11.0, 1)  # the first step sees the command of none before it
+        measure(battery, vehicle, brain, 10.7, 100)
         drive.signals = (0.0, 0.0)
-        told(battery, vehicle, brain, 10.7, 1)
-        told(battery, vehicle, brain, 11.0, 100)
+        measure(battery, vehicle, brain, 10.7, 1)
+        measure(battery, vehicle, brain, 11.0, 100)
         assert battery.charging is charging
         assert battery.voltage == pytest.approx(11.0, abs=1e-3)
 
@@ -288,7 +288,7 @@ def test_light_asymmetry(left: float, right: float) -> None:
     assert light.variable().value(vehicle.robot) == pytest.approx(max(left, right) / (max(left, right) + 2.0))
 
 
-def test_of_one_light_sensor_alone_no_asymmetry_is_told() -> None:
+def test_one_light_sensor_alone_gives_no_asymmetry() -> None:
     light, stepped = LightSense(), Stepped(description=FULL)
     brain = alone(Stop(), light)
     stepped.step(brain, light_left=1000, light_right=0, light_age=0)
@@ -364,7 +364,7 @@ def test_nearness_ahead_of_what_ping_says(fields: dict[str, int], expected: floa
     assert near().value(stepped.robot) == pytest.approx(expected or 0.0, abs=0.01), "stale infra-red is left out"
 
 
-# ---- whatever is told --------------------------------------------------------------------------------------------
+# ---- any readings --------------------------------------------------------------------------------------------------
 
 
 BYTES, WORDS, COUNTS = st.integers(0, 255), st.integers(0, 65535), st.integers(-(2**31), 2**31 - 1)
@@ -389,6 +389,10 @@ ANYTHING = st.fixed_dictionaries(
         "compass_y": st.integers(-4096, 2047),
         "compass_age": BYTES,
         "compass_status": st.sampled_from([int(one) for one in CompassStatus]),
+        "line_left": WORDS,
+        "line_middle": WORDS,
+        "line_right": WORDS,
+        "line_age": BYTES,
     }
 )
 
@@ -406,13 +410,13 @@ def numbers_of(process: CognitiveProcess) -> list[float]:
 
 @given(st.lists(ANYTHING, min_size=1, max_size=5))
 @settings(max_examples=40)
-def test_no_observation_makes_a_number_that_is_none(told: list[dict[str, int]]) -> None:
+def test_no_observation_makes_a_number_that_is_none(seen: list[dict[str, int]]) -> None:
     battery, odometry, drift, stuck = BatteryLevel(empty=5, full=7.75), Odometry(), Drift(), StuckDetector()
     light = LightSense()
     processes = (odometry, battery, drift, stuck, light, Contact(), Proximity(), SunCompass(turning=True))
     variables = [near(), contact()] + [one.variable() for one in (battery, drift, stuck, light)]
     brain, stepped = Brain([Stop(), *processes], [*variables, battery.charging_variable()]), Stepped(description=FULL)
-    for fields in told:
+    for fields in seen:
         stepped.step(brain, **fields)
         for process in processes:
             process.step_time = 0.0

@@ -1,5 +1,5 @@
-"""What holds for every process: commands within bounds whatever is told, the same chance from the same seed, and
-nothing left of the run before.
+"""What holds for every process: commands within bounds whatever the sensors say, the same chance from the same
+seed, and nothing left of the run before.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from boebot.behaviors import (
     Escalate,
     Escape,
     Evade,
+    FollowLine,
     FollowWall,
     Homing,
     Kinesis,
@@ -70,6 +71,7 @@ CASES = {
     "escalate": Case(Escalate),
     "escape": Case(Escape),
     "evade": Case(Evade),
+    "follow line": Case(FollowLine),
     "follow wall": Case(FollowWall),
     "homing": Case(lambda: Homing(found=landmark), lambda: [Odometry(), PathIntegration()]),
     "kinesis": Case(lambda: Kinesis(stimulus=half, spread=20.0)),
@@ -84,13 +86,13 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@given(told=st.lists(ANYTHING, min_size=1, max_size=6), seed=st.integers(0, 9))
+@given(seen=st.lists(ANYTHING, min_size=1, max_size=6), seed=st.integers(0, 9))
 @settings(max_examples=6)
-def test_commands_stay_within_bounds_whatever_is_told(name: str, told: list[dict[str, int]], seed: int) -> None:
+def test_commands_stay_within_bounds_whatever_the_sensors_say(name: str, seen: list[dict[str, int]], seed: int) -> None:
     """Stale, missing and extreme values included; the robot itself refuses NaN and signals beyond 1."""
     case = CASES[name]
     brain, stepped = Brain([case.make(), *case.with_()]), Stepped(0.05, seed, FULL)
-    for fields in told:
+    for fields in seen:
         for _ in range(3):
             kind, left, right = stepped.step(brain, **fields)
             assert kind in ("signal", "stop") and -1 <= left <= 1 and -1 <= right <= 1
@@ -101,8 +103,8 @@ def test_the_same_seed_gives_the_same_commands_and_others_change_none_of_its_cha
     def commands(seed: int, *more: CognitiveProcess) -> list[Command]:
         case = CASES[name]
         brain, stepped = Brain([case.make(), *case.with_(), *more]), Stepped(0.05, seed, FULL)
-        told = {"light_left": 900, "light_right": 1100, "light_age": 0, "battery": 700, "battery_age": 0}
-        return [stepped.step(brain, whiskers=step // 30 % 4, infrared=step // 20 % 4, **told) for step in range(200)]
+        slow = {"light_left": 900, "light_right": 1100, "light_age": 0, "battery": 700, "battery_age": 0}
+        return [stepped.step(brain, whiskers=step // 30 % 4, infrared=step // 20 % 4, **slow) for step in range(200)]
 
     @dataclass(kw_only=True)
     class Gambler(CognitiveProcess):
@@ -156,7 +158,7 @@ def life(brain: Brain, steps: int) -> tuple[list[Command], list[BrainStep], list
     stepped = Stepped(0.05, 3, FULL)
     commands = []
     for step in range(steps):
-        told = {
+        seen = {
             "whiskers": (0, 1, 0, 3)[step // 9 % 4],
             "infrared": step // 7 % 4,
             "light_left": 900 + 40 * (step % 11),
@@ -171,8 +173,12 @@ def life(brain: Brain, steps: int) -> tuple[list[Command], list[BrainStep], list
             "encoder_right": 3 * step,
             "pulse_left": 25000,
             "pulse_right": 25100,
+            "line_left": (3500, 250)[step // 8 % 2],
+            "line_middle": (3500, 250)[step // 4 % 2],
+            "line_right": 250,
+            "line_age": 0,
         }
-        commands.append(stepped.step(brain, **told))
+        commands.append(stepped.step(brain, **seen))
     return commands, brain.steps, brain.switches
 
 
@@ -192,7 +198,7 @@ def test_second_run_is_as_the_first_whenever_that_ended(name: str) -> None:
 
 def test_second_run_knows_nothing_of_what_the_first_perceived() -> None:
     first = life(brain_of(Wander(), cognitive()), 60)
-    moved = [len(set(told)) > 1 for told in zip(*(step.variables for step in first[1]), strict=True)]
+    moved = [len(set(values)) > 1 for values in zip(*(step.variables for step in first[1]), strict=True)]
     assert sum(moved) >= 6, "most variables say something"
     brain = brain_of(Wander(), cognitive())
     for ended in (11, 38):

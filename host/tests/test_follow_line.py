@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,37 +14,28 @@ from boebot.arenas import load_arena
 from boebot.behaviors import FollowLine
 from boebot.brain import Brain
 from boebot.description.robots import load_robot
-from boebot.devices.equipment import Equipment
-from boebot.devices.latest import Latest, without_readings
+from boebot.devices.latest import NEVER, without_readings
 from boebot.devices.line import LineSensor
-from boebot.link.messages import LineTelemetry, Telemetry
-from boebot.robot import Observation, Robot
+from boebot.errors import BrainError
+from boebot.link.messages import LineTelemetry
 from reading import read
+from steps import Stepped
 
-ROBOT = load_robot("shieldbot-line")
 NOTHING = without_readings(LineTelemetry)
-TELEMETRY = Telemetry(*(0,) * len(Telemetry._fields))
 WHITE, BLACK = 250, 3500
 
 
-class Over:
+class Over(Stepped):
     """A robot whose sensors are over what a test says."""
 
     def __init__(self, behavior: FollowLine) -> None:
-        self.robot = Robot("shieldbot-line", 0.05)
+        super().__init__(0.05, description=load_robot("shieldbot-line"))
         self.brain = Brain([behavior])
-        self.steps = 0
-        self._equipment = Equipment(ROBOT, 0.01)
 
-    def step(self, left: int, middle: int, right: int) -> tuple[float, float]:
-        """One step over these decay times (us); the motor signals."""
-        message = LineTelemetry(0, left, middle, right, 1)
-        time = 0.05 * self.steps
-        latest = Latest({LineTelemetry: message}, 0)
-        self.robot.observation = Observation(TELEMETRY, self._equipment, time, slow=latest)
-        self.brain.step(self.robot)
-        self.steps += 1
-        return self.robot.command[1:]
+    def drive(self, left: int, middle: int, right: int, age: int = 1) -> tuple[float, float]:
+        """One step over these decay times (us), measured `age` ticks ago; the motor signals."""
+        command = self.step(self.brain, line_left=left, line_middle=middle, line_right=right, line_age=age)
+        return command[1:]
 
 
 @pytest.mark.parametrize(
@@ -58,18 +50,43 @@ class Over:
     ],
 )
 def test_it_steers_to_the_side_of_the_line(over: tuple[int, int, int], turn: float) -> None:
-    left, right = Over(FollowLine(signal=0.4, gain=0.2)).step(*over)
+    left, right = Over(FollowLine(signal=0.4, gain=0.2)).drive(*over)
     assert (left, right) == pytest.approx((0.4 + 0.2 * turn, 0.4 - 0.2 * turn))
 
 
-def test_a_lost_line_is_looked_for_where_it_was_seen_last_and_then_given_up() -> None:
+@pytest.mark.parametrize(
+    ("last", "turning"),
+    [
+        ((WHITE, BLACK, BLACK), (0.8, 0.0)),
+        ((BLACK, BLACK, WHITE), (0.0, 0.8)),
+        ((WHITE, BLACK, WHITE), (0.4, 0.4)),
+    ],
+)
+def test_a_lost_line_is_looked_for_where_it_was_seen_last_and_then_given_up(
+    last: tuple[int, int, int], turning: tuple[float, float]
+) -> None:
     one = Over(FollowLine(signal=0.4, gain=0.2, patience=0.2))
-    one.step(WHITE, BLACK, BLACK)
-    assert one.step(WHITE, WHITE, WHITE) == pytest.approx((0.8, 0.0)), "to the right, twice as sharply"
-    for _ in range(4):
-        signals = one.step(WHITE, WHITE, WHITE)
-    assert signals == (0.0, 0.0)
-    assert one.step(WHITE, BLACK, WHITE) == pytest.approx((0.4, 0.4)), "found again"
+    one.drive(*last)
+    for _ in range(4):  # 0.2 s
+        assert one.drive(WHITE, WHITE, WHITE) == pytest.approx(turning), "to that side, twice as sharply"
+    assert one.drive(WHITE, WHITE, WHITE) == (0.0, 0.0)
+    assert one.drive(WHITE, BLACK, WHITE) == pytest.approx((0.4, 0.4)), "found again"
+
+
+@pytest.mark.parametrize("age", [7, NEVER])
+def test_sensors_without_fresh_readings_see_no_line(age: int) -> None:
+    one = Over(FollowLine(signal=0.4, gain=0.2, patience=0.2))
+    signals = [one.drive(BLACK, WHITE, WHITE, age) for _ in range(6)]
+    assert signals[:5] == [(0.4, 0.4)] * 5 and signals[5] == (0.0, 0.0), "looks ahead, and then stops"
+
+
+def test_brain_of_a_file_follows_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "tape.toml"
+    path.write_text("[process.follow_line]\nsignal = 0.3\ngain = 0.1\n")
+    result = boebot.run(path, "shieldbot-line", arena="track", on="native", seconds=10)
+    assert result.distance > 0.5 and result.contacts == 0
+    with pytest.raises(BrainError, match="needs line_left and line_middle and line_right, which robot 'shieldbot' "):
+        boebot.run(path, "shieldbot", on="native", seconds=1)
 
 
 def test_a_sensor_that_was_not_read_is_not_over_a_line() -> None:

@@ -24,7 +24,7 @@ std::vector<uint64_t> gaps(const std::vector<message> &all) {
 }
 
 constexpr uint64_t TURN = 4;                   /* ticks from one message about the board itself to the next */
-constexpr uint64_t ROUND = TURN * (TASKS + 1); /* each task's time, and the counters */
+constexpr uint64_t ROUND = TURN * (TASK_COUNT + 1); /* each task's time, and the counters */
 
 /* As if a task had run for so long. */
 void ran(native_bench &bench, uint8_t task, uint32_t cycles) {
@@ -78,15 +78,15 @@ TEST_CASE("the times of the tasks are told one after another, the counters betwe
       own.push_back(m);
     }
   }
-  REQUIRE(own.size() >= 2 * (TASKS + 1));
+  REQUIRE(own.size() >= 2 * (TASK_COUNT + 1));
   for (uint64_t gap : gaps(own)) {
     CHECK(gap == TURN);
   }
   const auto turn = [](const message &m) {
-    return m.id == MSG_COUNTERS_ID ? static_cast<uint8_t>(TASKS) : m.as<msg_task_time>().task;
+    return m.id == MSG_COUNTERS_ID ? static_cast<uint8_t>(TASK_COUNT) : m.as<msg_task_time>().task;
   };
   for (size_t i = 1; i < own.size(); i++) {
-    CHECK(turn(own[i]) == (turn(own[i - 1]) + 1) % (TASKS + 1));
+    CHECK(turn(own[i]) == (turn(own[i - 1]) + 1) % (TASK_COUNT + 1));
   }
 }
 
@@ -220,7 +220,7 @@ TEST_CASE("telemetry fills half of the line at most, at every rate") {
     for (uint64_t gap : all) {
       CHECK(gap == ROUND * line.period);
     }
-    const size_t own = TASKS * (MSG_TASK_TIME_LENGTH + FRAME_OVERHEAD) + MSG_COUNTERS_LENGTH + FRAME_OVERHEAD;
+    const size_t own = TASK_COUNT * (MSG_TASK_TIME_LENGTH + FRAME_OVERHEAD) + MSG_COUNTERS_LENGTH + FRAME_OVERHEAD;
     CHECK(own * 10.0 / (line.baud * 100) <= 0.035 * 0.010 * ROUND * line.period); /* a small part of the line */
   }
 }
