@@ -178,12 +178,12 @@ def test_hash_ignores_what_a_minor_version_adds(tmp_path: Path) -> None:
     original = (PROTOCOL / "messages.toml").read_text()
     count = len(schema.load().parameter)
     added = {
-        "minor = 0": "minor = 1",
+        "minor = 1": "minor = 2",
         '\n[[parameter]]\nname = "devices"': '\n[[message]]\nname = "more"\nid = 0x9E\ndirection = "to_host"\n'
-        'delivery = "telemetry"\ndoc = ""\nsince = 1\nfields = [{ name = "x", type = "u8" }]\n'
+        'delivery = "telemetry"\ndoc = ""\nsince = 2\nfields = [{ name = "x", type = "u8" }]\n'
         '\n[[parameter]]\nname = "devices"',
-        '"latched_again", "busy"]': '"latched_again", "busy", "tired"]\nsince = { tired = 1 }',
-        "max = 2047": "max = 4095",
+        '"latched_again", "busy"]': '"latched_again", "busy", "tired"]\nsince = { tired = 2 }',
+        "max = 4095": "max = 8191",
     }
     text = original
     for before, after in added.items():
@@ -191,10 +191,10 @@ def test_hash_ignores_what_a_minor_version_adds(tmp_path: Path) -> None:
         text = text.replace(before, after)
     text += f'\n[[parameter]]\nname = "mood"\nid = {count}\ntype = "u16"\nunit = ""\ndoc = ""\nmin = 0\nmax = 1\n'
     file = tmp_path / "messages.toml"
-    file.write_text(text + "since = 1\n")
+    file.write_text(text + "since = 2\n")
     spec, ours = schema.load(file), schema.load()
     assert spec.hash == ours.hash and spec.version_byte == ours.version_byte + 1
     assert [spec.message_hash(m) for m in ours.message] == [ours.message_hash(m) for m in ours.message]
-    for mark in ("since = { tired = 1 }", "since = 1\nfields", "since = 1\n"):
-        file.write_text((text + "since = 1\n").replace(mark, mark.partition("fields")[1]))
+    for mark in ("since = { tired = 2 }", "since = 2\nfields", "since = 2\n"):
+        file.write_text((text + "since = 2\n").replace(mark, mark.partition("fields")[1]))
         assert schema.load(file).hash != ours.hash, mark

@@ -1,40 +1,54 @@
 /* buzzer.c: see buzzer.h. */
 #include "buzzer.h"
 
+#include <math.h>
+
 #define PERIOD_MAXIMUM (BOARD_CLOCK_HZ / 20u) /* below 20 Hz there are clicks, no tone */
 
 #define PERIODS_MINIMUM 2u /* one alone is the pause between two tones */
 
-/* The tone under way has ended with the period that began at the last rise. */
-static void end_tone(buzzer *self) {
+static void begin_tone(buzzer *self, uint64_t begin, uint64_t cycles, uint32_t periods) {
+  self->begin = begin;
+  self->periods = periods;
+  self->sum = cycles;
+  self->period = cycles / periods;
+  self->odd = 0;
+}
+
+static void end_tone(buzzer *self, uint64_t end) {
   if (self->periods >= PERIODS_MINIMUM) {
-    const double period = (double)(self->rise - self->begin) / self->periods;
     const sim_tone tone = {
         .time = (double)self->begin / BOARD_CLOCK_HZ,
-        .duration = (double)(self->fall - self->begin) / BOARD_CLOCK_HZ,
-        .frequency = BOARD_CLOCK_HZ / period,
+        .duration = (double)(end - self->begin) / BOARD_CLOCK_HZ,
+        .frequency = BOARD_CLOCK_HZ * (double)self->periods / (double)self->sum,
     };
     buffer_append(self->part.chassis->tones, &tone, sizeof tone);
   }
   self->periods = 0;
 }
 
-static int is_like(const buzzer *self, uint64_t period) {
-  const double difference = (double)period - (double)self->period;
-  return difference <= BUZZER_LIKENESS * (double)self->period && -difference <= BUZZER_LIKENESS * (double)self->period;
+static int is_like(uint64_t period, uint64_t other) {
+  return fabs((double)period - (double)other) <= BUZZER_LIKENESS * (double)other;
 }
 
+/* A period unlike the tone's has an edge that came late, or is the first one of another pitch. It is another pitch if
+ * the next period is like it. */
 static void on_rise(buzzer *self, uint64_t cycle) {
   const uint64_t period = cycle - self->rise;
-  if (self->periods > 0 && is_like(self, period)) {
+  if (self->periods > 0 && is_like(period, self->period)) {
     self->periods++;
+    self->sum += period;
+    self->odd = 0;
+  } else if (period > PERIOD_MAXIMUM) {
+    end_tone(self, self->fall);
+  } else if (self->periods < PERIODS_MINIMUM) {
+    begin_tone(self, self->rise, period, 1);
+  } else if (self->odd != 0 && is_like(period, self->odd)) {
+    const uint64_t change = self->rise - self->odd;
+    end_tone(self, change);
+    begin_tone(self, change, self->odd + period, 2);
   } else {
-    end_tone(self);
-    if (period <= PERIOD_MAXIMUM) {
-      self->begin = self->rise;
-      self->period = period;
-      self->periods = 1;
-    }
+    self->odd = period;
   }
   self->rise = cycle;
 }
@@ -55,7 +69,7 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
 /* Silence since: boards have run up to the beginning of the step. */
 static void step(part *base) {
   buzzer *self = (buzzer *)base;
-  if (self->periods > 0 && base->chassis->since > self->rise + 2 * self->period) end_tone(self);
+  if (self->periods > 0 && base->chassis->since > self->rise + 2 * self->period) end_tone(self, self->fall);
 }
 
 static const part_operations OPERATIONS = {.edge = edge, .step = step};

@@ -1,7 +1,7 @@
 /* buzzer.h: a piezo speaker: it hears its pin and logs what it sounds, one row per tone.
  *
- * A tone is a row of at least two periods that are alike (BUZZER_LIKENESS); it ends with the last falling edge when the next edge does
- * not come within its time, or with the edge at which another pitch begins. The world does not hear it.
+ * A tone has at least two periods that are alike (BUZZER_LIKENESS). It ends with its last falling edge when the next edge
+ * does not come in time, or where another pitch begins. The world does not hear it.
  */
 #ifndef PART_BUZZER_H
 #define PART_BUZZER_H
@@ -16,7 +16,9 @@ typedef struct {
   uint64_t rise, fall; /* the last ones */
   uint64_t begin;      /* first rise of the tone under way */
   uint32_t periods;    /* of it; 0: silence, or one pulse so far */
+  uint64_t sum;        /* of these periods, cycles */
   uint64_t period;     /* its first one, cycles */
+  uint64_t odd;        /* the last one, if it was unlike, cycles; 0: it was not */
 } buzzer;
 
 /* python: begin */

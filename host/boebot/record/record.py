@@ -73,6 +73,10 @@ class Record:
         self.rows = sink.rows
         self._decoded: dict[str, list[Any]] = {}
 
+    def __repr__(self) -> str:
+        names = ("telemetry", "readings", "event", "command")
+        return "<Record: " + ", ".join(f"{len(self.rows(name))} {name}" for name in names if self.rows(name)) + ">"
+
     # ---- writing -----------------------------------------------------------------------------------------------------
 
     def append_telemetry(self, time_s: float, payload: bytes, host_s: float, bound_s: float) -> None:
