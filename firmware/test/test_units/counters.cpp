@@ -23,7 +23,7 @@ std::vector<uint64_t> gaps(const std::vector<message> &all) {
   return found;
 }
 
-constexpr uint64_t TURN = 4;                   /* ticks from one message about the board itself to the next */
+constexpr uint64_t TURN = 4;                        /* ticks from one message about the board itself to the next */
 constexpr uint64_t ROUND = TURN * (TASK_COUNT + 1); /* each task's time, and the counters */
 
 /* As if a task had run for so long. */
