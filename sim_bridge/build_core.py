@@ -17,6 +17,7 @@ from cffi import FFI
 # What headers cannot say in a form that cffi reads.
 BEFORE = """
 typedef struct part_kind part_kind;
+typedef struct sensor_kind sensor_kind;
 board *native_board_create(const char *library_path, char *error, size_t error_size);
 """
 AFTER = """

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from boebot.devices.accelerometer import Accelerometer
 from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE
 from sim_bridge.vehicles.model import VehicleModel
 
 SWITCHES = {
@@ -12,11 +14,17 @@ SWITCHES = {
     ),
 }
 
+ACCELEROMETER = SensorKind(
+    "accelerometer",
+    dict.fromkeys(("mass", "stiffness", "range"), POSITIVE) | dict.fromkeys(("damping", "sigma"), NOT_NEGATIVE),
+)
+
 
 @modelled(Accelerometer)
 def accelerometer(device: Accelerometer, name: str, model: VehicleModel) -> None:
     """A proof mass on a spring."""
-    model.accelerometer(
+    model.sensor(
+        "accelerometer",
         name,
         period=device.period_s,
         mass=device.proof_mass_kg,

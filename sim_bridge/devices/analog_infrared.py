@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.analog_infrared import SharpSensor
@@ -9,7 +10,9 @@ from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
 from sim_bridge.devices.catalogue import joined, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import Draw
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE
 
 SHARP_HEIGHT_M = 0.08
 SHARP_REACH_M = 1.5  # 0.8 specified, beyond it less and less (chosen)
@@ -23,6 +26,21 @@ SWITCHES = {
     "sharp_noise": off("the Sharp's voltage is that of its curve", "SHARP_SPREAD", "SHARP_GAIN_SPREAD"),
     "sharp_delay": off("the Sharp's value is not late", "SHARP_LATE_S"),
 }
+
+
+def _lateness(values: Mapping[str, Any]) -> str:
+    late, period = values["late"], values["period"]
+    return "" if period == 0.0 or late <= period else f"late is {late:g}; expected at most the period, {period:g}"
+
+
+SHARP_INFRARED = SensorKind(
+    "sharp_infrared",
+    {"reach": POSITIVE} | dict.fromkeys(("sigma", "gain", "period", "late"), NOT_NEGATIVE),
+    _lateness,
+    usual={"gain": 1.0},
+    reach="reach",
+    has_period=False,
+)
 
 
 @joined(SharpSensor)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from boebot.description.robots import Supply
 from boebot.devices.battery import Energy
 from sim_bridge._core import ffi
 from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE
 from sim_bridge.vehicles.model import VehicleModel
 
 BOARD_A = 0.08  # (chosen)
@@ -30,6 +33,14 @@ SWITCHES = {
     ),
     "battery_noise": off("the measured battery voltage is exact", "BATTERY_NOISE_V", "Energy.sigma_v"),
 }
+
+
+def _order(values: Mapping[str, Any]) -> str:
+    low, high = values["empty"], values["full"]
+    return "" if low < high else f"full is {high:g}; expected more than empty, {low:g}"
+
+
+CHARGE = SensorKind("charge", {"sigma": NOT_NEGATIVE}, _order, usual={"empty": 5.0, "full": 7.75}, has_period=False)
 
 
 @modelled(Energy)

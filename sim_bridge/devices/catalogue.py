@@ -1,7 +1,7 @@
 """All simulated devices, found in the files of this folder: nothing is listed by hand.
 
-A file has constants in capitals (parameters with their sources), `SWITCHES`, and functions marked by `joined` and
-`modelled` with the kinds of the robot's description that they are for.
+A file has constants in capitals (parameters with their sources, `SWITCHES`, `SensorKind`s), and functions marked by
+`joined` and `modelled` with the kinds of the robot's description that they are for.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any, TypeVar
+
+from sim_bridge.devices.sensor import SensorKind
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -88,6 +90,13 @@ def parameters() -> dict[str, float | tuple[float, ...]]:
         for name, value in vars(module).items()
         if name.isupper() and not name.startswith("_") and type(value) in (float, int, tuple)
     }
+
+
+@cache
+def sensor_kinds() -> Mapping[str, SensorKind]:
+    """All kinds of sensors of robots without boards, by their name in C."""
+    found = [value for module in modules() for value in vars(module).values() if isinstance(value, SensorKind)]
+    return {kind.name: kind for kind in sorted(found, key=lambda kind: kind.name)}
 
 
 @cache

@@ -8,7 +8,9 @@ from boebot.devices.compass import HeadingCompass, MagneticCompass
 from sim_bridge._core import ffi
 from sim_bridge.devices.catalogue import joined, modelled, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import Draw
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, TURN
 from sim_bridge.vehicles.model import VehicleModel
 
 COMPASS_HORIZONTAL_G = 0.19  # central Europe
@@ -29,6 +31,8 @@ SWITCHES = {
     ),
 }
 
+COMPASS = SensorKind("compass", {"sigma": NOT_NEGATIVE, "bias": TURN})
+
 
 @joined(MagneticCompass)
 def part(device: MagneticCompass, at: At) -> Part:
@@ -39,7 +43,7 @@ def part(device: MagneticCompass, at: At) -> Part:
 @modelled(HeadingCompass)
 def heading(device: HeadingCompass, name: str, model: VehicleModel) -> None:
     """A heading."""
-    model.compass(name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
+    model.sensor("compass", name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
 
 
 def compass_parameters(draw: Draw) -> Any:

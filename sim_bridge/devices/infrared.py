@@ -9,7 +9,9 @@ from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
 from sim_bridge.devices.catalogue import joined, modelled, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SWITCH
 from sim_bridge.vehicles.model import VehicleModel
 
 INFRARED_RAYS = 5
@@ -28,6 +30,12 @@ SWITCHES = {
     "cross_talk": off("an infra-red receiver sees its own LED only", "INFRARED_DIRECT_M"),
 }
 
+INFRARED_PROXIMITY = SensorKind(
+    "infrared_proximity",
+    {"range": POSITIVE, "reflectance": SWITCH} | dict.fromkeys(("c1", "c2", "sigma"), NOT_NEGATIVE),
+    reach="range",
+)
+
 
 @joined(InfraredPair)
 def part(device: InfraredPair, at: At) -> Part:
@@ -39,7 +47,8 @@ def part(device: InfraredPair, at: At) -> Part:
 @modelled(InfraredProximity)
 def proximity(device: InfraredProximity, name: str, model: VehicleModel) -> None:
     """A reading from 0 to 1."""
-    model.infrared_proximity(
+    model.sensor(
+        "infrared_proximity",
         name,
         period=device.period_s,
         beam=beam_of(device.position_m, device.heading_rad, device.beam_rad, device.height_m, device.rays),

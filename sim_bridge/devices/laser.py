@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
 from boebot.devices.laser import Laser
 from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE, TURN, Range
 from sim_bridge.vehicles.model import VehicleModel
 
 SWITCHES = {
@@ -11,11 +17,29 @@ SWITCHES = {
 }
 
 
+def _fan(values: Mapping[str, Any]) -> str:
+    step, rays = values["step"], values["rays"]
+    if rays > 1 and not step > 0.0:
+        return f"step is {step:g}; expected a number more than 0, with {rays} rays"
+    if not step * (rays - 1) < 2 * math.pi:
+        return f"step is {step:g}; expected a fan of {rays} rays of less than a turn"
+    return ""
+
+
+LASER = SensorKind(
+    "laser",
+    {"heading": HEADING, "first": TURN, "step": NOT_NEGATIVE, "rays": Range(1, 4096)}
+    | {"range": POSITIVE, "sigma": NOT_NEGATIVE},
+    _fan,
+)
+
+
 @modelled(Laser)
 def laser(device: Laser, name: str, model: VehicleModel) -> None:
     """A fan of rays."""
     x, y = device.position_m
-    model.laser(
+    model.sensor(
+        "laser",
         name,
         period=device.period_s,
         x=x,

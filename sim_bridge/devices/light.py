@@ -8,7 +8,9 @@ from boebot.devices.light import LightSensor, Phototransistor
 from sim_bridge._core import ffi
 from sim_bridge.devices.catalogue import joined, modelled, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import Draw
+from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE
 from sim_bridge.vehicles.model import VehicleModel
 
 LIGHT_HEIGHT_M = 0.09
@@ -28,6 +30,12 @@ SWITCHES = {
     "ambient_light": off("lamps are the only light", "LIGHT_AMBIENT", "Phototransistor.ambient"),
 }
 
+PHOTOTRANSISTOR = SensorKind(
+    "phototransistor",
+    {"heading": HEADING, "near_distance": POSITIVE} | dict.fromkeys(("ambient", "sigma", "gain"), NOT_NEGATIVE),
+    usual={"gain": 1.0},
+)
+
 
 @joined(LightSensor)
 def part(device: LightSensor, at: At) -> Part:
@@ -39,7 +47,8 @@ def part(device: LightSensor, at: At) -> Part:
 def phototransistor(device: Phototransistor, name: str, model: VehicleModel) -> None:
     """The irradiance."""
     x, y = device.position_m
-    model.light(
+    model.sensor(
+        "phototransistor",
         name,
         period=device.period_s,
         x=x,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.ping import PingSensor, Sonar
@@ -10,7 +11,9 @@ from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
 from sim_bridge.devices.catalogue import joined, modelled, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range
 from sim_bridge.vehicles.model import VehicleModel
 
 PING_RAYS = 7
@@ -27,6 +30,21 @@ SWITCHES = {
 }
 
 
+def _ranges(values: Mapping[str, Any]) -> str:
+    low, high = values["range_minimum"], values["range_maximum"]
+    return "" if low < high else f"range_minimum is {low:g}; expected less than range_maximum, {high:g}"
+
+
+SONAR = SensorKind(
+    "sonar",
+    {"range_minimum": NOT_NEGATIVE, "range_maximum": POSITIVE, "sigma": NOT_NEGATIVE}
+    | {"miss": SHARE, "grazing_cosine": SHARE, "temperature": Range(-100.0, 200.0), "absorption": SWITCH},
+    _ranges,
+    reach="range_maximum",
+    nothing=None,
+)
+
+
 @joined(PingSensor)
 def part(device: PingSensor, at: At) -> Part:
     """Trigger and echo."""
@@ -36,7 +54,8 @@ def part(device: PingSensor, at: At) -> Part:
 @modelled(Sonar)
 def sonar(device: Sonar, name: str, model: VehicleModel) -> None:
     """A distance."""
-    model.sonar(
+    model.sensor(
+        "sonar",
         name,
         period=device.period_s,
         beam=beam_of(device.position_m, device.heading_rad, device.beam_rad, device.height_m, device.rays),

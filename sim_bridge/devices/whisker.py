@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices.catalogue import joined, modelled, off
 from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.model import VehicleModel
 
@@ -19,6 +21,14 @@ SWITCHES = {
 }
 
 
+def _length(values: Mapping[str, Any]) -> str:
+    ends = [values[key] for key in ("root_x", "root_y", "tip_x", "tip_y")]
+    return "tip is where root is; expected a whisker that has a length" if ends[:2] == ends[2:] else ""
+
+
+TOUCH = SensorKind("touch", {}, _length, has_period=False)
+
+
 @joined(WhiskerSwitch)
 def part(device: WhiskerSwitch, at: At) -> Part:
     """Its switch."""
@@ -28,7 +38,8 @@ def part(device: WhiskerSwitch, at: At) -> Part:
 @modelled(TouchWhisker)
 def touch(device: TouchWhisker, name: str, model: VehicleModel) -> None:
     """A segment that touches."""
-    model.whisker(name, device.root_m, device.tip_m)
+    (root_x, root_y), (tip_x, tip_y) = device.root_m, device.tip_m
+    model.sensor("touch", name, root_x=root_x, root_y=root_y, tip_x=tip_x, tip_y=tip_y)
 
 
 def whisker_parameters(whisker: WhiskerSwitch, draw: Draw = AS_BUILT) -> Any:

@@ -8,6 +8,16 @@
 
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
+#include "../world/sensors/accelerometer.h"
+#include "../world/sensors/charge.h"
+#include "../world/sensors/compass.h"
+#include "../world/sensors/infrared_proximity.h"
+#include "../world/sensors/laser.h"
+#include "../world/sensors/light.h"
+#include "../world/sensors/odometer.h"
+#include "../world/sensors/sharp_infrared.h"
+#include "../world/sensors/sonar.h"
+#include "../world/sensors/touch.h"
 #include "geometry/hash.h"
 
 #define WORLDS 2
@@ -107,17 +117,22 @@ static vehicle_model *model(void) {
   const odometer_parameters wheels = {
       .half_track = 0.2, .wheel_radius = 0.1, .factor_left = 1.0, .factor_right = 1.0, .sigma_step = 1e-4};
   const accelerometer_parameters spring = {1e-3, 10.0, 0.1, 20.0, 0.05, 0.1};
+  const touch_parameters whisker = {0.2, 0.0, 0.3, 0.0};
+  const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
   motor_dc_parameters motor;
   motor_dc_default(&motor);
   vehicle_model *made = vehicle_model_new(&chassis, 0.01);
   int bad = vehicle_model_drive_dc(made, &motor, &motor, 1) != VEHICLE_OK;
-  bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.0) < 0;
-  bad |= vehicle_model_add_infrared_proximity(made, &eye, 0.03) < 0;
-  bad |= vehicle_model_add_sharp_infrared(made, &sharp) < 0 || vehicle_model_add_laser(made, &finder, 0.1) < 0;
-  bad |= vehicle_model_add_phototransistor(made, &light, 0.0) < 0 || vehicle_model_add_odometer(made, &wheels) < 0;
-  bad |= vehicle_model_add_accelerometer(made, &spring, 0.0) < 0 || vehicle_model_add_whisker(made, 0.2, 0, 0.3, 0) < 0;
-  bad |= vehicle_model_battery(made, &energy, 5.0, 7.75, 0.005) < 0;
+  bad |= vehicle_model_add(made, infrared_proximity_sensor, &eye, 0.0) < 0;
+  bad |= vehicle_model_add(made, infrared_proximity_sensor, &eye, 0.03) < 0;
+  bad |= vehicle_model_add(made, sharp_infrared_sensor, &sharp, 0.0) < 0 ||
+         vehicle_model_add(made, laser_sensor, &finder, 0.1) < 0;
+  bad |= vehicle_model_add(made, phototransistor_sensor, &light, 0.0) < 0 ||
+         vehicle_model_add(made, odometer_sensor, &wheels, 0.0) < 0;
+  bad |= vehicle_model_add(made, accelerometer_sensor, &spring, 0.0) < 0 ||
+         vehicle_model_add(made, touch_sensor, &whisker, 0.0) < 0;
+  bad |= vehicle_model_battery(made, &energy) != VEHICLE_OK || vehicle_model_add(made, charge_sensor, &gauge, 0.0) < 0;
   vehicle_model_switch(made, 1, 0);
   CHECK(!bad);
   return made;

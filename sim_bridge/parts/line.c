@@ -6,19 +6,19 @@
 typedef struct {
   capacitor capacitor;
   double decay_s;
-  line_sensor sensor;
+  reflectance sensor;
 } line_part;
 
 static double decay_time(capacitor *base, uint64_t cycle) {
   line_part *self = (line_part *)base;
   const viewpoint from = part_view(&base->part, cycle);
-  return self->decay_s / line_sensor_read(&self->sensor, &from, &base->part.noise);
+  return self->decay_s / reflectance_read(&self->sensor, &from, &base->part.noise);
 }
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   line_part *self = (line_part *)base;
   const line_part_parameters *p = parameters;
-  if (line_sensor_init(&self->sensor, &p->floor) != 0) return -1;
+  if (reflectance_init(&self->sensor, &p->floor) != 0) return -1;
   if (!(p->decay_s > 0.0 && isfinite(p->decay_s))) return -1;
   self->decay_s = p->decay_s;
   return capacitor_init(&self->capacitor, place, pins[0], &p->capacitor, decay_time);

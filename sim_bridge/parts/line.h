@@ -8,7 +8,7 @@
 
 /* python: begin */
 typedef struct {
-  line_sensor_parameters floor;
+  reflectance_parameters floor;
   capacitor_parameters capacitor;
   double decay_s; /* from the full charge to the threshold over a floor that throws all light back */
 } line_part_parameters;

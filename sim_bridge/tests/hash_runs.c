@@ -7,6 +7,16 @@
 
 #include "../vehicles/vehicle.h"
 #include "../vehicles/wander.h"
+#include "../world/sensors/accelerometer.h"
+#include "../world/sensors/charge.h"
+#include "../world/sensors/compass.h"
+#include "../world/sensors/infrared_proximity.h"
+#include "../world/sensors/laser.h"
+#include "../world/sensors/light.h"
+#include "../world/sensors/odometer.h"
+#include "../world/sensors/sharp_infrared.h"
+#include "../world/sensors/sonar.h"
+#include "../world/sensors/touch.h"
 
 #define WORLDS 9 /* a row (world/row.h) and one alone */
 #define STEPS 600
@@ -34,42 +44,50 @@ static int add_sensors(vehicle_model *m) {
   for (int side = 0; side < 2; side++) {
     const infrared_proximity_parameters ir = {
         .beam = side ? right : look, .range = 1.0, .c1 = 0.03, .c2 = 0.1, .sigma = 0.01};
-    bad |= vehicle_model_add_infrared_proximity(m, &ir, 0.0) < 0;
+    bad |= vehicle_model_add(m, infrared_proximity_sensor, &ir, 0.0) < 0;
   }
-  bad |= vehicle_model_add_sonar(m,
-                                 &(sonar_parameters){.beam = look,
-                                                     .range_minimum = 0.02,
-                                                     .range_maximum = 3.0,
-                                                     .sigma = 0.01,
-                                                     .miss = 0.02,
-                                                     .grazing_cosine = 0.7},
-                                 0.05) < 0;
-  bad |= vehicle_model_add_sharp_infrared(
-             m, &(sharp_infrared_parameters){
-                    .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076}) < 0;
-  bad |= vehicle_model_add_laser(
-             m, &(laser_parameters){.first = -2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01}, 0.1) < 0;
-  bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01}, 0.0) < 0;
-  bad |= vehicle_model_add_accelerometer(m, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1}, 0.0) < 0;
+  bad |= vehicle_model_add(m, sonar_sensor,
+                           &(sonar_parameters){.beam = look,
+                                               .range_minimum = 0.02,
+                                               .range_maximum = 3.0,
+                                               .sigma = 0.01,
+                                               .miss = 0.02,
+                                               .grazing_cosine = 0.7},
+                           0.05) < 0;
   bad |=
-      vehicle_model_add_phototransistor(
-          m, &(phototransistor_parameters){.near_distance = 0.05, .gain = 1.0, .sigma = 0.01, .height = 0.09}, 0.0) < 0;
-  bad |= vehicle_model_add_odometer(m, &(odometer_parameters){.half_track = 0.05,
-                                                              .wheel_radius = 0.033,
-                                                              .factor_left = 1.01,
-                                                              .factor_right = 0.99,
-                                                              .sigma_share = 0.01,
-                                                              .edges_per_turn = 64.0,
-                                                              .slips_per_s = 0.1,
-                                                              .slip_share = 1.0}) < 0;
+      vehicle_model_add(m, sharp_infrared_sensor,
+                        &(sharp_infrared_parameters){
+                            .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076},
+                        0.0) < 0;
+  bad |= vehicle_model_add(m, laser_sensor,
+                           &(laser_parameters){.first = -2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01},
+                           0.1) < 0;
+  bad |= vehicle_model_add(m, compass_sensor, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01},
+                           0.0) < 0;
+  bad |= vehicle_model_add(m, accelerometer_sensor, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1},
+                           0.0) < 0;
+  bad |= vehicle_model_add(
+             m, phototransistor_sensor,
+             &(phototransistor_parameters){.near_distance = 0.05, .gain = 1.0, .sigma = 0.01, .height = 0.09}, 0.0) < 0;
+  bad |= vehicle_model_add(m, odometer_sensor,
+                           &(odometer_parameters){.half_track = 0.05,
+                                                  .wheel_radius = 0.033,
+                                                  .factor_left = 1.01,
+                                                  .factor_right = 0.99,
+                                                  .sigma_share = 0.01,
+                                                  .edges_per_turn = 64.0,
+                                                  .slips_per_s = 0.1,
+                                                  .slip_share = 1.0},
+                           0.0) < 0;
   /* As the notes have them: what a row reads at once. */
-  bad |= vehicle_model_add_compass(m, &(compass_parameters){.sigma = 0.05, .bias = 0.2}, 0.0) < 0;
-  bad |= vehicle_model_add_odometer(m, &(odometer_parameters){.half_track = 0.05,
-                                                              .wheel_radius = 0.033,
-                                                              .factor_left = 1.01,
-                                                              .factor_right = 0.99,
-                                                              .sigma_step = 1e-4}) < 0;
-  bad |= vehicle_model_add_whisker(m, 0.05, 0.03, 0.12, 0.06) < 0;
+  bad |= vehicle_model_add(m, compass_sensor, &(compass_parameters){.sigma = 0.05, .bias = 0.2}, 0.0) < 0;
+  bad |=
+      vehicle_model_add(
+          m, odometer_sensor,
+          &(odometer_parameters){
+              .half_track = 0.05, .wheel_radius = 0.033, .factor_left = 1.01, .factor_right = 0.99, .sigma_step = 1e-4},
+          0.0) < 0;
+  bad |= vehicle_model_add(m, touch_sensor, &(touch_parameters){0.05, 0.03, 0.12, 0.06}, 0.0) < 0;
   return bad;
 }
 
@@ -110,8 +128,10 @@ static vehicle_model *model(int servos, const double notes[BODY]) {
   motor_dc_parameters dc;
   motor_dc_default(&dc);
   const int driven = servos ? vehicle_model_drive_servo(m, &left, &right) : vehicle_model_drive_dc(m, &dc, &dc, 1);
+  const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
-  const int bad = add_sensors(m) || vehicle_model_battery(m, &energy, 5.0, 7.75, 0.005) < 0 || driven != VEHICLE_OK;
+  const int bad = add_sensors(m) || vehicle_model_battery(m, &energy) != VEHICLE_OK ||
+                  vehicle_model_add(m, charge_sensor, &gauge, 0.0) < 0 || driven != VEHICLE_OK;
   vehicle_model_switch(m, 1, 0);
   if (bad) printf("bad model\n");
   return m;

@@ -24,7 +24,7 @@ STARTS = np.array([[0.1 * (k % 5) - 0.2, 0.1 * (k % 3), 0.7 * k] for k in range(
 
 def model() -> VehicleModel:
     built = arsim(odometer_sigma=1e-3, ends_at_collision=False)
-    built.sonar("sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
+    built.sensor("sonar", "sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
     return built
 
 
@@ -253,5 +253,5 @@ def test_a_model_whose_worlds_exist_does_not_grow() -> None:
     built = model()
     vehicle = Vehicle(built, load_arena("arsim"))
     with pytest.raises(RobotError, match="expected all of its devices before"):
-        built.compass("second")
+        built.sensor("compass", "second")
     vehicle.step(0.5, 0.5)

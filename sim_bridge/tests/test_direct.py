@@ -19,6 +19,7 @@ from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.compass import HeadingCompass
 from boebot.devices.infrared import InfraredProximity
 from boebot.devices.laser import Laser
+from boebot.devices.line import ReflectanceSensor
 from boebot.devices.whisker import TouchWhisker
 from boebot.errors import BoardError, BrainError
 from boebot.robot import Observation, Robot
@@ -146,3 +147,36 @@ def test_period_of_the_brain_is_a_multiple_of_the_step() -> None:
         with pytest.raises(boebot.BoebotError, match="ms is none; expected more than 0"):
             boebot.run("wander", robot="arsim", period=none)
     assert boebot.run("wander", robot="arsim", period=1.5, seconds=6).steps == 4, "no set-point has to outlive it"
+
+
+def test_sensors_of_the_floor_stand_anywhere_under_any_name() -> None:
+    """The track's tape is 19 mm wide with reflectance 0.05 on a floor of 0.8; a black hole would seem to have 0.01."""
+    robot = changed(
+        nose=ReflectanceSensor(position_m=(0.1, 0.0), sigma=0.0),
+        wing=ReflectanceSensor(position_m=(0.1, 0.1), sigma=0.0),
+    )
+    seen: list[tuple[float | None, bool]] = []
+
+    def step(robot: Robot) -> None:
+        for name in ("nose", "wing"):
+            line = getattr(robot, name)
+            seen.append((line.reflectance, line.dark))
+
+    boebot.run(step, robot, arena="track", on="direct", seconds=0.1)
+    assert [dark for _, dark in seen[:2]] == [True, False]
+    assert [reflectance for reflectance, _ in seen[:2]] == pytest.approx([0.06, 0.81])
+
+
+def test_a_robot_may_have_several_lasers() -> None:
+    """Each alone between the walls at 1.8 m; the second looks back."""
+    robot = changed(
+        ahead=Laser(position_m=(0.0, 0.0), rays=1, range_m=9.0, sigma=0.0),
+        behind=Laser(position_m=(0.0, 0.0), rays=1, heading_rad=math.pi, range_m=9.0, sigma=0.0),
+    )
+    found: list[float | None] = []
+
+    def step(robot: Robot) -> None:
+        found.extend(getattr(robot, name).distances[0] for name in ("ahead", "behind"))
+
+    boebot.run(step, robot, arena="arsim", on="direct", seconds=0.1, pose=(0.5, 0.0, 0.0))
+    assert found[:2] == pytest.approx([1.3, 2.3])

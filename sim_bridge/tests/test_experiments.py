@@ -269,7 +269,7 @@ def test_e13_wall_from_a_tenth_to_beyond_the_range() -> None:
     """0.1 to 1.05 m ahead of a vehicle's sensor: 1 below 0.15 m, 0 beyond D = 1 m, and (3.12)-(3.14) between."""
     around = arena_of([(5.0, -50), (6.0, -50), (6.0, 50), (5.0, 50)])
     model = VehicleModel(ARSIM_BODY | {"radius": 0.05})
-    model.infrared_proximity("ir", beam=beam(opening=0.5, rays=3), range=1.0, c1=0.03, c2=0.1)
+    model.sensor("infrared_proximity", "ir", beam=beam(opening=0.5, rays=3), range=1.0, c1=0.03, c2=0.1)
     model.dc_motors()
     vehicle = Vehicle(model, around)
     for distance in np.linspace(0.1, 1.05, 191).tolist():

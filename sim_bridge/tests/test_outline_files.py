@@ -150,7 +150,7 @@ def test_a_view_draws_the_outline_where_the_vehicle_is() -> None:
     """Against shapely; the ghost is where the odometer has it."""
     model = VehicleModel(ARSIM_BODY | {"outline_m": BOX}, noise=False)
     model.dc_motors()
-    model.odometer("odometer")
+    model.sensor("odometer", "odometer")
     view = View(vehicle := Vehicle(model, arena_of(), pose=(0.3, -0.2, 0.4)))
     for _ in range(100):
         vehicle.step(0.3, 0.5)

@@ -99,7 +99,7 @@ def test_draws_follow_the_seed_and_do_not_follow_each_other() -> None:
 def test_a_vehicles_sensor_reads_what_the_real_one_read(angle: float) -> None:
     """0.4 m from the wall along the beam, met at `angle` to its normal: mean and spread of that bin within 5 %."""
     model = VehicleModel(ARSIM_BODY | {"radius": 0.1})
-    model.table("seen", filled(), beam=beam(), reach=1.0)
+    model.sensor("table", "seen", table=filled(), beam=beam(), reach=1.0)
     reads = standing(model, (2 - 0.4 * math.cos(angle), 0.0, angle), "seen")
     assert reads.mean() == pytest.approx(clean(0.4, angle), rel=0.05)
     assert reads.std() == pytest.approx(SIGMA * clean(0.4, angle), rel=0.05)
@@ -108,7 +108,7 @@ def test_a_vehicles_sensor_reads_what_the_real_one_read(angle: float) -> None:
 def test_without_noise_it_reads_the_means() -> None:
     table = filled()
     model = VehicleModel(ARSIM_BODY, noise=False)
-    model.table("seen", table, beam=beam(x=0.2), reach=1.0)
+    model.sensor("table", "seen", table=table, beam=beam(x=0.2), reach=1.0)
     reads = standing(model, (1.2, 0, 0), "seen", 5)
     mean = float(np.mean([table.readings(0.6, 0.0, 20_000, seed=seed).mean() for seed in range(4)]))
     assert len(set(reads)) == 1 and reads[0] == pytest.approx(mean, rel=4 * SIGMA / math.sqrt(80_000))
@@ -117,8 +117,8 @@ def test_without_noise_it_reads_the_means() -> None:
 def test_two_sensors_keep_what_makes_them_unlike() -> None:
     weak, strong = (ReadingTable([0.1, 1.0], [0.0], [[[0.9 * gain]], [[0.1 * gain]]]) for gain in (0.8, 1.0))
     model = VehicleModel(ARSIM_BODY)
-    model.infrared_proximity("left", table=weak, beam=beam(x=0.2), range=1.0)
-    model.infrared_proximity("right", table=strong, beam=beam(x=0.2), range=1.0)
+    model.sensor("infrared_proximity", "left", table=weak, beam=beam(x=0.2), range=1.0)
+    model.sensor("infrared_proximity", "right", table=strong, beam=beam(x=0.2), range=1.0)
     model.dc_motors()
     vehicle = Vehicle(model, wall(), pose=(1.0, 0, 0))
     assert vehicle["left"] == pytest.approx(0.8 * vehicle["right"]) and 0.1 < vehicle["left"] < 0.8
@@ -127,9 +127,9 @@ def test_two_sensors_keep_what_makes_them_unlike() -> None:
 def test_nothing_in_reach_is_0_for_infra_red_and_d_max_for_sonar() -> None:
     table = ReadingTable([0.1, 3.0], [0.0], [[[0.1]], [[3.0]]])
     model = VehicleModel(ARSIM_BODY)
-    model.infrared_proximity("ir", table=table, beam=beam(), range=0.5)
-    model.sonar("near", table=table, beam=beam(), range_maximum=0.5)
-    model.sonar("far", table=table, beam=beam(), range_maximum=3.0, period=0.05)
+    model.sensor("infrared_proximity", "ir", table=table, beam=beam(), range=0.5)
+    model.sensor("sonar", "near", table=table, beam=beam(), range_maximum=0.5)
+    model.sensor("sonar", "far", table=table, beam=beam(), range_maximum=3.0, period=0.05)
     model.dc_motors()
     vehicle = Vehicle(model, wall(), pose=(1.0, 0, 0))
     assert (vehicle["ir"], vehicle["near"]) == (0.0, 0.5)
@@ -141,7 +141,7 @@ def test_of_several_rays_the_nearest_counts() -> None:
     """Rays at -0.5, 0 and 0.5 rad; turned by 0.5 rad the right one meets the wall straight on, at 1 m."""
     table = ReadingTable([0.5, 1.5], [0.0, 0.6], [[[0.5], [10.5]], [[1.5], [11.5]]])  # d, and 10 more at 0.6 rad
     model = VehicleModel(ARSIM_BODY)
-    model.table("seen", table, beam=beam(opening=1.0, rays=3), reach=5.0)
+    model.sensor("table", "seen", table=table, beam=beam(opening=1.0, rays=3), reach=5.0)
     model.dc_motors()
     assert Vehicle(model, wall(), pose=(1.0, 0, 0.5))["seen"] == pytest.approx(1.0)
     assert Vehicle(model, wall(), pose=(1.0, 0, 0.8))["seen"] == pytest.approx(1 / math.cos(0.3) + 10 * 0.3 / 0.6)
@@ -205,14 +205,29 @@ def test_a_sensor_with_a_wrong_table_gets_a_sentence() -> None:
     model, table, none = VehicleModel(ARSIM_BODY), ReadingTable([0.5], [0.0], [[[1.0]]]), cast(Any, 3)
     for add, what in (
         (
-            lambda: model.infrared_proximity("a", table=none, beam=beam(), range=1.0),
+            lambda: model.sensor("infrared_proximity", "a", table=none, beam=beam(), range=1.0),
             "table is 3; expected a ReadingTable",
         ),
-        (lambda: model.infrared_proximity("a", table=table, beam=beam(), range=1.0, c1=0.03), "there is no key 'c1'"),
-        (lambda: model.infrared_proximity("a", table=table, beam=beam()), "range is None; expected a number more than"),
-        (lambda: model.sonar("a", table=table, range_maximum=1.0), "beam is None; expected a mapping"),
-        (lambda: model.table("a", table, beam=beam(rays=0), reach=1.0), "rays is 0; expected a whole number from 1"),
-        (lambda: model.table("a", table, beam=beam(), reach=1.0, none=math.nan), "none is nan; expected a finite"),
+        (
+            lambda: model.sensor("infrared_proximity", "a", table=table, beam=beam(), range=1.0, c1=0.03),
+            "there is no key 'c1'",
+        ),
+        (
+            lambda: model.sensor("infrared_proximity", "a", table=table, beam=beam()),
+            "range is None; expected a number more than",
+        ),
+        (
+            lambda: model.sensor("sonar", "a", table=table, range_maximum=1.0),
+            "the key 'beam' is missing; expected a mapping",
+        ),
+        (
+            lambda: model.sensor("table", "a", table=table, beam=beam(rays=0), reach=1.0),
+            "rays is 0; expected a whole number from 1",
+        ),
+        (
+            lambda: model.sensor("table", "a", table=table, beam=beam(), reach=1.0, none=math.nan),
+            "none is nan; expected a finite",
+        ),
         (lambda: table.readings(0.5, math.nan, 3), "angle is nan"),
         (lambda: table.readings(0.5, 0.0, -1), "count is -1; expected a whole number from 0"),
     ):

@@ -60,9 +60,11 @@ def sealed(words: list[int]) -> bytes:
 
 def model() -> VehicleModel:
     built = arsim(odometer_sigma=1e-3, ends_at_collision=False)
-    built.sharp_infrared("sharp", beam=beam(x=0.2), reach=1.5, gain=1.0, period=0.0383, late=0.0076, sigma=0.01)
-    built.accelerometer("acceleration", mass=1e-3, stiffness=1.0, damping=0.01, range=50.0, sigma=0.01)
-    built.sonar("sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
+    built.sensor(
+        "sharp_infrared", "sharp", beam=beam(x=0.2), reach=1.5, gain=1.0, period=0.0383, late=0.0076, sigma=0.01
+    )
+    built.sensor("accelerometer", "acceleration", mass=1e-3, stiffness=1.0, damping=0.01, range=50.0, sigma=0.01)
+    built.sensor("sonar", "sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
     built.battery("battery", empty=5.0, full=8.0, idle_per_s=0.01)
     return built
 
@@ -216,7 +218,7 @@ DEVICES: dict[str, tuple[str, dict[str, Any]]] = {
     "laser": ("laser_parameters", {"first": -1.0, "step": 0.1, "rays": 9, "range": 4.0}),
     "compass": ("compass_parameters", {}),
     "accelerometer": ("accelerometer_parameters", {"mass": 1e-3, "stiffness": 10.0, "range": 20.0}),
-    "light": ("phototransistor_parameters", {"near_distance": 0.05, "gain": 1.0}),
+    "phototransistor": ("phototransistor_parameters", {"near_distance": 0.05, "gain": 1.0}),
     "odometer": (
         "odometer_parameters",
         {"half_track": 0.2, "wheel_radius": 0.1, "factor_left": 1.0, "factor_right": 1.0},
@@ -249,7 +251,15 @@ def driven_by(kind: str, values: dict[str, Any]) -> Callable[[VehicleModel], Non
 def with_sensor(kind: str, values: dict[str, Any]) -> Callable[[VehicleModel], None]:
     def build(built: VehicleModel) -> None:
         built.dc_motors()
-        getattr(built, kind)("device", **values)
+        built.sensor(kind, "device", **values)
+
+    return build
+
+
+def with_battery(values: dict[str, Any]) -> Callable[[VehicleModel], None]:
+    def build(built: VehicleModel) -> None:
+        built.dc_motors()
+        built.battery("device", **values)
 
     return build
 
@@ -301,9 +311,9 @@ def test_switches_battery_whisker_and_table_are_the_models() -> None:
 
     for build in (
         table,
-        lambda x: with_sensor("whisker", {"root": (0.2, 0.0), "tip": (0.3, x)}),
-        lambda x: with_sensor("battery", {"idle_per_s": 0.1 + x}),
-        lambda x: with_sensor("battery", {"full": 8.0 + x}),
+        lambda x: with_sensor("touch", {"root_x": 0.2, "tip_x": 0.3, "tip_y": x}),
+        lambda x: with_battery({"idle_per_s": 0.1 + x}),
+        lambda x: with_battery({"full": 8.0 + x}),
         lambda x: with_sensor("compass", {"period": x}),
     ):
         assert refused(built_from(build(1.0)), [built_from(build(1.25))]) == 1

@@ -56,7 +56,7 @@ def test_euler_limit_is_that_of_the_linearised_rates() -> None:
 
 def test_readings_have_names_and_perfect_ones_are_the_truth() -> None:
     model = arsim(noise=False)
-    model.odometer("exact", half_track=0.2, wheel_radius=0.1, rule=lib.ODOMETER_NEW_HEADING)
+    model.sensor("odometer", "exact", half_track=0.2, wheel_radius=0.1, rule=lib.ODOMETER_NEW_HEADING)
     vehicle = Vehicle(model, arena_of(outline=FIELD), pose=(1, -2, 0.5))
     assert list(vehicle["odometer"]) == [1, -2, 0.5] and vehicle["compass"] == 0.5
     for step in range(500):
@@ -75,7 +75,7 @@ def test_noise_can_be_switched_off_and_a_sensor_more_changes_no_draw() -> None:
     run(quiet, 10, 0, 0)
     assert quiet["compass"] == 0.0
     plain, more = arsim(), arsim()
-    more.sonar("sonar", beam=beam(rays=3, opening=0.3), range_minimum=0.02, range_maximum=3.0, sigma=0.01)
+    more.sensor("sonar", "sonar", beam=beam(rays=3, opening=0.3), range_minimum=0.02, range_maximum=3.0, sigma=0.01)
     a, b = (Vehicle(model, load_arena("arsim"), seed=9) for model in (plain, more))
     for _ in range(100):
         a.step(0.3, 0.4)
@@ -87,7 +87,7 @@ def test_slow_sensors_hold_their_reading() -> None:
     """Rule S4: a compass of 25 Hz in a world of 100 Hz changes at every fourth step."""
     model = VehicleModel(ARSIM_BODY)
     model.dc_motors()
-    model.compass("compass", period=0.04, sigma=0.05)
+    model.sensor("compass", "compass", period=0.04, sigma=0.05)
     vehicle = Vehicle(model, arena_of(outline=FIELD))
     readings = [vehicle["compass"]]
     for _ in range(40):
@@ -101,7 +101,7 @@ def test_accelerometer_feels_the_start() -> None:
     """Acceleration of the body, straight on, by the spring's steady state (Fig. 1.10)."""
     model = VehicleModel(ARSIM_BODY)
     model.dc_motors()
-    model.accelerometer("a", mass=1e-3, stiffness=1e4, damping=1.0, range=50.0)
+    model.sensor("accelerometer", "a", mass=1e-3, stiffness=1e4, damping=1.0, range=50.0)
     vehicle = Vehicle(model, arena_of(outline=FIELD))
     speeds = [0.0]
     for _ in range(30):
@@ -114,12 +114,12 @@ def test_a_lasers_rays_go_counter_clockwise_from_the_first() -> None:
     """A wall on the left alone: ray i looks along heading + first + i step."""
     model = VehicleModel(ARSIM_BODY, noise=False)
     model.dc_motors()
-    model.laser("laser", heading=0.2, first=0.5, step=0.3, rays=4, range=9.0, height=0.1)
+    model.sensor("laser", "laser", heading=0.2, first=0.5, step=0.3, rays=4, range=9.0, height=0.1)
     vehicle = Vehicle(model, arena_of([(-50, 1), (50, 1), (50, 2), (-50, 2)]))
     assert list(vehicle["laser"]) == pytest.approx([1 / math.sin(0.2 + 0.5 + 0.3 * i) for i in range(4)])
     one = VehicleModel(ARSIM_BODY, noise=False)
     one.dc_motors()
-    one.laser("laser", first=0.5, rays=1, range=9.0, height=0.1)
+    one.sensor("laser", "laser", first=0.5, rays=1, range=9.0, height=0.1)
     assert list(np.atleast_1d(Vehicle(one, vehicle.arena)["laser"])) == pytest.approx([1 / math.sin(0.5)])
 
 
@@ -127,10 +127,10 @@ def test_whiskers_table_battery_laser_and_light_in_one_model() -> None:
     table = ReadingTable([0.1, 1.1], [0.0], [[[5.0]], [[1.0]]])
     model = VehicleModel(ARSIM_BODY, noise=False, ends_at_collision=False)
     model.dc_motors()
-    model.whisker("whisker", (0.2, 0.0), (0.3, 0.0))
-    model.table("table", table, beam=beam(x=0.2), reach=1.1, none=-7.0)
+    model.sensor("touch", "whisker", root_x=0.2, root_y=0.0, tip_x=0.3, tip_y=0.0)
+    model.sensor("table", "table", table=table, beam=beam(x=0.2), reach=1.1, none=-7.0)
     model.battery("battery", empty=5.0, full=8.0, idle_per_s=0.1, signal_per_s=0.0, charger_per_s=0.0)
-    model.laser("laser", first=-1.0, step=1.0, rays=3, range=5.0, height=0.1)
+    model.sensor("laser", "laser", first=-1.0, step=1.0, rays=3, range=5.0, height=0.1)
     wall = arena_of([(1.0, -5), (2.0, -5), (2.0, 5), (1.0, 5)])
     vehicle = Vehicle(model, wall)
     assert vehicle["whisker"] == 0.0 and vehicle["battery"] == 8.0
@@ -166,7 +166,7 @@ def test_a_moving_shape_is_seen_and_bumps_and_the_charger_charges() -> None:
     lib.arena_build(handle)
     model = VehicleModel(ARSIM_BODY, noise=False)
     model.dc_motors()
-    model.sonar("sonar", beam=beam(x=0.2), range_minimum=0.0, range_maximum=3.0)
+    model.sensor("sonar", "sonar", beam=beam(x=0.2), range_minimum=0.0, range_maximum=3.0)
     model.battery("battery", empty=5.0, full=8.0, idle_per_s=0.05, signal_per_s=0.0, charger_per_s=0.1)
     vehicle, distances = Vehicle(model, arena), []
     while not vehicle.ended:
@@ -179,9 +179,11 @@ def test_a_moving_shape_is_seen_and_bumps_and_the_charger_charges() -> None:
 
 def lively(seed: int = 3) -> Vehicle:
     model = arsim(odometer_sigma=1e-3, ends_at_collision=False)
-    model.sharp_infrared("sharp", beam=beam(x=0.2), reach=1.5, gain=1.0, period=0.0383, late=0.0076, sigma=0.01)
-    model.accelerometer("acceleration", mass=1e-3, stiffness=1.0, damping=0.01, range=50.0, sigma=0.01)
-    model.sonar("sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
+    model.sensor(
+        "sharp_infrared", "sharp", beam=beam(x=0.2), reach=1.5, gain=1.0, period=0.0383, late=0.0076, sigma=0.01
+    )
+    model.sensor("accelerometer", "acceleration", mass=1e-3, stiffness=1.0, damping=0.01, range=50.0, sigma=0.01)
+    model.sensor("sonar", "sonar", period=0.05, beam=beam(rays=3, opening=0.3), range_maximum=3.0, miss=0.1, sigma=0.01)
     return Vehicle(model, load_arena("arsim"), seed=seed)
 
 
@@ -278,13 +280,13 @@ def test_bad_models_are_refused() -> None:
     with pytest.raises(RobotError, match="it has a drive already"):
         model.dc_motors()
     with pytest.raises(RobotError, match=r"'a': range_minimum is 1; expected less than range_maximum, 0\.5"):
-        model.sonar("a", beam=beam(), range_minimum=1.0, range_maximum=0.5)
+        model.sensor("sonar", "a", beam=beam(), range_minimum=1.0, range_maximum=0.5)
     with pytest.raises(RobotError, match=r"'a': period is -1\.0; expected a number of at least 0"):
-        model.compass("a", period=-1.0)
-    model.compass("b")
+        model.sensor("compass", "a", period=-1.0)
+    model.sensor("compass", "b")
     with pytest.raises(RobotError, match="two sensors named 'b'"):
-        model.compass("b")
+        model.sensor("compass", "b")
     for number in range(23):
-        model.compass(str(number))
+        model.sensor("compass", str(number))
     with pytest.raises(RobotError, match="no room for sensor 'one too many'; expected at most 24"):
-        model.compass("one too many")
+        model.sensor("compass", "one too many")

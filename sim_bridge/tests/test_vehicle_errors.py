@@ -55,14 +55,13 @@ GOOD: dict[str, dict[str, Any]] = {
     "laser": {"step": 0.01, "rays": 9, "range": 4.0},
     "compass": {},
     "accelerometer": {"mass": 1e-3, "stiffness": 1.0, "range": 20.0},
-    "light": {"near_distance": 0.05},
+    "phototransistor": {"near_distance": 0.05},
     "odometer": {},
 }
-KINDS = {name: ("phototransistor" if name == "light" else name) for name in GOOD}
 sensors = st.sampled_from(sorted(GOOD)).flatmap(
     lambda name: st.tuples(
         st.just(name),
-        dictionaries(f"{KINDS[name]}_parameters", beam=beams, period=anything, table=st.just(TABLE) | anything),
+        dictionaries(f"{name}_parameters", beam=beams, period=anything, table=st.just(TABLE) | anything),
     )
 )
 
@@ -91,7 +90,7 @@ def settles(build: Callable[[], VehicleModel]) -> None:
 
 @given(sensors)
 @example(("accelerometer", {"period": None}))
-@example(("light", {"near_distance": 1e-300, "gain": 1e11}))
+@example(("phototransistor", {"near_distance": 1e-300, "gain": 1e11}))
 @example(("sonar", {"beam": beam(rays=3.0), "range_maximum": True}))  # type: ignore[arg-type]
 def test_sensors_take_any_dictionary(chosen: tuple[str, dict[str, Any]]) -> None:
     name, changes = chosen
@@ -99,7 +98,7 @@ def test_sensors_take_any_dictionary(chosen: tuple[str, dict[str, Any]]) -> None
     def build() -> VehicleModel:
         model = VehicleModel(ARSIM_BODY)
         model.dc_motors()
-        getattr(model, name)("one", **GOOD[name] | changes)
+        model.sensor(name, "one", **GOOD[name] | changes)
         return model
 
     settles(build)
@@ -118,7 +117,7 @@ def test_sensors_take_any_dictionary(chosen: tuple[str, dict[str, Any]]) -> None
 def test_drives_take_any_dictionary(drive: str, left: Any, right: Any, full: bool) -> None:
     def build() -> VehicleModel:
         model = VehicleModel(ARSIM_BODY)
-        model.compass("compass", current_x=0.1)
+        model.sensor("compass", "compass", current_x=0.1)
         more = {"full": full} if drive == "dc_motors" else {}
         getattr(model, drive)(left, right, **more)
         return model
@@ -134,7 +133,7 @@ def test_bodies_take_any_dictionary(changes: Any, dt: Any) -> None:
     def build() -> VehicleModel:
         body = ARSIM_BODY | changes if isinstance(changes, dict) else changes
         model = VehicleModel(body, dt=dt)
-        model.odometer("odometer")
+        model.sensor("odometer", "odometer")
         model.dc_motors()
         return model
 
@@ -162,13 +161,13 @@ def test_tables_and_whiskers_take_anything(a: Any, b: Any, given_keys: dict[str,
         model = VehicleModel(ARSIM_BODY)
         model.dc_motors()
         keys: dict[str, Any] = {"beam": beam(), "reach": 1.0} | given_keys
-        model.table("one", TABLE, **keys)
+        model.sensor("table", "one", table=TABLE, **keys)
         return model
 
     def whisker() -> VehicleModel:
         model = VehicleModel(ARSIM_BODY)
         model.dc_motors()
-        model.whisker("one", a, b)
+        model.sensor("touch", "one", root_x=a, tip_y=b)
         return model
 
     settles(table)
@@ -226,34 +225,46 @@ def test_motors_take_any_dictionary(kind: Any, data: Any) -> None:
 @pytest.mark.parametrize(
     ("add", "what"),
     [
-        (lambda m: m.sonar("a", beam=beam(), range=3.0), "'a': there is no key 'range'; expected beam, range_minimum"),
-        (lambda m: m.sonar("a", beam=beam()), "'a': the key 'range_maximum' is missing; expected a number more than 0"),
         (
-            lambda m: m.sonar("a", range_maximum=3.0),
+            lambda m: m.sensor("sonar", "a", beam=beam(), range=3.0),
+            "'a': there is no key 'range'; expected beam, range_minimum",
+        ),
+        (
+            lambda m: m.sensor("sonar", "a", beam=beam()),
+            "'a': the key 'range_maximum' is missing; expected a number more than 0",
+        ),
+        (
+            lambda m: m.sensor("sonar", "a", range_maximum=3.0),
             "'a': the key 'beam' is missing; expected a mapping, x, y, heading",
         ),
-        (lambda m: m.sonar("a", beam=beam() | {"ray": 3}, range_maximum=3.0), "'a': beam: there is no key 'ray'"),
         (
-            lambda m: m.sonar("a", beam=beam(rays=33), range_maximum=3.0),
+            lambda m: m.sensor("sonar", "a", beam=beam() | {"ray": 3}, range_maximum=3.0),
+            "'a': beam: there is no key 'ray'",
+        ),
+        (
+            lambda m: m.sensor("sonar", "a", beam=beam(rays=33), range_maximum=3.0),
             "'a': beam.rays is 33; expected a whole number from",
         ),
         (
-            lambda m: m.sonar("a", beam=beam(), range_maximum=3.0, miss=2),
+            lambda m: m.sensor("sonar", "a", beam=beam(), range_maximum=3.0, miss=2),
             "'a': miss is 2; expected a number from 0 to 1",
         ),
         (
-            lambda m: m.laser("a", step=1.0, rays=9, range=4.0),
+            lambda m: m.sensor("laser", "a", step=1.0, rays=9, range=4.0),
             "'a': step is 1; expected a fan of 9 rays of less than a turn",
         ),
-        (lambda m: m.laser("a", rays=9, range=4.0), "'a': step is 0; expected a number more than 0, with 9 rays"),
         (
-            lambda m: m.sharp_infrared("a", beam=beam(), reach=1.0, period=0.03, late=0.04),
+            lambda m: m.sensor("laser", "a", rays=9, range=4.0),
+            "'a': step is 0; expected a number more than 0, with 9 rays",
+        ),
+        (
+            lambda m: m.sensor("sharp_infrared", "a", beam=beam(), reach=1.0, period=0.03, late=0.04),
             "'a': late is 0.04; expected at most",
         ),
-        (lambda m: m.compass("a", sigma="big"), "'a': sigma is 'big'; expected a number of at least 0"),
-        (lambda m: m.compass(7), "a sensor's name is 7; expected a text"),
-        (lambda m: m.odometer("a", rule=3), "'a': rule is 3; expected 0 or 1 or 2"),
-        (lambda m: m.whisker("a", (0, 0), (1,)), "'a': tip is (1,); expected 2 numbers, x, y"),
+        (lambda m: m.sensor("compass", "a", sigma="big"), "'a': sigma is 'big'; expected a number of at least 0"),
+        (lambda m: m.sensor("compass", 7), "a sensor's name is 7; expected a text"),
+        (lambda m: m.sensor("odometer", "a", rule=3), "'a': rule is 3; expected 0 or 1 or 2"),
+        (lambda m: m.sensor("touch", "a", root_x=(1,)), "'a': root_x is (1,); expected a finite number"),
         (
             lambda m: m.battery("a", idle=1),
             "'a': there is no key 'idle'; expected idle_per_s, signal_per_s, charger_per_s",
@@ -263,7 +274,7 @@ def test_motors_take_any_dictionary(kind: Any, data: Any) -> None:
         (lambda m: m.battery("a", signal_per_s=-1), "'a': signal_per_s is -1; expected a number of at least 0"),
         (lambda m: m.battery("a", charger_per_s=-1), "'a': charger_per_s is -1; expected a number of at least 0"),
         (
-            lambda m: m.whisker("a", (0.1, 0), (0.1, 0.0)),
+            lambda m: m.sensor("touch", "a", root_x=0.1, root_y=0, tip_x=0.1, tip_y=0.0),
             "'a': tip is where root is; expected a whisker that has a length",
         ),
         (lambda m: m.dc_motors(full="no"), "vehicle: full is 'no'; expected True or False"),
@@ -310,9 +321,6 @@ def test_one_of_each() -> None:
     for drive in (model.dc_motors, model.regulated_motors, model.servos):
         with pytest.raises(RobotError, match="it has a drive already; expected one of dc_motors, regulated_motors or"):
             drive()
-    model.laser("eye", rays=1, range=4.0)
-    with pytest.raises(RobotError, match="'second': it has a laser already; expected one"):
-        model.laser("second", rays=1, range=4.0)
     model.battery("pack")
     with pytest.raises(RobotError, match="'more': it has a battery already; expected one"):
         model.battery("more")

@@ -183,7 +183,7 @@ def test_current_of_a_full_motor_rises_with_its_time_constant_and_that_of_the_ot
 def test_compass_is_disturbed_by_the_current_that_flows() -> None:
     """Fields of (1, 0) and 0.1 per ampere across it: the reading follows the slow current, not its settled value."""
     model = driven(0.01, {"inductance_h": 0.5})
-    model.compass("compass", current_y=0.1)
+    model.sensor("compass", "compass", current_y=0.1)
     vehicle = Vehicle(model, arena_of())
     for _ in range(30):
         vehicle.step(0.4, 0.4)

@@ -1,14 +1,14 @@
 """A caller's keywords, checked, as C structs of sim_bridge/world; an error is one sentence.
 
 Which keys a struct has is read from its C declaration; what a key may be is in `RANGES`, beside what several keys
-must be to each other. Every message says where, which key, what it was and what was expected.
+must be. Every message says where, which key, what it was and what was expected.
 """
 
 from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -72,21 +72,6 @@ RANGES: Final[Mapping[str, Mapping[str, Range]]] = {
     | dict.fromkeys(("top_speed_rad_s", "dead_band_us"), NOT_NEGATIVE),
     "energy_parameters": dict.fromkeys(("idle_per_s", "signal_per_s", "charger_per_s"), NOT_NEGATIVE),
     "beam_parameters": {"heading": HEADING, "opening": Range(0.0, math.pi), "rays": Range(1, 32)},
-    "infrared_proximity_parameters": {"range": POSITIVE, "reflectance": SWITCH}
-    | dict.fromkeys(("c1", "c2", "sigma"), NOT_NEGATIVE),
-    "sharp_infrared_parameters": {"reach": POSITIVE} | dict.fromkeys(("sigma", "gain", "period", "late"), NOT_NEGATIVE),
-    "sonar_parameters": {"range_minimum": NOT_NEGATIVE, "range_maximum": POSITIVE, "sigma": NOT_NEGATIVE}
-    | {"miss": SHARE, "grazing_cosine": SHARE, "temperature": Range(-100.0, 200.0), "absorption": SWITCH},
-    "laser_parameters": {"heading": HEADING, "first": TURN, "step": NOT_NEGATIVE, "rays": Range(1, 4096)}
-    | {"range": POSITIVE, "sigma": NOT_NEGATIVE},
-    "compass_parameters": {"sigma": NOT_NEGATIVE, "bias": TURN},
-    "accelerometer_parameters": dict.fromkeys(("mass", "stiffness", "range"), POSITIVE)
-    | dict.fromkeys(("damping", "sigma"), NOT_NEGATIVE),
-    "phototransistor_parameters": {"heading": HEADING, "near_distance": POSITIVE}
-    | dict.fromkeys(("ambient", "sigma", "gain"), NOT_NEGATIVE),
-    "odometer_parameters": dict.fromkeys(("half_track", "wheel_radius", "factor_left", "factor_right"), POSITIVE)
-    | dict.fromkeys(("sigma_step", "sigma_share", "edges_per_turn", "slips_per_s"), NOT_NEGATIVE)
-    | {"slip_share": SHARE, "rule": Range(choices=(0, 1, 2))},
 }
 
 
@@ -125,13 +110,21 @@ def known(where: str, given: Any, keys: Iterable[str]) -> dict[str, Any]:
     return dict(given)
 
 
-def struct(kind: str, where: str, given: Any, usual: Mapping[str, Any] | None = None) -> Any:
+def struct(
+    kind: str,
+    where: str,
+    given: Any,
+    usual: Mapping[str, Any] | None = None,
+    ranges: Mapping[str, Range] | None = None,
+) -> Any:
     """A pointer to a new C struct `kind`: what is not `given` is as `usual`, or else 0.
+
+    `ranges`: what its keys may be, of a struct that is not in `RANGES`.
 
     Raises:
         RobotError: a key that the struct has not, that is missing or outside its range.
     """
-    values = _values(kind, where, "", given, usual or {})
+    values = _values(kind, where, "", given, usual or {}, RANGES[kind] if ranges is None else ranges)
     try:
         pointer = ffi.new(f"{kind} *", values)
     except TypeError:  # the numbers fit by now: it is a pointer that does not
@@ -140,8 +133,6 @@ def struct(kind: str, where: str, given: Any, usual: Mapping[str, Any] | None = 
         raise RobotError(f"{where}: {what}") from None
     if kind == "body_parameters":
         _check_body(where, pointer)
-    elif kind in RELATIONS and (what := RELATIONS[kind](values)):
-        raise RobotError(f"{where}: {what}")
     return pointer
 
 
@@ -150,12 +141,14 @@ def keys_of(kind: str) -> list[str]:
     return [name for name, _ in ffi.typeof(kind).fields]
 
 
-def _values(kind: str, where: str, inside: str, given: Any, usual: Mapping[str, Any]) -> dict[str, Any]:
+def _values(
+    kind: str, where: str, inside: str, given: Any, usual: Mapping[str, Any], ranges: Mapping[str, Range]
+) -> dict[str, Any]:
     """What to initialise the struct with. `inside`: "beam." for the keys of a struct within one."""
     known(f"{where}: {inside[:-1]}" if inside else where, given, keys_of(kind))
     values: dict[str, Any] = {}
     for key, field in ffi.typeof(kind).fields:
-        allowed = RANGES[kind].get(key, FINITE)
+        allowed = ranges.get(key, FINITE)
         if key not in given and key not in usual:
             if field.type.kind == "struct" or (field.type.kind == "primitive" and 0 not in allowed):
                 raise RobotError(f"{where}: the key '{inside}{key}' is missing; expected {_wanted(field, allowed)}")
@@ -163,7 +156,7 @@ def _values(kind: str, where: str, inside: str, given: Any, usual: Mapping[str, 
         value = given[key] if key in given else usual[key]
         if field.type.kind == "struct":
             below = usual.get(key, {}) if key in given else {}
-            values[key] = _values(field.type.cname, where, f"{inside}{key}.", value, below)
+            values[key] = _values(field.type.cname, where, f"{inside}{key}.", value, below, RANGES[field.type.cname])
         elif field.type.kind == "pointer":
             values[key] = ffi.NULL if value is None else value
         else:
@@ -193,32 +186,3 @@ def _check_body(where: str, pointer: Any) -> None:
     again = lib.body_parameters_wrong(pointer)
     positive = again != ffi.NULL and ffi.string(again).decode() == key
     raise RobotError(f"{where}: {key} is {value:g}; expected {(POSITIVE if positive else NOT_NEGATIVE).text()}")
-
-
-# ---- what several keys must be to each other -------------------------------------------------------------------------
-
-
-def _sonar(values: Mapping[str, Any]) -> str:
-    low, high = values.get("range_minimum", 0.0), values["range_maximum"]
-    return "" if low < high else f"range_minimum is {low:g}; expected less than range_maximum, {high:g}"
-
-
-def _sharp(values: Mapping[str, Any]) -> str:
-    late, period = values.get("late", 0.0), values.get("period", 0.0)
-    return "" if period == 0.0 or late <= period else f"late is {late:g}; expected at most the period, {period:g}"
-
-
-def _laser(values: Mapping[str, Any]) -> str:
-    step, rays = values.get("step", 0.0), values["rays"]
-    if rays > 1 and not step > 0.0:
-        return f"step is {step:g}; expected a number more than 0, with {rays} rays"
-    if not step * (rays - 1) < 2 * math.pi:
-        return f"step is {step:g}; expected a fan of {rays} rays of less than a turn"
-    return ""
-
-
-RELATIONS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
-    "sonar_parameters": _sonar,
-    "sharp_infrared_parameters": _sharp,
-    "laser_parameters": _laser,
-}

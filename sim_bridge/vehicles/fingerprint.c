@@ -36,72 +36,8 @@ static uint64_t hash_drive(uint64_t sum, const vehicle_model *m) {
   return sum;
 }
 
-static uint64_t hash_beam(uint64_t sum, const beam *b) {
-  const size_t rays = (size_t)b->rays;
-  sum = HASH_NUMBERS(sum, b->x, b->y, b->height, b->middle_cosine, b->middle_sine);
-  return hash_numbers(hash_numbers(hash_numbers(sum, b->fan.cosine, rays), b->fan.sine, rays), b->inward, rays);
-}
-
-static uint64_t hash_laser(uint64_t sum, const laser_parameters *p) {
-  sum = hash_word(sum, (uint64_t)p->rays);
-  return HASH_NUMBERS(sum, p->x, p->y, p->heading, p->height, p->first, p->step, p->range, p->sigma);
-}
-
-static uint64_t hash_odometer(uint64_t sum, const odometer_parameters *p) {
-  sum = hash_word(sum, (uint64_t)p->rule);
-  return HASH_NUMBERS(sum, p->half_track, p->wheel_radius, p->sigma_step, p->factor_left, p->factor_right,
-                      p->sigma_share, p->edges_per_turn, p->slips_per_s, p->slip_share);
-}
-
 static uint64_t hash_sensor(uint64_t sum, const vehicle_sensor *s) {
-  sum = HASH_NUMBERS(hash_word(hash_word(sum, s->device), s->first), s->period);
-  switch (s->kind) {
-    case SENSOR_INFRARED_PROXIMITY: {
-      const infrared_proximity *p = &s->as.infrared_proximity;
-      sum = hash_word(hash_beam(sum, &p->beam), p->reflectance != 0);
-      sum = hash_numbers(sum, &p->c1, 1);
-      return HASH_NUMBERS(sum, p->range, p->c2, p->sigma);
-    }
-    case SENSOR_SHARP_INFRARED: {
-      const sharp_infrared *p = &s->as.sharp_infrared;
-      return HASH_NUMBERS(hash_beam(sum, &p->beam), p->reach, p->sigma, p->gain, p->period, p->late);
-    }
-    case SENSOR_SONAR: {
-      const sonar *p = &s->as.sonar;
-      sum = hash_word(hash_beam(sum, &p->beam), p->absorption != 0);
-      return HASH_NUMBERS(sum, p->range_minimum, p->range_maximum, p->sigma, p->miss, p->grazing_cosine,
-                          p->temperature);
-    }
-    case SENSOR_LASER:
-      return hash_laser(sum, &s->as.laser);
-    case SENSOR_COMPASS: {
-      const compass_parameters *p = &s->as.compass;
-      return HASH_NUMBERS(sum, p->sigma, p->bias, p->iron_x, p->iron_y, p->current_x, p->current_y);
-    }
-    case SENSOR_ACCELEROMETER: {
-      const accelerometer_parameters *p = &s->as.accelerometer;
-      return HASH_NUMBERS(sum, p->mass, p->stiffness, p->damping, p->range, p->sigma, p->bias);
-    }
-    case SENSOR_PHOTOTRANSISTOR: {
-      const phototransistor *p = &s->as.phototransistor;
-      return HASH_NUMBERS(hash_beam(sum, &p->mount), p->near_squared, p->ambient, p->sigma, p->gain);
-    }
-    case SENSOR_ODOMETER:
-      return hash_odometer(sum, &s->as.odometer);
-    case SENSOR_TABLE: {
-      const table_sensor *t = &s->as.table;
-      sum = HASH_NUMBERS(hash_beam(sum, &t->beam), t->range, t->none);
-      return hash_word(sum, table_noise_fingerprint(t->table));
-    }
-    case SENSOR_WHISKER: {
-      const whisker_segment *w = &s->as.whisker;
-      return HASH_NUMBERS(sum, w->x0, w->y0, w->x1, w->y1);
-    }
-    default: {
-      const battery_gauge *g = &s->as.battery;
-      return HASH_NUMBERS(sum, g->empty, g->full, g->sigma);
-    }
-  }
+  return s->kind->hash(HASH_NUMBERS(hash_word(hash_word(sum, s->device), s->first), s->period), s->made);
 }
 
 uint64_t vehicle_model_fingerprint(const vehicle_model *self) {

@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 static int positive(double value) { return value > 0.0 && isfinite(value); }
 
@@ -17,7 +16,10 @@ vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
   return self;
 }
 
-void vehicle_model_destroy(vehicle_model *self) { free(self); }
+void vehicle_model_destroy(vehicle_model *self) {
+  for (size_t i = 0; self != NULL && i < self->sensors_count; i++) free(self->sensors[i].made);
+  free(self);
+}
 
 void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision) {
   self->noise = noise;
@@ -102,108 +104,33 @@ int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_par
   return check_step(self);
 }
 
-/* ---- sensors ------------------------------------------------------------------------------------------------------ */
+/* ---- battery and sensors ------------------------------------------------------------------------------------------ */
 
-/* A new sensor with that many readings, NULL where there is no room or the period is no time. */
-static vehicle_sensor *added(vehicle_model *self, int kind, double period, size_t readings) {
-  if (self->sensors_count == VEHICLE_SENSORS || !(period >= 0.0) || !isfinite(period)) return NULL;
+int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy) {
+  if (self->has_battery) return VEHICLE_TOO_MANY;
+  if (!isfinite(energy->idle_per_s + energy->signal_per_s + energy->charger_per_s)) return VEHICLE_BAD_NUMBER;
+  self->energy = *energy;
+  self->has_battery = 1;
+  return VEHICLE_OK;
+}
+
+size_t vehicle_model_readings(const vehicle_model *self) { return self->readings; }
+
+int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *parameters, double period) {
+  if (self->sensors_count == VEHICLE_SENSORS) return VEHICLE_TOO_MANY;
+  if (!(period >= 0.0) || !isfinite(period)) return VEHICLE_BAD_NUMBER;
+  void *made = calloc(1, kind->size);
+  if (made == NULL) return VEHICLE_NO_MEMORY;
+  const size_t readings = kind->make(made, parameters);
+  if (readings == 0) {
+    free(made);
+    return VEHICLE_BAD_NUMBER;
+  }
   uint32_t number = 0;
   for (size_t i = 0; i < self->sensors_count; i++) number += self->sensors[i].kind == kind;
-  vehicle_sensor *sensor = &self->sensors[self->sensors_count++];
-  memset(sensor, 0, sizeof *sensor);
-  sensor->kind = kind;
-  sensor->device = (uint32_t)kind * 64u + number;
-  sensor->period = period;
-  sensor->first = self->readings;
+  self->sensors[self->sensors_count++] = (vehicle_sensor){
+      .kind = kind, .device = kind->noise * 64u + number, .first = self->readings, .period = period, .made = made};
+  if (kind->reach != NULL) self->reach = fmax(self->reach, kind->reach(made));
   self->readings += readings;
-  return sensor;
-}
-
-/* What adding a sensor returns; one that is not `usable` leaves again. */
-static int done(vehicle_model *self, const vehicle_sensor *sensor, int usable, size_t readings) {
-  if (sensor == NULL) return self->sensors_count == VEHICLE_SENSORS ? VEHICLE_TOO_MANY : VEHICLE_BAD_NUMBER;
-  if (usable) return (int)sensor->first;
-  self->sensors_count--;
-  self->readings -= readings;
-  return VEHICLE_BAD_NUMBER;
-}
-
-int vehicle_model_add_infrared_proximity(vehicle_model *self, const infrared_proximity_parameters *p, double period) {
-  vehicle_sensor *s = added(self, SENSOR_INFRARED_PROXIMITY, period, 1);
-  return done(self, s, s != NULL && infrared_proximity_init(&s->as.infrared_proximity, p) == 0, 1);
-}
-
-int vehicle_model_add_sharp_infrared(vehicle_model *self, const sharp_infrared_parameters *p) {
-  vehicle_sensor *s = added(self, SENSOR_SHARP_INFRARED, 0.0, 1);
-  return done(self, s, s != NULL && sharp_infrared_init(&s->as.sharp_infrared, p) == 0, 1);
-}
-
-int vehicle_model_add_sonar(vehicle_model *self, const sonar_parameters *p, double period) {
-  vehicle_sensor *s = added(self, SENSOR_SONAR, period, 1);
-  return done(self, s, s != NULL && sonar_init(&s->as.sonar, p) == 0, 1);
-}
-
-int vehicle_model_add_laser(vehicle_model *self, const laser_parameters *p, double period) {
-  if (self->laser != NULL) return VEHICLE_TOO_MANY;
-  if (laser_check(p)) return VEHICLE_BAD_NUMBER;
-  vehicle_sensor *s = added(self, SENSOR_LASER, period, (size_t)p->rays);
-  if (s != NULL) s->as.laser = *p;
-  self->laser = s;
-  return done(self, s, 1, (size_t)p->rays);
-}
-
-int vehicle_model_add_compass(vehicle_model *self, const compass_parameters *p, double period) {
-  vehicle_sensor *s = added(self, SENSOR_COMPASS, period, 1);
-  if (s != NULL) s->as.compass = *p;
-  return done(self, s, s != NULL && compass_check(p) == 0, 1);
-}
-
-int vehicle_model_add_accelerometer(vehicle_model *self, const accelerometer_parameters *p, double period) {
-  vehicle_sensor *s = added(self, SENSOR_ACCELEROMETER, period, 1);
-  if (s != NULL) s->as.accelerometer = *p;
-  return done(self, s, s != NULL && accelerometer_check(p) == 0, 1);
-}
-
-int vehicle_model_add_phototransistor(vehicle_model *self, const phototransistor_parameters *p, double period) {
-  vehicle_sensor *s = added(self, SENSOR_PHOTOTRANSISTOR, period, 1);
-  return done(self, s, s != NULL && phototransistor_init(&s->as.phototransistor, p) == 0, 1);
-}
-
-int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p) {
-  vehicle_sensor *s = added(self, SENSOR_ODOMETER, 0.0, 3);
-  if (s != NULL) s->as.odometer = *p;
-  return done(self, s, s != NULL && odometer_check(p) == 0, 3);
-}
-
-int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
-                            double none, double period) {
-  vehicle_sensor *s = added(self, SENSOR_TABLE, period, 1);
-  int usable = 0;
-  if (s != NULL) {
-    s->as.table.table = table;
-    s->as.table.range = range;
-    s->as.table.none = none;
-    usable = beam_init(&s->as.table.beam, look) == 0 && positive(range) && isfinite(none) && table != NULL;
-  }
-  return done(self, s, usable, 1);
-}
-
-int vehicle_model_add_whisker(vehicle_model *self, double x0, double y0, double x1, double y1) {
-  vehicle_sensor *s = added(self, SENSOR_WHISKER, 0.0, 1);
-  const double reach = sqrt(fmax(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1));
-  if (s != NULL) s->as.whisker = (whisker_segment){x0, y0, x1, y1};
-  const int usable = isfinite(x0 + y0 + x1 + y1) && isfinite(reach);
-  if (usable && reach > self->reach) self->reach = reach;
-  return done(self, s, usable, 1);
-}
-
-int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, double empty, double full,
-                          double sigma) {
-  if (self->has_battery) return VEHICLE_TOO_MANY;
-  const double sum = energy->idle_per_s + energy->signal_per_s + energy->charger_per_s + empty + full + sigma;
-  vehicle_sensor *s = added(self, SENSOR_BATTERY, 0.0, 1);
-  if (s != NULL) s->as.battery = (battery_gauge){empty, full, sigma};
-  self->energy = *energy;
-  self->has_battery = s != NULL && isfinite(sum) && sigma >= 0.0;
-  return done(self, s, self->has_battery, 1);
+  return (int)(self->readings - readings);
 }

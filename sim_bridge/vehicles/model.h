@@ -1,8 +1,7 @@
 /* model.h: what a vehicle without a board is made of: a body, a drive, sensors and perhaps a battery.
  *
  * A model is built up once and then shared by any number of worlds and threads, which do not change it. Each sensor adds
- * readings, numbers that the brain gets; a sensor with a period holds its readings in between (notes, section 3.2.2). A
- * sensor's noise is keyed by its kind and its number among that kind, so that another sensor changes no draw.
+ * readings, numbers that the brain gets; a sensor with a period holds its readings in between (notes, section 3.2.2).
  */
 #ifndef VEHICLES_MODEL_H
 #define VEHICLES_MODEL_H
@@ -13,16 +12,8 @@
 #include "../world/body.h"
 #include "../world/motor_dc.h"
 #include "../world/motor_regulated.h"
-#include "../world/sensors/accelerometer.h"
-#include "../world/sensors/compass.h"
-#include "../world/sensors/infrared_proximity.h"
-#include "../world/sensors/laser.h"
-#include "../world/sensors/light.h"
-#include "../world/sensors/odometer.h"
 #include "../world/sensors/sample_hold.h"
-#include "../world/sensors/sharp_infrared.h"
-#include "../world/sensors/sonar.h"
-#include "../world/sensors/table_noise.h"
+#include "../world/sensors/sensor.h"
 #include "../world/servo_motor.h"
 #include "../world/supply.h"
 
@@ -60,98 +51,42 @@ int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters 
 int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
                                   const motor_regulated_parameters *right);
 
-/* The notes' battery; its reading is the voltage empty + E (full - empty) with noise sigma, V. */
-int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy, double empty, double full,
-                          double sigma);
+/* The notes' battery, which empties by these rates; sensors/charge.h reads it. */
+int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy);
 
 /* Switches: all noise (1), and the end of a run at a collision (1). */
 void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision);
 
-/* Sensors. Each returns the number of its first reading, or an error. `period`: s between samples, 0: every step.
- * Readings: one each, except the odometer (x, y, heading) and the laser (one a ray). */
-int vehicle_model_add_infrared_proximity(vehicle_model *self, const infrared_proximity_parameters *p, double period);
-int vehicle_model_add_sharp_infrared(vehicle_model *self, const sharp_infrared_parameters *p);
-int vehicle_model_add_sonar(vehicle_model *self, const sonar_parameters *p, double period);
-int vehicle_model_add_laser(vehicle_model *self, const laser_parameters *p, double period);
-int vehicle_model_add_compass(vehicle_model *self, const compass_parameters *p, double period);
-int vehicle_model_add_accelerometer(vehicle_model *self, const accelerometer_parameters *p, double period);
-int vehicle_model_add_phototransistor(vehicle_model *self, const phototransistor_parameters *p, double period);
-int vehicle_model_add_odometer(vehicle_model *self, const odometer_parameters *p);
+/* Adds a sensor of a kind (world/sensors/sensor.h), with the parameters that its header says. `period`: s between samples;
+ * 0: every step. Returns the number of its first reading, or an error. */
+int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *parameters, double period);
 
-/* A sensor known by its table: distance and angle of incidence at the nearest thing that its rays meet; `none` beyond
- * `range`. The table stays the caller's. */
-int vehicle_model_add_table(vehicle_model *self, const beam_parameters *look, const table_noise *table, double range,
-                            double none, double period);
-
-/* Whisker: a segment from (x0, y0) to (x1, y1) in the body's frame; reads 1 while it touches something. */
-int vehicle_model_add_whisker(vehicle_model *self, double x0, double y0, double x1, double y1);
+/* How many readings there are by now. */
+size_t vehicle_model_readings(const vehicle_model *self);
 
 /* Above this step, s, Euler's method diverges for the drive and body: 2 / (the faster of their two linearised rates). */
 double vehicle_model_euler_limit(const vehicle_model *self);
 /* python: end */
 
-enum {
-  SENSOR_INFRARED_PROXIMITY = 1,
-  SENSOR_SHARP_INFRARED,
-  SENSOR_SONAR,
-  SENSOR_LASER,
-  SENSOR_COMPASS,
-  SENSOR_ACCELEROMETER,
-  SENSOR_PHOTOTRANSISTOR,
-  SENSOR_ODOMETER,
-  SENSOR_TABLE,
-  SENSOR_WHISKER,
-  SENSOR_BATTERY,
-};
-
 enum { DRIVE_NONE = 0, DRIVE_DC, DRIVE_SERVO, DRIVE_REGULATED };
 
 typedef struct {
-  beam beam;
-  const table_noise *table;
-  double range, none;
-} table_sensor;
-
-typedef struct {
-  double x0, y0, x1, y1;
-} whisker_segment;
-
-#define WHISKER_HEIGHT_M 0.03 /* above the floor: what is lower does not bend it */
-
-typedef struct {
-  double empty, full, sigma;
-} battery_gauge;
-
-typedef struct {
-  int kind;
+  const sensor_kind *kind;
   uint32_t device; /* key of its noise */
   size_t first;    /* of its readings */
   double period;
-  union {
-    infrared_proximity infrared_proximity;
-    sharp_infrared sharp_infrared;
-    sonar sonar;
-    laser_parameters laser;
-    compass_parameters compass;
-    accelerometer_parameters accelerometer;
-    phototransistor phototransistor;
-    odometer_parameters odometer;
-    table_sensor table;
-    whisker_segment whisker;
-    battery_gauge battery;
-  } as;
+  void *made; /* by its kind */
 } vehicle_sensor;
 
 struct vehicle_model {
   body_parameters body;
-  double reach; /* of body and whiskers, m */
+  double reach; /* of the body and what sticks out of it, m */
   double dt;
   int drive, full;
   motor_dc_parameters dc[2];
   servo_motor_parameters servo[2];
   motor_regulated_parameters regulated[2];
   int has_battery;
-  const vehicle_sensor *laser; /* NULL: there is none */
   energy_parameters energy;
   int noise, ends_at_collision;
   size_t sensors_count, readings;

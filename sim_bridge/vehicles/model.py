@@ -13,14 +13,15 @@ from typing import Any, Final
 from boebot.arguments import shown, switch
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
+from sim_bridge.devices.catalogue import sensor_kinds
+from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.outline import collision_outline
-from sim_bridge.vehicles.checked_structs import FINITE, NOT_NEGATIVE, POSITIVE, keys_of, known, number, several, struct
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
 
 SENSORS_MAXIMUM: Final = 24
 SIDES: Final = ("left", "right")
-UNTIMED: Final = ("sharp_infrared", "odometer")  # sensors that keep their own time, or read in each step
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
 
 
@@ -159,15 +160,66 @@ class VehicleModel:
         usual = ffi.new("energy_parameters *")
         lib.energy_default(usual)
         values = {key: getattr(usual, key) for key in keys_of("energy_parameters")}
-        low, high = number(where, "empty", empty), number(where, "full", full)
-        if not low < high:
-            raise RobotError(f"{where}: full is {shown(full)}; expected more than empty, {low:g}")
-        spread = number(where, "sigma", sigma, NOT_NEGATIVE)
         rates = struct("energy_parameters", where, energy, values)
-        first = lib.vehicle_model_battery(self._open, rates, low, high, spread)
-        if first == lib.VEHICLE_TOO_MANY:
+        if lib.vehicle_model_battery(self._open, rates) == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a battery already; expected one")
-        self._add(name, where, first)
+        self.sensor("charge", name, empty=empty, full=full, sigma=sigma)
+
+    def sensor(
+        self, kind: str, name: str, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any
+    ) -> None:
+        """Adds a sensor.
+
+        Args:
+            kind: as in sim_bridge/world/sensors: accelerometer, charge, compass, infrared_proximity, laser ...
+            name: of its readings.
+            period: s between readings; 0: in each step.
+            table: it reads what is drawn from there for the distance and the angle of incidence of the nearest thing
+                that its beam's rays meet (rule S3); then only its beam and its reach are given.
+            parameters: the keys of the C struct KIND_parameters.
+
+        Raises:
+            RobotError: no such kind, a key that it has not, or a number outside its range.
+        """
+        kinds = sensor_kinds()
+        where = self._named(name)
+        if kind not in kinds:
+            raise RobotError(f"{where}: its kind is {shown(kind)}; expected {', '.join(kinds)}")
+        what = kinds[kind]
+        if table is not None or kind == "table":
+            parameters, what = self._by_table(where, what, table, parameters), kinds["table"]
+        if period != 0.0 and not what.has_period:  # then it is a key of its struct, or of nothing
+            parameters, period = {**parameters, "period": period}, 0.0
+        usual = {**what.usual, **{key: self.body[key] for key in what.of_body}}
+        given = struct(f"{what.name}_parameters", where, parameters, usual, what.ranges)
+        if wrong := what.wrong({key: getattr(given, key) for key in keys_of(f"{what.name}_parameters")}):
+            raise RobotError(f"{where}: {wrong}")
+        time = number(where, "period", period, NOT_NEGATIVE)
+        first = lib.vehicle_model_add(self._open, getattr(lib, f"{what.name}_sensor"), given, time)
+        if first == lib.VEHICLE_NO_MEMORY:
+            raise RobotError(f"{where}: there is no memory for it")
+        if first < 0:
+            raise RobotError(f"{where} has numbers that do not fit together; expected such as its header says")
+        self.names[name] = slice(first, lib.vehicle_model_readings(self.handle))
+        if what.reach:
+            beam_keys = {key: getattr(given.beam, key) for key in keys_of("beam_parameters")}
+            self.looks[name] = (beam_keys, float(getattr(given, what.reach)))
+
+    def _by_table(
+        self, where: str, what: SensorKind, table: ReadingTable | None, given: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """The parameters of a sensor of kind "table" that stands for one of kind `what`."""
+        if not isinstance(table, ReadingTable):
+            raise RobotError(f"{where}: table is {shown(table)}; expected a ReadingTable")
+        self._keep.append(table)
+        if what.name == "table":
+            return {**known(where, given, ("beam", "reach", "none")), "table": table.handle}
+        if not what.reach:
+            raise RobotError(f"{where}: a sensor of kind {what.name} looks at nothing; expected one with a beam")
+        beam = known(where, given, ("beam", what.reach)).get("beam")
+        reach = number(where, what.reach, given.get(what.reach), POSITIVE)
+        none = reach if what.nothing is None else what.nothing
+        return {"reach": reach, "none": none, "table": table.handle} | ({} if beam is None else {"beam": beam})
 
     def _named(self, name: str) -> str:
         """Where messages about a new sensor of that name are from."""
@@ -178,118 +230,3 @@ class VehicleModel:
         if len(self.names) >= SENSORS_MAXIMUM:
             raise RobotError(f"vehicle: no room for sensor {shown(name)}; expected at most {SENSORS_MAXIMUM}")
         return f"vehicle: sensor {shown(name)}"
-
-    def _add(self, name: str, where: str, first: int, count: int = 1) -> None:
-        if first < 0:
-            raise RobotError(f"{where} has numbers that do not fit together; expected such as its header says")
-        self.names[name] = slice(first, first + count)
-
-    def _sensor(
-        self,
-        kind: str,
-        name: str,
-        given: Mapping[str, Any],
-        usual: Mapping[str, Any] | None = None,
-        period: float = 0.0,
-        reach: str = "",
-    ) -> None:
-        """Adds a sensor of a C kind. `reach`: the key that says how far it looks."""
-        where = self._named(name)
-        parameters = struct(f"{kind}_parameters", where, given, usual)
-        times = [] if kind in UNTIMED else [number(where, "period", period, NOT_NEGATIVE)]
-        first = getattr(lib, f"vehicle_model_add_{kind}")(self._open, parameters, *times)
-        if kind == "laser" and first == lib.VEHICLE_TOO_MANY:
-            raise RobotError(f"{where}: it has a laser already; expected one")
-        counts = {"laser": parameters.rays if kind == "laser" else 1, "odometer": 3}
-        self._add(name, where, first, counts.get(kind, 1))
-        if reach:
-            self._looks(name, parameters.beam, getattr(parameters, reach))
-
-    def _looks(self, name: str, look: Any, reach: float) -> None:
-        self.looks[name] = ({key: getattr(look, key) for key in keys_of("beam_parameters")}, float(reach))
-
-    def infrared_proximity(
-        self, name: str, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any
-    ) -> None:
-        """The notes' IR sensor: beam, range, c1, c2, sigma, reflectance. One reading in [0, 1].
-
-        With a `table`: beam and range; what it reads is drawn from there instead, 0 beyond the range.
-        """
-        if table is None:
-            self._sensor("infrared_proximity", name, parameters, None, period, "range")
-        else:
-            self._by_table(name, table, parameters, "range", 0.0, period)
-
-    def sonar(self, name: str, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any) -> None:
-        """Sonar: beam, range_minimum, range_maximum, sigma, miss, ... One reading, m; D_max: nothing heard.
-
-        With a `table`: beam and range_maximum; what it reads is drawn from there instead.
-        """
-        if table is None:
-            self._sensor("sonar", name, parameters, None, period, "range_maximum")
-        else:
-            self._by_table(name, table, parameters, "range_maximum", None, period)
-
-    def _by_table(
-        self, name: str, table: ReadingTable, given: Any, reach: str, none: float | None, period: float
-    ) -> None:
-        """Adds a table of a sensor whose key for its range is `reach`, which it also reads where `none` is None."""
-        where = self._named(name)
-        known(where, given, ("beam", reach))
-        far = number(where, reach, given.get(reach), POSITIVE)
-        self.table(name, table, beam=given.get("beam"), reach=far, none=far if none is None else none, period=period)
-
-    def table(self, name: str, table: ReadingTable, *, period: float = 0.0, **parameters: Any) -> None:
-        """A sensor known by its table of readings (rule S3): beam, reach, none. One reading, drawn from the table.
-
-        It is that for the distance and the angle of incidence of the nearest thing that the beam's rays meet within
-        `reach` (m), and `none` (0 unless said) where there is nothing.
-        """
-        where = self._named(name)
-        if not isinstance(table, ReadingTable):
-            raise RobotError(f"{where}: table is {shown(table)}; expected a ReadingTable")
-        given = {"beam": None, "reach": None, "none": 0.0} | known(where, parameters, ("beam", "reach", "none"))
-        look = struct("beam_parameters", f"{where}: beam", given["beam"])
-        far, free = number(where, "reach", given["reach"], POSITIVE), number(where, "none", given["none"], FINITE)
-        time = number(where, "period", period, NOT_NEGATIVE)
-        first = lib.vehicle_model_add_table(self._open, look, table.handle, far, free, time)
-        self._keep.append(table)
-        self._add(name, where, first)
-        self._looks(name, look, far)
-
-    def sharp_infrared(self, name: str, **parameters: Any) -> None:
-        """Sharp GP2D12: beam, reach, sigma, gain, period, late. One reading, V."""
-        self._sensor("sharp_infrared", name, parameters, {"gain": 1.0}, reach="reach")
-
-    def laser(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Laser range finder: first, step, rays, range, sigma, height, ... A reading a ray, m; -1: beyond the range.
-
-        Ray i looks along heading + first + i step, counter-clockwise as all angles (3.10): a fan about the heading has
-        first = -step (rays - 1) / 2, and its readings go from right to left.
-        """
-        self._sensor("laser", name, parameters, None, period)
-
-    def compass(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Compass: sigma, bias, iron_x, iron_y, current_x, current_y. One reading, rad."""
-        self._sensor("compass", name, parameters, None, period)
-
-    def accelerometer(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Accelerometer along the heading: mass, stiffness, damping, range, sigma, bias. One reading, m/s^2."""
-        self._sensor("accelerometer", name, parameters, None, period)
-
-    def light(self, name: str, *, period: float = 0.0, **parameters: Any) -> None:
-        """Phototransistor: x, y, heading, height, near_distance, ambient, sigma, gain. One reading."""
-        self._sensor("phototransistor", name, parameters, {"gain": 1.0}, period)
-
-    def odometer(self, name: str, **parameters: Any) -> None:
-        """Odometer: sigma_step, factor_left, ...; half_track and wheel_radius as the body's. Reads x, y, heading."""
-        usual = {key: self.body[key] for key in ("half_track", "wheel_radius")}
-        self._sensor("odometer", name, parameters, usual | {"factor_left": 1.0, "factor_right": 1.0})
-
-    def whisker(self, name: str, root: tuple[float, float], tip: tuple[float, float]) -> None:
-        """A whisker from `root` to `tip` on the body. One reading: 1 while it touches something."""
-        where = self._named(name)
-        ends = (*several(where, "root", root, ("x", "y")), *several(where, "tip", tip, ("x", "y")))
-        if ends[:2] == ends[2:]:
-            raise RobotError(f"{where}: tip is where root is; expected a whisker that has a length")
-        self._add(name, where, lib.vehicle_model_add_whisker(self._open, *ends))

@@ -10,6 +10,10 @@ void vehicle_sense(vehicles *self, size_t i);
 /* The same for one sensor, if it is due; `from`: where the body is. */
 void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from);
 
+/* Room to work in for the sensors of world `i` that need it; 0 without memory. */
+int vehicle_sensors_find_room(vehicles *self, size_t i);
+void vehicle_sensors_free_room(vehicles *self, size_t i);
+
 /* Sensors at the beginning of a run. */
 void vehicle_sensors_start(vehicles *self, size_t i);
 

@@ -113,16 +113,7 @@ static void walk_mover(stream *s, mover *m) {
 
 static void walk_sensor(stream *s, const vehicle_sensor *sensor, sensor_slot *slot) {
   if (sensor->period > 0.0) NUMBERS(s, LARGEST, &slot->hold.next, &slot->hold.taken, &slot->hold.value);
-  if (sensor->kind == SENSOR_SHARP_INFRARED) {
-    sharp_infrared_state *a = &slot->as.sharp_infrared;
-    NUMBERS(s, LARGEST, &a->next, &a->pending, &a->pending_due, &a->output);
-  } else if (sensor->kind == SENSOR_ACCELEROMETER) {
-    NUMBERS(s, LARGEST, &slot->as.accelerometer.deflection, &slot->as.accelerometer.speed);
-  } else if (sensor->kind == SENSOR_ODOMETER) {
-    odometer_state *o = &slot->as.odometer;
-    NUMBERS(s, LARGEST, &o->x, &o->y, &o->heading, &o->wheel_left, &o->wheel_right, &o->rest_left, &o->rest_right,
-            &o->distance);
-  }
+  for (size_t k = 0; k < sensor->kind->numbers; k++) number(s, &slot->memory.numbers[k], LARGEST);
 }
 
 static void walk_brain(stream *s, unsigned char *memory, size_t size) {

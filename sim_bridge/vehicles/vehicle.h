@@ -93,17 +93,11 @@ int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
 size_t vehicles_memory(const vehicles *self);
 /* python: end */
 
-typedef union {
-  sharp_infrared_state sharp_infrared;
-  accelerometer_state accelerometer;
-  odometer_state odometer;
-} sensor_state;
-
 /* What a sensor keeps from step to step. */
 typedef struct {
   uint64_t key; /* of its noise */
   sample_hold hold;
-  sensor_state as;
+  sensor_memory memory;
 } sensor_slot;
 
 /* What changes in a world, without pointers. */
@@ -124,7 +118,6 @@ typedef struct {
   const world *in;     /* the world that it is in; NULL: none yet */
   world own;           /* its own, if that is it: with this vehicle alone */
   world_robot member;  /* of it */
-  laser *laser;        /* NULL: the model has none */
   double hold;         /* of the DC motors' friction, see motor_dc.h */
   double speed_before; /* when the step under way began, m/s */
   body body;

@@ -6,6 +6,9 @@
 
 #include "../world/body_step.h"
 #include "../world/row.h"
+#include "../world/sensors/compass.h"
+#include "../world/sensors/infrared_proximity.h"
+#include "../world/sensors/odometer.h"
 #include "sense.h"
 
 #define DRAWS (VEHICLE_SENSORS + 1u) /* sensors draw one number each, an odometer two */
@@ -78,9 +81,9 @@ typedef struct {
 /* How many normal draws a sensor takes of which the whole row is read at once; 0: it is read for each world alone. */
 static unsigned draws_of(const vehicle_sensor *sensor) {
   if (sensor->period > 0.0) return 0;
-  if (sensor->kind == SENSOR_INFRARED_PROXIMITY) return !sensor->as.infrared_proximity.reflectance;
-  if (sensor->kind == SENSOR_COMPASS) return !compass_is_disturbed(&sensor->as.compass);
-  return sensor->kind == SENSOR_ODOMETER && odometer_is_plain(&sensor->as.odometer) ? 2 : 0;
+  if (sensor->kind == infrared_proximity_sensor) return !((const infrared_proximity *)sensor->made)->reflectance;
+  if (sensor->kind == compass_sensor) return !compass_is_disturbed(sensor->made);
+  return sensor->kind == odometer_sensor && odometer_is_plain(sensor->made) ? 2 : 0;
 }
 
 /* All draws that the row's sensors take together; 0 without noise. */
@@ -113,7 +116,7 @@ static void finish_eyes(const infrared_proximity *eye, const double (*distances)
 }
 
 static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
-  const infrared_proximity *eye = &sensor->as.infrared_proximity;
+  const infrared_proximity *eye = sensor->made;
   fan_question asked[ROW];
   double distances[ROW][BEAM_RAYS];
   double readings[ROW];
@@ -129,12 +132,12 @@ static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const 
 static void read_compasses(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
   double readings[ROW];
   for (size_t k = 0; k < ROW; k++) readings[k] = s->from[k].heading;
-  for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(&sensor->as.compass, readings[k], draws[k]);
+  for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(sensor->made, readings[k], draws[k]);
   for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
 }
 
 static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
-  const odometer_parameters parameters = sensor->as.odometer;
+  const odometer_parameters parameters = *(const odometer_parameters *)sensor->made;
   const odometer_parameters *p = &parameters; /* here, where no result can be */
   const size_t number = (size_t)(sensor - s->all->model->sensors);
   const double spread = p->sigma_step > 0.0 ? odometer_spread(p, s->all->model->dt) : 0.0;
@@ -143,7 +146,7 @@ static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor, c
   const body_state *bodies[ROW];
   double left[ROW], right[ROW], x[ROW], y[ROW], heading[ROW], distance[ROW];
   for (size_t k = 0; k < ROW; k++) {
-    states[k] = &s->slots[k][number].as.odometer;
+    states[k] = (odometer_state *)s->slots[k][number].memory.numbers;
     bodies[k] = &s->worlds[k]->body.state;
   }
   for (size_t k = 0; k < ROW; k++) {
@@ -191,9 +194,9 @@ static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
     count += taken;
     for (size_t k = 0; k < ROW && taken == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
     if (taken == 0) continue;
-    if (sensor->kind == SENSOR_INFRARED_PROXIMITY) read_eyes(&s, sensor, draws);
-    if (sensor->kind == SENSOR_COMPASS) read_compasses(&s, sensor, draws);
-    if (sensor->kind == SENSOR_ODOMETER) read_odometers(&s, sensor, draws);
+    if (sensor->kind == infrared_proximity_sensor) read_eyes(&s, sensor, draws);
+    if (sensor->kind == compass_sensor) read_compasses(&s, sensor, draws);
+    if (sensor->kind == odometer_sensor) read_odometers(&s, sensor, draws);
   }
   for (size_t k = 0; k < ROW; k++) worlds[k]->state.sensed = worlds[k]->state.step + 1;
 }

@@ -29,13 +29,13 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
 /* Frees what belongs to one world. */
 static void leave(vehicle *w) {
   free(w->own.movers);
-  laser_destroy(w->laser);
   memset(w, 0, sizeof *w);
 }
 
 void vehicles_destroy(vehicles *self) {
   if (self == NULL) return;
   for (size_t i = 0; self->worlds != NULL && i < self->count; i++) leave(&self->worlds[i]);
+  for (size_t i = 0; self->slots != NULL && i < self->count; i++) vehicle_sensors_free_room(self, i);
   free(self->worlds);
   free(self->slots);
   free(self->readings);
@@ -63,8 +63,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
     free(movers);
     return VEHICLE_NOT_FREE;
   }
-  laser *eye = m->laser != NULL ? laser_new(&m->laser->as.laser) : NULL;
-  if (m->laser != NULL && eye == NULL) {
+  if (!vehicle_sensors_find_room(self, i)) {
     free(movers);
     return VEHICLE_NO_MEMORY;
   }
@@ -75,7 +74,6 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   w->member = (world_robot){.body = &w->body, .op = &VEHICLE_OPERATIONS, .owner = w};
   w->own.robots = &w->member;
   w->own.count = 1;
-  w->laser = eye;
   memset(&self->readings[i * m->readings], 0, m->readings * sizeof *self->readings);
   memset(self->brains + i * self->state_size, 0, self->state_size);
   w->state.seed = seed;

@@ -55,7 +55,9 @@ def robot() -> VehicleModel:
 def laser_robot(noise: bool) -> VehicleModel:
     model = VehicleModel(ARSIM_BODY, noise=noise, ends_at_collision=False)
     model.dc_motors()
-    model.laser("laser", rays=BEAMS, first=-(BEAMS // 2) * BEAM_STEP, step=BEAM_STEP, range=LASER_RANGE, sigma=0.01)
+    model.sensor(
+        "laser", "laser", rays=BEAMS, first=-(BEAMS // 2) * BEAM_STEP, step=BEAM_STEP, range=LASER_RANGE, sigma=0.01
+    )
     return model
 
 

@@ -1,7 +1,7 @@
 """Line sensors that look at the floor: Parallax QTI, an infra-red LED and a phototransistor.
 
 The phototransistor discharges a capacitor; over a bright floor soon, over a dark line late. So a decay time above the
-sensor's threshold is a dark floor.
+sensor's threshold is a dark floor. In a robot without a board the floor's reflectance itself is read.
 
 Wiring: white to 5 V, black to ground, red to the pin (Parallax, "QTI Sensor", document 555-27401).
 
@@ -19,9 +19,10 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Place, Point, Reader, SlowDevice
+from boebot.devices.device import NotNegative, Place, Point, Reader, Sensor, Share, SlowDevice
 from boebot.devices.drawing import Shape, Spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.devices.readings import Readings
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -31,9 +32,11 @@ class Line(NamedTuple):
     """One line sensor."""
 
     decay_time: float | None
-    """Seconds that the capacitor took; None if it could not be measured."""
+    """Seconds that the capacitor took; None if it could not be measured, or there is none."""
+    reflectance: float | None
+    """Share of the light that the floor throws back, in a robot without a board; None on a board."""
     dark: bool
-    """The floor below is dark: it took longer than the sensor's threshold."""
+    """The floor below is dark, by the sensor's threshold."""
     age: float
     """Seconds since the measurement; infinite if there was none."""
     valid: bool
@@ -67,8 +70,36 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
             us, ticks = message[field], message.line_age + since
             age = ticks * tick_s if message.line_age < NEVER else float("inf")
             if message.line_age >= NEVER or us == 0:
-                return Line(None, False, age, False)
-            return Line(us * 1e-6, us > dark_us, age, ticks <= fresh)
+                return Line(None, None, False, age, False)
+            return Line(us * 1e-6, None, us > dark_us, age, ticks <= fresh)
+
+        return read
+
+    def drawing(self) -> list[Shape]:
+        """Where it sits."""
+        return [Spot(self.position_m, None)]
+
+
+class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=True):
+    """A sensor that looks at the floor of a robot without a board: the mean reflectance of the spot below it."""
+
+    position_m: Point
+    spot_m: NotNegative = 0.004  # radius of the spot
+    dark_below: Share = 0.3  # less is a dark floor
+    sigma: NotNegative = 0.02
+
+    READING: ClassVar = Line
+    GROUP: ClassVar[str] = "lines"
+    COLUMNS: ClassVar = (("reflectance", "", "", 4),)
+    SHOWN: ClassVar = ("", "", 1.0, 2)
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        first, dark_below = place.where.start, self.dark_below
+
+        def read(sample: Readings, _: object) -> Line:
+            seen = sample.values[first]
+            return Line(None, seen, seen < dark_below, sample.ages[first], True)
 
         return read
 

@@ -5,7 +5,7 @@
 #ifndef SENSORS_ACCELEROMETER_H
 #define SENSORS_ACCELEROMETER_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -31,6 +31,8 @@ void accelerometer_step(const accelerometer_parameters *self, accelerometer_stat
 
 /* k z / m with bias and noise, m/s^2. */
 double accelerometer_read(const accelerometer_parameters *self, const accelerometer_state *state, noise_source *noise);
+
+extern const sensor_kind *const accelerometer_sensor;
 /* python: end */
 
 #endif

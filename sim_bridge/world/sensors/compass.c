@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 int compass_check(const compass_parameters *p) {
@@ -24,3 +25,26 @@ double compass_read(const compass_parameters *p, const viewpoint *from, double c
   }
   return compass_of(p, heading, p->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
 }
+
+/* ---- of a robot without a board ----------------------------------------------------------------------------------- */
+
+static size_t make(void *self, const void *parameters) {
+  *(compass_parameters *)self = *(const compass_parameters *)parameters;
+  return compass_check(self) == 0;
+}
+
+static uint64_t hash(uint64_t sum, const void *self) {
+  const compass_parameters *p = self;
+  return HASH_NUMBERS(sum, p->sigma, p->bias, p->iron_x, p->iron_y, p->current_x, p->current_y);
+}
+
+static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
+  const compass_parameters *p = self;
+  (void)memory;
+  const double current = p->current_x != 0.0 || p->current_y != 0.0 ? s->motor_current(s->robot) : 0.0;
+  *readings = compass_read(p, &s->from, current, noise);
+}
+
+static const sensor_kind KIND = {
+    .noise = 5, .size = sizeof(compass_parameters), .make = make, .hash = hash, .read = read};
+const sensor_kind *const compass_sensor = &KIND;

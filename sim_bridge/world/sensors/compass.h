@@ -7,8 +7,8 @@
 #ifndef SENSORS_COMPASS_H
 #define SENSORS_COMPASS_H
 
-#include "beam.h"
 #include "geometry/numbers.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -27,6 +27,8 @@ void compass_field(const compass_parameters *self, const viewpoint *from, double
 
 /* Heading, rad in (-pi, pi]. */
 double compass_read(const compass_parameters *self, const viewpoint *from, double current, noise_source *noise);
+
+extern const sensor_kind *const compass_sensor;
 /* python: end */
 
 static inline int compass_is_disturbed(const compass_parameters *p) {

@@ -6,8 +6,8 @@
 #ifndef SENSORS_INFRARED_PROXIMITY_H
 #define SENSORS_INFRARED_PROXIMITY_H
 
-#include "beam.h"
 #include "geometry/numbers.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -30,6 +30,8 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
 
 /* S in [0, 1]. */
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise);
+
+extern const sensor_kind *const infrared_proximity_sensor;
 /* python: end */
 
 /* The same in parts, for many sensors at once, all without `reflectance`: the question that arena_fans is to answer, what

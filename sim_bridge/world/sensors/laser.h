@@ -7,8 +7,8 @@
 #ifndef SENSORS_LASER_H
 #define SENSORS_LASER_H
 
-#include "beam.h"
 #include "geometry/scan.h"
+#include "sensor.h"
 
 #define LASER_RAYS 4096
 
@@ -33,6 +33,8 @@ void laser_destroy(laser *self);
 
 /* One scan into `distances`, as many as there are rays. */
 void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double *distances);
+
+extern const sensor_kind *const laser_sensor;
 /* python: end */
 
 #endif

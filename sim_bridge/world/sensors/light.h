@@ -6,7 +6,7 @@
 #ifndef SENSORS_LIGHT_H
 #define SENSORS_LIGHT_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -30,6 +30,8 @@ double phototransistor_read(const phototransistor *self, const viewpoint *from, 
 
 /* Time of the capacitor's decay, s: `scale` s at L = 1, never above `maximum`. */
 double phototransistor_decay_time(double irradiance, double scale, double maximum);
+
+extern const sensor_kind *const phototransistor_sensor;
 /* python: end */
 
 #endif

@@ -3,21 +3,23 @@
 
 #include <math.h>
 
+#include "geometry/hash.h"
+
 #define SPOTS 9 /* at which the spot is sampled: its middle, and two rings of four */
 #define LEAST 1e-6
 
-int line_sensor_init(line_sensor *self, const line_sensor_parameters *p) {
+int reflectance_init(reflectance *self, const reflectance_parameters *p) {
   if (!isfinite(p->x + p->y + p->radius + p->dark + p->sigma + p->gain)) return -1;
   if (!(p->radius >= 0.0 && p->dark >= 0.0 && p->sigma >= 0.0 && p->gain >= 0.0)) return -1;
   self->parameters = *p;
   return 0;
 }
 
-double line_sensor_read(const line_sensor *self, const viewpoint *from, noise_source *noise) {
+double reflectance_read(const reflectance *self, const viewpoint *from, noise_source *noise) {
   static const double spot[SPOTS][2] = {
       {0.0, 0.0}, {0.5, 0.0}, {-0.5, 0.0}, {0.0, 0.5}, {0.0, -0.5}, {0.7, 0.7}, {-0.7, 0.7}, {0.7, -0.7}, {-0.7, -0.7},
   };
-  const line_sensor_parameters *p = &self->parameters;
+  const reflectance_parameters *p = &self->parameters;
   double sum = 0.0;
   for (int i = 0; i < SPOTS; i++) {
     const double ahead = p->x + p->radius * spot[i][0];
@@ -30,3 +32,20 @@ double line_sensor_read(const line_sensor *self, const viewpoint *from, noise_so
   const double seen = p->gain * (sum / SPOTS + p->dark) * spread;
   return seen > LEAST ? seen : LEAST;
 }
+
+/* ---- of a robot without a board ----------------------------------------------------------------------------------- */
+
+static size_t make(void *self, const void *parameters) { return reflectance_init(self, parameters) == 0; }
+
+static uint64_t hash(uint64_t sum, const void *self) {
+  const reflectance_parameters *p = &((const reflectance *)self)->parameters;
+  return HASH_NUMBERS(sum, p->x, p->y, p->radius, p->dark, p->sigma, p->gain);
+}
+
+static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
+  (void)memory;
+  *readings = reflectance_read(self, &s->from, noise);
+}
+
+static const sensor_kind KIND = {.noise = 12, .size = sizeof(reflectance), .make = make, .hash = hash, .read = read};
+const sensor_kind *const reflectance_sensor = &KIND;

@@ -5,7 +5,7 @@
 #ifndef SENSORS_LINE_H
 #define SENSORS_LINE_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -14,17 +14,19 @@ typedef struct {
   double dark;   /* reflectance that a black hole would seem to have: leakage, stray light */
   double sigma;  /* of (3.1); 0: no noise */
   double gain;   /* of this unit, 1: nominal */
-} line_sensor_parameters;
+} reflectance_parameters;
 
 typedef struct {
-  line_sensor_parameters parameters;
-} line_sensor;
+  reflectance_parameters parameters;
+} reflectance;
 
 /* 0, or -1: a number that is not finite or negative. */
-int line_sensor_init(line_sensor *self, const line_sensor_parameters *parameters);
+int reflectance_init(reflectance *self, const reflectance_parameters *parameters);
 
 /* Share of the light that comes back, above 0. */
-double line_sensor_read(const line_sensor *self, const viewpoint *from, noise_source *noise);
+double reflectance_read(const reflectance *self, const viewpoint *from, noise_source *noise);
+
+extern const sensor_kind *const reflectance_sensor;
 /* python: end */
 
 #endif

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 int odometer_check(const odometer_parameters *p) {
@@ -51,3 +52,48 @@ void odometer_step(const odometer_parameters *p, odometer_state *s, double wheel
   s->wheel_right = wheel_right;
   odometer_advance(p, s, left, right);
 }
+
+/* ---- of a robot without a board ----------------------------------------------------------------------------------- */
+
+static size_t make(void *self, const void *parameters) {
+  *(odometer_parameters *)self = *(const odometer_parameters *)parameters;
+  return odometer_check(self) == 0 ? 3 : 0;
+}
+
+static uint64_t hash(uint64_t sum, const void *self) {
+  const odometer_parameters *p = self;
+  sum = hash_word(sum, (uint64_t)p->rule);
+  return HASH_NUMBERS(sum, p->half_track, p->wheel_radius, p->sigma_step, p->factor_left, p->factor_right,
+                      p->sigma_share, p->edges_per_turn, p->slips_per_s, p->slip_share);
+}
+
+static void start(const void *self, sensor_memory *memory, const sensing *s) {
+  const body_state *b = &s->body->state;
+  (void)self;
+  odometer_calibrate((odometer_state *)memory->numbers, b->x, b->y, b->heading, b->wheel_left, b->wheel_right);
+}
+
+static void step(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise) {
+  const body_state *b = &s->body->state;
+  odometer_step(self, (odometer_state *)memory->numbers, b->wheel_left, b->wheel_right, s->dt, noise);
+}
+
+static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
+  const odometer_state *state = (const odometer_state *)memory->numbers;
+  (void)self;
+  (void)s;
+  (void)noise;
+  readings[0] = state->x;
+  readings[1] = state->y;
+  readings[2] = state->heading;
+}
+
+static const sensor_kind KIND = {.noise = 8,
+                                 .size = sizeof(odometer_parameters),
+                                 .numbers = 8,
+                                 .make = make,
+                                 .hash = hash,
+                                 .start = start,
+                                 .step = step,
+                                 .read = read};
+const sensor_kind *const odometer_sensor = &KIND;

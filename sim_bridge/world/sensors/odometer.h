@@ -9,8 +9,8 @@
 
 #include <math.h>
 
-#include "beam.h"
 #include "geometry/numbers.h"
+#include "sensor.h"
 
 #define ODOMETER_ARSIM_STEP_S 0.01
 
@@ -49,6 +49,8 @@ void odometer_advance(const odometer_parameters *self, odometer_state *state, do
 /* The wheels have come to these angles in `dt` s. */
 void odometer_step(const odometer_parameters *self, odometer_state *state, double wheel_left, double wheel_right,
                    double dt, noise_source *noise);
+
+extern const sensor_kind *const odometer_sensor;
 /* python: end */
 
 /* 1 if nothing but the noise of sigma_step comes between the wheels' travel and the estimate. */

@@ -6,7 +6,7 @@
 #ifndef SENSORS_SHARP_INFRARED_H
 #define SENSORS_SHARP_INFRARED_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -39,6 +39,8 @@ double sharp_infrared_volts(double distance);
 /* Voltage at the output at `time` s, which does not go back. */
 double sharp_infrared_read(const sharp_infrared *self, sharp_infrared_state *state, const viewpoint *from, double time,
                            noise_source *noise);
+
+extern const sensor_kind *const sharp_infrared_sensor;
 /* python: end */
 
 #endif

@@ -7,7 +7,7 @@
 #ifndef SENSORS_SONAR_H
 #define SENSORS_SONAR_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -42,6 +42,8 @@ double sonar_read(const sonar *self, const viewpoint *from, noise_source *noise)
 /* Speed of sound in air of that temperature (degrees C), m/s, and the time of an echo from that distance (m), s. */
 double sonar_speed_of_sound(double temperature);
 double sonar_echo_time(const sonar *self, double distance);
+
+extern const sensor_kind *const sonar_sensor;
 /* python: end */
 
 #endif

@@ -1,0 +1,33 @@
+/* touch.c: see touch.h. */
+#include "touch.h"
+
+#include <math.h>
+
+#include "geometry/hash.h"
+
+static double reach(const void *self) {
+  const touch_parameters *p = self;
+  return sqrt(fmax(p->root_x * p->root_x + p->root_y * p->root_y, p->tip_x * p->tip_x + p->tip_y * p->tip_y));
+}
+
+static size_t make(void *self, const void *parameters) {
+  const touch_parameters *p = parameters;
+  *(touch_parameters *)self = *p;
+  return isfinite(p->root_x + p->root_y + p->tip_x + p->tip_y) && isfinite(reach(p));
+}
+
+static uint64_t hash(uint64_t sum, const void *self) {
+  const touch_parameters *p = self;
+  return HASH_NUMBERS(sum, p->root_x, p->root_y, p->tip_x, p->tip_y);
+}
+
+static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
+  const touch_parameters *p = self;
+  (void)memory;
+  (void)noise;
+  *readings = body_segment_touches(s->body, s->from.around, p->root_x, p->root_y, p->tip_x, p->tip_y, WHISKER_HEIGHT_M);
+}
+
+static const sensor_kind KIND = {
+    .noise = 10, .size = sizeof(touch_parameters), .make = make, .hash = hash, .reach = reach, .read = read};
+const sensor_kind *const touch_sensor = &KIND;
