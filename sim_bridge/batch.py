@@ -249,12 +249,14 @@ class Batch:
 
     def save(self, index: int) -> bytes:
         """The state of one world; `restore` takes it into any world of the same model and arena, on any machine."""
-        return worlds.save(self.handle, self._index(index))
+        world = self._index(index)
+        return worlds.save(self.handle, world, self.model, self.arenas[world], self.state_bytes)
 
     def restore(self, index: int, state: bytes) -> None:
-        """Raises RobotError: it is of another model, arena, size of memory or version, or damaged; nothing changes."""
+        """Raises SavedStateError: it is of another model, arena, size of memory or format, or damaged."""
         world = self._index(index)
-        worlds.restore(f"batch, world {world}", self.handle, world, self.arenas[world], state)
+        arena = self.arenas[world]
+        worlds.restore(f"batch, world {world}", self.handle, world, self.model, arena, self.state_bytes, state)
 
     def hashes(self) -> NDArray[np.uint64]:
         """Shape (N,): of all that `save` writes of each world, in the same order; the same on every machine."""

@@ -30,6 +30,7 @@ class ReadingTable:
     Attributes:
         distances: of the bins, increasing.
         angles: of the bins, increasing.
+        data: distances, angles, how many readings each bin has, and all of them.
         handle: the C table.
     """
 
@@ -48,6 +49,7 @@ class ReadingTable:
                 readings = _listed(f"samples[{i}][{j}]", drawn, None, "readings")
                 counts.append(len(readings))
                 flat += [number("table", f"samples[{i}][{j}][{k}]", value) for k, value in enumerate(readings)]
+        self.data = (tuple(self.distances), tuple(self.angles), tuple(counts), tuple(flat))
         handle = lib.table_noise_new(
             ffi.new("double[]", self.distances), len(self.distances),
             ffi.new("double[]", self.angles), len(self.angles),

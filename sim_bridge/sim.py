@@ -18,10 +18,10 @@ from boebot.arenas.floor_plan import Lateness
 from boebot.arguments import point, shown, whole
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
+from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.loop import saved
 from sim_bridge.robots import imperfections, switches
 from sim_bridge.robots.outline import collision_outline
 from sim_bridge.robots.wiring import done, join
@@ -349,7 +349,7 @@ class Sim:
                 changed here.
             BoardError: the firmware has changed on disk.
         """
-        heading, inputs = saved.decode(state)
+        heading, inputs = saved.decode(state, saved.Simulation)
         saved.check_alike(heading, self._heading())
         fresh = Sim(self.arena, seed=self.seed, noise=self.noise, record=self._record, step_cycles=self._step_cycles)
         try:
@@ -373,8 +373,8 @@ class Sim:
             if member.board is not None:
                 self._take(member.board)
 
-    def _heading(self) -> saved.Heading:
-        return saved.Heading(
+    def _heading(self) -> saved.Simulation:
+        return saved.Simulation(
             format=saved.FORMAT,
             cycle=self.cycle,
             state=f"{lib.sim_state_hash(self.handle):016x}",
@@ -383,7 +383,7 @@ class Sim:
             record=self._record,
             step_cycles=self._step_cycles,
             arena=self.arena.name,
-            arena_fingerprint=saved.fingerprint_of(self.arena.description),
+            arena_fingerprint=self.arena.fingerprint,
             robots=[
                 saved.SavedRobot(
                     number=number,
@@ -396,7 +396,7 @@ class Sim:
             ],
         )
 
-    def _replay(self, heading: saved.Heading, inputs: bytes, progress: Progress) -> None:
+    def _replay(self, heading: saved.Simulation, inputs: bytes, progress: Progress) -> None:
         """From the start to where `heading` says."""
         at = ffi.new("size_t *")
         shown = time.monotonic()

@@ -15,6 +15,7 @@ from boebot.arenas import load_arena
 from boebot.errors import ArenaError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
+from sim_bridge.saved import SavedStateError
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
 
@@ -94,7 +95,7 @@ def test_a_compiled_brain_drives_and_is_saved_with_its_world() -> None:
     other.restore(8, state)
     other.run(WANDER, 200)
     assert other.hashes()[8] == whole.hashes()[3]
-    with pytest.raises(RobotError, match="no saved state"):
+    with pytest.raises(SavedStateError, match="saved state"):
         other.restore(0, state[:-8])
 
 

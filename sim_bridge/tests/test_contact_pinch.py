@@ -18,8 +18,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from boebot.arenas import Arena, ArenaDescription, Moving, Waypoint, load_arena
-from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
+from sim_bridge.saved import SavedStateError
 from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim
@@ -291,7 +291,7 @@ def test_a_world_that_waits_is_saved_and_goes_on() -> None:
         assert there.hash() == here.hash()
     assert here.pose[1] > 0.3
     assert here.hash() != Vehicle(model, arena).hash()
-    with pytest.raises(RobotError, match="saved in another arena"):
+    with pytest.raises(SavedStateError, match="saved in another arena"):
         Vehicle(model, shuttle(0.5), pose=(-3.0, 0.0, 0.0)).restore(Vehicle(model, arena_of()).save())
 
 

@@ -24,7 +24,7 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
-from sim_bridge.loop.saved import SavedStateError
+from sim_bridge.saved import SavedStateError
 from sim_bridge.sim import TICK_CYCLES, Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import Vehicle

@@ -28,11 +28,12 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
-from sim_bridge.loop.saved import FORMAT, MAGIC, SavedStateError
 from sim_bridge.pins import BoardPins
+from sim_bridge.saved import FORMAT, MAGIC, SavedStateError
 from sim_bridge.sessions import opening, with_board
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of
+from sim_bridge.vehicle import Vehicle, arsim
 
 KINDS = {
     "native": lambda pin_map: native_board(native_library(pin_map)),
@@ -240,7 +241,7 @@ def test_damaged_bytes_are_refused_and_change_nothing() -> None:
             sim.restore(wrong)
     nothing: list[Any] = ["text", 3, None]
     for none in nothing:
-        with pytest.raises(SavedStateError, match="no saved simulation"):
+        with pytest.raises(SavedStateError, match="is no saved state"):
             sim.restore(none)
     for place in range(0, len(data), 7):
         flipped = bytearray(data)
@@ -286,6 +287,15 @@ def test_what_was_built_otherwise_is_refused_by_name() -> None:
     basic.add(KINDS["native"](other.pin_map), other, pose=(0.8, 0.2, 0.0))
     with pytest.raises(SavedStateError, match="shieldbot"):
         basic.restore(data)
+
+
+def test_a_world_and_a_simulation_are_not_taken_for_each_other() -> None:
+    sim, data = saved_one()
+    vehicle = Vehicle(arsim(), load_arena("arsim"))
+    with pytest.raises(SavedStateError, match="saved state of a world; expected that of a simulation"):
+        sim.restore(vehicle.save())
+    with pytest.raises(SavedStateError, match="saved state of a simulation; expected that of a world"):
+        vehicle.restore(data)
 
 
 def test_other_formats_and_states_are_refused() -> None:

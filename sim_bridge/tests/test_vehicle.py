@@ -12,6 +12,7 @@ from boebot.arenas import Arena, load_arena
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.reading_table import ReadingTable
+from sim_bridge.saved import SavedStateError
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
 
@@ -217,9 +218,9 @@ def test_damaged_and_foreign_states_are_refused() -> None:
         bytes(len(state)),
         state[:200] + bytes([state[200] ^ 1]) + state[201:],
     ):
-        with pytest.raises(RobotError, match="no saved state"):
+        with pytest.raises(SavedStateError, match="saved state"):
             vehicle.restore(wrong)
-    with pytest.raises(RobotError, match="saved by another model"):
+    with pytest.raises(SavedStateError, match="saved by another model"):
         Vehicle(arsim(), load_arena("arsim")).restore(state)
     assert vehicle.hash() == before
 

@@ -19,6 +19,7 @@ from scipy.integrate import solve_ivp
 from boebot.arenas import load_arena
 from boebot.errors import RobotError
 from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
+from sim_bridge.saved import SavedStateError
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.vehicles.model_file import vehicle_model
@@ -210,7 +211,7 @@ def test_saved_state_and_hash_carry_the_current() -> None:
     other = Vehicle(driven(0.01, SLOW | {"inductance_h": 0.06}), load_arena("arsim"), seed=3)
     other.step(0.001, 0.001)
     assert quiet.pose == other.pose and quiet.hash() not in (before, other.hash())
-    with pytest.raises(RobotError, match="saved by another model"):
+    with pytest.raises(SavedStateError, match="saved by another model"):
         Vehicle(driven(0.01, SLOW, full=False), load_arena("arsim")).restore(state)
 
 

@@ -141,6 +141,14 @@ def keys_of(kind: str) -> list[str]:
     return [name for name, _ in ffi.typeof(kind).fields]
 
 
+def values_of(struct: Any) -> dict[str, Any]:
+    """What a C struct holds, by key; pointers are left out."""
+    kind = ffi.typeof(struct)
+    fields = (kind.item if kind.kind == "pointer" else kind).fields
+    found = {key: getattr(struct, key) for key, field in fields if field.type.kind != "pointer"}
+    return {key: values_of(value) if isinstance(value, ffi.CData) else value for key, value in found.items()}
+
+
 def _values(
     kind: str, where: str, inside: str, given: Any, usual: Mapping[str, Any], ranges: Mapping[str, Range]
 ) -> dict[str, Any]:

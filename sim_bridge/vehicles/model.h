@@ -27,11 +27,8 @@ enum {
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
   VEHICLE_TOO_MANY = -4,   /* sensors, or a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
-  VEHICLE_BAD_SNAPSHOT = -6, /* not made by this version, or damaged */
+  VEHICLE_BAD_SNAPSHOT = -6, /* of another size, or with a number that no world comes to */
   VEHICLE_NOT_PLACED = -7,   /* a world that is not there or without an arena, or a model without a drive */
-  VEHICLE_OTHER_MODEL = -8,  /* a saved state is of another model */
-  VEHICLE_OTHER_ARENA = -9,
-  VEHICLE_OTHER_MEMORY = -10, /* its compiled brain's memory has another size */
 };
 
 typedef struct vehicle_model vehicle_model;
@@ -92,8 +89,5 @@ struct vehicle_model {
   size_t sensors_count, readings;
   vehicle_sensor sensors[VEHICLE_SENSORS];
 };
-
-/* A hash of all parameters: equal for two models only if their worlds go on alike from the same state. */
-uint64_t vehicle_model_fingerprint(const vehicle_model *self);
 
 #endif

@@ -2,17 +2,15 @@
  *
  * One walk goes through all numbers that a world has come to, in one order; it hashes, writes, checks or reads them. What
  * follows from model, arena and the rest is not among them. Bytes are words of 64 bits, the lowest byte first, the same on
- * every machine: a heading (version, model, arena, brain's memory, checksum), then the walk. */
+ * every machine. Format and checksum are saved.py's, whose FORMAT changes with the walk. */
 #include <float.h>
 #include <math.h>
 
 #include "geometry/hash.h"
 #include "vehicle.h"
 
-#define VERSION UINT64_C(0x32746f6f62656f62) /* "boeboot2": changes with the walk */
-#define LARGEST 1e12                         /* of a state's numbers */
-#define FASTEST 1e5                          /* m/s, rad/s: a step's time goes with the speed */
-#define HEADING_WORDS 5u
+#define LARGEST 1e12 /* of a state's numbers */
+#define FASTEST 1e5  /* m/s, rad/s: a step's time goes with the speed */
 
 enum { COUNT, HASH, WRITE, CHECK, READ };
 
@@ -144,47 +142,22 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
 size_t vehicles_snapshot_size(const vehicles *self, size_t i) {
   stream s = {.mode = COUNT};
   walk(&s, (vehicles *)self, i); /* changes nothing */
-  return 8 * (HEADING_WORDS + s.count);
-}
-
-/* Of the words behind the heading. */
-static uint64_t checksum(const unsigned char *bytes, size_t size) {
-  uint64_t sum = VERSION;
-  for (size_t k = 0; 8 * k < size; k++) sum = hash_word(sum, get(bytes, k));
-  return sum;
+  return 8 * s.count;
 }
 
 void vehicles_save(const vehicles *self, size_t i, void *bytes) {
-  unsigned char *rest = (unsigned char *)bytes + 8 * HEADING_WORDS;
-  stream s = {.mode = WRITE, .out = rest};
+  stream s = {.mode = WRITE, .out = bytes};
   walk(&s, (vehicles *)self, i); /* changes nothing */
-  put(bytes, 0, VERSION);
-  put(bytes, 1, vehicle_model_fingerprint(self->model));
-  put(bytes, 2, self->worlds[i].in != NULL ? arena_fingerprint(self->worlds[i].in->arena) : 0);
-  put(bytes, 3, self->state_size);
-  put(bytes, 4, checksum(rest, 8 * s.count));
-}
-
-/* VEHICLE_OK if these bytes can become the state of world i. */
-static int check(vehicles *self, size_t i, const unsigned char *bytes, size_t size) {
-  if (size < 8 * HEADING_WORDS || size % 8 != 0 || get(bytes, 0) != VERSION) return VEHICLE_BAD_SNAPSHOT;
-  const unsigned char *rest = bytes + 8 * HEADING_WORDS;
-  if (get(bytes, 4) != checksum(rest, size - 8 * HEADING_WORDS)) return VEHICLE_BAD_SNAPSHOT;
-  if (get(bytes, 1) != vehicle_model_fingerprint(self->model)) return VEHICLE_OTHER_MODEL;
-  if (get(bytes, 2) != arena_fingerprint(self->worlds[i].in->arena)) return VEHICLE_OTHER_ARENA;
-  if (get(bytes, 3) != self->state_size) return VEHICLE_OTHER_MEMORY;
-  if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
-  stream s = {.mode = CHECK, .good = 1, .in = rest};
-  walk(&s, self, i);
-  return s.good ? VEHICLE_OK : VEHICLE_BAD_SNAPSHOT;
 }
 
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size) {
   if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
-  const int status = check(self, i, bytes, size);
-  if (status != VEHICLE_OK) return status;
+  if (size != vehicles_snapshot_size(self, i)) return VEHICLE_BAD_SNAPSHOT;
+  stream check = {.mode = CHECK, .good = 1, .in = bytes};
+  walk(&check, self, i);
+  if (!check.good) return VEHICLE_BAD_SNAPSHOT;
   vehicle *w = &self->worlds[i];
-  stream s = {.mode = READ, .in = (const unsigned char *)bytes + 8 * HEADING_WORDS};
+  stream s = {.mode = READ, .in = bytes};
   walk(&s, self, i);
   w->own.steps = w->state.step;
   w->body.id = w->state.id;

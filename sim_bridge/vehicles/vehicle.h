@@ -83,8 +83,8 @@ void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
  * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
-/* World i as bytes, the same on every machine, and back into a world of the same model that is placed in the same arena.
- * Restoring checks model, arena, the brain's memory and every number; what it refuses changes nothing. */
+/* World i as bytes, the same on every machine, and back into a world of the same model and size of a brain's memory that is
+ * placed in the same arena. Restoring checks every number; what it refuses changes nothing. */
 size_t vehicles_snapshot_size(const vehicles *self, size_t i);
 void vehicles_save(const vehicles *self, size_t i, void *bytes);
 int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import ArenaError, RobotError
+from sim_bridge import saved
 from sim_bridge._core import ffi, lib
+from sim_bridge.saved import SavedStateError
 
 if TYPE_CHECKING:
     from sim_bridge.vehicles.model import VehicleModel
@@ -77,30 +79,34 @@ def place(
         raise RobotError(f"{who}: cannot start at {pose}; expected a pose near the arena")
 
 
-def save(handle: Any, index: int) -> bytes:
+def save(handle: Any, index: int, model: VehicleModel, arena: Arena, state_bytes: int) -> bytes:
     """The state of one world."""
     room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(handle, index))
     lib.vehicles_save(handle, index, room)
-    return bytes(ffi.buffer(room))
+    return saved.encode(_heading(model, arena, state_bytes), bytes(ffi.buffer(room)))
 
 
-def restore(who: str, handle: Any, index: int, arena: Arena, state: Any) -> None:
+def restore(who: str, handle: Any, index: int, model: VehicleModel, arena: Arena, state_bytes: int, state: Any) -> None:
     """World `index` goes on from a saved state; what is refused changes nothing.
 
     Raises:
-        RobotError: it is of another model, version, arena, size of the brain's memory, or damaged.
+        SavedStateError: it is of another model, format, arena, size of the brain's memory, or damaged.
     """
-    if not isinstance(state, (bytes, bytearray, memoryview)):
-        raise RobotError(f"{who}: {arguments.shown(state)} is no saved state; expected the bytes that save() gave")
-    given = bytes(state)
-    status = lib.vehicles_restore(handle, index, given, len(given))
-    if status == lib.VEHICLE_OTHER_MODEL:
-        raise RobotError(
+    heading, numbers = saved.decode(state, saved.World)
+    here = _heading(model, arena, state_bytes)
+    if heading.model != here.model:
+        raise SavedStateError(
             f"{who}: the state was saved by another model; expected one whose body, drive and sensors are the same"
         )
-    if status == lib.VEHICLE_OTHER_ARENA:
-        raise RobotError(f"{who}: the state was saved in another arena; expected one saved in this arena, {arena.name}")
-    if status == lib.VEHICLE_OTHER_MEMORY:
-        raise RobotError(f"{who}: the state has another size of a brain's memory; expected the same state_bytes")
-    if status:
-        raise RobotError(f"{who}: this is no saved state of this version, or damaged; expected what save() gave")
+    if heading.arena_fingerprint != here.arena_fingerprint:
+        raise SavedStateError(
+            f"{who}: the state was saved in another arena; expected one saved in this arena, {arena.name}"
+        )
+    if heading.state_bytes != here.state_bytes:
+        raise SavedStateError(f"{who}: the state has another size of a brain's memory; expected the same state_bytes")
+    if lib.vehicles_restore(handle, index, numbers, len(numbers)) != lib.VEHICLE_OK:
+        raise SavedStateError(f"{who}: the saved state has a number that no world comes to; expected what save() gave")
+
+
+def _heading(model: VehicleModel, arena: Arena, state_bytes: int) -> saved.World:
+    return saved.World(saved.FORMAT, model.fingerprint, arena.name, arena.fingerprint, state_bytes)

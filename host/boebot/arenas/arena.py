@@ -5,8 +5,10 @@ Lengths in m, angles in rad. A wrong file gets one sentence that names file, lin
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -77,6 +79,11 @@ class Arena:
         for moving in self.description.moving:
             self._add_moving(moving)
         lib.arena_build(self.handle)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A number that two arenas share only if their descriptions are equal."""
+        return hashlib.sha256(repr(self.description).encode()).hexdigest()
 
     def _add_polygon(self, polygon: Polygon, kind: int) -> None:
         corners = np.array(polygon.corners_m, dtype=np.float64)

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 int accelerometer_check(const accelerometer_parameters *p) {
   if (!isfinite(p->mass + p->stiffness + p->damping + p->range + p->sigma + p->bias)) return -1;
   return p->mass > 0.0 && p->stiffness > 0.0 && p->damping >= 0.0 && p->range > 0.0 && p->sigma >= 0.0 ? 0 : -1;
@@ -35,11 +33,6 @@ static size_t make(void *self, const void *parameters) {
   return accelerometer_check(self) == 0;
 }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const accelerometer_parameters *p = self;
-  return HASH_NUMBERS(sum, p->mass, p->stiffness, p->damping, p->range, p->sigma, p->bias);
-}
-
 static void step(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise) {
   (void)noise;
   accelerometer_step(self, (accelerometer_state *)memory->numbers, s->acceleration, s->dt);
@@ -50,11 +43,6 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = accelerometer_read(self, (const accelerometer_state *)memory->numbers, noise);
 }
 
-static const sensor_kind KIND = {.noise = 6,
-                                 .size = sizeof(accelerometer_parameters),
-                                 .numbers = 2,
-                                 .make = make,
-                                 .hash = hash,
-                                 .step = step,
-                                 .read = read};
+static const sensor_kind KIND = {
+    .noise = 6, .size = sizeof(accelerometer_parameters), .numbers = 2, .make = make, .step = step, .read = read};
 const sensor_kind *const accelerometer_sensor = &KIND;

@@ -3,17 +3,10 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 static size_t make(void *self, const void *parameters) {
   const charge_parameters *p = parameters;
   *(charge_parameters *)self = *p;
   return isfinite(p->empty + p->full + p->sigma) && p->sigma >= 0.0;
-}
-
-static uint64_t hash(uint64_t sum, const void *self) {
-  const charge_parameters *p = self;
-  return HASH_NUMBERS(sum, p->empty, p->full, p->sigma);
 }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
@@ -23,6 +16,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = p->empty + s->energy * (p->full - p->empty) + noisy;
 }
 
-static const sensor_kind KIND = {
-    .noise = 11, .size = sizeof(charge_parameters), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 11, .size = sizeof(charge_parameters), .make = make, .read = read};
 const sensor_kind *const charge_sensor = &KIND;

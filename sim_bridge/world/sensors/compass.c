@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 int compass_check(const compass_parameters *p) {
@@ -33,11 +32,6 @@ static size_t make(void *self, const void *parameters) {
   return compass_check(self) == 0;
 }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const compass_parameters *p = self;
-  return HASH_NUMBERS(sum, p->sigma, p->bias, p->iron_x, p->iron_y, p->current_x, p->current_y);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const compass_parameters *p = self;
   (void)memory;
@@ -45,6 +39,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = compass_read(p, &s->from, current, noise);
 }
 
-static const sensor_kind KIND = {
-    .noise = 5, .size = sizeof(compass_parameters), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 5, .size = sizeof(compass_parameters), .make = make, .read = read};
 const sensor_kind *const compass_sensor = &KIND;

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_parameters *p) {
   if (beam_init(&self->beam, &p->beam)) return -1;
   if (!(p->range >= 0.0 && p->c1 >= 0.0 && p->c2 >= 0.0 && p->sigma >= 0.0)) return -1;
@@ -43,17 +41,10 @@ double infrared_proximity_read(const infrared_proximity *self, const viewpoint *
 
 static size_t make(void *self, const void *parameters) { return infrared_proximity_init(self, parameters) == 0; }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const infrared_proximity *s = self;
-  sum = hash_numbers(hash_word(sensor_hash_beam(sum, &s->beam), s->reflectance != 0), &s->c1, 1);
-  return HASH_NUMBERS(sum, s->range, s->c2, s->sigma);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   (void)memory;
   *readings = infrared_proximity_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {
-    .noise = 1, .size = sizeof(infrared_proximity), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 1, .size = sizeof(infrared_proximity), .make = make, .read = read};
 const sensor_kind *const infrared_proximity_sensor = &KIND;

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 struct laser {
@@ -73,12 +72,6 @@ static size_t make(void *self, const void *parameters) {
   return (size_t)p->rays;
 }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const laser_parameters *p = self;
-  sum = hash_word(sum, (uint64_t)p->rays);
-  return HASH_NUMBERS(sum, p->x, p->y, p->heading, p->height, p->first, p->step, p->range, p->sigma);
-}
-
 static void *work(const void *self) { return laser_new(self); }
 static void free_work(void *work) { laser_destroy(work); }
 
@@ -87,11 +80,6 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   laser_scan(memory->work, &s->from, noise, readings);
 }
 
-static const sensor_kind KIND = {.noise = 4,
-                                 .size = sizeof(laser_parameters),
-                                 .make = make,
-                                 .hash = hash,
-                                 .work = work,
-                                 .free_work = free_work,
-                                 .read = read};
+static const sensor_kind KIND = {
+    .noise = 4, .size = sizeof(laser_parameters), .make = make, .work = work, .free_work = free_work, .read = read};
 const sensor_kind *const laser_sensor = &KIND;

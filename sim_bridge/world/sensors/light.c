@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 int phototransistor_init(phototransistor *self, const phototransistor_parameters *p) {
   const beam_parameters mount = {.x = p->x, .y = p->y, .heading = p->heading, .height = p->height, .rays = 1};
   if (beam_init(&self->mount, &mount)) return -1;
@@ -48,15 +46,10 @@ double phototransistor_decay_time(double irradiance, double scale, double maximu
 
 static size_t make(void *self, const void *parameters) { return phototransistor_init(self, parameters) == 0; }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const phototransistor *s = self;
-  return HASH_NUMBERS(sensor_hash_beam(sum, &s->mount), s->near_squared, s->ambient, s->sigma, s->gain);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   (void)memory;
   *readings = phototransistor_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 7, .size = sizeof(phototransistor), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 7, .size = sizeof(phototransistor), .make = make, .read = read};
 const sensor_kind *const phototransistor_sensor = &KIND;

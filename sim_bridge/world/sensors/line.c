@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 #define SPOTS 9 /* at which the spot is sampled: its middle, and two rings of four */
 #define LEAST 1e-6
 
@@ -37,15 +35,10 @@ double reflectance_read(const reflectance *self, const viewpoint *from, noise_so
 
 static size_t make(void *self, const void *parameters) { return reflectance_init(self, parameters) == 0; }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const reflectance_parameters *p = &((const reflectance *)self)->parameters;
-  return HASH_NUMBERS(sum, p->x, p->y, p->radius, p->dark, p->sigma, p->gain);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   (void)memory;
   *readings = reflectance_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 12, .size = sizeof(reflectance), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 12, .size = sizeof(reflectance), .make = make, .read = read};
 const sensor_kind *const reflectance_sensor = &KIND;

@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 int odometer_check(const odometer_parameters *p) {
@@ -60,13 +59,6 @@ static size_t make(void *self, const void *parameters) {
   return odometer_check(self) == 0 ? 3 : 0;
 }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const odometer_parameters *p = self;
-  sum = hash_word(sum, (uint64_t)p->rule);
-  return HASH_NUMBERS(sum, p->half_track, p->wheel_radius, p->sigma_step, p->factor_left, p->factor_right,
-                      p->sigma_share, p->edges_per_turn, p->slips_per_s, p->slip_share);
-}
-
 static void start(const void *self, sensor_memory *memory, const sensing *s) {
   const body_state *b = &s->body->state;
   (void)self;
@@ -92,7 +84,6 @@ static const sensor_kind KIND = {.noise = 8,
                                  .size = sizeof(odometer_parameters),
                                  .numbers = 8,
                                  .make = make,
-                                 .hash = hash,
                                  .start = start,
                                  .step = step,
                                  .read = read};

@@ -40,7 +40,6 @@ typedef struct sensor_kind {
 
   /* Makes it; returns how many readings it gives, or 0: its parameters are not as its header says. */
   size_t (*make)(void *self, const void *parameters);
-  uint64_t (*hash)(uint64_t sum, const void *self); /* of all its parameters */
 
   /* NULL where there is nothing to do. */
   double (*reach)(const void *self); /* how far it sticks out from the middle of the body, m */
@@ -52,8 +51,5 @@ typedef struct sensor_kind {
 
   void (*read)(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings);
 } sensor_kind;
-
-/* Hash of a beam, for `hash`. */
-uint64_t sensor_hash_beam(uint64_t sum, const beam *self);
 
 #endif

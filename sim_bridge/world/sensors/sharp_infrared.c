@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 #define FOLD_CM 10.0
 
 static double beyond_fold(double cm) { return 33.9 / (cm + 4.74); }
@@ -56,15 +54,9 @@ double sharp_infrared_read(const sharp_infrared *self, sharp_infrared_state *sta
 
 static size_t make(void *self, const void *parameters) { return sharp_infrared_init(self, parameters) == 0; }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const sharp_infrared *s = self;
-  return HASH_NUMBERS(sensor_hash_beam(sum, &s->beam), s->reach, s->sigma, s->gain, s->period, s->late);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   *readings = sharp_infrared_read(self, (sharp_infrared_state *)memory->numbers, &s->from, s->time, noise);
 }
 
-static const sensor_kind KIND = {
-    .noise = 2, .size = sizeof(sharp_infrared), .numbers = 4, .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 2, .size = sizeof(sharp_infrared), .numbers = 4, .make = make, .read = read};
 const sensor_kind *const sharp_infrared_sensor = &KIND;

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 int sonar_init(sonar *self, const sonar_parameters *p) {
   if (beam_init(&self->beam, &p->beam)) return -1;
   if (!(p->range_minimum >= 0.0 && p->range_minimum < p->range_maximum && p->sigma >= 0.0)) return -1;
@@ -66,16 +64,10 @@ double sonar_read(const sonar *self, const viewpoint *from, noise_source *noise)
 
 static size_t make(void *self, const void *parameters) { return sonar_init(self, parameters) == 0; }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const sonar *s = self;
-  sum = hash_word(sensor_hash_beam(sum, &s->beam), s->absorption != 0);
-  return HASH_NUMBERS(sum, s->range_minimum, s->range_maximum, s->sigma, s->miss, s->grazing_cosine, s->temperature);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   (void)memory;
   *readings = sonar_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 3, .size = sizeof(sonar), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 3, .size = sizeof(sonar), .make = make, .read = read};
 const sensor_kind *const sonar_sensor = &KIND;

@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
 #include "geometry/numbers.h"
 
 typedef struct {
@@ -20,12 +19,6 @@ static size_t make(void *self, const void *parameters) {
   t->none = p->none;
   if (beam_init(&t->beam, &p->beam) || p->table == NULL) return 0;
   return p->reach > 0.0 && isfinite(p->reach) && isfinite(p->none);
-}
-
-static uint64_t hash(uint64_t sum, const void *self) {
-  const table *t = self;
-  sum = HASH_NUMBERS(sensor_hash_beam(sum, &t->beam), t->reach, t->none);
-  return hash_word(sum, table_noise_fingerprint(t->table));
 }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
@@ -48,5 +41,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = nearest < 0.0 ? t->none : table_noise_read(t->table, nearest, angle, noise);
 }
 
-static const sensor_kind KIND = {.noise = 9, .size = sizeof(table), .make = make, .hash = hash, .read = read};
+static const sensor_kind KIND = {.noise = 9, .size = sizeof(table), .make = make, .read = read};
 const sensor_kind *const table_sensor = &KIND;

@@ -4,8 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "geometry/hash.h"
-
 struct table_noise {
   int rows, columns;
   double *distances, *angles;
@@ -117,13 +115,4 @@ double table_noise_read(const table_noise *self, double distance, double angle, 
   const double near = a + (b - a) * across;
   const double far = c + (d - c) * across;
   return near + (far - near) * along;
-}
-
-uint64_t table_noise_fingerprint(const table_noise *self) {
-  const size_t bins = (size_t)self->rows * (size_t)self->columns;
-  uint64_t sum = hash_numbers(0, self->distances, (size_t)self->rows);
-  sum = hash_numbers(sum, self->angles, (size_t)self->columns);
-  for (size_t bin = 0; bin < bins; bin++)
-    sum = hash_numbers(sum, &self->samples[self->first[bin]], self->first[bin + 1] - self->first[bin]);
-  return sum;
 }

@@ -23,7 +23,4 @@ void table_noise_destroy(table_noise *self);
 double table_noise_read(const table_noise *self, double distance, double angle, noise_source *noise);
 /* python: end */
 
-/* A hash of all bins and samples. */
-uint64_t table_noise_fingerprint(const table_noise *self);
-
 #endif

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "geometry/hash.h"
-
 static double reach(const void *self) {
   const touch_parameters *p = self;
   return sqrt(fmax(p->root_x * p->root_x + p->root_y * p->root_y, p->tip_x * p->tip_x + p->tip_y * p->tip_y));
@@ -16,11 +14,6 @@ static size_t make(void *self, const void *parameters) {
   return isfinite(p->root_x + p->root_y + p->tip_x + p->tip_y) && isfinite(reach(p));
 }
 
-static uint64_t hash(uint64_t sum, const void *self) {
-  const touch_parameters *p = self;
-  return HASH_NUMBERS(sum, p->root_x, p->root_y, p->tip_x, p->tip_y);
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const touch_parameters *p = self;
   (void)memory;
@@ -29,5 +22,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
 }
 
 static const sensor_kind KIND = {
-    .noise = 10, .size = sizeof(touch_parameters), .make = make, .hash = hash, .reach = reach, .read = read};
+    .noise = 10, .size = sizeof(touch_parameters), .make = make, .reach = reach, .read = read};
 const sensor_kind *const touch_sensor = &KIND;

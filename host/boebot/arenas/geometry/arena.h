@@ -88,9 +88,6 @@ void arena_build(arena *self);
 /* Which index answers. The answers are the same. */
 void arena_use_index(arena *self, int choice);
 
-/* Equal for two arenas, once built, only if the same things stand in them, added in the same order; names do not count. */
-uint64_t arena_fingerprint(const arena *self);
-
 size_t arena_edge_count(const arena *self);
 size_t arena_disc_count(const arena *self);
 const arena_shape *arena_shape_at(const arena *self, size_t number);

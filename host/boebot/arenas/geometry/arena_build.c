@@ -266,7 +266,6 @@ int arena_set_charger(arena *self, double x, double y, double radius) {
 void arena_build(arena *self) {
   const grid_items items = arena_items(self);
   index_drop(self);
-  self->fingerprint = arena_compute_fingerprint(self);
   for (size_t i = 0; i < self->shape_count; i++) enclose(self, &self->shape[i]);
   if (self->index_choice >= ARENA_INDEX_GRID && grid_build(&self->grid, &items) == 0 &&
       self->index_choice >= ARENA_INDEX_LISTS) {
@@ -296,7 +295,6 @@ int arena_is_at_charger(const arena *self, double x, double y) {
 }
 
 uint32_t arena_version(const arena *self) { return self->version; }
-uint64_t arena_fingerprint(const arena *self) { return self->fingerprint; }
 
 const arena_shape *arena_shape_at(const arena *self, size_t number) {
   return number < self->shape_count ? &self->shape[number] : NULL;

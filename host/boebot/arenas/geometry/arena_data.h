@@ -39,14 +39,10 @@ struct arena {
   arena_charger charger;
   int has_charger;
   uint32_t version;
-  uint64_t fingerprint; /* since arena_build */
   int index_choice;
   grid grid;        /* columns == 0: none */
   ray_lists *lists; /* NULL: none */
 };
-
-/* The hash that arena_fingerprint gives (arena_fingerprint.c). */
-uint64_t arena_compute_fingerprint(const arena *self);
 
 static inline grid_items arena_items(const arena *self) {
   return (grid_items){self->edge, self->edge_count, self->disc, self->disc_count};

@@ -24,14 +24,4 @@ static inline uint64_t hash_bits(double value) {
   return bits;
 }
 
-static inline uint64_t hash_numbers(uint64_t sum, const double *values, size_t count) {
-  sum = hash_word(sum, count);
-  for (size_t i = 0; i < count; i++) sum = hash_word(sum, hash_bits(values[i]));
-  return sum;
-}
-
-/* Of the arguments after `sum`, doubles. */
-#define HASH_NUMBERS(sum, ...) \
-  hash_numbers((sum), (const double[]){__VA_ARGS__}, sizeof((const double[]){__VA_ARGS__}) / sizeof(double))
-
 #endif

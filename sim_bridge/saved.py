@@ -1,29 +1,43 @@
-"""A simulation as bytes: what it was built of, all that came from outside up to a cycle, and a hash of its state.
+"""Saved states: what `Sim`, `Vehicle` and `Batch` give by `save()` and go on from by `restore()`.
 
-A run is a function of these, bit for bit (docs/explanation/world.md), so that the state is not written down but gone to
-again: the inputs are played to a simulation that was built alike, and the hash tells that it came to the same state.
-The layout is
+One format for both kinds. The state of a *world* without boards is its numbers (vehicles/snapshot.c). A *simulation*
+with boards is all that came from outside up to a cycle (loop/inputs.c), and a hash of its state: a run is a function of
+these, bit for bit (docs/explanation/world.md), so the inputs are replayed to a simulation that was built alike, and the
+hash shows that it came to the same state. The layout is
 
-    MAGIC, length of the heading (4 bytes, little-endian), heading (JSON), inputs (inputs.c), SHA-256 of all that
+    MAGIC, length of the heading (4 bytes, little-endian), heading (JSON), numbers or inputs, SHA-256 of all that
 """
 
 from __future__ import annotations
 
 import hashlib
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
+from boebot.arguments import shown
 from boebot.errors import BoebotError
 
-MAGIC = b"boebot simulation\n"
-FORMAT = 1
+MAGIC = b"boebot saved state\n"
+FORMAT = 2  # changes with the headings, and with what follows them
 _LENGTH = 4
 _DIGEST = 32
 
 
 class SavedStateError(BoebotError):
-    """A simulation cannot be saved, or bytes cannot be restored."""
+    """A state cannot be saved, or bytes cannot be restored."""
+
+
+class World(msgspec.Struct, forbid_unknown_fields=True, frozen=True, tag_field="kind", tag="world"):
+    """What a saved world was built of."""
+
+    format: int
+    model: str
+    """fingerprint of the vehicle's model"""
+    arena: str
+    arena_fingerprint: str
+    state_bytes: int
+    """memory of the compiled brain"""
 
 
 class SavedRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -39,7 +53,7 @@ class SavedRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """bytes that had come from its board and were not yet taken"""
 
 
-class Heading(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Simulation(msgspec.Struct, forbid_unknown_fields=True, frozen=True, tag_field="kind", tag="simulation"):
     """What a saved simulation was built of, and where it stood."""
 
     format: int
@@ -60,36 +74,42 @@ def fingerprint_of(*parts: Any) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
-def encode(heading: Heading, inputs: bytes) -> bytes:
-    """The bytes of a simulation."""
+Heading = TypeVar("Heading", World, Simulation)
+
+
+def encode(heading: World | Simulation, rest: bytes) -> bytes:
+    """The bytes of a state; `rest` follows the heading."""
     head = msgspec.json.encode(heading)
-    data = MAGIC + len(head).to_bytes(_LENGTH, "little") + head + inputs
+    data = MAGIC + len(head).to_bytes(_LENGTH, "little") + head + rest
     return data + hashlib.sha256(data).digest()
 
 
-def decode(data: bytes) -> tuple[Heading, bytes]:
-    """Heading and inputs.
+def decode(data: Any, kind: type[Heading]) -> tuple[Heading, bytes]:
+    """The heading, of that kind, and what follows it.
 
     Raises:
-        SavedStateError: these are no such bytes, or they are damaged, or of another format.
+        SavedStateError: this is no saved state, or one of another kind or format, or it is damaged.
     """
     if not isinstance(data, bytes | bytearray | memoryview) or not bytes(data).startswith(MAGIC):
-        raise SavedStateError("this is no saved simulation; expected what Sim.save() gave")
+        raise SavedStateError(f"{shown(data)} is no saved state; expected the bytes that save() gave")
     body, digest = bytes(data[:-_DIGEST]), bytes(data[-_DIGEST:])
     if hashlib.sha256(body).digest() != digest:
-        raise SavedStateError("the saved simulation is damaged or cut short: its checksum is wrong")
+        raise SavedStateError("the saved state is damaged or cut short: its checksum is wrong")
     at = len(MAGIC) + _LENGTH
     end = at + int.from_bytes(body[len(MAGIC) : at], "little")
     try:
-        form = msgspec.json.decode(body[at:end], type=dict[str, Any]).get("format")
-        if form != FORMAT:
-            raise SavedStateError(f"the simulation was saved in format {form}; expected format {FORMAT}")
-        return msgspec.json.decode(body[at:end], type=Heading), body[end:]
+        heading = msgspec.json.decode(body[at:end], type=dict[str, Any])
+        if heading.get("format") != FORMAT:
+            raise SavedStateError(f"the state was saved in format {heading.get('format')}; expected format {FORMAT}")
+        wanted = kind.__struct_config__.tag
+        if heading.get("kind") != wanted:
+            raise SavedStateError(f"this is the saved state of a {heading.get('kind')}; expected that of a {wanted}")
+        return msgspec.json.decode(body[at:end], type=kind), body[end:]
     except msgspec.DecodeError as error:
-        raise SavedStateError(f"the heading of the saved simulation is wrong: {error}") from None
+        raise SavedStateError(f"the heading of the saved state is wrong: {error}") from None
 
 
-def check_alike(saved: Heading, here: Heading) -> None:
+def check_alike(saved: Simulation, here: Simulation) -> None:
     """Refuses to restore a simulation that was built otherwise.
 
     Raises:
