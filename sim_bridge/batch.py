@@ -19,10 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from boebot import arguments
 from boebot.arenas import Arena
+from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import VehicleModel
 from sim_bridge.vehicles import worlds
+from sim_bridge.vehicles.brains import Brains
 from sim_bridge.vehicles.compiled_brain import WANDER, CompiledBrain
 
 __all__ = ["WANDER", "Batch", "CompiledBrain"]
@@ -75,6 +77,8 @@ class Batch:
         room = ffi.buffer(pointer, size) if size else b""
         self.readings: Floats = np.frombuffer(room, dtype=np.float64).reshape(self.count, columns)
         self.readings.flags.writeable = False
+        self._seeds: list[int] = keys.tolist()
+        self._brains: Brains | None = None
         self._closed = False
         self._pool: ThreadPoolExecutor | None = None
         self._open_pool()
@@ -172,18 +176,27 @@ class Batch:
         )
         return self.readings
 
-    def run(self, brain: CompiledBrain, steps: int) -> Floats:
-        """`steps` steps with a brain in compiled code that is asked in each of them. Returns the readings.
+    def run(self, brain: object, steps: int, *, period: float | None = None) -> Floats:
+        """`steps` steps with a brain. Returns the readings.
 
-        Its memory in each world is at `state`. Ctrl-C ends it soon, after some of the steps.
+        A `CompiledBrain` is asked in each step; its memory in each world is at `state`. Any other brain is one as
+        `boebot.run` takes it: a name, a file, `step(robot)`, a class, an object. Each world has its own, in `brains`
+        (an object is copied), and its own robot, with the world's seed. They are asked every `period` seconds (None: as
+        the brain says, or 0.05), from the first step on; with the brain of the run before they go on. Ctrl-C ends it
+        soon, after some of the steps.
 
         Raises:
             BrainError: the model or the memory is not what the brain needs, and then no world has moved; or the brain
-                gave a signal that is not finite, and then that world's run has ended and the others' went on.
+                gave a signal that is not finite, and then that world's run has ended and the others' went on; or a
+                brain in Python has failed, and all worlds stand where they were when it was asked.
             RobotError: it is closed.
         """
+        if isinstance(brain, ffi.CData):
+            raise BrainError(f"batch: brain is {arguments.shown(brain)}; expected a CompiledBrain of it")
         if not isinstance(brain, CompiledBrain):
-            raise BrainError(f"batch: brain is {arguments.shown(brain)}; expected a CompiledBrain")
+            return self._run_python(brain, steps, period)
+        if period is not None:
+            raise BrainError("batch: a compiled brain is asked in each step; expected no period")
         brain.check("batch", self.model, self.state_bytes)
         well = self._advance(
             lambda first, count, some: int(lib.vehicles_run(self.handle, first, count, brain.function, some)), steps
@@ -195,6 +208,22 @@ class Batch:
                 f"{self.count} worlds, first in world {worlds_failed[0]}; expected numbers in [-1, 1]"
             )
         return self.readings
+
+    def _run_python(self, brain: object, steps: int, period: float | None) -> Floats:
+        left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
+        if self._brains is None or self._brains.made_of != (brain, period):
+            self._brains = Brains(brain, self.model, self._seeds, period)
+        while left > 0:
+            runs = (self.flags == lib.VEHICLE_RUNS).tolist()
+            signals = self._brains.step(self.steps.tolist(), self.readings.tolist(), runs)
+            self.step(signals, min(left, self._brains.period_ticks))
+            left -= min(left, self._brains.period_ticks)
+        return self.readings
+
+    @property
+    def brains(self) -> list[LoadedBrain]:
+        """Of the last run with brains in Python, that of each world; `brains[i].brain` is a `boebot.brain.Brain`."""
+        return [] if self._brains is None else self._brains.loaded
 
     def state(self, index: int, kind: str = "unsigned char *") -> Any:
         """The compiled brain's memory in a world, as a pointer of that C type.

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import boebot
 from boebot.arenas import load_arena
-from boebot.errors import ArenaError, BrainError, RobotError
+from boebot.behaviors import Avoid, Wander
+from boebot.brain import Brain
+from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
+from boebot.robot import Robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
 from sim_bridge.saved import SavedStateError
 from sim_bridge.tests.simulated import arena_of, square
-from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam
+from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam, vehicle_model
 
 HERE = Path(__file__).resolve().parent
 STARTS = np.array([[0.1 * (k % 5) - 0.2, 0.1 * (k % 3), 0.7 * k] for k in range(12)])
@@ -256,3 +262,90 @@ def test_a_model_whose_worlds_exist_does_not_grow() -> None:
     with pytest.raises(RobotError, match="expected all of its devices before"):
         built.sensor("compass", "second")
     vehicle.step(0.5, 0.5)
+
+
+# ---- brains in Python ------------------------------------------------------------------------------------------------
+
+
+def commanded(robot: Robot) -> None:
+    """Speeds and signals, chance, readings, and a stop now and then."""
+    turn = robot.random.uniform(-0.5, 0.5)
+    if robot.observation.tick % 40 == 0:
+        robot.stop()
+    elif (robot.infrared_left.reading or 0.0) > 0.1:
+        robot.drive(-0.3, 0.6)
+    else:
+        robot.drive_speed(0.3, turn + 0.1 * (robot.compass.heading or 0.0))
+
+
+class Counting:
+    """A brain with a memory."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def step(self, robot: Robot) -> None:
+        self.steps += 1
+        robot.drive(0.01 * self.steps, 0.3)
+
+
+@pytest.mark.parametrize("brain", ["wander", commanded, Counting, Counting(), Brain([Avoid(), Wander()])])
+def test_a_brain_in_python_comes_to_the_same_as_in_a_run(brain: Any) -> None:
+    seeds = [3, 4, 7]
+    batch = Batch(vehicle_model("arsim"), load_arena("arsim"), np.zeros((3, 3)), seeds)
+    fresh = copy.deepcopy(brain)
+    batch.run(brain, 220)
+    batch.run(brain, 80)  # goes on
+    for world, seed in enumerate(seeds):
+        alone = boebot.run(
+            copy.deepcopy(fresh), "arsim", arena="arsim", on="direct", seed=seed, seconds=3.0, pose=(0.0, 0.0, 0.0)
+        )
+        assert alone.record.readings[-1][0].values == tuple(batch.readings[world])
+
+
+def test_each_world_has_its_own_brain_in_python() -> None:
+    batch = Batch(vehicle_model("arsim"), load_arena("arsim"), np.zeros((2, 3)), [1, 1])
+    batch.run(Counting(), 100, period=0.1)
+    one, other = (loaded.step.__self__ for loaded in batch.brains)  # type: ignore[attr-defined]
+    assert one is not other and one.steps == other.steps == 10
+    assert batch.hashes()[0] == batch.hashes()[1]
+
+
+class SecondFails:
+    made = 0
+
+    def __init__(self) -> None:
+        SecondFails.made += 1
+        self.number = SecondFails.made
+
+    def step(self, robot: Robot) -> None:
+        robot.drive(0.5 / (self.number - 2) if robot.time > 0.45 else 0.5, 0.0)
+
+
+def test_a_brain_in_python_that_fails_names_world_and_line() -> None:
+    batch = Batch(vehicle_model("arsim"), load_arena("arsim"), np.zeros((3, 3)), [5, 1, 2])
+    with pytest.raises(BrainError, match=r"^batch, world 1: .*test_batch.py, line \d+: ZeroDivisionError"):
+        batch.run(SecondFails, 100, period=0.1)
+    assert batch.steps.tolist() == [50, 50, 50]
+
+
+@pytest.mark.parametrize(
+    ("brain", "more", "why"),
+    [
+        (5, {}, "5 is no brain; expected a name"),
+        ("nobody", {}, "there is no brain 'nobody'"),
+        ("wander", {"period": 0.015}, "a brain period of 15 ms does not fit; expected a multiple of 10 ms"),
+        (WANDER, {"period": 0.05}, "a compiled brain is asked in each step; expected no period"),
+    ],
+)
+def test_what_is_no_brain_for_a_batch_is_one_sentence(brain: Any, more: Any, why: str) -> None:
+    batch = Batch(vehicle_model("arsim"), load_arena("arsim"), [[0, 0, 0]], [1])
+    with pytest.raises(BoebotError, match=why):
+        batch.run(brain, 10, **more)
+
+
+def test_a_model_built_by_hand_has_no_robot_for_a_brain_in_python() -> None:
+    model = VehicleModel(ARSIM_BODY)
+    model.dc_motors()
+    with pytest.raises(BrainError, match=r"need a robot's description; expected a model of vehicle_model\(\)"):
+        Batch(model, load_arena("arsim"), [[0, 0, 0]], [1]).run("wander", 1)

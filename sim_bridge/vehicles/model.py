@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from boebot.arguments import shown, switch
+from boebot.description.robots import RobotDescription
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices.catalogue import sensor_kinds
@@ -55,6 +56,7 @@ class VehicleModel:
 
     Attributes:
         names: readings by name: where they stand among all readings.
+        robot: whose model it is; None: it was built by hand.
         looks: sensors with a beam by name: the beam, and how far it reaches (m).
         a: A of (2.26), 1/m.
         b: B of (2.30).
@@ -78,6 +80,7 @@ class VehicleModel:
         self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
         self.body = dict(body)
         self.in_use = False
+        self.robot: RobotDescription | None = None
         self._keep: list[Any] = [given, outline]  # what the model in C points to
         handle = lib.vehicle_model_new(parameters, self.dt)
         if handle == ffi.NULL:
@@ -92,6 +95,11 @@ class VehicleModel:
     def euler_limit(self) -> float:
         """The step, s, from which on Euler's method diverges."""
         return float(lib.vehicle_model_euler_limit(self.handle))
+
+    @property
+    def readings(self) -> int:
+        """How many readings it gives."""
+        return int(lib.vehicle_model_readings(self.handle))
 
     @property
     def fingerprint(self) -> str:

@@ -56,6 +56,7 @@ def vehicle_model(
     if described.body.outline_m:
         body["outline_m"] = described.body.outline_m
     model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
+    model.robot = described
     _drive(model, described)
     for name, device in described.device.items():
         if device.on and not isinstance(device, Motor) and not add_to(model, name, device):
