@@ -11,7 +11,7 @@ import pytest
 
 from boebot.link.ports.descriptor import HAS_THREAD
 from boebot.link.ports.switch_interval import INTERVAL_S
-from tools.bench.busy import DEFAULT_INTERVAL_S, measure, measure_round_trips, per_cent
+from tools.bench.busy import PYTHONS_INTERVAL_S, delays, milliseconds, round_trips
 
 pytestmark = [
     pytest.mark.wall_clock,
@@ -31,22 +31,22 @@ def test_stamps_do_not_wait_for_python() -> None:
     """Without the thread, bytes are stamped after the computing thread's turn of 5 ms."""
 
     def earlier() -> bool:
-        by_thread = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
-        by_caller = measure(thread=False, interval_s=DEFAULT_INTERVAL_S, count=COUNT).receipt
+        by_thread = delays(True, PYTHONS_INTERVAL_S, COUNT)[:, 0]
+        by_caller = delays(False, PYTHONS_INTERVAL_S, COUNT)[:, 0]
         assert by_thread.min() > 0, "never before the sending"
-        return per_cent(by_thread, 50) < per_cent(by_caller, 50) / 2
+        return milliseconds(by_thread, 50) < milliseconds(by_caller, 50) / 2
 
     assert holds_once(earlier)
 
 
 def test_brain_wakes_up_earlier_by_the_short_interval() -> None:
     def earlier() -> bool:
-        short = measure(thread=True, interval_s=INTERVAL_S, count=COUNT).wake_up
-        usual = measure(thread=True, interval_s=DEFAULT_INTERVAL_S, count=COUNT).wake_up
-        return per_cent(short, 75) < per_cent(usual, 75) / 1.5
+        short = delays(True, INTERVAL_S, COUNT)[:, 1]
+        usual = delays(True, PYTHONS_INTERVAL_S, COUNT)[:, 1]
+        return milliseconds(short, 75) < milliseconds(usual, 75) / 1.5
 
     assert holds_once(earlier)
 
 
 def test_every_request_is_answered() -> None:
-    assert measure_round_trips(thread=True, count=500).min() > 0
+    assert round_trips(500).min() > 0

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sized
+from functools import partial
 from importlib import import_module
-from itertools import cycle, islice
-from types import ModuleType
 
 from boebot.link import messages
 from boebot.link.frame import Decoder, encode
@@ -14,6 +13,7 @@ from tools.bench.figures import Peer, figure
 
 COUNT = 10_240
 ROUNDS = 30  # the best counts: others may have needed the processor in between
+SEQUENCES = [number % 256 for number in range(COUNT)]
 SEED = 0x12345
 
 TELEMETRY = messages.Telemetry.unpack(bytes(range(1, 1 + messages.Telemetry.LENGTH)))
@@ -30,115 +30,105 @@ def per_second(work: Callable[[], int]) -> float:
     return best
 
 
-def sequences() -> Iterator[int]:
-    return islice(cycle(range(256)), COUNT)
-
-
-def encoding(message: messages.Message, *, fields: bool = False) -> float:
-    """Payloads to frames (1/s); with `fields`, from fields to frames."""
-    payload = message.pack()
-
-    def payloads_work() -> int:
-        for sequence in sequences():
-            encode(message.ID, sequence, payload, SEED)
-        return COUNT
-
-    def fields_work() -> int:
-        for sequence in sequences():
-            encode(message.ID, sequence, message.pack(), SEED)
-        return COUNT
-
-    return per_second(fields_work if fields else payloads_work)
-
-
-def decoding(message: messages.Message, *, chunk: int, fields: bool = False) -> float:
-    """Frames to payloads (1/s), `chunk` frames at a time; with `fields`, to fields."""
-    frames = [encode(message.ID, sequence, message.pack(), SEED) for sequence in range(256)]
-    chunks = [b"".join(frames[start : start + chunk]) for start in range(0, 256, chunk)]
-    unpack = type(message).unpack
+def encoding(frame_of: Callable[[int], object]) -> float:
+    """Frames made (1/s); `frame_of` makes the one of a sequence number."""
 
     def work() -> int:
-        decoder = Decoder(SEED, to_board=message.ID < 0x80)
-        done = 0
-        while done < COUNT:
-            for data in chunks:
-                found = decoder.feed(data)
-                done += len(found)
-                if fields:
-                    for _, _, payload in found:
-                        unpack(payload)
-        assert decoder.good == done and decoder.bad == decoder.lost == 0
-        return done
+        for sequence in SEQUENCES:
+            frame_of(sequence)
+        return COUNT
 
     return per_second(work)
 
 
-def _peers() -> ModuleType:
-    """Looked for when a peer is measured: its packages are only installed for `make bench`."""
-    return import_module("tools.bench.frame_peers")
+def decoding(frame_of: Callable[[int], bytes], chunk: int, receiver: Callable[[], Callable[[bytes], Sized]]) -> float:
+    """Frames taken apart (1/s), `chunk` of them at a time; `receiver` makes a function from bytes to their messages."""
+    frames = [frame_of(sequence) for sequence in range(256)]
+    chunks = [b"".join(frames[start : start + chunk]) for start in range(0, 256, chunk)]
+
+    def work() -> int:
+        receive, done = receiver(), 0
+        while done < COUNT:
+            for data in chunks:
+                done += len(receive(data))
+        return done
+
+    assert work() == COUNT
+    return per_second(work)
 
 
-# ---- figures ----------------------------------------------------------------------------------------------------
+# ---- ours -----------------------------------------------------------------------------------------------------------
+
+
+def payload_frame(message: messages.Message) -> Callable[[int], bytes]:
+    """From its payload."""
+    payload = message.pack()
+    return lambda sequence: encode(message.ID, sequence, payload, SEED)
+
+
+def fields_frame(sequence: int) -> bytes:
+    """Of telemetry, from its fields."""
+    return encode(TELEMETRY.ID, sequence, TELEMETRY.pack(), SEED)
+
+
+def payloads() -> Callable[[bytes], Sized]:
+    """From bytes to payloads."""
+    return Decoder(SEED).feed
+
+
+def fields() -> Callable[[bytes], Sized]:
+    """From bytes to telemetry."""
+    feed, unpack = Decoder(SEED).feed, messages.Telemetry.unpack
+    return lambda data: [unpack(payload) for _, _, payload in feed(data)]
+
+
+# ---- figures --------------------------------------------------------------------------------------------------------
+
+
+def peer(name: str, measure: str, *arguments: object) -> list[Peer]:
+    """A function of frame_peers.py, whose packages are only installed for `make bench`."""
+    return [Peer(name, lambda: getattr(import_module("tools.bench.frame_peers"), measure)(*arguments))]
+
 
 COBS = "cobs + CRC-16 of fastcrc"
 MAVLINK = "pymavlink, 37 B"
-
-
-@figure(
-    "Python encodes telemetry of 37 B: payload to frame",
-    "frames/s",
-    at_least=300_000,
-    peers=[Peer(COBS, lambda: _peers().cobs_encoding(TELEMETRY))],
-)
-def encode_telemetry() -> float:
-    return encoding(TELEMETRY)
-
-
-@figure(
-    "Python encodes set-points of 8 B: payload to frame",
-    "frames/s",
-    at_least=300_000,
-    peers=[Peer(COBS, lambda: _peers().cobs_encoding(SETPOINT))],
-)
-def encode_setpoints() -> float:
-    return encoding(SETPOINT)
-
-
-@figure(
-    "Python decodes telemetry of 37 B: 16 frames at a time to payloads",
-    "frames/s",
-    at_least=500_000,
-    peers=[Peer(COBS, lambda: _peers().cobs_decoding(TELEMETRY, chunk=16))],
-)
-def decode_telemetry() -> float:
-    return decoding(TELEMETRY, chunk=16)
-
-
-@figure(
-    "Python decodes telemetry of 37 B: one frame at a time to its payload",
-    "frames/s",
-    at_least=500_000,
-    peers=[Peer(COBS, lambda: _peers().cobs_decoding(TELEMETRY, chunk=1))],
-)
-def decode_single_telemetry() -> float:
-    return decoding(TELEMETRY, chunk=1)
-
-
-@figure(
-    "Python encodes telemetry of 37 B: fields to frame",
-    "frames/s",
-    at_least=200_000,
-    peers=[Peer(MAVLINK, lambda: _peers().mavlink_encoding())],
-)
-def encode_fields() -> float:
-    return encoding(TELEMETRY, fields=True)
-
-
-@figure(
-    "Python decodes telemetry of 37 B: 16 frames at a time to fields",
-    "frames/s",
-    at_least=200_000,
-    peers=[Peer(MAVLINK, lambda: _peers().mavlink_decoding())],
-)
-def decode_fields() -> float:
-    return decoding(TELEMETRY, chunk=16, fields=True)
+OF_TELEMETRY = payload_frame(TELEMETRY)
+for _name, _least, _measure, _peers in (
+    (
+        "encodes telemetry of 37 B: payload to frame",
+        300_000,
+        partial(encoding, OF_TELEMETRY),
+        peer(COBS, "cobs_encoding", TELEMETRY),
+    ),
+    (
+        "encodes set-points of 8 B: payload to frame",
+        300_000,
+        partial(encoding, payload_frame(SETPOINT)),
+        peer(COBS, "cobs_encoding", SETPOINT),
+    ),
+    (
+        "decodes telemetry of 37 B: 16 frames at a time to payloads",
+        500_000,
+        partial(decoding, OF_TELEMETRY, 16, payloads),
+        peer(COBS, "cobs_decoding", TELEMETRY, 16),
+    ),
+    (
+        "decodes telemetry of 37 B: one frame at a time to its payload",
+        500_000,
+        partial(decoding, OF_TELEMETRY, 1, payloads),
+        peer(COBS, "cobs_decoding", TELEMETRY, 1),
+    ),
+    (
+        "encodes telemetry of 37 B: fields to frame",
+        200_000,
+        partial(encoding, fields_frame),
+        peer(MAVLINK, "mavlink_encoding"),
+    ),
+    (
+        "decodes telemetry of 37 B: 16 frames at a time to fields",
+        200_000,
+        partial(decoding, OF_TELEMETRY, 16, fields),
+        peer(MAVLINK, "mavlink_decoding"),
+    ),
+):
+    figure(f"Python {_name}", "frames/s", at_least=_least, peers=_peers)(_measure)
