@@ -10,6 +10,18 @@
 #define LIST_ROW(id, length, hash) {(id), (length)},
 static const struct { uint8_t id, length; } ALL[] = {MESSAGE_LIST(LIST_ROW)};
 
+uint64_t channel_random(uint64_t *state) {
+  *state += 0x9E3779B97F4A7C15ull;
+  uint64_t mixed = *state;
+  mixed = (mixed ^ mixed >> 30) * 0xBF58476D1CE4E5B9ull;
+  mixed = (mixed ^ mixed >> 27) * 0x94D049BB133111EBull;
+  return mixed ^ mixed >> 31;
+}
+
+uint32_t channel_below(uint64_t *state, uint32_t limit) {
+  return (uint32_t)((channel_random(state) >> 32) * limit >> 32);
+}
+
 static uint32_t below(channel *line, uint32_t limit) { return channel_below(&line->random, limit); }
 
 /* From `least` to `greatest`, both included. */
@@ -150,6 +162,14 @@ static void bit_errors(channel *line, const clean_line *clean, channel_round *ro
     const double step = log(uniform(line)) / right;
     at = step < (double)bits ? at + 1u + (uint32_t)step : bits;
   }
+}
+
+static void one_bit_in_10000(channel *line, const clean_line *clean, channel_round *round) {
+  bit_errors(line, clean, round, 1e-4);
+}
+
+static void three_bits_in_1000(channel *line, const clean_line *clean, channel_round *round) {
+  bit_errors(line, clean, round, 3e-3);
 }
 
 static void replace(channel_round *round, const clean_line *clean, uint16_t from, uint16_t to, const uint8_t *by,
@@ -311,6 +331,22 @@ static void foreign(channel *line, const clean_line *clean, channel_round *round
   replace(round, clean, at, at, bytes, size);
 }
 
+typedef void fault_maker(channel *line, const clean_line *clean, channel_round *round);
+
+static fault_maker *const FAULTS[CHANNEL_FAULTS] = {
+    [CHANNEL_BITS_1E4] = one_bit_in_10000,
+    [CHANNEL_BITS_3E3] = three_bits_in_1000,
+    [CHANNEL_DROP] = drop,
+    [CHANNEL_INSERT] = insert,
+    [CHANNEL_DOUBLE] = double_byte,
+    [CHANNEL_BURST] = burst,
+    [CHANNEL_TRUNCATION] = truncate_frame,
+    [CHANNEL_CONCATENATION] = concatenate,
+    [CHANNEL_NOISE] = noise,
+    [CHANNEL_EARLIER] = earlier_session,
+    [CHANNEL_FOREIGN] = foreign,
+};
+
 void channel_send(channel *line, channel_fault fault, channel_round *round) {
   clean_line clean = {.size = 0};
   round->size = 0;
@@ -322,41 +358,7 @@ void channel_send(channel *line, channel_fault fault, channel_round *round) {
     clean.size = (uint16_t)(clean.size + write_frame(&clean.bytes[clean.size], frame, line->seed));
     frame->end = clean.size;
   }
-  switch (fault) {
-    case CHANNEL_BITS_1E4:
-      bit_errors(line, &clean, round, 1e-4);
-      break;
-    case CHANNEL_BITS_3E3:
-      bit_errors(line, &clean, round, 3e-3);
-      break;
-    case CHANNEL_DROP:
-      drop(line, &clean, round);
-      break;
-    case CHANNEL_INSERT:
-      insert(line, &clean, round);
-      break;
-    case CHANNEL_DOUBLE:
-      double_byte(line, &clean, round);
-      break;
-    case CHANNEL_BURST:
-      burst(line, &clean, round);
-      break;
-    case CHANNEL_TRUNCATION:
-      truncate_frame(line, &clean, round);
-      break;
-    case CHANNEL_CONCATENATION:
-      concatenate(line, &clean, round);
-      break;
-    case CHANNEL_NOISE:
-      noise(line, &clean, round);
-      break;
-    case CHANNEL_EARLIER:
-      earlier_session(line, &clean, round);
-      break;
-    default:
-      foreign(line, &clean, round);
-      break;
-  }
+  FAULTS[fault](line, &clean, round);
 }
 
 /* ---- the judge ---- */
@@ -388,4 +390,29 @@ void channel_count(const channel_round *round, channel_tally *tally) {
   tally->wrong += round->wrong;
   tally->lost += lost;
   tally->excess += lost > damaged;
+}
+
+/* ---- the decoder in C ---- */
+
+void channel_run(channel_fault fault, uint64_t rounds, uint64_t random, channel_tally *tally) {
+  channel line;
+  channel_round round;
+  frame_decoder decoder;
+  channel_start(&line, random);
+  for (uint64_t i = 0; i < rounds; i++) {
+    if (i % CHANNEL_SESSION_ROUNDS == 0) {
+      channel_session(&line, 0);
+      frame_decoder_start(&decoder, line.seed);
+      frame_decode(&decoder, 0);
+    }
+    channel_send(&line, fault, &round);
+    for (uint16_t at = 0; at < round.size; at++) {
+      if (frame_decode(&decoder, round.wire[at])) {
+        const uint8_t id = frame_id(&decoder);
+        channel_accept(&round, id, frame_sequence(&decoder), frame_payload(&decoder),
+                       (uint8_t)frame_accepted_length(id));
+      }
+    }
+    channel_count(&round, tally);
+  }
 }

@@ -1,9 +1,8 @@
-/* channel.h: a serial line that spoils frames in all the ways that a measurement asks for, and the judge of what a
- * receiver made of them. One and the same for every receiver: the firmware's C, the host library's Python, the image in
- * the emulated board.
+/* channel.h: a serial line with faults, and the judge of what a receiver accepted from it. It serves every receiver: the
+ * firmware's C, the host library's Python, the image in the emulated board. library.py declares all of this to Python.
  *
- * A round is a handful of frames on the line and one fault among them. A round knows what was sent, which frames the fault touched, and
- * which whole pieces it added that nobody sent in this session (garbage).
+ * A round is a handful of frames on the line and one fault among them. A round knows what was sent, which frames the
+ * fault touched, and which whole pieces it added that nobody sent in this session (garbage).
  *
  * Judgement. What the receiver accepts must be a frame of the round that has not been passed over: byte by byte the id,
  * sequence number and payload of one that was sent, in the order of sending, each once. Anything else is a wrong frame.
@@ -18,6 +17,7 @@
 #define CHANNEL_FRAMES 4u
 #define CHANNEL_WIRE 1024u
 #define CHANNEL_PAYLOAD 64u
+#define CHANNEL_SESSION_ROUNDS 1000u /* rounds in one session of a run */
 
 typedef enum {
   CHANNEL_BITS_1E4,      /* each bit wrong with a probability of 1e-4; rounds without a wrong bit are passed over */
@@ -89,18 +89,13 @@ void channel_accept(channel_round *round, uint8_t id, uint8_t sequence, const ui
 /* The receiver has had all of the round. */
 void channel_count(const channel_round *round, channel_tally *tally);
 
+/* Sends rounds with that fault to a new decoder in C and adds up what it made of them. */
+void channel_run(channel_fault fault, uint64_t rounds, uint64_t random, channel_tally *tally);
+
 /* Next number of a random sequence, 64 bits (splitmix64, Steele, Lea and Flood 2014). */
-static inline uint64_t channel_random(uint64_t *state) {
-  *state += 0x9E3779B97F4A7C15ull;
-  uint64_t mixed = *state;
-  mixed = (mixed ^ mixed >> 30) * 0xBF58476D1CE4E5B9ull;
-  mixed = (mixed ^ mixed >> 27) * 0x94D049BB133111EBull;
-  return mixed ^ mixed >> 31;
-}
+uint64_t channel_random(uint64_t *state);
 
 /* From 0 on, below `limit`. */
-static inline uint32_t channel_below(uint64_t *state, uint32_t limit) {
-  return (uint32_t)((channel_random(state) >> 32) * limit >> 32);
-}
+uint32_t channel_below(uint64_t *state, uint32_t limit);
 
 #endif

@@ -2,7 +2,8 @@
 
 What is sent are clock probes: the board answers each one that it accepts, with the probe's token, so the answers say
 which frames it accepted. It counts the accepted ones as well (the message `counters`): one that was accepted but not
-answered would show there. The decoder in C gets all that the board gets, and must count the same good and bad frames.
+answered would show there. The library's decoder for the board's end, which is the same C, gets all that the board gets,
+and must count the same good and bad frames.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 from boebot.link import messages
-from boebot.link.frame import NO_SESSION
+from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from sim_bridge.boards import avr
 from tools.error_rates.library import ROOT, ffi, library, new
 from tools.error_rates.streams import FAULTS, Tally, seed_of
@@ -19,7 +20,6 @@ from tools.error_rates.streams import FAULTS, Tally, seed_of
 CYCLES_PER_MS = 16_000
 BATCH = 2000  # rounds between two looks at the counters
 KEEP_ALIVE = 30  # steps of 10 ms after which the host says something
-HANDSHAKE_SEED = 0x155555
 # A probe is answered by 14 bytes, and telemetry takes a tenth of the line: probes must not come faster than answers go.
 BYTE_CYCLES = 320
 ROUND_BYTES = 70  # time of a round at least
@@ -32,10 +32,9 @@ class Image:
     def __init__(self, pin_map: str = "shieldbot") -> None:
         self._board = avr.create(ROOT / "build" / "images" / f"{pin_map}.elf")
         self._access = self._board.access()
-        self._host, self._reference = library("host"), library("board")
-        self._receiver = self._host.c_decoder_new(HANDSHAKE_SEED)
-        self._twin = self._reference.c_decoder_new(NO_SESSION)
-        self._found = new("c_decoder_message[]", 4096)
+        self._receiver, self._twin = Decoder(), Decoder(NO_SESSION, to_board=True)
+        for decoder in (self._receiver, self._twin):
+            decoder.feed(b"\0")
         self._tokens: list[int] = []
         self._kept_alive = 0
         self._sequence = 0
@@ -45,38 +44,28 @@ class Image:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._host.c_decoder_free(self._receiver)
-        self._reference.c_decoder_free(self._twin)
         self._access.close()
         self._board.close()
 
     # ---- session ----
 
     def _send(self, message: messages.Message, seed: int) -> None:
-        wire = new("uint8_t[]", 80)
-        payload = message.pack()
         self._sequence = (self._sequence + 1) & 0xFF
-        size = self._host.c_decoder_encode(wire, message.ID, self._sequence, payload, len(payload), seed)
-        self._give(ffi().buffer(wire, size)[:], self._access.now)
+        self._give(encode(message.ID, self._sequence, message.pack(), seed), self._access.now)
 
     def _give(self, data: bytes, at: int) -> None:
-        """The same bytes to the board, from cycle `at` on, and to the decoder in C."""
+        """The same bytes to the board, from cycle `at` on, and to its twin."""
         self._access.send(data, at=at)
-        self._reference.c_decoder_feed(self._twin, data, len(data), ffi().NULL, 0)
+        self._twin.feed(data)
 
     def _expected(self) -> tuple[int, int]:
-        """Good and bad frames by the decoder in C, without those that keep the session open."""
-        lib = self._reference
-        return lib.c_decoder_good(self._twin) - self._kept_alive, lib.c_decoder_bad(self._twin)
+        """Good and bad frames by the twin, without those that keep the session open."""
+        return self._twin.good - self._kept_alive, self._twin.bad
 
     def _messages(self) -> Iterator[messages.Message]:
         """What the board has sent since the last call."""
-        data = bytes(sent.byte for sent in self._access.receive())
-        count = self._host.c_decoder_feed(self._receiver, data, len(data), self._found, len(self._found))
-        if count > len(self._found):
-            raise AssertionError("more messages at once than there is room for")
-        for message in self._found[0:count]:
-            yield messages.MESSAGES[message.id].unpack(ffi().buffer(message.payload, message.length)[:])
+        for number, _, payload in self._receiver.feed(bytes(sent.byte for sent in self._access.receive())):
+            yield messages.MESSAGES[number].unpack(payload)
 
     def _hello(self) -> messages.Hello:
         for _ in range(100):
@@ -89,11 +78,10 @@ class Image:
     def _open(self) -> int:
         nonce = self._hello().board_nonce
         seed = 0x0F1E2D ^ nonce & 1
-        self._send(messages.Open(messages.PROTOCOL_VERSION, nonce, nonce ^ seed), HANDSHAKE_SEED)
+        self._send(messages.Open(messages.PROTOCOL_VERSION, nonce, nonce ^ seed), SEED)
         for _ in range(10):
             if self._hello().session == seed:
-                self._host.c_decoder_seed(self._receiver, seed)
-                self._reference.c_decoder_seed(self._twin, seed)
+                self._receiver.seed = self._twin.seed = seed
                 return seed
         raise AssertionError("the board has opened no session")
 
@@ -129,10 +117,10 @@ class Image:
     def run(self, fault: int, rounds: int, part: int = 0) -> Tally:
         """Rounds with that fault (streams.FAULTS)."""
         tally = Tally("AVR image", FAULTS[fault])
-        line = new("channel *")
-        self._reference.channel_start(line, seed_of(tally.receiver, fault, part))
-        self._reference.channel_only(line, messages.ClockProbe.ID)
-        self._reference.channel_session(line, self.seed)
+        lib, line = library("board"), new("channel *")
+        lib.channel_start(line, seed_of(tally.receiver, fault, part))
+        lib.channel_only(line, messages.ClockProbe.ID)
+        lib.channel_session(line, self.seed)
         before = self._settle()
         left = rounds
         while left > 0:
@@ -144,7 +132,7 @@ class Image:
         self, line: Any, fault: int, rounds: int, before: tuple[int, int, int], tally: Tally
     ) -> tuple[int, int, int]:
         """Some rounds, judged; returns the counts after them."""
-        lib = self._reference
+        lib = library("board")
         sent = [new("channel_round *") for _ in range(rounds)]
         expected_before = self._expected()
         self._tokens = []
@@ -174,6 +162,7 @@ class Image:
 
     def _judge(self, sent: list[Any], tokens: list[int]) -> None:
         """Finds the frame behind each answer, in order."""
+        lib = library("board")
         frames = [(spoilt, frame) for spoilt in sent for frame in spoilt.sent]
         payloads = [int.from_bytes(bytes(frame.payload[0:2]), "little") for _, frame in frames]
         place = 0
@@ -184,4 +173,4 @@ class Image:
                 sent[0].wrong += 1
                 continue
             spoilt, frame = frames[place - 1]
-            self._reference.channel_accept(spoilt, frame.id, frame.sequence, frame.payload, frame.length)
+            lib.channel_accept(spoilt, frame.id, frame.sequence, frame.payload, frame.length)

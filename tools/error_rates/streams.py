@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from hashlib import sha256
 from typing import Any
 
+from boebot.link.frame import Decoder
 from tools.error_rates.library import ffi, library, new
 from tools.error_rates.statistics import LOST_ALLOWED, LOST_ALLOWED_CUT, RATE_ALLOWED, upper_bound
 
@@ -23,7 +24,6 @@ FAULTS = (
     "earlier session",
     "foreign frames",
 )
-SESSION_ROUNDS = 1000
 
 
 @dataclass
@@ -65,10 +65,6 @@ class Tally:
         """Whether everything asked for is shown."""
         return self.wrong_bound <= RATE_ALLOWED and self.lost_rate <= self.lost_allowed and self.excess == 0
 
-    def row(self) -> dict[str, object]:
-        """Everything, for JSON."""
-        return {**asdict(self), "wrong_bound": self.wrong_bound, "lost_rate": self.lost_rate, "met": self.met}
-
 
 def pooled(tallies: list[Tally]) -> Tally:
     """All faults of one receiver together."""
@@ -84,25 +80,23 @@ def seed_of(receiver: str, fault: int, part: int) -> int:
 
 
 def through_c(end: str, fault: int, rounds: int, part: int = 0, without: str = "") -> Tally:
-    """Rounds through the decoder in C at that end ("board" or "host"), if wanted without one of its protections."""
+    """Rounds through the decoder in C at that end ("board" or "host"), without one of its protections if wanted."""
     tally = Tally(f"C, {end}'s end", FAULTS[fault])
     counts = new("channel_tally *")
-    library(end, without).c_decoder_run(fault, rounds, seed_of(tally.receiver, fault, part), counts)
+    library(end, without).channel_run(fault, rounds, seed_of(tally.receiver, fault, part), counts)
     tally.add(counts)
     return tally
 
 
 def through_python(fault: int, rounds: int, part: int = 0) -> Tally:
     """Rounds through the Python library's decoder."""
-    from boebot.link.frame import Decoder
-
     tally = Tally("Python", FAULTS[fault])
     lib, buffer = library("host"), ffi().buffer
     line, spoilt = new("channel *"), new("channel_round *")
     counts = new("channel_tally *")
     lib.channel_start(line, seed_of(tally.receiver, fault, part))
     for number in range(rounds):
-        if number % SESSION_ROUNDS == 0:
+        if number % lib.CHANNEL_SESSION_ROUNDS == 0:
             lib.channel_session(line, 0)
             decoder = Decoder(line.seed)
             decoder.feed(b"\0")

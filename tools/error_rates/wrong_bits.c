@@ -54,29 +54,23 @@ static void judge(const wire_scene *scene, wrong_bits_tally *tally) {
 
 static void flip(wire_scene *scene, uint32_t bit) { scene->wire[bit / 8u] ^= (uint8_t)(1u << bit % 8u); }
 
+/* Every set of `bits` more wrong bits from bit `first` on. */
+static void judge_sets(wire_scene *scene, uint32_t first, uint8_t bits, wrong_bits_tally *tally) {
+  if (bits == 0) {
+    judge(scene, tally);
+    return;
+  }
+  for (uint32_t bit = first; bit < 8u * scene->size; bit++) {
+    flip(scene, bit);
+    judge_sets(scene, bit + 1u, (uint8_t)(bits - 1u), tally);
+    flip(scene, bit);
+  }
+}
+
 void wrong_bits_all(const wrong_bits_frame *frame, uint8_t bits, wrong_bits_tally *tally) {
   wire_scene scene;
   prepare(frame, &scene);
-  const uint32_t count = 8u * scene.size;
-  for (uint32_t one = 0; one < count; one++) {
-    flip(&scene, one);
-    if (bits == 1) {
-      judge(&scene, tally);
-    }
-    for (uint32_t two = one + 1; bits > 1 && two < count; two++) {
-      flip(&scene, two);
-      if (bits == 2) {
-        judge(&scene, tally);
-      }
-      for (uint32_t three = two + 1; bits > 2 && three < count; three++) {
-        flip(&scene, three);
-        judge(&scene, tally);
-        flip(&scene, three);
-      }
-      flip(&scene, two);
-    }
-    flip(&scene, one);
-  }
+  judge_sets(&scene, 0, bits, tally);
 }
 
 /* Whether the bit makes a delimiter or unmakes one. */

@@ -17,7 +17,7 @@ typedef struct {
   uint64_t lost;     /* patterns after which a neighbour was missing */
 } wrong_bits_tally;
 
-/* Every set of `bits` wrong bits, 1 to 3. */
+/* Every set of `bits` wrong bits. */
 void wrong_bits_all(const wrong_bits_frame *frame, uint8_t bits, wrong_bits_tally *tally);
 
 /* `count` random sets of `bits` wrong bits, up to 8. Every other set begins with a bit that makes or unmakes a delimiter,

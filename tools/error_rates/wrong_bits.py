@@ -5,26 +5,26 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 
 from boebot.link import messages
+from boebot.link.frame import FRAME_OVERHEAD
 from tools.error_rates.library import ROOT, ffi, library, new
 from tools.error_rates.statistics import LOST_ALLOWED
 
-FRAME_OVERHEAD = 8
 BITS = (1, 2, 3, 4, 5)
-EXHAUSTIVE = 3  # up to so many bits every set is tried
+EXHAUSTIVE = 3  # up to three bits every set is tried
+SAMPLES = 2_000_000  # random sets for each payload beyond
 
 
 @dataclass
 class BitTally:
-    """How often a frame with wrong bits was taken for a message, and a neighbour for none."""
+    """How often a frame with wrong bits was accepted, and a neighbour was not."""
 
     end: str  # which end receives: "board" or "host"
     wire_bytes: int
     bits: int
-    exhaustive: bool
     patterns: int = 0
     accepted: int = 0
     lost: int = 0
@@ -33,10 +33,6 @@ class BitTally:
     def met(self) -> bool:
         """Whether nothing wrong was accepted and few neighbours were lost, none of them by a single bit."""
         return self.accepted == 0 and self.lost <= (self.bits > 1) * LOST_ALLOWED * self.patterns
-
-    def row(self) -> dict[str, object]:
-        """Everything, for JSON."""
-        return asdict(self)
 
 
 @cache
@@ -66,28 +62,27 @@ def lengths(end: str) -> list[int]:
     return sorted({kind.LENGTH + FRAME_OVERHEAD for kind in kinds(end)})
 
 
-def measure(end: str, wire_bytes: int, bits: int, samples: int = 0) -> BitTally:
+def measure(end: str, wire_bytes: int, bits: int, exhaustive: int = EXHAUSTIVE, samples: int = SAMPLES) -> BitTally:
     """Wrong bits in every message of that length.
 
     Args:
         end: which end receives.
         wire_bytes: length of the frames.
         bits: how many are wrong.
-        samples: random sets for each payload; 0: every set, for up to three bits.
+        exhaustive: up to this number of bits, at most three, every set is tried.
+        samples: random sets for each payload beyond.
     """
-    tally = BitTally(end, wire_bytes, bits, samples == 0)
+    tally = BitTally(end, wire_bytes, bits)
     lib, counts, frame = library(end), new("wrong_bits_tally *"), new("wrong_bits_frame *")
-    for kind in kinds(end):
-        if wire_bytes != kind.LENGTH + FRAME_OVERHEAD:
-            continue
+    for kind in (kind for kind in kinds(end) if wire_bytes == kind.LENGTH + FRAME_OVERHEAD):
         for number, payload in enumerate(payloads(kind)):
             draw = random.Random(f"{kind.NAME} {number} {bits}")
             frame.id, frame.length, frame.sequence = kind.ID, kind.LENGTH, draw.randrange(256)
             frame.seed = draw.randrange(1, 1 << 21)
             ffi().memmove(frame.payload, payload, len(payload))
-            if samples:
-                lib.wrong_bits_some(frame, bits, samples, draw.randrange(1 << 64), counts)
-            else:
+            if bits <= exhaustive:
                 lib.wrong_bits_all(frame, bits, counts)
+            else:
+                lib.wrong_bits_some(frame, bits, samples, draw.randrange(1 << 64), counts)
     tally.patterns, tally.accepted, tally.lost = int(counts.patterns), int(counts.accepted), int(counts.lost)
     return tally

@@ -13,6 +13,7 @@ import pytest
 
 from boebot.link import messages
 from tools.error_rates import library, wrong_bits
+from tools.error_rates.__main__ import damaged_needed, missed
 from tools.error_rates.image import Image
 from tools.error_rates.statistics import LOST_ALLOWED, RATE_ALLOWED, trials_needed, upper_bound
 from tools.error_rates.streams import FAULTS, Tally, pooled, through_c, through_python
@@ -31,6 +32,13 @@ def test_bound_is_that_of_clopper_and_pearson() -> None:
     assert [trials_needed(0), trials_needed(1)] == pytest.approx([3_141_000, 4_974_000], rel=1e-3)
 
 
+@pytest.mark.parametrize(("fault", "chance"), [("bursts", 4), ("noise", 0)])
+def test_wrong_frames_beyond_chance_miss_the_rate(fault: str, chance: int) -> None:
+    damaged = damaged_needed(FAULTS.index(fault))
+    tallies = [Tally("C", fault, damaged=damaged, wrong=wrong) for wrong in (chance, chance + 1)]
+    assert missed([], tallies) == tallies[1:]
+
+
 @pytest.mark.parametrize("end", ENDS)
 @pytest.mark.parametrize(
     "bits", [pytest.param(bits, marks=pytest.mark.soak if bits > 2 else ()) for bits in wrong_bits.BITS]
@@ -38,8 +46,7 @@ def test_bound_is_that_of_clopper_and_pearson() -> None:
 def test_no_frame_with_up_to_five_wrong_bits_is_accepted(end: str, bits: int) -> None:
     patterns = 0
     for size in wrong_bits.lengths(end):
-        exhaustive = bits <= 2 or (bits == 3 and size <= SHORT)
-        tally = wrong_bits.measure(end, size, bits, 0 if exhaustive else SAMPLES)
+        tally = wrong_bits.measure(end, size, bits, 3 if size <= SHORT else 2, SAMPLES)
         assert tally.met, tally
         patterns += tally.patterns
     assert patterns > 0
