@@ -26,14 +26,14 @@ export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures timing format setup clean lock compile_commands.json
+.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures timing format setup clean lock
 
 help:
 	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      a long run in the emulator, SECONDS=3600 by default, and the link: a full line, all error rates; jitter, JITTER_SECONDS; each protection taken away; longest tasks, SEARCH_SECONDS; the firmware by other options of the compiler, and in other emulators; all experiments"
+	@echo "make soak      what takes long: all experiments, a run in the emulator (SECONDS=3600), the search for the longest tasks (SEARCH_SECONDS=60), other compilers and emulators, tests with each protection left out, error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -69,12 +69,10 @@ experiments:
 	@$(VENV)/bin/boebot experiment --all --out build/experiments
 
 SECONDS ?= 3600
-JITTER_SECONDS ?= 10
 SEARCH_SECONDS ?= 60
 soak: experiments
 	@$(SIDE_BY_SIDE) ready-soak
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
-	@$(PYTHON_VENV) -m tools.bench.jitter --seconds $(JITTER_SECONDS)
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
 	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.other_emulators
@@ -122,12 +120,8 @@ format:
 setup:
 	@$(SIDE_BY_SIDE) ready-test ready-check
 
-compile_commands.json:
-	@$(SIDE_BY_SIDE) ready-run
-	@$(PYTHON_VENV) tools/compile_commands.py
-
 clean:
-	@rm -rf build dist compile_commands.json host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
+	@rm -rf build dist host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
 	@rm -rf firmware/src/generated $(GENERATED)
 	@find host sim_bridge -name '*.so' -delete
 	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +

@@ -32,7 +32,15 @@ from sim_bridge.timing.traffic import TIME_TO_LIVE_MS, EachTick
 
 pytestmark = pytest.mark.emulated
 
-SECONDS = 1.6  # of the board's time, for each load
+# Of the board's time, for each load; seeds begin at other phases.
+CASES = [
+    *(pytest.param((load, 1, 1.6), id=load.name) for load in LOADS),
+    *(
+        pytest.param((load, seed, 10.0), id=f"{load.name}, seed {seed}", marks=pytest.mark.soak)
+        for load in LOADS
+        for seed in range(1, 7)
+    ),
+]
 LEFT, RIGHT = 13, 12  # pins of the servos
 ENCODER_PINS = [(14, 15), (16, 17)]
 SERVO_TOLERANCE = 16  # cycles: what is promised, of width and period
@@ -47,11 +55,16 @@ def image() -> Path:
     return resources.folder("images") / "shieldbot-quad.elf"
 
 
-@pytest.fixture(scope="module", params=LOADS, ids=[load.name for load in LOADS])
+@pytest.fixture(scope="module", params=CASES)
 def run(request: pytest.FixtureRequest) -> Iterator[Run]:
-    """What happened under each load."""
+    """What happened in each case."""
+    load, seed, seconds = request.param
     with Bench(image()) as bench:
-        yield drive(bench, request.param, SECONDS, 1, lambda share: None)
+        yield drive(bench, load, seconds, seed, lambda share: None)
+
+
+def seconds_of(run: Run) -> float:
+    return (run.ended - run.begun) / 16e6
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +73,17 @@ def found(run: Run) -> dict[str, Distribution]:
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_servo_pulses_are_exact_to_16_cycles(found: dict[str, Distribution], side: str) -> None:
+def test_servo_pulses_are_exact_to_16_cycles(run: Run, found: dict[str, Distribution], side: str) -> None:
     for quantity in ("width", "period"):
         errors = found[f"servo {quantity}, {side}"]
-        assert errors.count >= SECONDS * 50 - 2, "a pulse is missing"
+        assert errors.count >= seconds_of(run) * 50 - 2, "a pulse is missing"
         assert np.all(np.abs(errors.values) <= SERVO_TOLERANCE), errors.values
 
 
-def test_echoes_are_right_to_16_cycles(found: dict[str, Distribution]) -> None:
+def test_echoes_are_right_to_16_cycles(run: Run, found: dict[str, Distribution]) -> None:
     """Ping at its fastest: a trigger every 4 ticks."""
     errors = found["echo length"]
-    assert errors.count >= SECONDS * 25 - 3, "an echo is missing"
+    assert errors.count >= seconds_of(run) * 25 - 3, "an echo is missing"
     assert np.all(np.abs(errors.values) <= ECHO_TOLERANCE), errors.values
 
 
@@ -102,12 +115,12 @@ def test_nothing_is_lost_but_in_an_overload_and_no_tick_there(run: Run) -> None:
     (*_, counted) = (heard.message for heard in run.line.heard if isinstance(heard.message, messages.Counters))
     assert losses.bytes == 0 or counted.overrun > 0, "it is told that bytes were lost"
     told = [heard.message for heard in run.line.telemetry if run.begun + 3 * TICK_CYCLES < heard.first < run.ended]
-    assert len(told) > SECONDS * 90 and sum(bool(one.status & MASKED) for one in told) > 0.97 * len(told)
+    assert len(told) > seconds_of(run) * 90 and sum(bool(one.status & MASKED) for one in told) > 0.97 * len(told)
 
 
 def test_the_loads_are_what_they_are_said_to_be(run: Run) -> None:
     """Overload: 50,000 bytes/s arrive; three lines at 4 kHz, noise on the fourth."""
-    seconds = (run.ended - run.begun) / 16e6
+    seconds = seconds_of(run)
     if run.load.is_overload:
         assert run.bench.access.counters()["bytes_in"] >= 50_000 * seconds
         assert [len(wheel) for wheel in run.encoders] == [0, 2]

@@ -1,4 +1,4 @@
-"""The Arduino core's Servo library in the same emulator, under the same loads, at the same pins as ours.
+"""The Arduino core's Servo library in the same emulator, under the same overload, at the same pins as ours.
 
 The library comes in the package `arduino-servo` of PyPI, which pip downloads (66 KB, pinned by its hash) into
 build/arduino-servo; the core in Debian's package `arduino-core-avr`, where it is installed. No source of either is kept
@@ -16,18 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from boebot.errors import BoebotError
-from boebot.timing.distributions import Distribution
-from sim_bridge.timing.latency_limits import EXACT
 from sim_bridge.timing.line import BYTE_CYCLES
-from sim_bridge.timing.loads import LOADS, TICK_CYCLES, Bench, Load, wheels
+from sim_bridge.timing.loads import OVERLOAD, TICK_CYCLES, Bench, wheels
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "arduino-servo"
 PACKAGE = "arduino-servo==0.1 --hash=sha256:a9e67d8004fa85ec6ae87a2b019b774b80265c7a978d32602721d2254ac3b251"
 CORE = Path("/usr/share/arduino/hardware/arduino/avr")  # of arduino-core-avr
-SUBJECT = "Arduino Servo"
 WIDTHS_US = {13: 1560, 12: 1440}
-REFRESH_CYCLES = 320_000  # 20 ms, the library's
 ENCODERS = [(14, 15), (16, 17)]
 FRAME = bytes(range(1, 16)) + b"\0"  # of 16 bytes, as a set-point
 SETTLE_CYCLES = 8 * TICK_CYCLES
@@ -125,46 +121,27 @@ def _run(command: list[str]) -> None:
         raise UnavailableError(f"the Arduino sketch cannot be compiled: {result.stderr.strip().splitlines()[0]}")
 
 
-class Bytes:
-    """Frames to the sketch: one each tick, or back to back. See Source."""
+class FullLine:
+    """Frames to the sketch, back to back. See Source."""
 
-    def __init__(self, first: int, full_line: bool) -> None:
+    def __init__(self, first: int) -> None:
         self._next = first
-        self._period = len(FRAME) * BYTE_CYCLES if full_line else 159_001
 
     def queue(self, bench: Bench, until: int) -> None:
         """See Source."""
         while self._next < until:
             bench.access.send(FRAME, at=self._next)
-            self._next += self._period
+            self._next += len(FRAME) * BYTE_CYCLES
 
 
-def measure(elf: Path, load: Load, seconds: float) -> list[Distribution]:
-    """Width and period of both servos' pulses, less what they should be."""
-    with Bench(elf) as bench:
+def largest_width_error(seconds: float) -> float:
+    """Of both servos' pulses under the overload, in cycles. Raises UnavailableError."""
+    with Bench(build()) as bench:
         bench.run(SETTLE_CYCLES)
-        trains = wheels(ENCODERS, load.edges_per_s, bench.now + TICK_CYCLES)
-        bench.sources += [
-            *(train for wheel in trains for train in wheel),
-            Bytes(bench.now + TICK_CYCLES, load.is_overload),
-        ]
+        first = bench.now + TICK_CYCLES
+        trains = wheels(ENCODERS, OVERLOAD.edges_per_s, first)
+        bench.sources += [*(train for wheel in trains for train in wheel), FullLine(first)]
         begun = bench.now + 2 * TICK_CYCLES
         bench.run_until(begun + round(seconds * 16e6))
-        found = []
-        for (pin, width_us), side in zip(WIDTHS_US.items(), ("left", "right"), strict=True):
-            pulses = bench.pulses(pin, begun)
-            values = {
-                f"servo width, {side}": pulses[:, 1] - width_us * 16,
-                f"servo period, {side}": np.diff(pulses[:, 0]) - REFRESH_CYCLES,
-            }
-            found += [
-                Distribution(name, f"at pin {pin}", load.name, errors, *EXACT, subject=SUBJECT)
-                for name, errors in values.items()
-            ]
-        return found
-
-
-def measure_all(seconds: float) -> list[Distribution]:
-    """The same under all loads. Raises UnavailableError."""
-    elf = build()
-    return [one for load in LOADS for one in measure(elf, load, seconds)]
+        errors = [np.abs(bench.pulses(pin, begun)[:, 1] - width * 16) for pin, width in WIDTHS_US.items()]
+        return float(np.concatenate(errors).max())

@@ -14,17 +14,16 @@ from tools.bench.figures import Peer, figure
 SERVO_LEFT, SERVO_RIGHT = 13, 12
 
 
-def arduino_width() -> float:
-    found = arduino_servo.measure_all(2.0)
-    widths = [one.values for one in found if one.load == "overload" and "width" in one.quantity]
-    return float(np.abs(np.concatenate(widths)).max())
-
-
 @figure(
     "servo pulse width at the pin, UART saturated both ways: largest error",
     "cycles",
     at_most=16,
-    peers=[Peer("Arduino core's Servo library under the full line and encoders", arduino_width)],
+    peers=[
+        Peer(
+            "Arduino core's Servo library under the full line and encoders",
+            lambda: arduino_servo.largest_width_error(2.0),
+        )
+    ],
 )
 def servo_width() -> float:
     worst = 0.0
