@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from tools.bench import report
+from tools.bench.__main__ import figures
+from tools.bench.figures import Figure
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "figures.md"
@@ -18,11 +16,8 @@ NUMBER = r"(?:\d{1,3}(?:,\d{3})+|\d+(?:\.\d+)?(?:e-\d+)?)"
 
 
 @cache
-def figures() -> list[dict[str, Any]]:
-    """All that the bench knows, asked of the command."""
-    command = [sys.executable, "-m", "tools.bench", "--list", "--json"]
-    listed: list[dict[str, Any]] = json.loads(subprocess.run(command, cwd=ROOT, check=True, capture_output=True).stdout)
-    return listed
+def all_figures() -> list[Figure]:
+    return figures([])
 
 
 def rows() -> list[list[str]]:
@@ -42,23 +37,21 @@ def test_the_page_names_machine_load_and_time() -> None:
 def test_the_page_has_every_figure_with_its_unit_and_target() -> None:
     heading, ruler, *found = rows()
     assert tuple(heading) == report.COLUMNS and set(ruler) == {"---"}
-    expected = [(figure["name"], figure["unit"], report.target(figure)) for figure in figures()]
+    expected = [(figure.name, figure.unit, report.target(vars(figure))) for figure in all_figures()]
     assert [(row[0], row[3], row[4]) for row in found] == expected
 
 
 def test_every_value_is_a_number_and_every_peer_is_there() -> None:
     """A measurement that failed is named with its error."""
     failures = next((line for line in PAGE.read_text().splitlines() if line.startswith("Failed: ")), "")
-    for row, figure in zip(rows()[2:], figures(), strict=True):
+    for row, figure in zip(rows()[2:], all_figures(), strict=True):
         if row[1] == "failed":
             assert f"{row[0]}: " in failures
             continue
         assert re.fullmatch(NUMBER, row[1]), row
-        assert re.fullmatch(rf"–|{NUMBER} %", row[2]) and (row[2] == "–") <= (figure["rounds"] == 1 or row[1] == "0"), (
-            row
-        )
+        assert re.fullmatch(rf"–|{NUMBER} %", row[2]) and (row[2] == "–") <= (figure.rounds == 1 or row[1] == "0"), row
         beside = [] if row[5] == "–" else row[5].split("; ")
-        assert len(beside) == len(figure["peers"]), row
-        for text, peer in zip(beside, figure["peers"], strict=True):
+        assert len(beside) == len(figure.peers), row
+        for text, peer in zip(beside, figure.peers, strict=True):
             times = "" if row[1] == "0" else rf" \(× {NUMBER}\)"
-            assert re.fullmatch(rf"{re.escape(peer)}: {NUMBER}{times}", text), row
+            assert re.fullmatch(rf"{re.escape(peer.name)}: {NUMBER}{times}", text), row

@@ -2,8 +2,6 @@
 
     python -m tools.bench [--only PATTERN ...] [--json] [--page FILE] [--list]
 
---only measures the figures whose names contain a PATTERN; --json prints what build/bench.json holds instead of the
-table; --page writes the table as a page of the documentation; --list measures nothing and says which figures there are.
 Ctrl-C ends it with what was measured so far. The exit code is 1 when a target is missed or a measurement failed, 130
 after Ctrl-C.
 """
@@ -13,7 +11,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -47,27 +44,8 @@ def figures(only: list[str]) -> list[Figure]:
     return [figure for figure in FIGURES if not only or any(part in figure.name for part in only)]
 
 
-class Interrupt:
-    """Ctrl-C. Python drops a KeyboardInterrupt that arises while an object is being freed; this one is remembered, so
-    that the next figure is not begun."""
-
-    def __init__(self) -> None:
-        self._came = False
-        signal.signal(signal.SIGINT, self._hear)
-
-    def _hear(self, *_: object) -> None:
-        self._came = True
-        raise KeyboardInterrupt
-
-    def check(self) -> None:
-        """Raises KeyboardInterrupt if it came."""
-        if self._came:
-            raise KeyboardInterrupt
-
-
 def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]:
     """Rows, one after the other, with a line of progress for each. A measurement that fails is a row with its error."""
-    interrupt = Interrupt()
     for number, figure in enumerate(wanted, 1):
         started = time.monotonic()
         console.print(f"[{number}/{len(wanted)}] {figure.name} ...", end="", markup=False, highlight=False)
@@ -75,7 +53,6 @@ def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]
             row = report.measure(figure)
         except Exception as error:  # the others are measured all the same
             row = report.failed(figure, error)
-        interrupt.check()
         took = time.monotonic() - started
         console.print(f" {report.shown(row)} ({took:.0f} s)", markup=False, highlight=False)
         yield row
@@ -84,9 +61,9 @@ def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.bench", description="Measures every figure.")
     parser.add_argument("--only", action="append", default=[], metavar="PATTERN", help="figures whose names contain it")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--json", action="store_true", help="print what build/bench.json holds instead of the table")
     parser.add_argument("--page", type=Path, metavar="FILE", help="write the table as a page of the documentation")
-    parser.add_argument("--list", action="store_true", help="which figures there are")
+    parser.add_argument("--list", action="store_true", help="measure nothing, print the names of the figures")
     chosen = parser.parse_args(arguments)
     wanted = figures(chosen.only)
     if not wanted:
@@ -94,8 +71,7 @@ def main(arguments: list[str]) -> int:
             f"no figure's name contains {' or '.join(map(repr, chosen.only))}; without --only all are measured"
         )
     if chosen.list:
-        described = [report.description(figure) for figure in wanted]
-        print(json.dumps(described, indent=2) if chosen.json else "\n".join(figure.name for figure in wanted))
+        print("\n".join(figure.name for figure in wanted))
         return 0
     started, before = time.monotonic(), report.load()
     rows: list[dict[str, Any]] = []

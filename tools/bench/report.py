@@ -30,18 +30,6 @@ def chosen(values: list[float], figure: Figure) -> float:
     return max(values) if figure.better == "more" else min(values)
 
 
-def description(figure: Figure) -> dict[str, Any]:
-    """What is known of a figure before it is measured."""
-    return {
-        "name": figure.name,
-        "unit": figure.unit,
-        "target": figure.target,
-        "better": figure.better,
-        "peers": [peer.name for peer in figure.peers],
-        "rounds": figure.rounds,
-    }
-
-
 def row_of(figure: Figure, values: list[float], peers: list[list[float]]) -> dict[str, Any]:
     """A figure as bench.json holds it, from the rounds' values and those of each peer."""
     value = chosen(values, figure)

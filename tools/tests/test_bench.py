@@ -15,6 +15,7 @@ from rich.console import Console
 
 import copied_process
 from tools.bench import report, scene
+from tools.bench.__main__ import figures
 from tools.bench.figures import Figure, Peer, figure
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,11 +97,12 @@ def run(*options: str) -> copied_process.Done:
 def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
     names = run("--list").stdout.splitlines()
     assert len(set(names)) == len(names) > 50
-    lasers = json.loads(run("--list", "--json", "--only", "laser of 683", "--only", "no such thing").stdout)
-    assert [row["name"] for row in lasers] == [name for name in names if "laser of 683" in name]
-    assert {(row["target"], row["unit"]) for row in lasers} == {(target, "rays/s") for target in (100e6, 20e6)}
-    (wandering,) = json.loads(run("--list", "--json", "--only", "native board and world, wander").stdout)
-    assert wandering["target"] == 300 and wandering["better"] == "more"
+    lasers = run("--list", "--only", "laser of 683", "--only", "no such thing").stdout.splitlines()
+    assert lasers == [name for name in names if "laser of 683" in name] and len(lasers) == 4
+    chosen = figures(["laser of 683"])
+    assert {(one.target, one.unit) for one in chosen} == {(target, "rays/s") for target in (100e6, 20e6)}
+    (wandering,) = figures(["native board and world, wander"])
+    assert wandering.target == 300 and wandering.better == "more"
 
 
 def test_a_pattern_without_a_figure_is_one_sentence() -> None:
