@@ -21,7 +21,7 @@ from boebot.errors import BoardError
 from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.symbols import entry_of, find_symbol
 from sim_bridge.timing.measure import run
-from tools.bench import avr_program
+from tools import avr_program
 
 pytestmark = pytest.mark.emulated
 

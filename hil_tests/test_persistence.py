@@ -15,6 +15,7 @@ from hil_tests.bootloader import with_bootloader
 from hil_tests.minimal_host import CYCLES_PER_S, TICK_S, MinimalHost, power_on
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
 from sim_bridge.tests.symbols import DATA_BASE, entry_of
+from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.emulated
 
@@ -29,7 +30,6 @@ BANDGAP, TRACK_WIDTH, LEFT_CENTRE, RIGHT_GAIN = 17, 12, 2, 5
 VALUES = ({BANDGAP: 1050, TRACK_WIDTH: 10_001, LEFT_CENTRE: 22_500, RIGHT_GAIN: -3100},
           {BANDGAP: 1180, TRACK_WIDTH: 43_210, LEFT_CENTRE: 25_599, RIGHT_GAIN: 1234})  # fmt: skip
 
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 
 OK, SUPPLY_LOW = messages.AnswerStatus.OK, messages.AnswerStatus.SUPPLY_LOW
 
@@ -273,7 +273,7 @@ def test_a_hang_is_told(
     assert host.hello(2.0).reset_cause == EXTERNAL
 
 
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map: str) -> None:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
     leaves it whole cannot be told from an external reset."""
@@ -292,7 +292,7 @@ def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map:
         assert host.hello(2.0).reset_cause == told
 
 
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_what_a_reset_leaves_alone_lies_where_no_bootloader_writes(pin_map: str) -> None:
     """Optiboot's buffer is 0x100 to 0x1FF, its stack at the end of RAM (0x8FF)."""
     elf = ELFFile(io.BytesIO((resources.folder("images") / f"{pin_map}.elf").read_bytes()))

@@ -15,10 +15,10 @@ from boebot.link import messages
 from hil_tests.bootloader import with_bootloader
 from hil_tests.minimal_host import CYCLES_PER_S, MinimalHost, power_on
 from sim_bridge.boards.board import Level, ResetCause
+from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.emulated
 
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
 DRIVEN = {Level.LOW, Level.HIGH}
 SERVOS = (13, 12)
 
@@ -40,7 +40,7 @@ def levels(host: MinimalHost, seconds: float) -> dict[int, set[Level]]:
 
 
 @pytest.mark.parametrize("kind", ["native", "avr"])
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
     host = MinimalHost(power_on(kind, pin_map))
     host.open()
@@ -53,7 +53,7 @@ def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: s
 
 
 @pytest.mark.parametrize("kind", ["native", "avr"])
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
     """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
     host = MinimalHost(power_on(kind, pin_map))
@@ -70,7 +70,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
 
 
 @pytest.mark.parametrize("kind", ["native", "avr"])
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
     """Who knows what is wired to the board before it was told?"""
     host = MinimalHost(power_on(kind, pin_map))
@@ -97,7 +97,7 @@ def low_after_ms(image: Path) -> float:
     return float(of_servos["cycle"].max() - start) / CYCLES_PER_S * 1e3
 
 
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_servo_lines_are_low_within_milliseconds(pin_map: str) -> None:
     assert low_after_ms(resources.folder("images") / f"{pin_map}.elf") < 5.0
 

@@ -12,8 +12,7 @@ import pytest
 from boebot.cli import timing
 from boebot.timing.budget import Report
 from command import boebot as command
-from tools import timing_page
-from tools.bench import avr_program
+from tools import avr_program, timing_page
 from tools.timing_promises import PROMISES
 
 pytestmark = pytest.mark.emulated
@@ -22,7 +21,7 @@ PLANTED = 200  # cycles
 FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
 
-@pytest.fixture(scope="module", params=timing_page.IMAGES)
+@pytest.fixture(scope="module", params=list(avr_program.IMAGES))
 def judged(request: pytest.FixtureRequest) -> dict[str, Report]:
     """A bundled image under each load."""
     return timing_page.reports(request.param, timing_page.measured(request.param))

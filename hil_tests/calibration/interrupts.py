@@ -6,13 +6,15 @@ Most are INT0 and INT1, which the program raises itself: pins 2 and 3 are output
 
 from __future__ import annotations
 
+from functools import partial
+
 from hil_tests.calibration.rows import STAMP_CYCLES, Row
 
 JMP = 3
 RETI = 4
 ENTRY = 4
 RESPONSE = "7.7.1"
-GROUP = "Interrupts"
+row = partial(Row, group="Interrupts")
 
 # Raises both flags with interrupts off; one enable bit for each row that wants it.
 RAISED = """
@@ -54,72 +56,63 @@ UNMATCH = "cli\nsts TIMSK1, r1"
 MATCH_AROUND = MATCH_DISTANCE + 1 + JMP + 1
 
 ROWS = [
-    Row(
-        group=GROUP,
+    row(
         what="entry into an interrupt that waits, after SEI and one NOP",
         expected=ENTRY,
         source=RESPONSE,
         code=f"{ONE}\nbegin\nsei\nnop\n{DONE}",
         around=STAMP_CYCLES + 1 + 1 + JMP,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="the one instruction that runs after SEI: a JMP",
         expected=3,
         source="7.7",
         code=f"{ONE}\nbegin\nsei\njmp 1f\n1:\n{DONE}",
         around=STAMP_CYCLES + 1 + ENTRY + JMP,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="RETI, then at once the interrupted program",
         expected=RETI,
         source=RESPONSE,
         code=f"{ONE}\nsei\nnop\nmovw r2, r4\nfinish\n{DONE}",
         around=STAMP_CYCLES + 1 + 1,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="the one instruction that runs between two interrupts: a NOP",
         expected=1,
         source="7.7",
         code=f"{TWO}\nsei\nnop\nnop\nmovw r2, r4\nmovw r4, r10\n{DONE}",
         around=STAMP_CYCLES + 1 + RETI + ENTRY + JMP,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="the one instruction that runs between two interrupts: a JMP",
         expected=3,
         source="7.7",
         code=f"{TWO}\nsei\nnop\njmp 1f\n1:\nmovw r2, r4\nmovw r4, r10\n{DONE}",
         around=STAMP_CYCLES + 1 + RETI + ENTRY + JMP,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="from the flag of compare A to its interrupt, in NOPs",
         expected=ENTRY,
         source=RESPONSE,
         code=f"{MATCH}\n.rept 200\nnop\n.endr\n{UNMATCH}",
         around=MATCH_AROUND,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="the same, from idle sleep",
         expected=ENTRY + 4,
         source=RESPONSE,
         code=f"{MATCH}\nsleep\nnop\n{UNMATCH}",
         around=MATCH_AROUND,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="RETI behind a sleep: to the instruction after SLEEP",
         expected=RETI,
         source=RESPONSE,
         code=f"{MATCH}\nsleep\nmovw r2, r4\nfinish\n{UNMATCH}",
         around=STAMP_CYCLES + 1 + 1,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="pin change (A5, by SBI) to its interrupt, in NOPs",
         expected=(2 + ENTRY, 4 + ENTRY),
         source="figure 13-1: about 3; 7.7.1",

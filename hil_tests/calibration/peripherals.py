@@ -5,6 +5,8 @@ The EEPROM's rows write back what they read, in its last cell: a robot's paramet
 
 from __future__ import annotations
 
+from functools import partial
+
 from hil_tests.calibration.interrupts import ENTRY, JMP
 from hil_tests.calibration.rows import CPU_HZ, STAMP_CYCLES, Row
 
@@ -18,6 +20,7 @@ STS, SBI = 2, 2
 
 BIT = 8 * (3 + 1)
 BYTE = 10 * BIT
+uart = partial(Row, group="UART, 500,000 baud")
 UART_ON = "store UCSR0B, 1 << RXEN0 | 1 << TXEN0"
 
 
@@ -50,8 +53,7 @@ def overrun(count: int) -> str:
 
 
 UART = [
-    Row(
-        group="UART, 500,000 baud",
+    uart(
         what="bytes sent without a gap: UDRE0 to UDRE0",
         expected=BYTE,
         source="20.4, table 20-1: 10 bits of 8 (UBRR0 + 1) cycles",
@@ -66,8 +68,7 @@ UART = [
           {UART_ON}
         """,
     ),
-    Row(
-        group="UART, 500,000 baud",
+    uart(
         what="one byte into an idle transmitter: UDR0 written to TXC0",
         expected=(BYTE, BYTE + BIT),
         source="20.6: begins with the next clock of the transmitter",
@@ -83,8 +84,7 @@ UART = [
         """,
         around=STAMP_CYCLES + STS + FROM_IDLE,
     ),
-    Row(
-        group="UART, 500,000 baud",
+    uart(
         what="bytes received without a gap: RXC0 to RXC0",
         expected=BYTE,
         source="20.4, table 20-1",
@@ -104,8 +104,7 @@ UART = [
         board_only_shown="the computer's serial adapter decides",
     ),
     *(
-        Row(
-            group="UART, 500,000 baud",
+        uart(
             what=f"{count} bytes that nobody reads for 20 ms: {'DOR0' if flag else 'bytes kept'}",
             expected=int(count > 3) if flag else 3,
             source="20.7.4: 2 in the buffer, 1 in the shift register",
@@ -119,6 +118,7 @@ UART = [
 
 # ---- UART: bits at the TX pin, which is pin 1; read at PIND, and by its pin-change interrupt ----
 
+tx_bits = partial(Row, group="UART, bits at the TX pin")
 SAMPLE = 2  # cycles of SBIC or SBIS with an INC that it may skip
 
 
@@ -150,8 +150,7 @@ def bit_at_pin(what: str, byte: int, frames: int, high: bool, window: tuple[floa
     bit = divider * (3 + 1)
     begin, end = (round(bit * edge) for edge in window)
     wait = begin // 3  # cycles of DEC and BRNE, at most 255 times
-    return Row(
-        group=TX_BITS,
+    return tx_bits(
         what=f"{what}, {divider} (UBRR0 + 1), UBRR0 = 3",
         expected=bit,
         source="table 20-1",
@@ -179,8 +178,7 @@ def bit_at_pin(what: str, byte: int, frames: int, high: bool, window: tuple[floa
 
 def seven_bits(divider: int, ubrr: int) -> Row:
     """From the second edge of 0x0E, the first that comes in sleep, to the fourth: all data bits but the first."""
-    return Row(
-        group=TX_BITS,
+    return tx_bits(
         what=f"seven data bits, {divider} (UBRR0 + 1), UBRR0 = {ubrr}: from edge to edge",
         expected=7 * divider * (ubrr + 1),
         source="table 20-1, figure 20-4",
@@ -203,7 +201,6 @@ def seven_bits(divider: int, ubrr: int) -> Row:
     )
 
 
-TX_BITS = "UART, bits at the TX pin"
 UART_BITS = [
     *(
         row
@@ -220,11 +217,11 @@ UART_BITS = [
 
 # ---- ADC, clk/128 ----
 
+adc = partial(Row, group="ADC, clk/128")
 ADC_CLOCK = 128
 ADC_ON = "1 << ADEN | 7"
 ADC = [
-    Row(
-        group="ADC, clk/128",
+    adc(
         what="first conversion, switched on with it: 25 clocks, begun with the next one",
         expected=(25 * ADC_CLOCK, 26 * ADC_CLOCK),
         source="table 24-1",
@@ -238,8 +235,7 @@ ADC = [
         """,
         around=STAMP_CYCLES + STS + FROM_IDLE,
     ),
-    Row(
-        group="ADC, clk/128",
+    adc(
         what="conversion: 13 clocks, begun with the next one",
         expected=(13 * ADC_CLOCK, 14 * ADC_CLOCK),
         source="table 24-1",
@@ -252,8 +248,7 @@ ADC = [
         """,
         around=STAMP_CYCLES + STS + FROM_IDLE,
     ),
-    Row(
-        group="ADC, clk/128",
+    adc(
         what="free running: conversion to conversion, 13 clocks",
         expected=13 * ADC_CLOCK,
         source="table 24-1, figure 24-7",
@@ -271,6 +266,7 @@ ADC = [
 
 # ---- EEPROM ----
 
+eeprom = partial(Row, group="EEPROM")
 CELL = """
   ldi r24, lo8(1023)
   out EEARL, r24
@@ -284,8 +280,7 @@ EEPROM_IDLE = "7: sbic EECR, EEPE\nrjmp 7b"
 def window(nops: int) -> Row:
     """EEPE is set `nops` + 2 cycles after EEMPE."""
     begun = nops + SBI <= 4
-    return Row(
-        group="EEPROM",
+    return eeprom(
         what=f"EEPE {nops + SBI} cycles after EEMPE: a write begins",
         expected=int(begun),
         source="8.6.3: within four clock cycles",
@@ -309,24 +304,21 @@ def window(nops: int) -> Row:
 
 
 EEPROM = [
-    Row(
-        group="EEPROM",
+    eeprom(
         what="reading a byte: OUT and the CPU's halt",
         expected=1 + 4,
         source="8.6.3: halted for four cycles",
         code=f"{CELL}\nldi r24, 1 << EERE\nbegin\nout EECR, r24\nfinish",
         around=STAMP_CYCLES,
     ),
-    Row(
-        group="EEPROM",
+    eeprom(
         what="beginning a write: SBI and the CPU's halt",
         expected=SBI + 2,
         source="8.6.3: halted for two cycles",
         code=f"{CELL}\nbegin\nsbi EECR, EEMPE\nsbi EECR, EEPE\nfinish\n{EEPROM_IDLE}",
         around=STAMP_CYCLES + SBI,
     ),
-    Row(
-        group="EEPROM",
+    eeprom(
         what="erasing and writing a byte, 3.4 ms, by the chip's own oscillator",
         expected=CPU_HZ * 34 // 10_000,
         source="table 8-1",
@@ -348,6 +340,7 @@ EEPROM = [
 
 # ---- two-wire interface, TWBR = 72: 100 kHz; nobody answers ----
 
+two_wire = partial(Row, group="Two-wire interface, 100 kHz")
 TWI_BIT = 16 + 2 * 72
 TWI_COMMAND = "1 << TWINT | 1 << TWEN | 1 << TWIE"
 TWI_START = f"""
@@ -362,8 +355,7 @@ TWI_START = f"""
 """
 TWI_STOP = "store TWCR, 1 << TWINT | 1 << TWEN | 1 << TWSTO\n7: lds r24, TWCR\nsbrc r24, TWSTO\nrjmp 7b\nsts TWCR, r1"
 TWO_WIRE = [
-    Row(
-        group="Two-wire interface, 100 kHz",
+    two_wire(
         what="address and answer: 9 bits, from TWINT cleared to TWINT set",
         expected=(9 * TWI_BIT, 9 * TWI_BIT + TWI_BIT // 2),
         source="22.5.2, figure 22-9: SCL is low before the first bit",
@@ -378,8 +370,7 @@ TWO_WIRE = [
         around=STAMP_CYCLES + STS + FROM_IDLE,
         board_only_shown=PULL_UPS,
     ),
-    Row(
-        group="Two-wire interface, 100 kHz",
+    two_wire(
         what="period of SCL, by the pin-change interrupt of A5",
         expected=TWI_BIT,
         source="22.5.2: 16 + 2 TWBR",
@@ -407,6 +398,7 @@ TWO_WIRE = [
 
 # ---- watchdog: interrupt only; Timer 1 counts by 64 ----
 
+watchdog_row = partial(Row, group="Watchdog, 128 kHz by its own oscillator")
 WATCHDOG_CYCLES = CPU_HZ // 128_000 * 2048
 WATCHDOG_OFF = """
   wdr
@@ -417,8 +409,7 @@ WATCHDOG_OFF = """
 
 def watchdog(step: int) -> Row:
     """From time-out to time-out, at most four seconds."""
-    return Row(
-        group="Watchdog, 128 kHz by its own oscillator",
+    return watchdog_row(
         what=f"time-out to time-out, {16 << step} ms nominal",
         expected=WATCHDOG_CYCLES << step,
         source="table 11-2: 2048 cycles and doublings",

@@ -6,10 +6,12 @@ Capture needs no wire: pin 8 is an output that the program moves, and the captur
 
 from __future__ import annotations
 
+from functools import partial
+
 from hil_tests.calibration.interrupts import ENTRY, JMP
 from hil_tests.calibration.rows import LAP, Row
 
-GROUP = "Timers"
+row = partial(Row, group="Timers")
 PRESCALERS_0 = {1: 1, 2: 8, 3: 64, 4: 256, 5: 1024}  # table 15-9
 INFRARED_TOP = 210  # 37.9 kHz, the carrier of the infrared detectors
 
@@ -19,8 +21,7 @@ TWO_INTERRUPTS = "clr r8\nsleep_until 3\nmovw r2, r4\nsleep_until 4"
 
 def timer_0(clock_select: int, divider: int, top: int) -> Row:
     """The time from match to match."""
-    return Row(
-        group=GROUP,
+    return row(
         what=f"Timer 0, clear on match at {top}, clk/{divider}: match to match",
         expected=divider * (top + 1),
         source="15.7.2",
@@ -44,8 +45,7 @@ def timer_0(clock_select: int, divider: int, top: int) -> Row:
 
 def timer_2(top: int) -> Row:
     """The carrier of the infrared detectors."""
-    return Row(
-        group=GROUP,
+    return row(
         what=f"Timer 2, clear on match at {top}, clk/1: match to match",
         expected=top + 1,
         source="18.7.2",
@@ -67,8 +67,7 @@ def timer_2(top: int) -> Row:
 def capture(noise_filter: int) -> Row:
     """The count that is captured against the cycle at whose end the pin moves."""
     cancelled = 4 * noise_filter
-    return Row(
-        group=GROUP,
+    return row(
         what=f"Timer 1, capture {'with' if noise_filter else 'without'} noise canceller: from edge to count kept",
         expected=3 + cancelled,
         source="16.6.2: 4 cycles; 17.3: 2.5 to 3.5" if noise_filter else "16.6.1, 17.3: 2.5 to 3.5",
@@ -101,8 +100,7 @@ def capture(noise_filter: int) -> Row:
 
 
 ROWS = [
-    Row(
-        group=GROUP,
+    row(
         what="Timer 1, normal, clk/1: compare A to compare B, 400 counts apart",
         expected=400,
         source="16.9.1",
@@ -118,8 +116,7 @@ ROWS = [
           sts TIMSK1, r1
         """,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="Timer 1, normal, clk/1: compare A to compare A, one lap later",
         expected=LAP,
         laps=1,
@@ -135,8 +132,7 @@ ROWS = [
           sts TIMSK1, r1
         """,
     ),
-    Row(
-        group=GROUP,
+    row(
         what="Timer 1, overflow: the count at which its interrupt begins, from idle sleep",
         expected=0,
         source="16.9.1, figure 16-12",
@@ -152,8 +148,7 @@ ROWS = [
         around=ENTRY + 4 + JMP + 1,
         unit="counts",
     ),
-    Row(
-        group=GROUP,
+    row(
         what="Timer 1, compare output A: counts from the match to the edge at pin 9",
         expected=1,
         source="16.8, figure 16-10",

@@ -13,6 +13,7 @@ from sim_bridge.timing.loads import Bench
 from sim_bridge.timing.measure import CLOCK_HZ, Run, run
 from sim_bridge.timing.scenarios import load, numbers_of, prepare
 from tools import timing_page
+from tools.avr_program import IMAGES
 from tools.bench.figures import Peer, figure
 from tools.timing_promises import PROMISES, Promise
 
@@ -70,7 +71,7 @@ def _reached(image: str, promise: Promise) -> float:
     return found
 
 
-for _image in timing_page.IMAGES:
+for _image in IMAGES:
     for _promise in PROMISES:
         figure(f"timing: {_image}, {_promise.load}: {_promise.what}", _promise.unit, at_most=_promise.most)(
             functools.partial(_reached, _image, _promise)

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from tools.bench.avr_program import SOURCES, flags
+from tools.avr_program import IMAGES, SOURCES, flags
 
-IMAGES = Path(__file__).resolve().parents[2] / "build" / "images"
-PIN_MAPS = ("shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot")
+FOLDER = Path(__file__).resolve().parents[2] / "build" / "images"
 NOT_SAID = 0xFFFFFFFF
 PROGRAM = """
 #include <stdint.h>
@@ -68,14 +67,14 @@ def test_a_bound_takes_no_code_and_follows_its_function(tmp_path: Path) -> None:
     assert sorted(row[1:] for row in rows) == [(200, NOT_SAID), (NOT_SAID, 70000)], "none of `unused`"
 
 
-@pytest.mark.parametrize("pin_map", PIN_MAPS)
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_rows_are_not_loaded(pin_map: str) -> None:
-    with (IMAGES / f"{pin_map}.elf").open("rb") as file:
+    with (FOLDER / f"{pin_map}.elf").open("rb") as file:
         elf = ELFFile(file)
         sections = {section.name: section for section in elf.iter_sections()}
         for name in (".boebot.loops", ".boebot.timing"):
             assert sections[name]["sh_size"] > 0
             assert sections[name]["sh_flags"] == 0
         loaded = sections[".text"]["sh_size"] + sections[".data"]["sh_size"]
-    records = (IMAGES / f"{pin_map}.hex").read_text(encoding="ascii").split()
+    records = (FOLDER / f"{pin_map}.hex").read_text(encoding="ascii").split()
     assert sum(int(record[1:3], 16) for record in records if record[7:9] == "00") == loaded

@@ -5,15 +5,10 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+from tools import avr_program
+
 PROJECT = Path(__file__).resolve().parents[2]
 IMAGES = PROJECT / "build" / "images"
-IMAGE_OF = {
-    "uno": "shieldbot",
-    "uno_basic": "shieldbot-basic",
-    "uno_quad": "shieldbot-quad",
-    "uno_line": "shieldbot-line",
-    "uno_boebot": "boebot",
-}
 
 
 def pio(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -24,10 +19,10 @@ def test_it_builds_the_images_that_everybody_loads() -> None:
     done = pio("run")
     assert done.returncode == 0, done.stdout + done.stderr
     built = PROJECT / "build" / "platformio" / "build"
-    for environment, pin_map in IMAGE_OF.items():
+    for image, section in avr_program.IMAGES.items():
         for suffix in (".elf", ".hex"):
-            assert (IMAGES / f"{pin_map}{suffix}").read_bytes() == (
-                built / environment / f"firmware{suffix}"
+            assert (IMAGES / f"{image}{suffix}").read_bytes() == (
+                built / section.removeprefix("env:") / f"firmware{suffix}"
             ).read_bytes()
 
 

@@ -10,8 +10,9 @@ from elftools.elf.sections import SymbolTableSection
 
 from boebot.timing.program import Table
 from tools import timing_table
+from tools.avr_program import IMAGES
 
-IMAGES = timing_table.ROOT / "build" / "images"
+FOLDER = timing_table.ROOT / "build" / "images"
 TABLE = timing_table.read_table()
 
 
@@ -24,9 +25,9 @@ def lines_of(table: Table) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("pin_map", ["shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad", "boebot"])
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_an_image_carries_the_table(pin_map: str) -> None:
-    with (IMAGES / f"{pin_map}.elf").open("rb") as file:
+    with (FOLDER / f"{pin_map}.elf").open("rb") as file:
         elf = ELFFile(file)
         rows, symbols = elf.get_section_by_name(".boebot.timing"), elf.get_section_by_name(".symtab")
         assert rows is not None
