@@ -17,6 +17,7 @@ GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host
 GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
+ARENA_SCHEMA := host/boebot/arenas/bundled/schema.json
 IMAGES := build/images/shieldbot.elf build/images/shieldbot-line.elf build/images/shieldbot-basic.elf build/images/shieldbot-quad.elf build/images/boebot.elf
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -122,7 +123,7 @@ setup:
 
 clean:
 	@rm -rf build dist host/boebot/data sim_bridge/images host/*.egg-info *.egg-info
-	@rm -rf firmware/src/generated $(GENERATED)
+	@rm -rf firmware/src/generated $(GENERATED) $(ARENA_SCHEMA)
 	@find host sim_bridge -name '*.so' -delete
 	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
@@ -153,7 +154,7 @@ check-generated:
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
-ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(IMAGES)
+ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
 ready-bench: ready-test build/.done-system-bench build/avr8js/.done
 ready-soak: ready-bench build/.done-system-soak
@@ -216,6 +217,9 @@ build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) bu
 	@echo "Compiling the simulated world and the emulated boards"
 	@$(PYTHON_VENV) setup.py --quiet build_ext --inplace >build/core.log 2>&1 || { cat build/core.log; exit 1; }
 	@touch $@
+
+$(ARENA_SCHEMA): host/boebot/arenas/description.py host/boebot/arenas/reference.py | $(VENV)/.done-boebot
+	@$(PYTHON_VENV) -m boebot.arenas.reference --schema
 
 build/platformio-core/appstate.json: tools/prepare_platformio.py $(VENV)/.done-firmware \
 		$(shell find tools/platformio -name '*.py' -o -name '*.json')

@@ -211,7 +211,7 @@ def test_moving_shapes_are_where_their_path_says() -> None:
 
 @pytest.mark.unsanitized
 def test_schema_and_page_are_fresh() -> None:
-    """`python -m boebot.arenas.reference` renews them."""
+    """`make` renews the schema, `make pictures` the page."""
     assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == reference.schema()
     assert reference.page(PAGE) == PAGE
 

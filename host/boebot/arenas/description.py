@@ -1,7 +1,6 @@
 """What an arena file says: its keys with their units and limits, and what a description has to keep beyond its types.
 
-`bundled/schema.json` and the table in docs/reference/arenas.md are made from these types
-(reference.py).
+The JSON schema for editors and the tables in docs/reference/arenas.md are made from these types (reference.py).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Writes what documents arena files: `python -m boebot.arenas.reference [--pictures]`.
+"""Writes what documents arena files, from their types (description.py).
 
-* bundled/schema.json: the JSON schema of an arena file, made from the types (description.py);
-* the tables of keys in docs/reference/arenas.md, between its markers;
-* with --pictures, docs/images/arena-NAME.png of each bundled arena.
+python -m boebot.arenas.reference --schema      bundled/schema.json, the JSON schema of an arena file: `make`
+python -m boebot.arenas.reference --pictures    docs/images/arena-NAME.png of each bundled arena, and the tables of
+                                                keys in docs/reference/arenas.md: `make pictures`
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import msgspec
 from boebot import resources
 from boebot.arenas.arena import arena_names, load_arena
 from boebot.arenas.description import ArenaDescription
-from boebot.arenas.picture import draw
 
 SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
@@ -116,15 +115,18 @@ def _meaning(value: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Writes schema and page, and the pictures if they are wanted."""
-    (resources.folder("arenas") / "schema.json").write_text(schema(), encoding="utf-8")
-    if (root := resources.checkout()) is None:
-        return
-    document = root / "docs" / "reference" / "arenas.md"
-    document.write_text(page(document.read_text(encoding="utf-8")), encoding="utf-8")
-    if "--pictures" in sys.argv[1:]:
+    """Writes what is asked for."""
+    if sys.argv[1:] == ["--schema"]:
+        (resources.folder("arenas") / "schema.json").write_text(schema(), encoding="utf-8")
+    elif sys.argv[1:] == ["--pictures"] and (root := resources.checkout()) is not None:
+        from boebot.arenas.picture import draw
+
+        document = root / "docs" / "reference" / "arenas.md"
+        document.write_text(page(document.read_text(encoding="utf-8")), encoding="utf-8")
         for name in arena_names():
             draw(load_arena(name), root / "docs" / "images" / f"arena-{name}.png")
+    else:
+        sys.exit(__doc__)
 
 
 if __name__ == "__main__":
