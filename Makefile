@@ -108,7 +108,7 @@ firmware: ready-firmware
 wheel:
 	@$(SIDE_BY_SIDE) ready-run
 	@rm -rf build/bdist.*
-	@find build/lib.* -type f -not -name '*.so' -delete # what is compiled and linked for the checkout is so for the wheel
+	@find build/lib.* -type f -not -name '*.so' -delete # the wheel links the same objects as the checkout
 	@$(PYTHON_VENV) -m pip wheel --quiet --no-index --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 

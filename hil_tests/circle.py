@@ -1,6 +1,6 @@
 """The whole circle: firmware on an emulated board, its devices as parts at the pins, their models in an arena.
 
-A test builds an arena, puts a robot of its own description into it, and speaks with the board as with any other.
+A test builds an arena, puts a robot with its own description into it, and speaks with the board as with any other.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A test rig: one board on a bench, its serial line in our hands and, where it is emulated, its pins too.
+"""A test rig: one board, its serial line and, where it is emulated, its pins.
 
 Every wait is in the board's own time and says what it waits for.
 """
@@ -30,8 +30,8 @@ HOST_NONCE = 0x0A5A5A
 
 
 class Rig:
-    """Speaks frames with the board, one message at a time, without the kit's session layer: what is lost is not sent
-    again. It keeps the session open, though, and acknowledges events, unless told not to (`alive`, `acknowledges`)."""
+    """Exchanges frames with the board, one message at a time, without the kit's session layer: a lost frame is not sent
+    again. While `alive` it keeps the session open, and while `acknowledges` it acknowledges events."""
 
     def __init__(self, session: BoardSession) -> None:
         self.session = session
@@ -166,7 +166,7 @@ class Rig:
         return self.telemetry[-1]
 
     def devices(self, after_s: float = 0.0) -> messages.DevicesTelemetry:
-        """The slow devices as they are told after that long."""
+        """The next message of the slow devices after that time."""
         self.listen(after_s)
         self.answers.clear()
         return self.next(messages.DevicesTelemetry, 0.2)
@@ -242,7 +242,7 @@ class Rig:
         raise AssertionError("the board opens no session")
 
     def arm(self) -> None:
-        """Ends the latch that the newest telemetry tells of, and waits until a set-point would count."""
+        """Ends the latches in the newest telemetry, and waits until a set-point would count."""
         answer = self.request(messages.Arm, self.latest().latches)
         assert answer.status == messages.AnswerStatus.OK, messages.AnswerStatus(answer.status)
         self.latest()

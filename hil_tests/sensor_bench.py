@@ -1,5 +1,4 @@
-"""A board on a bench with sensors whose surroundings change at given cycles, and how old the readings are that its
-telemetry then tells."""
+"""A board with sensors whose surroundings change at given cycles, and the age of the readings in its telemetry."""
 
 from __future__ import annotations
 
@@ -51,7 +50,7 @@ class Surroundings:
         self._number = 0
 
     def begin(self, devices: Devices) -> None:
-        """Opens a session with those devices on, each told as often as it can be."""
+        """Opens a session with those devices on, each sent as often as it can be."""
         self.line.open()
         self.line.set("devices", int(devices))
         self.line.set("encoder_gap", 0)
@@ -97,15 +96,15 @@ class Surroundings:
     def ages(self, name: str, kind: type, shows: Callable[[Any, bool], bool]) -> Ages:
         """Of all changes of a stimulus, by the telemetry of that kind. `shows(message, state)`: it is of that state
         alone."""
-        told = [heard for heard in self.line.heard if isinstance(heard.message, kind)]
-        firsts = [heard.first for heard in told]
+        sent = [heard for heard in self.line.heard if isinstance(heard.message, kind)]
+        firsts = [heard.first for heard in sent]
         changes = self.stimuli[name].changes[1:]
         ages, delays = [], []
         for (cycle, state), (until, _) in pairwise(changes):
-            since = told[bisect_right(firsts, cycle) : bisect_right(firsts, until)]
+            since = sent[bisect_right(firsts, cycle) : bisect_right(firsts, until)]
             old = [number for number, heard in enumerate(since) if not shows(heard.message, state)]
             shown = old[-1] + 1 if old else 0
-            assert shown < len(since), f"{name}: a change was never told"
+            assert shown < len(since), f"{name}: a change was never sent"
             ages.append((since[shown - 1].first - cycle) / CYCLES_PER_US if old else 0.0)
             delays.append((since[shown].first - cycle) / CYCLES_PER_US)
         return Ages(name, np.array(ages), np.array(delays))

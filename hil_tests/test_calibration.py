@@ -55,7 +55,7 @@ def test_emulator_says_what_the_data_sheet_says(index: int) -> None:
 def test_every_time_is_measured_twice() -> None:
     for row, by_program, by_pin in zip(ROWS, measured().by_program, measured().by_pin, strict=True):
         assert by_program is not None
-        assert by_pin == (None if row.told else by_program), row.what
+        assert by_pin == (None if row.is_number else by_program), row.what
 
 
 def test_every_instruction_is_measured() -> None:
@@ -81,7 +81,7 @@ def changed(values: list[int | None], index: int, by: int) -> list[int | None]:
 @pytest.mark.parametrize("by", [-1, 1])
 def test_one_cycle_more_or_less_is_wrong(way: str, by: int) -> None:
     for index, row in enumerate(ROWS):
-        if isinstance(row.expected, tuple) or (row.told and way == "by_pin"):
+        if isinstance(row.expected, tuple) or (row.is_number and way == "by_pin"):
             continue
         off = replace(measured(), **{way: changed(getattr(measured(), way), index, by)})
         wrong = table.wrong_rows(table.Calibration(off))
@@ -89,7 +89,7 @@ def test_one_cycle_more_or_less_is_wrong(way: str, by: int) -> None:
         assert table.cells(table.Calibration(off), index)[4].endswith(": wrong")
 
 
-def test_a_known_difference_that_is_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_known_difference_that_is_none_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = (replace(ROWS[0], difference="it is said to be slow"), *ROWS[1:])
     monkeypatch.setattr(table, "ROWS", rows)
     assert len(table.wrong_rows(table.Calibration(measured()))) == 1

@@ -3,7 +3,7 @@
     python tools/requirements.py build|run|firmware|test|check ...
 
 `build` is what setup.py needs, `run` what the installed distribution needs; the others are its extras. The
-exact versions stand in requirements.lock, which pip takes as --constraint.
+exact versions are in requirements.lock, which pip takes as --constraint.
 """
 
 from __future__ import annotations

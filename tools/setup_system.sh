@@ -24,7 +24,7 @@ has_cargo() {
   return 1
 }
 
-# clang with the libraries of its fuzzer and sanitizers, which Debian keeps in a package of their own
+# clang with the libraries of its fuzzer and sanitizers, which Debian keeps in a separate package
 can_fuzz() {
   echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | clang -fsanitize=fuzzer,address,undefined -x c -o /dev/null -
 }

@@ -202,7 +202,7 @@ def loads() -> str:
 
 
 def sensors(report: Report) -> str:
-    """How long a reading takes in hardware, how often it is taken, how old it is when it is told."""
+    """How long a reading takes in hardware, how often it is taken, how old it is when it is sent."""
     tick_ms = report.tick_cycles * 1000 / CLOCK_HZ
     rows = [
         [

@@ -23,7 +23,7 @@ HEAD = """# Timing table
 
 Made from `firmware/src/tasks.def` by `python -m tools.timing_table`; do not edit. Every task, interrupt and sensor
 stands there once: schedule, code, tests and analysis read the same rows, and each image carries them in its section
-`.boebot.timing`. Why a number is what it is stands in the table's own comments.
+`.boebot.timing`. The table's comments give the reasons of the numbers.
 
 One cycle is 1/16 µs, a slot 2.5 ms (40,000 cycles), a control tick 4 slots (10 ms).
 """

@@ -1,4 +1,4 @@
-// avr8js_run.js: runs the calibration program in avr8js and tells what it sent and when pin 13 changed.
+// avr8js_run.js: runs the calibration program in avr8js; prints what it sent, and when pin 13 changed.
 //
 // calibrate(avr8js, flash, answers, quiet): `flash` holds the program's bytes, `answers` what the program may ask for;
 // it is given up when it has sent nothing for `quiet` cycles. Returns the bytes sent with their cycles and the cycles of

@@ -51,7 +51,7 @@ def flash(port: str) -> None:
 
 
 def listen(port: str, watch: Watch = lambda awaited: None) -> list[int | None]:
-    """All rows, from a board that holds the program; `watch` is told what is awaited.
+    """All rows, from a board that holds the program; `watch` is called with the name of what comes next.
 
     Raises:
         BoardError: no such port, another program, or it stopped talking.

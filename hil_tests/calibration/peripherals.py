@@ -109,7 +109,7 @@ UART = [
             expected=int(count > 3) if flag else 3,
             source="20.7.4: 2 in the buffer, 1 in the shift register",
             code=f"{overrun(count)}\nmov r24, {'r21' if flag else 'r20'}",
-            told=True,
+            is_number=True,
             unit="flag" if flag else "bytes",
         )
         for count, flag in ((3, False), (3, True), (4, True))
@@ -172,7 +172,7 @@ def bit_at_pin(what: str, byte: int, frames: int, high: bool, window: tuple[floa
           mov r24, r21
           lsl r24
         """,
-        told=True,
+        is_number=True,
     )
 
 
@@ -298,7 +298,7 @@ def window(nops: int) -> Row:
           {EEPROM_IDLE}
           cbi EECR, EEMPE
         """,
-        told=True,
+        is_number=True,
         unit="flag",
     )
 

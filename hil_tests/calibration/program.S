@@ -1,7 +1,7 @@
 /* program.S: the frame of the calibration program; the measurements themselves come from rows.inc, which program.py
  * writes from the rows of this folder.
  *
- * The program waits for a '?', tells its name, and then of each row its number and what it measured, in hexadecimal:
+ * The program waits for a '?', then sends its name, and of each row its number and the result, in hexadecimal:
  * "=0012 0004". With ">3" it asks for three bytes. At the end it says "end" and waits again.
  *
  * A measurement lies between two stamps of Timer 1, which runs at clk/1. A stamp takes 6 cycles; it reads the count in
@@ -104,7 +104,7 @@ handler 21 /* ADC */
   inc r8
   reti
 
-handler 2 /* INT1: a stamp of its own */
+handler 2 /* INT1: another stamp */
   stamp r10, r11
   reti
 
@@ -179,7 +179,7 @@ report:
   sub r24, r2
   sbc r25, r3
 /* The number r25:r24. */
-tell:
+report_number:
   cli
   movw r18, r24
   rcall fresh_line

@@ -17,7 +17,7 @@ ROWS: tuple[Row, ...] = (*instructions.ROWS, *interrupts.ROWS, *timers.ROWS, *pe
 
 
 def _code(row: Row) -> str:
-    return f"{row.code}\ncall {'tell' if row.told else 'report'}\n"
+    return f"{row.code}\ncall {'report_number' if row.is_number else 'report'}\n"
 
 
 def source() -> str:
@@ -26,7 +26,7 @@ def source() -> str:
 
 
 def name() -> str:
-    """What the program says of itself: whoever hears another name talks to another program."""
+    """The name that the program sends; another name means another program."""
     return f"boebot calibration {zlib.crc32((FRAME.read_text(encoding='ascii') + source()).encode()):08X}"
 
 

@@ -17,7 +17,7 @@ LAP = 65_536  # counts of Timer 1
 class Row:
     """One measurement.
 
-    `code` holds `begin` and `finish`, or leaves the stamps r3:r2 and r5:r4, or, with `told`, a number in r25:r24.
+    `code` holds `begin` and `finish`, or leaves the stamps r3:r2 and r5:r4, or, with `is_number`, a number in r25:r24.
     """
 
     group: str
@@ -26,7 +26,7 @@ class Row:
     source: str  # where the data sheet says so
     code: str
     around: int = 0  # cycles of what stands around the measured thing and is measured with it
-    told: bool = False  # a number that is no time between two stamps
+    is_number: bool = False  # a number that is no time between two stamps
     scale: int = 1  # cycles for each count of Timer 1
     laps: int = 0  # of Timer 1 between the stamps, which do not show in the number
     edges: tuple[int, int] = (-2, -1)  # which of the row's edges at pin 13 are the two stamps

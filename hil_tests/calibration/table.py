@@ -28,7 +28,7 @@ class Calibration:
 
 def is_right(row: Row, by_program: int | None, by_pin: int | None) -> bool:
     """Whether both ways of measuring say what the data sheet says; the pin says nothing of some rows."""
-    values = [by_program] if row.told else [by_program, by_pin]
+    values = [by_program] if row.is_number else [by_program, by_pin]
     return all(value is not None and row.is_right(value) for value in values)
 
 
@@ -59,7 +59,7 @@ def _both(row: Row, by_program: int | None, by_pin: int | None) -> str:
     if by_program is None:
         return NOT_REACHED
     text = str(by_program)
-    if not row.told and by_pin != by_program:
+    if not row.is_number and by_pin != by_program:
         text += f", at the pin {NOT_REACHED if by_pin is None else by_pin}"
     return text if is_right(row, by_program, by_pin) else f"{text}: wrong"
 

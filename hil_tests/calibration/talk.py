@@ -87,7 +87,7 @@ def at_pin(talk: Talk, byte_cycles: list[int], edge_cycles: list[int]) -> list[i
             start, end = talk.lines[i]
             until = byte_cycles[start]
             edges = [cycle for cycle in edge_cycles if since <= cycle < until]
-            if not row.told and len(edges) >= -min(row.edges):
+            if not row.is_number and len(edges) >= -min(row.edges):
                 value = row.value_at_pin(edges[row.edges[1]] - edges[row.edges[0]])
             since = byte_cycles[end - 1]
         values.append(value)

@@ -93,7 +93,7 @@ def capture(noise_filter: int) -> Row:
           store TCCR1B, 1 << CS10
           movw r24, r12
         """,
-        told=True,
+        is_number=True,
         around=1 + 2 + 2 + 2,  # from the reading in `begin` to the end of the SBI that moves the pin
         unit="counts",
     )
@@ -144,7 +144,7 @@ ROWS = [
           sts TIMSK1, r1
           movw r24, r4
         """,
-        told=True,
+        is_number=True,
         around=ENTRY + 4 + JMP + 1,
         unit="counts",
     ),
@@ -177,9 +177,9 @@ ROWS = [
           sts TCCR1A, r1
           cbi DDRB, 1
         """,
-        # The first sample is taken 32 counts after the one that `begin` read, the first that sees the edge one cycle
+        # The first sample comes 32 counts after the one that `begin` read, the first that sees the edge one cycle
         # after it (figure 14-4).
-        told=True,
+        is_number=True,
         around=9,
         unit="counts",
     ),

@@ -1,4 +1,4 @@
-"""The other side of a line for the bench, in a process of its own.
+"""The other side of a line for the bench, in another process.
 
     python -m tools.bench.board_side ticks|answers FILE COUNT
 

@@ -1,7 +1,7 @@
 /* plain_simavr.c: the firmware image in simavr as it is published, with its own run loop, nothing on its pins and nobody
  * on its line: what our emulated board is measured against.
  *
- *   plain_simavr IMAGE.hex SECONDS      prints the wall-clock seconds that so many board seconds took
+ *   plain_simavr IMAGE.hex SECONDS      prints the wall-clock seconds of a run of SECONDS board seconds
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (it links simavr) */
 #include <stdio.h>

@@ -40,7 +40,7 @@ def allocated() -> int:
 
 
 def placed(worlds: int, threads: int, edges: int, laser: str | None) -> Batch:
-    """Worlds in the room, each with a seed of its own. Robots with a laser stand between pillars and turn there."""
+    """Worlds in the room, each with another seed. Robots with a laser stand between pillars and turn there."""
     from sim_bridge.batch import Batch
     from tools.bench import scene
 
@@ -68,7 +68,7 @@ def wander() -> CompiledBrain:
 
 @functools.cache
 def runner(worlds: int, threads: int, edges: int, laser: str | None) -> tuple[Callable[[int], Any], int]:
-    """Runs so many steps of all worlds with the compiled brain; and the steps that take long enough."""
+    """A function that runs a number of steps of all worlds with the compiled brain; and how many take long enough."""
     batch = placed(worlds, threads, edges, laser)
     run = functools.partial(batch.run, wander())
     steps = 1
@@ -116,7 +116,7 @@ def python(edges: int, steps: int = 100_000) -> float:
 
 
 def memory(laser: bool = False, worlds: int = 200) -> float:
-    """Bytes that the C heap gives to a world and all that is its own, movers, fan, readings, brain; not the arena."""
+    """Bytes that the C heap gives to a world and its movers, fan, readings and brain; not the arena."""
     kind = "noise" if laser else None
     placed(16, 1, 48, kind).run(wander(), 1000)  # what all share is there
     before = allocated()
@@ -126,7 +126,7 @@ def memory(laser: bool = False, worlds: int = 200) -> float:
 
 
 def memory_of_edges(edges: int, steps: int) -> float:
-    """Bytes per edge of an arena with its index, and with the lists that so many steps of 16 robots make."""
+    """Bytes per edge of an arena with its index, and with the lists that `steps` of 16 robots make."""
     from tools.bench import scene
 
     of_a_world = memory()

@@ -1,4 +1,4 @@
-"""Bounds of loops (firmware/src/bounds.h): the image tells them and where they are, and they cost nothing."""
+"""Bounds of loops (firmware/src/bounds.h): the image holds them and their addresses, and they cost nothing."""
 
 from __future__ import annotations
 

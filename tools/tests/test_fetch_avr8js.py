@@ -1,4 +1,4 @@
-"""The second emulator is taken only as it was pinned."""
+"""The second emulator is used only as it was pinned."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tools import fetch_avr8js
 
 @pytest.fixture
 def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A stand-in for npm that is found, and nothing fetched yet."""
+    """An npm that is found, and nothing fetched yet."""
     tool = tmp_path / "npm"
     monkeypatch.setattr(fetch_avr8js, "FOLDER", tmp_path / "avr8js" / "package")
     monkeypatch.setattr(fetch_avr8js, "MARK", tmp_path / "avr8js" / "fetched")

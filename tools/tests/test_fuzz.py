@@ -11,7 +11,7 @@ import pytest
 from tools import fuzz
 from tools.error_rates.library import frame_source
 
-# The protection taken from frame.c, and what the fuzzer then says.
+# The protection left out of frame.c, and the assertion that the fuzzer then breaks.
 MISSED = {
     "checksum": r"memcmp\(again \+ 1",
     "exact length": r"came->count ==",

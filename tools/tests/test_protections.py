@@ -2,7 +2,7 @@
 test` looks whether each protection is where its row says.
 
 A row names the protection, the file that holds it, the text that is it, what stands there without it, and the file of
-firmware/test/test_units that must notice. The checks of a frame are taken away in test_fuzz.py and test_error_rates.py.
+firmware/test/test_units that must notice. The checks of a frame are left out in test_fuzz.py and test_error_rates.py.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import pytest
 
 from tools.fuzz import FIRMWARE, TEST, firmware_sources
 
-# As the environment `native` of platformio.ini, without warnings: what is taken away leaves names that nothing uses.
+# As the environment `native` of platformio.ini, without warnings: without a protection some names are not used.
 FLAGS = ("-DPIN_MAP_SHIELDBOT", "-w", f"-I{FIRMWARE}", f"-I{TEST}")
 C = ("gcc", "-std=gnu11", "-O1")
 DOCTEST = ("-isystem", "/usr/include/doctest", "-isystem", "/usr/local/include/doctest")
@@ -114,7 +114,7 @@ ROWS = (
     ),
     Row("acknowledgements name the event", "link/event_delivery.c", "arrived != number", "false", "event_delivery"),
     Row("touches of an earlier session", "link/session.c", "events_forget_touches();", "", "event_delivery"),
-    Row("what finds the queue full is told later", "events.c", "deferred++;", "return;", "events"),
+    Row("an event that finds the queue full is sent later", "events.c", "deferred++;", "return;", "events"),
     Row("touches that were merged", "events.c", "waits[what->kind] && what->kind", "false && 0", "events"),
     Row("what is left of a cut frame", "link/receive.c", "  frame_decoder_cut(&receive_decoder);\n", "", "link"),
     Row("bytes that found no room are counted", "link/receive.c", "  counters_lose_bytes();\n", "", "link"),
@@ -142,9 +142,7 @@ def without(row: Row) -> str:
     """The text of the row's file without its protection."""
     text = (FIRMWARE / row.file).read_text(encoding="utf-8")
     found = text.count(row.text)
-    assert found == 1, (
-        f"{row.protection}: {row.file} holds {row.text!r} {found} times, not once; tell ROWS its new text"
-    )
+    assert found == 1, f"{row.protection}: {row.file} holds {row.text!r} {found} times, not once; correct ROWS"
     return text.replace(row.text, row.instead)
 
 

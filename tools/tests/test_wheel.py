@@ -18,7 +18,7 @@ PROJECT = Path(__file__).resolve().parents[2]
 
 
 def without_network(command: list[str]) -> list[str]:
-    """The command in a network namespace of its own; where this system makes none, a warning says so."""
+    """The command in a network namespace without a network; a warning where this system makes none."""
     unshare = shutil.which("unshare") or "unshare"
     for isolate in ([unshare, "--net"], [unshare, "--net", "--map-root-user"]):
         if (

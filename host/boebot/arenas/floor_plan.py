@@ -17,7 +17,7 @@ from boebot.arenas.arena import Arena, Floats
 
 SAMPLE_S = 0.05  # from one pose of a moving shape to the next
 SAMPLES_MAXIMUM = 20_000  # of one moving shape; longer times have them farther apart
-LOOKED_OVER_M = 0.10  # the highest sensor, a laser, sits so high: what is lower is not seen by all of them
+LOOKED_OVER_M = 0.10  # the highest sensor, a laser, sits here: lower things are not seen by all sensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,7 +252,7 @@ def moving_solids(arena: Arena) -> list[Solid]:
 
 
 def _times(arena: Arena, begin: float, end: float, late: Sequence[Lateness]) -> Floats:
-    """When poses are taken: evenly, and wherever a shape begins or ends to wait or passes a waypoint, between which it
+    """Times of the poses: evenly, and wherever a shape begins or ends to wait or passes a waypoint, between which it
     goes straight (paths.h)."""
     bends = [row.time for row in late]
     for k, moving in enumerate(arena.description.moving):

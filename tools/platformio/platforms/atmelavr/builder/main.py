@@ -1,4 +1,4 @@
-"""SCons script of the stand-in platform `atmelavr`: builds an AVR program without a framework and uploads it.
+"""SCons script of the local platform `atmelavr`: builds an AVR program without a framework and uploads it.
 
 The flags are those that PlatformIO's own platform gives to a project without a framework: both build alike.
 """

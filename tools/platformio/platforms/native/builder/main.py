@@ -1,4 +1,4 @@
-"""SCons script of the stand-in platform `native`: builds a program for this computer."""
+"""SCons script of the local platform `native`: builds a program for this computer."""
 
 from SCons.Script import AlwaysBuild, Default, DefaultEnvironment
 
