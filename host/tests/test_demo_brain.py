@@ -62,7 +62,7 @@ def test_it_charges_on_the_station_and_leaves_it_full(result: RunResult, record:
     arrived, left = int(on[0]), next(k for k in range(on[0], len(low)) if record.steps[k].motor != "charge")
     tick = int(np.searchsorted(result.series.time, record.steps[arrived].time))
     x, y = result.true_pose.x[tick], result.true_pose.y[tick]
-    assert np.hypot(x - charger.x, y - charger.y) <= charger.radius
+    assert np.hypot(x - charger.x_m, y - charger.y_m) <= charger.radius_m
     assert low[arrived] > 1 - 1 / 3.2, "it came because 1.5 - 3.2 E exceeds 0.5"
     assert 1 - low[left] >= 2.9 / 3.2
     assert record.steps[left].motor == "wander"

@@ -18,7 +18,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import boebot
-from boebot.arenas.floor_plan import Charger, FloorPlan, Lamp, Moving, Patch, Solid
+from boebot.arenas.description import Charger, Light
+from boebot.arenas.floor_plan import FloorPlan, Moving, Patch, Solid
 from boebot.boards import Truth
 from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
@@ -53,8 +54,8 @@ PLAN = FloorPlan(
         Solid(kind="wall", points=np.array([(0.0, -0.3), (0.0, 0.3)])),
     ],
     patches=[Patch(corners=box(-1, -1), grip=0.9), Patch(corners=box(0, -1), grip=0.2)],
-    lamps=[Lamp(x=1.0, y=-1.0, height=0.1, power=1.0)],
-    charger=Charger(x=1.6, y=-1.6, radius=0.2),
+    lamps=[Light(x_m=1.0, y_m=-1.0, height_m=0.1, power_w=1.0)],
+    charger=Charger(x_m=1.6, y_m=-1.6, radius_m=0.2),
     moving=[Moving(solid=Solid(kind="disc", points=np.zeros((1, 2)), radius=0.15), **WAY)],
 )
 # where, and what colour is there; off the middle, where a word may stand

@@ -33,8 +33,8 @@ def test_showcase_is_told_whole() -> None:
     assert np.array_equal(by_name["screen"].points, [(0.6, 0.4), (0.9, 0.7), (0.9, 1.1)])
     assert np.array_equal(by_name["pillar"].points, [(0.2, -0.9)]) and by_name["pillar"].radius == 0.15
     assert [(patch.name, patch.grip) for patch in plan.patches] == [("carpet", 0.9), ("wet floor", 0.15)]
-    assert [(lamp.x, lamp.y, lamp.power, lamp.height) for lamp in plan.lamps] == [(1.6, 1.2, 5.0, 0.25)]
-    assert plan.charger is not None and (plan.charger.x, plan.charger.y, plan.charger.radius) == (1.6, 1.2, 0.15)
+    assert [(lamp.x_m, lamp.y_m, lamp.power_w, lamp.height_m) for lamp in plan.lamps] == [(1.6, 1.2, 5.0, 0.25)]
+    assert plan.charger is not None and (plan.charger.x_m, plan.charger.y_m, plan.charger.radius_m) == (1.6, 1.2, 0.15)
     assert [moving.solid.name for moving in plan.moving] == ["cart", "ball"]
 
 

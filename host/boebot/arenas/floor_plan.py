@@ -112,26 +112,6 @@ class Line:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lamp:
-    """A lamp and its power (W)."""
-
-    x: float
-    y: float
-    height: float
-    power: float
-    name: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Charger:
-    """A charging station: a disc on the floor."""
-
-    x: float
-    y: float
-    radius: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class FloorPlan:
     """An arena from above; `grip`: of tyres on the floor outside of all patches."""
 
@@ -140,8 +120,8 @@ class FloorPlan:
     solids: Sequence[Solid] = field(default=(), repr=False)
     patches: Sequence[Patch] = field(default=(), repr=False)
     lines: Sequence[Line] = field(default=(), repr=False)
-    lamps: Sequence[Lamp] = field(default=(), repr=False)
-    charger: Charger | None = None
+    lamps: Sequence[description.Light] = field(default=(), repr=False)
+    charger: description.Charger | None = None
     moving: Sequence[Moving] = field(default=(), repr=False)
     grip: float = 0.7
 
@@ -180,7 +160,6 @@ def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
         poses: x, y (m), cosine and sine of the heading of each shape: shape (shapes, 4, times).
     """
     described = arena.description
-    charger = described.charger
     return FloorPlan(
         name=arena.name,
         title=described.title,
@@ -196,11 +175,8 @@ def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
             )
             for line in described.line
         ],
-        lamps=[
-            Lamp(x=light.x_m, y=light.y_m, height=light.height_m, power=light.power_w, name=light.name)
-            for light in described.light
-        ],
-        charger=None if charger is None else Charger(x=charger.x_m, y=charger.y_m, radius=charger.radius_m),
+        lamps=described.light,
+        charger=described.charger,
         moving=[
             Moving(solid=solid, time=time, x=x, y=y, heading=np.unwrap(np.arctan2(sine, cosine)))
             for solid, (x, y, cosine, sine) in zip(moving_solids(arena), poses, strict=True)

@@ -39,7 +39,7 @@ def draw_arena(axes: Axes, plan: FloorPlan) -> None:
     for solid in plan.obstacles:
         _draw_solid(axes, solid)
     for lamp in plan.lamps:
-        axes.plot(lamp.x, lamp.y, marker="*", ms=13, color=style.LAMP, mec=style.EDGE, mew=0.8, ls="", zorder=4.5)
+        axes.plot(lamp.x_m, lamp.y_m, marker="*", ms=13, color=style.LAMP, mec=style.EDGE, mew=0.8, ls="", zorder=4.5)
     for moving in plan.moving:
         _draw_moving(axes, moving)
     _draw_labels(axes, plan)
@@ -93,9 +93,13 @@ def _draw_floor(axes: Axes, plan: FloorPlan) -> None:
         axes.add_patch(_ribbon(line))
     if (charger := plan.charger) is not None:
         axes.add_patch(
-            Circle((charger.x, charger.y), charger.radius, fc=style.CHARGER, ec=style.CHARGER, alpha=0.35, zorder=0.7)
+            Circle(
+                (charger.x_m, charger.y_m), charger.radius_m, fc=style.CHARGER, ec=style.CHARGER, alpha=0.35, zorder=0.7
+            )
         )
-        axes.add_patch(Circle((charger.x, charger.y), charger.radius, fill=False, ec=style.CHARGER, lw=1.2, zorder=0.7))
+        axes.add_patch(
+            Circle((charger.x_m, charger.y_m), charger.radius_m, fill=False, ec=style.CHARGER, lw=1.2, zorder=0.7)
+        )
 
 
 def _ribbon(line: Line) -> PathPatch:
@@ -160,7 +164,7 @@ def _draw_labels(axes: Axes, plan: FloorPlan) -> None:
     for patch in plan.patches:
         _label(axes, _middle(patch.corners), f"grip {patch.grip:g}", "center")
     if (charger := plan.charger) is not None:
-        _label(axes, (charger.x, charger.y - charger.radius), "charger", "below")
+        _label(axes, (charger.x_m, charger.y_m - charger.radius_m), "charger", "below")
     for solid in (*plan.obstacles, *(moving.at(float(moving.time[0])) for moving in plan.moving)):
         if not (said := solid.remarks):
             continue

@@ -72,8 +72,8 @@ def plan_data(plan: FloorPlan) -> dict[str, Any]:
             for patch in plan.patches
         ],
         "lines": [{"points": _points(line.points), "width": line.width, "dark": line.is_dark} for line in plan.lines],
-        "lamps": [[lamp.x, lamp.y] for lamp in plan.lamps],
-        "charger": None if charger is None else [charger.x, charger.y, charger.radius],
+        "lamps": [[lamp.x_m, lamp.y_m] for lamp in plan.lamps],
+        "charger": None if charger is None else [charger.x_m, charger.y_m, charger.radius_m],
         "moving": [_moving(moving) for moving in plan.moving],
     }
 

@@ -102,7 +102,7 @@ def plan_bounds(plan: FloorPlan, places: Sequence[tuple[float, float]]) -> tuple
         corners += [np.array(place) for place in places]
         corners += [point for patch in plan.patches for point in patch.corners]
         corners += [point for line in plan.lines for point in line.points]
-        corners += [np.array((lamp.x, lamp.y)) for lamp in plan.lamps]
+        corners += [np.array((lamp.x_m, lamp.y_m)) for lamp in plan.lamps]
         corners += [point for moving in plan.moving for point in np.column_stack((moving.x, moving.y))]
     points = np.array(corners)
     low, high = points.min(axis=0), points.max(axis=0)
