@@ -7,7 +7,6 @@ something could not be measured at all.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -39,7 +38,6 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--port", help="serial port of a board, which is flashed and measured too")
     parser.add_argument("--no-flash", action="store_true", help="the board holds the program already")
-    parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
     parser.add_argument("--page", type=Path, metavar="FILE", help="write the table as a page of the documentation")
     chosen = parser.parse_args(arguments)
     try:
@@ -50,14 +48,11 @@ def main(arguments: list[str]) -> int:
         print(f"calibration: {error}", file=sys.stderr)
         return 2
     wrong = table.wrong_rows(result)
-    if chosen.json:
-        print(json.dumps(table.as_json(result), indent=2))
-    else:
-        console = Console(width=None if sys.stdout.isatty() else 180)
-        console.print(table.table(result))
-        console.print(table.summary(result), highlight=False)
-        for line in wrong:
-            console.print(f"Not as expected: {line}", markup=False, highlight=False)
+    console = Console(width=None if sys.stdout.isatty() else 180)
+    console.print(table.table(result))
+    console.print(table.summary(result), highlight=False)
+    for line in wrong:
+        console.print(f"Not as expected: {line}", markup=False, highlight=False)
     return int(bool(wrong))
 
 

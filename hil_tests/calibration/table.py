@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.table import Table
 
@@ -117,31 +116,3 @@ def page(result: Calibration) -> str:
         rows = [cells(result, i) for i, row in enumerate(ROWS) if row.group == group]
         parts.append(f"## {group}\n\n{ruler}\n" + "\n".join(f"| {' | '.join(row)} |" for row in rows))
     return "\n\n".join(part.strip() for part in parts) + "\n"
-
-
-def as_json(result: Calibration) -> dict[str, Any]:
-    """For programs. Values that were not measured are null."""
-
-    def both(measured: Measured | None, index: int) -> dict[str, Any] | None:
-        if measured is None:
-            return None
-        program, pin = measured.by_program[index], measured.by_pin[index]
-        return {"program": program, "pin": pin, "right": is_right(ROWS[index], program, pin)}
-
-    rows = []
-    for index, row in enumerate(ROWS):
-        low, high = row.expected if isinstance(row.expected, tuple) else (row.expected, row.expected)
-        rows.append(
-            {
-                "group": row.group,
-                "what": row.what,
-                "unit": row.unit,
-                "expected": [low, high],
-                "source": row.source,
-                "emulator": both(result.emulator, index),
-                "known_difference": row.difference or None,
-                "avr8js": both(result.avr8js, index),
-                "board": None if result.board is None else result.board[index],
-            }
-        )
-    return {"rows": rows, "wrong": wrong_rows(result)}
