@@ -177,9 +177,10 @@ setup(
     license_expression="MIT AND GPL-3.0-or-later" if HAS_SIMAVR else "MIT",
     license_files=["LICENSE", *(["LICENSES/GPL-3.0-or-later.txt"] if HAS_SIMAVR else [])],
     cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
-    package_dir={"boebot": "host/boebot", "sim_bridge": "sim_bridge"},
+    package_dir={"avr_timing": "host/avr_timing", "boebot": "host/boebot", "sim_bridge": "sim_bridge"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
+        *find_namespace_packages("host", include=["avr_timing", "avr_timing.*"], exclude=["avr_timing.tests"]),
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from avr_timing.flow.graph import load_program
+from avr_timing.interrupts.receive_times import DATA, RECEIVE
+from avr_timing.program import Program
 from boebot import resources
 from boebot.description import robots
-from boebot.timing.graph import load_program
-from boebot.timing.loads import ENCODERS, LOADS, RECEIVE, TICK
-from boebot.timing.program import Program
-from boebot.timing.receive_times import DATA
+from boebot.timing.loads import ENCODERS, LOADS, TICK
+from boebot.timing.table import read_table
 from sim_bridge.timing.measure import run
 
 pytestmark = pytest.mark.emulated
@@ -43,13 +44,13 @@ def cycles_up_to(program: Program, entry: str, mnemonic: str, address: int) -> i
 
 def test_no_received_byte_is_lost_that_is_taken_in_time(program: Program) -> None:
     """The latency's limit is the hardware's."""
-    row = next(row for row in program.table.interrupts if row.vector == RECEIVE)
+    row = next(row for row in read_table(IMAGE).interrupts if row.vector == RECEIVE)
     assert row.latency + cycles_up_to(program, "__vector_18", "lds", DATA) <= OVERRUN
 
 
-def test_noise_asks_no_oftener_than_the_overload_says(program: Program) -> None:
+def test_noise_asks_no_oftener_than_the_overload_says() -> None:
     """What masks a noisy line is the firmware; the load says how soon it does."""
-    (row,) = (row for row in program.table.interrupts if row.vector == ENCODERS)
+    (row,) = (row for row in read_table(IMAGE).interrupts if row.vector == ENCODERS)
     found = run(IMAGE, robots.load_robot("shieldbot-quad"), "overload", 0.5, seed=7, losses=False)
     came = found.spans[(found.spans["id"] == ENCODERS) & (found.spans["begin"] >= found.loaded_from)]["begin"]
     in_a_tick = np.searchsorted(came, came + TICK) - np.arange(len(came))

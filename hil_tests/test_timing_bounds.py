@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from avr_image import MARKS
-from boebot.timing.blocked import Blocked
-from boebot.timing.graph import load_program
-from boebot.timing.program import Program
-from boebot.timing.stack import Stack
-from boebot.timing.wcet import WorstCase
+from avr_timing.bounds.stack import Stack
+from avr_timing.bounds.wcet import WorstCase
+from avr_timing.flow.graph import load_program
+from avr_timing.interrupts.blocked import Blocked
+from avr_timing.program import Program
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import BoardAccess, Level
 

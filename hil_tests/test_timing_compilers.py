@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from boebot.errors import TimingError
-from boebot.timing.graph import load_program
-from boebot.timing.wcet import WorstCase
+from avr_timing.bounds.wcet import WorstCase
+from avr_timing.errors import AnalysisError
+from avr_timing.flow.graph import load_program
 from hil_tests.test_timing_bounds import HEAD, measured
 
 # The input: r24 and r25 are `a`, r22 and r23 are `b`; r20 and r21 are `c`.
@@ -85,5 +85,5 @@ def test_bound_is_what_the_longest_takes(tmp_path: Path, case: str) -> None:
 def test_refusal_names_the_line(tmp_path: Path) -> None:
     image = build(tmp_path, "while (x != 0) { y = a; }\n  return b;", "-gdwarf-2")
     line = PROGRAM.splitlines().index("  {body}") + 1
-    with pytest.raises(TimingError, match=rf"the loop at 0x[0-9A-F]{{4}} \(f\.c:{line}\) has no bound"):
+    with pytest.raises(AnalysisError, match=rf"the loop at 0x[0-9A-F]{{4}} \(f\.c:{line}\) has no bound"):
         WorstCase(load_program(image)).of("f")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from boebot.timing.constants import State, step
-from boebot.timing.elf import read_image
-from boebot.timing.instructions import decode
+from avr_timing.flow.constants import State, step
+from avr_timing.image.elf import read_image
+from avr_timing.image.instructions import decode
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
 

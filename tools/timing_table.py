@@ -9,7 +9,7 @@ import argparse
 import re
 from pathlib import Path
 
-from boebot.timing.program import InterruptRow, SensorRow, Table, TaskRow
+from boebot.timing.table import InterruptRow, SensorRow, Table, TaskRow
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "firmware" / "src" / "tasks.def"

@@ -11,17 +11,18 @@ from xml.etree import ElementTree
 import matplotlib.image
 import numpy as np
 import pytest
-from timing_program import build
 
+from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.response import responses
 from boebot.cli import timing, timing_tables
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError, TimingError
 from boebot.timing import budget, diagram, loads, realisable
-from boebot.timing.graph import load_program
+from boebot.timing.firmware import load_firmware
 from boebot.timing.measured import Measurement, Moment, Spans, Worst, merged
-from boebot.timing.program import InterruptRow
-from boebot.timing.response import responses
+from boebot.timing.table import InterruptRow
 from command import boebot as command
+from timing_program import build
 
 FIGURES = loads.LOADS["figures"]
 
@@ -96,7 +97,7 @@ def test_planted_faults_are_found(tmp_path: Path, options: dict[str, int], sente
 def judged(report: budget.Report, **cycles: int) -> budget.Report:
     """The same with other tasks."""
     costs = replace(report.costs, tasks=report.costs.tasks | cycles)
-    schedule = costs.schedule(load_program(Path(report.path)))
+    schedule = costs.schedule(load_firmware(Path(report.path)))
     answers = responses(schedule, report.sources)
     return replace(report, costs=costs, schedule=schedule, responses=answers)
 
@@ -212,7 +213,7 @@ def test_unknown_load_is_refused() -> None:
 def test_overload_asks_what_it_says() -> None:
     """50,000 bytes/s are one in 320 cycles; three lines of 4,000 edges/s one in 4,000 each, and noise on the fourth,
     which is masked after some in each tick."""
-    row = InterruptRow("receive", loads.RECEIVE, 60, 640, 320)
+    row = InterruptRow("receive", RECEIVE, 60, 640, 320)
     (bytes_,) = loads.LOADS["overload"].sources(row, 53)
     assert bytes_.requests(16_000_000) == 50_000
     edges = loads.LOADS["overload"].sources(replace(row, vector=loads.ENCODERS), 113)

@@ -7,16 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import timing_program
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import timing_program
+from avr_timing.interrupts.response import Piece, Schedule, Source, load
 from boebot import resources
-from boebot.timing import budget
+from boebot.timing import budget, loads
 from boebot.timing.changes import most_waiting
 from boebot.timing.costs import Costs
 from boebot.timing.loads import LOADS
-from boebot.timing.response import Piece, Schedule, Source, load
+from boebot.timing.table import Constants, InterruptRow
 
 ROUND, LOOP, FRAME, CHANGE = 100, 20, 2000, 10
 COSTS = Costs(
@@ -160,3 +161,13 @@ def test_ring_that_is_too_small_is_a_fault() -> None:
 def test_image_without_encoders_has_no_changes(tmp_path: Path) -> None:
     report = budget.prove(timing_program.build(tmp_path), LOADS["figures"])
     assert report.changes is None and report.notes == []
+
+
+def test_requests_come_closer_than_in_the_long_run() -> None:
+    """38 periods of 42.1 kHz in a burst, two bursts in a tick, 190 cycles from edge to edge; five changes of the
+    encoders at once."""
+    constants = Constants(**timing_program.CONSTANTS)
+    carrier = loads.densest(InterruptRow("carrier", loads.CARRIER, 0, 0, 952), constants)[0]
+    assert [carrier.requests(w) for w in (1, 190, 191, 1900, 160_000)] == [1, 1, 2, 10, 2 * 76]
+    changes = loads.densest(InterruptRow("changes", loads.ENCODERS, 0, 0, 1000), constants)[0]
+    assert [changes.requests(w) for w in (1, 1000, 1001)] == [5, 5, 6]

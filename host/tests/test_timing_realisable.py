@@ -14,8 +14,8 @@ from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
 from boebot.running import runner
 from boebot.timing import realisable
-from boebot.timing.program import SensorRow, Table, TaskRow
 from boebot.timing.realisable import BoardTimes, NotRealisableError, judge, telemetry_ticks
+from boebot.timing.table import SensorRow, Table, TaskRow
 from command import boebot as command
 from peer import InProcess, Peer
 

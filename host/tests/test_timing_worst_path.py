@@ -6,13 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
-import timing_program
 
+import timing_program
+from avr_timing.bounds.worst_path import PathRow
 from boebot import resources
 from boebot.cli import timing
 from boebot.timing import budget, loads
-from boebot.timing.graph import load_program
-from boebot.timing.worst_path import ACCEPTANCE, PathRow, WorstPath, worst_path
+from boebot.timing.firmware import load_firmware
+from boebot.timing.worst_path import ACCEPTANCE, WorstPath, worst_path
 from command import boebot as command
 
 # Five passes of 2 nops, dec and brne (2, at last 1), a function of 10 nops; on lines of their own.
@@ -46,7 +47,7 @@ def test_lines_have_the_cycles_counted_by_hand(image: Path) -> None:
     first = (
         timing_program.text().splitlines().index("__attribute__((noinline)) void first_task(void) { NOPS(100); }") + 1
     )
-    path = worst_path(load_program(image), "first")
+    path = worst_path(load_firmware(image), "first")
 
     def row(function: str, nth: int, cycles: int, runs: int, *passes: int) -> PathRow:
         return PathRow(function, f"program.c:{first + nth}", cycles, runs, passes)
@@ -64,7 +65,7 @@ def test_lines_have_the_cycles_counted_by_hand(image: Path) -> None:
 
 def test_interrupt_has_its_acceptance_and_its_vector(image: Path) -> None:
     """4 cycles, a jump of 3, 20 nops and the return."""
-    path = worst_path(load_program(image), "slot")
+    path = worst_path(load_firmware(image), "slot")
     assert path.rows[0] == PathRow(ACCEPTANCE, None, 4, 1, ()) and path.rows[1].cycles == 3
     assert path.kind == "interrupt" and path.cycles == summed(path) == 4 + 3 + 20 + 4
 
@@ -72,9 +73,9 @@ def test_interrupt_has_its_acceptance_and_its_vector(image: Path) -> None:
 def test_sums_are_the_bounds_of_a_real_image() -> None:
     """Every task and interrupt: with calls in loops, constants handed over, and library routines."""
     elf = resources.folder("images") / "shieldbot.elf"
-    program = load_program(elf)
-    rows = budget.prove(elf, loads.LOADS["figures"], program=program).rows
-    paths = {row.name: worst_path(program, row.name) for row in rows}
+    firmware = load_firmware(elf)
+    rows = budget.prove(elf, loads.LOADS["figures"], firmware=firmware).rows
+    paths = {row.name: worst_path(firmware, row.name) for row in rows}
     assert {name: summed(path) for name, path in paths.items()} == {row.name: row.bound for row in rows}
     assert any(max(row.passes, default=0) > 1 for path in paths.values() for row in path.rows)
     assert all(row.cycles >= 0 for path in paths.values() for row in path.rows)

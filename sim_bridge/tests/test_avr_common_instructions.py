@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from avr_timing.image.instructions import decode
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.timing.instructions import decode
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.tests.avr_program import Machine

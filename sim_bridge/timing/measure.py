@@ -18,7 +18,6 @@ from boebot.description import robots
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.timing.elf import read_image
 from boebot.timing.measured import Measurement, Worst, merged
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
@@ -92,15 +91,14 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     Raises:
         BoardError: there is no such scenario or length; the program crashed, hung or was reset by the watchdog, or its
             stack overflowed: the error names cycle, address, function and line.
-        TimingError: the image is no ELF file of a program.
+        AnalysisError: the image is no ELF file of a program.
     """
     if scenario not in SCENARIOS:
         raise BoardError(f"there is no scenario {scenario!r}; expected one of {', '.join(SCENARIOS)}")
     least = SILENCE / CLOCK_HZ if scenario == "everything" else 0.0
     if not least < seconds <= 3600:
         raise BoardError(f"scenario {scenario} for {seconds:g} s; expected more than {least:g} s and at most 3600 s")
-    said = read_image(image)
-    what = watched(said)
+    what = watched(image)
     board = avr.create(image)
     board.record(what.watch)
     under = Circumstances(scenario, seed)
@@ -140,8 +138,7 @@ def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
     Raises:
         BoardError: its watchdog does not reset it; and see `run`.
     """
-    said = read_image(image)
-    what = watched(said)
+    what = watched(image)
     if not what.entries or WATCHDOG not in what.vectors:
         raise BoardError(f"{image.name} has no {'watchdog interrupt' if what.entries else 'task'}; expected one")
     board = avr.create(image)
@@ -265,7 +262,7 @@ def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | 
         progress: called with the share that is done, 0 to 1.
 
     Raises:
-        BoardError, TimingError, RobotError: see `run`, `hang` and `robot_of`.
+        BoardError, AnalysisError, RobotError: see `run`, `hang` and `robot_of`.
     """
     robot = robot_of(elf)
     found = []
@@ -274,7 +271,7 @@ def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | 
         found.append(measure(elf, robot, scenario, max(seconds, least), seed))
         if progress:
             progress((number + 1) / len(SCENARIOS))
-    what = watched(read_image(elf))
+    what = watched(elf)
     if what.entries and WATCHDOG in what.vectors:
         found.append(hang(elf, robot, seed).measurement())
     return merged(found)

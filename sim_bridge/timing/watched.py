@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.timing.elf import Image
+from avr_timing.image.elf import read_image
 from boebot.timing.measured import Measurement, Moment, Spans, Worst
+from boebot.timing.table import read_table
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch
 from sim_bridge.timing.loads import TICK_CYCLES
 
@@ -46,16 +48,17 @@ class Watched:
         return FUNCTION_IDS + self.names.index(POLL) if POLL in self.names else None
 
 
-def watched(image: Image) -> Watched:
+def watched(path: Path) -> Watched:
     """What there is to watch in an image."""
+    image, table = read_image(path), read_table(path)
     functions = {s.name: s.address for s in image.symbols if s.kind in ("STT_FUNC", "STT_NOTYPE")}
-    tasks = {row.name: f"{row.name}_task" for row in image.table.tasks} or {
+    tasks = {row.name: f"{row.name}_task" for row in table.tasks} or {
         match[1]: match[0] for name in functions if (match := TASK.match(name))
     }
     found = {name: functions[symbol] for name, symbol in tasks.items() if symbol in functions}
     if POLL in functions:
         found[POLL] = functions[POLL]
-    rows = {row.vector: row.name for row in image.table.interrupts}
+    rows = {row.vector: row.name for row in table.interrupts}
     default = functions.get("__bad_interrupt")
     vectors = {
         vector: rows.get(vector, f"vector_{vector}")
@@ -66,7 +69,7 @@ def watched(image: Image) -> Watched:
         entries=tuple(found.values()),
         names=tuple(found),
         vectors=vectors,
-        first=next((row.name for row in image.table.tasks if row.period == 1), None),
+        first=next((row.name for row in table.tasks if row.period == 1), None),
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import contextlib
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,6 +52,32 @@ def test_host_never_imports_the_simulator() -> None:
         if name.split(".")[0] == "sim_bridge"
     ]
     assert not guilty
+
+
+def test_the_analysis_of_machine_code_knows_no_robot() -> None:
+    guilty = [
+        f"{source.relative_to(ROOT)}: {name}"
+        for source in (ROOT / "host" / "avr_timing").rglob("*.py")
+        for name in imported(source)
+        if name.split(".")[0] in ("boebot", "sim_bridge", "hil_tests", "tools", "timing_program")
+    ]
+    assert not guilty
+
+
+def test_running_a_brain_analyses_no_machine_code() -> None:
+    run = """
+import sys
+from boebot.cli import main
+sys.argv = ["boebot", "run", "wander", "--on", "avr", "--seconds", "0.5"]
+try:
+    main()
+except SystemExit as ended:
+    assert not ended.code, ended
+print(*{name.split(".")[0] for name in sys.modules})
+"""
+    ended = subprocess.run([sys.executable, "-c", run], cwd=ROOT / "build", capture_output=True, text=True, check=True)
+    loaded = set(ended.stdout.splitlines()[-1].split())
+    assert "sim_bridge" in loaded and not loaded & {"avr_timing", "elftools"}
 
 
 def test_brains_touch_only_what_is_meant_for_them() -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output, timing_board, timing_tables
+from boebot.cli import options, output, timing_board
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -88,12 +88,14 @@ def timing(
     json: options.Json = False,
 ) -> None:
     """See `_HELP`."""
+    from avr_timing.errors import AnalysisError
+
     try:
         if where is not None:
             _show_where(elf, robot, where, json)
             return
         answer = _answer(elf, robot, load, measure, seconds, seed, port, brain, step, period, baud, jitter, out)
-    except BoebotError as error:
+    except (BoebotError, AnalysisError) as error:
         output.say(str(error))
         raise typer.Exit(EXIT_INPUT) from None
     if json:
@@ -133,6 +135,8 @@ class Answer:
 
     def show(self) -> None:
         """For people."""
+        from boebot.cli import timing_tables
+
         if self.report is not None:
             timing_tables.show_report(self.report)
         timing_tables.show_verdict(self.verdict)
@@ -157,9 +161,8 @@ def _answer(
     jitter: bool,
     out: Path | None,
 ) -> Answer:
+    """Raises BoebotError or AnalysisError where what was asked for is none."""
     from boebot import view
-
-    """Raises BoebotError where what was asked for is none."""
     from boebot.description.robots import load_robot
     from boebot.running.tasks import DEFAULT_PERIOD
     from boebot.timing import budget, loads, realisable
@@ -193,15 +196,16 @@ def _answer(
 
 
 def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
-    """The worst path of a task or an interrupt. Raises BoebotError where there is none."""
+    """The worst path of a task or an interrupt. Raises BoebotError or AnalysisError where there is none."""
+    from boebot.cli import timing_tables
     from boebot.description.robots import load_robot
-    from boebot.timing.graph import load_program
+    from boebot.timing.firmware import load_firmware
     from boebot.timing.worst_path import worst_path
 
     image = _image(elf, load_robot(robot))
     if image is None:
         raise TimingError(f"robot {robot!r} has no board, and so no image; expected --elf F")
-    path = worst_path(load_program(image), name)
+    path = worst_path(load_firmware(image), name)
     if json:
         output.print_json({"elf": str(image)} | path.as_dict())
     else:

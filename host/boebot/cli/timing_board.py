@@ -28,10 +28,11 @@ def maxima(
     Raises:
         BoardError: there is no board at the port, or it does not answer.
         TimingError: the board runs another image.
+        AnalysisError: the image cannot be read.
     """
+    from avr_timing.image.elf import read_image
     from boebot.boards import BoardRequest, open_board
     from boebot.link.link import Link
-    from boebot.timing.elf import read_image
 
     code = read_image(image).code
     request = BoardRequest(

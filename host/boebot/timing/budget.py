@@ -20,18 +20,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avr_timing.bounds.stack import Stack
+from avr_timing.errors import AnalysisError
+from avr_timing.interrupts.blocked import WAKE
+from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.response import Responses, Schedule, Source, load, longest_gap, misses, response, responses
 from boebot.errors import TimingError
-from boebot.timing.blocked import WAKE
 from boebot.timing.changes import of_image as changes_of
-from boebot.timing.costs import Costs, costs, task_entry
-from boebot.timing.elf import Image, read_image
-from boebot.timing.graph import program_of
-from boebot.timing.loads import RECEIVE, SLOT, Load
+from boebot.timing.costs import Costs, costs
+from boebot.timing.firmware import Firmware, check, load_firmware
+from boebot.timing.loads import SLOT, Load
 from boebot.timing.measured import Measurement, Spans, as_json
-from boebot.timing.program import Program, Table
-from boebot.timing.response import Responses, Schedule, Source, load, longest_gap, misses, response, responses
-from boebot.timing.stack import Stack
-from boebot.timing.table_check import check_table
+from boebot.timing.table import Table
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
@@ -246,7 +246,7 @@ def prove(
     asked: Load,
     measured: Measurement | None = None,
     board: Mapping[str, int] | None = None,
-    program: Program | None = None,
+    firmware: Firmware | None = None,
     like: Report | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Report:
@@ -257,65 +257,65 @@ def prove(
         asked: the load.
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
-        program: the image's, if it has been read already.
+        firmware: the image, if it has been read already.
         like: its report under another load: what does not depend on that is taken from there.
         progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
 
     Raises:
-        TimingError: the file is no image, carries no table, or its timing cannot be told.
+        AnalysisError: the file is no image, or its code cannot be followed or has no bound where one is needed.
+        TimingError: it carries no table, or one that is not that of its program.
     """
-    image = read_image(path)
-    program = program or program_of(image)
-    check_table(path, program)
-    found = costs(program, asked, progress) if like is None else like.costs.under(program, asked)
-    schedule, sources, busy = found.schedule(program), found.sources(program, asked), found.busy(program, asked)
+    firmware = firmware or load_firmware(path)
+    check(firmware)
+    found = costs(firmware, asked, progress) if like is None else like.costs.under(firmware, asked)
+    schedule, sources, busy = found.schedule(firmware), found.sources(firmware, asked), found.busy(firmware, asked)
     answers = responses(schedule, busy)
-    gap, ring, taken = _of_link(program, found, schedule, (*busy, *found.between(program, asked)), asked)
+    gap, ring, taken = _of_link(firmware, found, schedule, (*busy, *found.between(firmware, asked)), asked)
     return Report(
         path=str(path),
-        table=program.table,
+        table=firmware.table,
         load=asked,
-        rows=tuple(_rows(program, asked, found, answers, measured, board or {})),
+        rows=tuple(_rows(firmware, asked, found, answers, measured, board or {})),
         costs=found,
         schedule=schedule,
         sources=tuple(sources),
         responses=answers,
         gap=gap,
         ring=None if asked.is_overload else ring,
-        ring_holds=program.constants.receive_ring,
-        changes=None if answers is None or asked.is_overload else changes_of(program, found, schedule, asked),
-        changes_held=program.constants.changes_ring - 1,
+        ring_holds=firmware.constants.receive_ring,
+        changes=None if answers is None or asked.is_overload else changes_of(firmware, found, schedule, asked),
+        changes_held=firmware.constants.changes_ring - 1,
         taken=taken,
         frames=found.of_frames(asked),
-        memory=_memory(program, image, found, measured),
+        memory=_memory(firmware, found, measured),
         measured=measured,
     )
 
 
-def _memory(program: Program, image: Image, found: Costs, measured: Measurement | None) -> Memory:
+def _memory(firmware: Firmware, found: Costs, measured: Measurement | None) -> Memory:
     """A task whose depth is not known counts with what was measured of the image."""
-    unknown, stack = [], Stack(program)
+    unknown, stack = [], Stack(firmware.program)
     for name in found.unbounded:
         try:
-            stack.of(task_entry(program, name))
-        except TimingError:
+            stack.of(firmware.task_entry(name))
+        except (AnalysisError, TimingError):
             unknown.append(name)
-    deepest = Stack(program, [task_entry(program, name) for name in unknown]).image().bytes
+    deepest = Stack(firmware.program, [firmware.task_entry(name) for name in unknown]).image().bytes
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     most = max(deepest, seen) if unknown and seen is not None else deepest
-    return Memory(image.ram_bytes, most, seen, image.flash_bytes, tuple(unknown))
+    return Memory(firmware.image.ram_bytes, most, seen, firmware.image.flash_bytes, tuple(unknown))
 
 
 def prove_all(path: Path, loads: Mapping[str, Load], measured: Measurement | None = None) -> dict[str, Report]:
     """The reports of an image under several loads; see `prove`."""
-    program, found = program_of(read_image(path)), dict[str, Report]()
+    firmware, found = load_firmware(path), dict[str, Report]()
     for name, asked in loads.items():
-        found[name] = prove(path, asked, measured, program=program, like=next(iter(found.values()), None))
+        found[name] = prove(path, asked, measured, firmware=firmware, like=next(iter(found.values()), None))
     return found
 
 
 def _rows(
-    program: Program,
+    firmware: Firmware,
     asked: Load,
     found: Costs,
     answers: Responses | None,
@@ -336,7 +336,7 @@ def _rows(
             board=board.get(row.name),
             response=answers.pieces[row.name] if answers else None,
         )
-        for row in program.table.tasks
+        for row in firmware.table.tasks
     ]
     rows += [
         Row(
@@ -350,7 +350,7 @@ def _rows(
             waited=_waited(measured, asked, row.name),
             latency_limit=row.latency if row.vector not in asked.may_be_late else None,
         )
-        for row in program.table.interrupts
+        for row in firmware.table.interrupts
     ]
     return rows
 
@@ -369,7 +369,7 @@ def _waited(measured: Measurement | None, asked: Load, name: str) -> int | None:
 
 
 def _of_link(
-    program: Program, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load
+    firmware: Firmware, found: Costs, schedule: Schedule, sources: tuple[Source, ...], asked: Load
 ) -> tuple[int | None, int | None, int | None]:
     """The longest time between two polls of the link, the bytes that wait in its ring then, and the longest time from a
     frame's last byte to its end; each None: overload.
@@ -381,7 +381,7 @@ def _of_link(
     gap = longest_gap(schedule, sources, found.blocking, after)
     taken = longest_gap(schedule, sources, found.blocking, after + found.frame)
     idle = longest_gap(schedule, sources, found.idle, after)
-    row = next((row for row in program.table.interrupts if row.vector == RECEIVE), None)
+    row = next((row for row in firmware.table.interrupts if row.vector == RECEIVE), None)
     if row is None:
         return gap, 0, taken
     if gap is None or idle is None:
@@ -391,7 +391,7 @@ def _of_link(
     def come(window: int) -> int:
         return sum(source.requests(window + 1) for source in bytes_)
 
-    return gap, max(come(gap), program.constants.poll_bytes + come(idle)), taken
+    return gap, max(come(gap), firmware.constants.poll_bytes + come(idle)), taken
 
 
 def _rows_broken(rows: tuple[Row, ...]) -> list[str]:

@@ -15,19 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avr_timing.interrupts.response import Schedule, Source, response
 from boebot.timing.costs import Costs
+from boebot.timing.firmware import Firmware
 from boebot.timing.loads import ENCODERS, Load
-from boebot.timing.program import Program
-from boebot.timing.response import Schedule, Source, response
 
 
-def of_image(program: Program, found: Costs, schedule: Schedule, asked: Load) -> int | None:
+def of_image(firmware: Firmware, found: Costs, schedule: Schedule, asked: Load) -> int | None:
     """Changes that wait at most under a load that is no overload; None: no encoders."""
-    row = next((row for row in program.table.interrupts if row.vector == ENCODERS), None)
+    row = next((row for row in firmware.table.interrupts if row.vector == ENCODERS), None)
     if row is None or not found.change:
         return None
     changes = asked.sources(row, 0)
-    return most_waiting(found, schedule, found.requested(program, asked), changes, found.latencies[row.name] or 0)
+    return most_waiting(found, schedule, found.requested(firmware, asked), changes, found.latencies[row.name] or 0)
 
 
 def most_waiting(

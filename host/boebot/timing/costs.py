@@ -21,17 +21,20 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
+from avr_timing.bounds.wcet import Bound, WorstCase
+from avr_timing.errors import AnalysisError
+from avr_timing.flow.constants import Context, Known
+from avr_timing.flow.loops import Loop, natural_loops, reverse_postorder
+from avr_timing.flow.paths import Graph, Way, longest
+from avr_timing.interrupts.blocked import ENTRY, Blocked
+from avr_timing.interrupts.latency import Latencies
+from avr_timing.interrupts.receive_times import RECEIVE, Taken
+from avr_timing.interrupts.response import Piece, Schedule, Source
+from avr_timing.program import Block, Function, Program
 from boebot.errors import TimingError
-from boebot.timing.blocked import ENTRY, Blocked
-from boebot.timing.constants import Context, Known
-from boebot.timing.latency import Latencies
-from boebot.timing.loads import ENCODERS, RECEIVE, SEND, SENT_WHILE_BUSY, Load
-from boebot.timing.loops import Loop, natural_loops, reverse_postorder
-from boebot.timing.paths import Graph, Way, longest
-from boebot.timing.program import Block, Function, Program, TaskRow
-from boebot.timing.receive_times import Taken
-from boebot.timing.response import Piece, Schedule, Source
-from boebot.timing.wcet import Bound, WorstCase
+from boebot.timing.firmware import Firmware
+from boebot.timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
+from boebot.timing.table import TaskRow
 
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
 AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task that runs
@@ -71,13 +74,13 @@ class Costs:
     changes_due: int  # so many changes the main loop works off between slots; fewer wait
     found_by: Latencies | None = field(default=None, compare=False, repr=False)
 
-    def under(self, program: Program, load: Load) -> Costs:
+    def under(self, firmware: Firmware, load: Load) -> Costs:
         """The same under another load, on which only the latencies depend."""
-        blocked = Blocked(program) if self.found_by is None else self.found_by.blocked
-        found = Latencies(blocked, _requests(program, load), self.found_by)
-        return replace(self, latencies=_latencies(program, load, found), found_by=found)
+        blocked = Blocked(firmware.program) if self.found_by is None else self.found_by.blocked
+        found = Latencies(blocked, _requests(firmware, load), apart=APART, never_near=NEVER_NEAR, like=self.found_by)
+        return replace(self, latencies=_latencies(firmware, load, found), found_by=found)
 
-    def busy(self, program: Program, load: Load) -> list[Source]:
+    def busy(self, firmware: Firmware, load: Load) -> list[Source]:
         """What comes while slots keep the main loop busy: of an overload no more bytes than the receive ring has room
         for and one poll takes from it. One byte more finds it full.
 
@@ -87,11 +90,11 @@ class Costs:
         And no more bytes leave than the send ring held, than that poll may have answered, and than the tasks of each
         tick send.
         """
-        found = self.sources(program, load)
+        found = self.sources(firmware, load)
         if not load.is_overload:
             return found
-        said = program.constants
-        rows = {row.name: row for row in program.table.interrupts}
+        said = firmware.constants
+        rows = {row.name: row for row in firmware.table.interrupts}
         most = said.receive_ring + 1 + said.poll_bytes
 
         def busy(one: Source) -> Source:
@@ -105,27 +108,27 @@ class Costs:
 
         return [busy(one) for one in found]
 
-    def requested(self, program: Program, load: Load) -> list[Source]:
+    def requested(self, firmware: Firmware, load: Load) -> list[Source]:
         """The interrupts under a load."""
-        return [one for row in program.table.interrupts for one in load.sources(row, self.charged[row.name])]
+        return [one for row in firmware.table.interrupts for one in load.sources(row, self.charged[row.name])]
 
-    def sources(self, program: Program, load: Load) -> list[Source]:
+    def sources(self, firmware: Firmware, load: Load) -> list[Source]:
         """The interrupts under a load, and the edges that they leave to the main loop."""
-        found = self.requested(program, load)
+        found = self.requested(firmware, load)
         if self.change:
-            found += [replace(one, name="changes worked off") for one in self._changes(program, load, self.change)]
+            found += [replace(one, name="changes worked off") for one in self._changes(firmware, load, self.change)]
         return found
 
-    def between(self, program: Program, load: Load) -> list[Source]:
+    def between(self, firmware: Firmware, load: Load) -> list[Source]:
         """What the main loop does besides when no slot waits: it looks for changes when so many are due."""
         return [
             replace(one, name="looks for changes")
-            for one in self._changes(program, load, -(-(self.loop + self.edges) // self.changes_due))
+            for one in self._changes(firmware, load, -(-(self.loop + self.edges) // self.changes_due))
         ]
 
     @staticmethod
-    def _changes(program: Program, load: Load, cycles: int) -> list[Source]:
-        rows = [row for row in program.table.interrupts if row.vector == ENCODERS]
+    def _changes(firmware: Firmware, load: Load, cycles: int) -> list[Source]:
+        rows = [row for row in firmware.table.interrupts if row.vector == ENCODERS]
         return [one for row in rows for one in load.sources(row, cycles)] if cycles else []
 
     def of_frames(self, load: Load) -> Source:
@@ -144,11 +147,11 @@ class Costs:
         frame."""
         return self.idle + self.frame
 
-    def schedule(self, program: Program) -> Schedule:
+    def schedule(self, firmware: Firmware) -> Schedule:
         """The slots of a whole cycle."""
-        rows, said = program.table.tasks, program.constants
+        rows, said = firmware.table.tasks, firmware.constants
         slots = []
-        for slot in range(_slots(program)):
+        for slot in range(_slots(firmware)):
             pieces = [Piece(SLOT_BEGINS, self.round)]
             pieces += [Piece(row.name, self.tasks[row.name] + self.around) for row in rows if _is_due(row, slot)]
             slots.append(tuple(pieces))
@@ -161,68 +164,71 @@ def _is_due(row: TaskRow, slot: int) -> bool:
     return slot % row.period == row.phase
 
 
-def costs(program: Program, load: Load, progress: Callable[[float], None] = lambda _: None) -> Costs:
+def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = lambda _: None) -> Costs:
     """Of an image under a load.
 
     Args:
-        program: the image's.
+        firmware: the image.
         load: how often its interrupts come.
         progress: called with the share of tasks and interrupts that are done, 0 to 1.
 
     Raises:
         TimingError: a task is no function; or an interrupt, the scheduler or a poll of the main loop has no bound.
     """
-    worst, table = WorstCase(program), program.table
+    program, table = firmware.program, firmware.table
+    worst = WorstCase(program)
     tasks, interrupts = {}, {}
     unbounded: dict[str, str] = {}
     rows = len(table.tasks) + len(table.interrupts)
     for done, task in enumerate(table.tasks, 1):
-        if entry_of(program, f"{task.name}_task") is None and unbounded:  # behind one that never returns
+        if firmware.entry_of(f"{task.name}_task") is None and unbounded:  # behind one that never returns
             raise TimingError(next(iter(unbounded.values())))
-        entry = task_entry(program, task.name)
+        entry = firmware.task_entry(task.name)
         try:
             tasks[task.name] = worst.bound(entry).cycles
-        except TimingError as error:
+        except AnalysisError as error:
             tasks[task.name], unbounded[task.name] = task.budget, str(error)
         progress(done / rows)
     for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
         interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
         progress(done / rows)
-    latencies = Latencies(Blocked(program, worst), _requests(program, load))
-    charged, heeding = _charged(worst, interrupts)
-    edges, change = _edges(program)
-    loop, scheduler = _rounds(program, edges)
+    latencies = Latencies(Blocked(program, worst), _requests(firmware, load), apart=APART, never_near=NEVER_NEAR)
+    charged, heeding = _charged(firmware, worst, interrupts)
+    edges, change = _edges(firmware)
+    loop, scheduler = _rounds(firmware, edges)
     return Costs(
         tasks=tasks,
         unbounded=unbounded,
         interrupts=interrupts,
         charged=charged,
         heeding=heeding,
-        latencies=_latencies(program, load, latencies),
+        latencies=_latencies(firmware, load, latencies),
         loop=loop,
         round=loop + scheduler,
-        around=sum(worst.bound(entry).cycles for entry in entries_of(program, AROUND_TASK)),
-        frame=sum(worst.bound(entry).cycles for entry in entries_of(program, (LINK_POLL,))),
+        around=sum(worst.bound(entry).cycles for entry in firmware.entries_of(AROUND_TASK)),
+        frame=sum(worst.bound(entry).cycles for entry in firmware.entries_of((LINK_POLL,))),
         edges=edges,
         change=change,
-        changes_due=program.constants.changes_due,
+        changes_due=firmware.constants.changes_due,
         found_by=latencies,
     )
 
 
-def _requests(program: Program, load: Load) -> dict[int, list[Source]]:
-    return {row.vector: load.requests(row, program) for row in program.table.interrupts}
+def _requests(firmware: Firmware, load: Load) -> dict[int, list[Source]]:
+    return {row.vector: load.requests(row, firmware.constants) for row in firmware.table.interrupts}
 
 
-def _latencies(program: Program, load: Load, found: Latencies) -> dict[str, int | None]:
+def _latencies(firmware: Firmware, load: Load, found: Latencies) -> dict[str, int | None]:
     """Of a byte none, where bytes may be lost."""
-    rows = program.table.interrupts
+    rows = firmware.table.interrupts
     return {row.name: None if load.is_overload and row.vector == RECEIVE else found.of(row.vector) for row in rows}
 
 
-def _charged(worst: WorstCase, interrupts: Mapping[str, int]) -> tuple[dict[str, int], frozenset[str]]:
+def _charged(
+    firmware: Firmware, worst: WorstCase, interrupts: Mapping[str, int]
+) -> tuple[dict[str, int], frozenset[str]]:
     """See `Costs.charged` and `Costs.heeding`."""
-    rows = worst.program.table.interrupts
+    rows = firmware.table.interrupts
     each = next((interrupts[row.name] for row in rows if row.vector == RECEIVE), 0)
     found = {row.name: Taken(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
     taking = {name: taken for name, taken in found.items() if taken.takes}
@@ -230,50 +236,50 @@ def _charged(worst: WorstCase, interrupts: Mapping[str, int]) -> tuple[dict[str,
     return {**interrupts, **charged}, frozenset(name for name, taken in taking.items() if taken.heeds_switch)
 
 
-def _edges(program: Program) -> tuple[int, int]:
+def _edges(firmware: Firmware) -> tuple[int, int]:
     """A poll of the pin changes: what it takes when nothing waits, and more for each change. 0: there is none.
 
     A change that is an edge of one wheel calls WHEEL once. In one that is an edge of both, each of them has been
     charged a whole change.
     """
-    entry = entry_of(program, CHANGES_POLL)
+    program, entry = firmware.program, firmware.entry_of(CHANGES_POLL)
     if entry is None:
         return 0, 0
-    wheel = entries_of(program, (WHEEL,))
+    wheel = firmware.entries_of((WHEEL,))
     once = dict.fromkeys(wheel, 0)
     none, one, two = (Given(_passed(program, entry, passes), once).bound(entry).cycles for passes in (0, 1, 2))
     return none, max(one - none, two - one) + sum(WorstCase(program).bound(callee).cycles for callee in wheel)
 
 
-def _rounds(program: Program, edges: int) -> tuple[int, int]:
+def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:
     """One pass of the main loop at most, and the scheduler in it around a slot's tasks, with so many cycles to look for
     edges: of the scheduler its longest way, of the loop around it every block once.
 
     The scheduler's only loop drops ticks when it has fallen behind. Where it has not, it is not passed.
     """
-    scheduler = entry_of(program, SCHEDULER)
+    program, scheduler = firmware.program, firmware.entry_of(SCHEDULER)
     if scheduler is None:
         raise TimingError(
             f"{program.path} has no function {SCHEDULER}; expected the scheduler as a function of its own, not in line"
         )
-    names = (*(f"{row.name}_task" for row in program.table.tasks), *AROUND_TASK)
-    elsewhere = dict.fromkeys(entries_of(program, names), 0)
-    polls = dict.fromkeys(entries_of(program, (CHANGES_POLL, LINK_POLL)), edges)
+    names = (*(f"{row.name}_task" for row in firmware.table.tasks), *AROUND_TASK)
+    elsewhere = dict.fromkeys(firmware.entries_of(names), 0)
+    polls = dict.fromkeys(firmware.entries_of((CHANGES_POLL, LINK_POLL)), edges)
     alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
     cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
-    loop = entry_of(program, LOOP)
+    loop = firmware.entry_of(LOOP)
     if loop is None:
-        return _main_loop(program, done, scheduler), cycles
-    return Given(program, done).bound(loop).cycles + _main_loop(program, {loop: 0}, loop), cycles
+        return _main_loop(firmware, done, scheduler), cycles
+    return Given(program, done).bound(loop).cycles + _main_loop(firmware, {loop: 0}, loop), cycles
 
 
-def _main_loop(program: Program, elsewhere: Mapping[int, int], called: int) -> int:
+def _main_loop(firmware: Firmware, elsewhere: Mapping[int, int], called: int) -> int:
     """All blocks once of the loops of `main` from which that is called."""
-    main = entry_of(program, "main")
+    main = firmware.entry_of("main")
     if main is None:
         return 0
-    given = Given(program, elsewhere)
+    given = Given(firmware.program, elsewhere)
     known = given.inside(main)
     function = known.function
     loops = [loop for loop in _loops(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
@@ -329,30 +335,6 @@ def _passed(program: Program, entry: int, passes: int) -> Program:
     return replace(program, bounds=tuple(bounds))
 
 
-def _slots(program: Program) -> int:
+def _slots(firmware: Firmware) -> int:
     """Slots of a whole cycle of the schedule."""
-    return math.lcm(program.constants.slots_per_tick, *(row.period for row in program.table.tasks))
-
-
-def entry_of(program: Program, name: str) -> int | None:
-    """Of a function of the source; the compiler may have added to its name. None: there is none, or not one only."""
-    if name in program.by_name:
-        return program.by_name[name]
-    found = [entry for other, entry in program.by_name.items() if other.startswith(f"{name}.")]
-    return found[0] if len(found) == 1 else None
-
-
-def task_entry(program: Program, name: str) -> int:
-    """Of the function of a task.
-
-    Raises:
-        TimingError: it is no function.
-    """
-    entry = entry_of(program, f"{name}_task")
-    if entry is None:
-        raise TimingError(f"{program.path} has no function {name}_task")
-    return entry
-
-
-def entries_of(program: Program, names: Collection[str]) -> list[int]:
-    return [entry for entry in (entry_of(program, name) for name in names) if entry is not None]
+    return math.lcm(firmware.constants.slots_per_tick, *(row.period for row in firmware.table.tasks))

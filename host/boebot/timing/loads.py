@@ -11,17 +11,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.response import Source, Spell
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.timing.program import InterruptRow, Program
-from boebot.timing.response import Source, Spell
+from boebot.timing.table import Constants, InterruptRow
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s
 # Vectors of the ATmega328P (data sheet, table 12-6), numbered as in __vector_N.
 ENCODERS, STAMP, WATCHDOG, CARRIER, CAPTURE, EDGE, SLOT, BUZZER = 4, 5, 6, 7, 10, 11, 12, 14
-RECEIVE, SEND, EEPROM, TWO_WIRE = 18, 19, 22, 24
+SEND, EEPROM, TWO_WIRE = 19, 22, 24
 VECTORS = 25
 
 _TELEMETRY = messages.Telemetry.LENGTH + FRAME_OVERHEAD
@@ -80,9 +81,9 @@ class Load:
             return []
         return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]
 
-    def requests(self, row: InterruptRow, program: Program) -> list[Source]:
+    def requests(self, row: InterruptRow, constants: Constants) -> list[Source]:
         """What asks for an interrupt at the worst, one by one; a noisy line stops its interrupt soon."""
-        return densest(row, program) if self.is_overload and row.vector == ENCODERS else self.sources(row, 1)
+        return densest(row, constants) if self.is_overload and row.vector == ENCODERS else self.sources(row, 1)
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
@@ -202,10 +203,10 @@ NEVER_NEAR = (EDGE, CARRIER)
 APART = {EDGE: frozenset({CARRIER}), SLOT: frozenset({CARRIER})}
 
 
-def densest(row: InterruptRow, program: Program) -> list[Source]:
+def densest(row: InterruptRow, constants: Constants) -> list[Source]:
     """The most requests of an interrupt in any time, one by one."""
     if row.vector == ENCODERS:  # those of a storm, before it masks itself
-        return [Stream(close=program.constants.changes_storm - 1).source(row, 1)]
+        return [Stream(close=constants.changes_storm - 1).source(row, 1)]
     return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 

@@ -23,8 +23,7 @@ from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
 from boebot.running.board_driver import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
 from boebot.running.driver import check_period, whole_ticks
-from boebot.timing.program import SensorRow, Table
-from boebot.timing.table import read_table
+from boebot.timing.table import SensorRow, Table, read_table
 
 TICK_S = 0.01
 TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD

@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from boebot.errors import TimingError
-from boebot.timing.program import Constants, InterruptRow, SensorRow, Table, TaskRow
 
 SECTION = ".boebot.timing"
 MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
@@ -23,6 +22,75 @@ LONGEST_CYCLE = 4096  # slots until the schedule repeats: ten seconds
 _DIGITS = 12  # of a number; longer ones are too large anyway
 _HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
 _SECTION = struct.Struct("<10I")
+
+
+@dataclass(frozen=True, slots=True)
+class TaskRow:
+    """TASK of tasks.def: runs in each slot whose number mod `period` is `phase`; `budget` in cycles, net."""
+
+    name: str
+    period: int
+    phase: int
+    budget: int
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptRow:
+    """INTERRUPT of tasks.def: all numbers but `vector` in cycles.
+
+    `budget` is its span from acceptance to the end of RETI, `latency` the longest from the request to acceptance,
+    `interval` the least time between two requests in the long run.
+    """
+
+    name: str
+    vector: int
+    budget: int
+    latency: int
+    interval: int
+
+
+@dataclass(frozen=True, slots=True)
+class SensorRow:
+    """SENSOR of tasks.def: a reading takes `conversion` us in hardware, comes every `period` ticks, and is at most
+    `age` us old when telemetry takes it."""
+
+    name: str
+    conversion: int
+    period: int
+    age: int
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What the program is built with and its bounds depend on.
+
+    A control tick is `slots_per_tick` slots of `slot_cycles` cycles; when more than `slots_kept` wait, ticks are
+    dropped. Between slots the main loop is at the link when a frame has ended, or the receive ring is full. The
+    ring holds `receive_ring` bytes, and its interrupt is off while it is full; a poll of the link takes at most
+    `poll_bytes`. Before the link the main loop is at the pin changes when `changes_due` of them wait, in a ring of
+    `changes_ring` places, of which one stays free. Their interrupt masks itself when `changes_storm` come close one
+    after another.
+    """
+
+    slot_cycles: int
+    slots_per_tick: int
+    slots_kept: int
+    receive_ring: int
+    poll_bytes: int
+    changes_ring: int
+    changes_due: int
+    changes_storm: int
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The timing table of an image, in its order."""
+
+    tasks: tuple[TaskRow, ...] = ()
+    interrupts: tuple[InterruptRow, ...] = ()
+    sensors: tuple[SensorRow, ...] = ()
+    constants: Constants | None = None
+
 
 CONSTANTS = tuple(field.name for field in fields(Constants))
 

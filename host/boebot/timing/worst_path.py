@@ -1,36 +1,18 @@
-"""Where the cycles of a bound go: the worst path of a task or an interrupt, by functions and lines of the source.
-
-The path is the one that the bound was worked out by (wcet.py); here its blocks are followed into what they call, and
-their cycles handed to the lines of their instructions. What a block takes more or less by the way out of it is its last
-instruction's, and so is the time that a loop waits.
-"""
+"""Where the cycles of a bound go: the worst path of a task or an interrupt of the kit's firmware."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+from avr_timing.bounds.wcet import WorstCase
+from avr_timing.bounds.worst_path import PathRow
+from avr_timing.bounds.worst_path import worst_path as path_of
+from avr_timing.interrupts.blocked import ENTRY
 from boebot.errors import TimingError
-from boebot.timing.blocked import ENTRY
-from boebot.timing.constants import Context, Known, known, root
-from boebot.timing.costs import task_entry
-from boebot.timing.marks import marks_of
-from boebot.timing.program import Block, Program
-from boebot.timing.wcet import Visit, WorstCase
+from boebot.timing.firmware import Firmware
 
 ACCEPTANCE = "acceptance of the interrupt"
-
-
-@dataclass(frozen=True, slots=True)
-class PathRow:
-    """A line of the source in one function of the image; `line` None: the image does not say which."""
-
-    function: str
-    line: str | None  # "file.c:123"
-    cycles: int
-    runs: int  # how often it runs at most of its instructions
-    passes: tuple[int, ...]  # of each loop whose bound counts this line
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,93 +43,23 @@ class WorstPath:
         }
 
 
-def worst_path(program: Program, name: str) -> WorstPath:
+def worst_path(firmware: Firmware, name: str) -> WorstPath:
     """Of a task or an interrupt of the image's table.
 
     Raises:
-        TimingError: there is none of that name, or it has no bound.
+        TimingError: there is none of that name.
+        AnalysisError: it has no bound.
     """
-    worst, table = WorstCase(program), program.table
+    table = firmware.table
     vectors = {row.name: row.vector for row in table.interrupts}
     names = [row.name for row in table.tasks] + list(vectors)
     if name not in names:
-        raise TimingError(f"{program.path} has no task or interrupt {name!r}; expected one of {', '.join(names)}")
-    kind = "interrupt" if name in vectors else "task"
-    entry = 4 * vectors[name] if name in vectors else task_entry(program, name)
-    found = _Lines(worst).of(entry, root(program.functions[entry]))
-    rows = [
-        PathRow(function, line, share.cycles, share.runs, tuple(share.passes.values()))
-        for (function, line), share in found.items()
-    ]
-    if kind == "interrupt":
-        rows.insert(0, PathRow(ACCEPTANCE, None, ENTRY, 1, ()))
-    return WorstPath(name, kind, sum(row.cycles for row in rows), tuple(rows))
-
-
-@dataclass(slots=True)
-class _Share:
-    """Of one line in one call of a function."""
-
-    cycles: int = 0
-    runs: int = 0
-    passes: dict[Hashable, int] = field(default_factory=dict)  # by loop
-
-    def add(self, other: _Share, times: int) -> None:
-        """Another call's, so many times."""
-        self.cycles += times * other.cycles
-        self.runs += times * other.runs
-        for loop, passes in other.passes.items():
-            self.passes[loop] = self.passes.get(loop, 0) + times * passes
-
-
-_Place = tuple[str, "str | None"]
-
-
-class _Lines:
-    def __init__(self, worst: WorstCase) -> None:
-        self.worst = worst
-        self.program = worst.program
-        self._found: dict[tuple[int, Context], dict[_Place, _Share]] = {}
-
-    def of(self, entry: int, context: Context) -> dict[_Place, _Share]:
-        """One call of a function, with what it calls; in the order of the path."""
-        if (entry, context) not in self._found:
-            self._found[entry, context] = self._worked_out(entry, context)
-        return self._found[entry, context]
-
-    def _worked_out(self, entry: int, context: Context) -> dict[_Place, _Share]:
-        function = self.program.functions[entry]
-        inside = known(function, context)
-        marks = marks_of(self.program, function, inside)
-        found: dict[_Place, _Share] = {}
-        for visit in self.worst.bound(entry, context).path:
-            block = inside.function.blocks[visit.block]
-            callee, callee_cycles = self._callee(block, inside)
-            ran: set[_Place] = set()
-            for address, cycles in _instructions(block, visit, visit.cycles - visit.times * callee_cycles):
-                place = (function.name, self.program.lines.get(address))
-                share = found.setdefault(place, _Share())
-                share.cycles += cycles
-                ran.add(place)
-            for place in ran:
-                found[place].runs = max(found[place].runs, visit.times)
-            first = found[function.name, self.program.lines.get(block.instructions[0].address)]
-            for mark in marks.get(visit.block, ()):
-                first.passes[mark.loop] = first.passes.get(mark.loop, 0) + visit.times
-            if callee is not None:
-                for place, share in self.of(callee, inside.handed(block)).items():
-                    found.setdefault(place, _Share()).add(share, visit.times)
-        return found
-
-    def _callee(self, block: Block, inside: Known) -> tuple[int | None, int]:
-        """What the block calls at its end, and its cycles."""
-        way = self.worst.ways(block, inside)[0]
-        return way.callee, way.callee_cycles
-
-
-def _instructions(block: Block, visit: Visit, cycles: int) -> Iterator[tuple[int, int]]:
-    """Address and cycles of each instruction in all runs of a block, `cycles` in sum."""
-    for instruction in block.instructions[:-1]:
-        yield instruction.address, visit.times * instruction.cycles
-        cycles -= visit.times * instruction.cycles
-    yield block.instructions[-1].address, cycles
+        raise TimingError(
+            f"{firmware.image.path} has no task or interrupt {name!r}; expected one of {', '.join(names)}"
+        )
+    is_interrupt = name in vectors
+    entry = 4 * vectors[name] if is_interrupt else firmware.task_entry(name)
+    rows = path_of(WorstCase(firmware.program), entry)
+    if is_interrupt:
+        rows = (PathRow(ACCEPTANCE, None, ENTRY, 1, ()), *rows)
+    return WorstPath(name, "interrupt" if is_interrupt else "task", sum(row.cycles for row in rows), rows)

@@ -1,0 +1,1 @@
+"""What a function takes at most: cycles and bytes of the stack, interrupts not counted."""

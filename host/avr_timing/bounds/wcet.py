@@ -1,0 +1,144 @@
+"""Worst-case execution time of a function of an image, interrupts not counted, and the path that takes it.
+
+From the function's first instruction to the end of its return, with all that it calls; the call itself is the
+caller's. A function is bounded once for each set of constants that calls hand to it (constants.py). Every path that
+these leave counts as possible; loops are bounded by what the image says of them and by their own code (counted.py).
+`main` never returns and so has no bound: one pass of its endless loop is taken apart in costs.py, and what comes before
+that loop is the start-up, of which only the stretches with interrupts off count (blocked.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from avr_timing.bounds.marks import marks_of
+from avr_timing.errors import AnalysisError
+from avr_timing.flow.constants import Context, Known, known, root
+from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
+from avr_timing.program import Block, Function, Program
+
+# Library routines with a loop that runs by an argument, of 16 bits: its lower register (avr-gcc's calling convention).
+COUNTS = {"memcpy": 20, "memcpy_P": 20, "memset": 20}
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A block on the worst path: how often it runs in one call of the function, and what that takes in all."""
+
+    block: int
+    times: int
+    cycles: int  # with callees
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Cycles that a function takes at most; the path, in the order of first visits; and how much of it is whose."""
+
+    cycles: int
+    path: tuple[Visit, ...]
+    callees: dict[int, int]  # entry of a function that this one calls -> its share of the cycles
+
+
+class WorstCase:
+    """Bounds of the functions of a program, each worked out once."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self._bounds: dict[tuple[int, Context], Bound] = {}
+        self._inside: dict[int, Known] = {}
+        self._marks: dict[int, dict[int, list[Mark]]] = {}
+        self._under_way: list[int] = []
+
+    def of(self, function: str | int) -> Bound:
+        """The bound of a function, by name or entry.
+
+        Raises:
+            AnalysisError: no such function; a loop without a bound; recursion; it never returns.
+        """
+        if isinstance(function, str):
+            if function not in self.program.by_name:
+                raise AnalysisError(f"{self.program.path} has no function {function}")
+            function = self.program.by_name[function]
+        return self.bound(function)
+
+    def bound(self, entry: int, context: Context | None = None) -> Bound:
+        """The same by entry; `context`: registers that hold constants there, else those of any call."""
+        function = self.program.functions[entry]
+        if entry in self.program.unproven:
+            raise AnalysisError(self.program.unproven[entry])
+        key = (entry, root(function) if context is None else context)
+        if key not in self._bounds:
+            if entry in self._under_way:
+                names = [self.program.functions[each].name for each in self._under_way]
+                around = names[self._under_way.index(entry) :]
+                chain = " calls ".join([*around, around[0] if around[1:] else "itself"])
+                raise AnalysisError(
+                    f"recursion at {self.program.where(entry)}: {chain}; expected functions that do not call themselves"
+                )
+            self._under_way.append(entry)
+            try:
+                self._bounds[key] = self._bound(function, key[1])
+            finally:
+                self._under_way.pop()
+        return self._bounds[key]
+
+    def inside(self, entry: int) -> Known:
+        """A function as any call of it finds it: what is known in it, and the ways that this leaves."""
+        if entry not in self._inside:
+            function = self.program.functions[entry]
+            self._inside[entry] = known(function, root(function))
+        return self._inside[entry]
+
+    def marks(self, entry: int) -> dict[int, list[Mark]]:
+        """What is known of the loops in it, at the blocks whose runs it counts."""
+        if entry not in self._marks:
+            self._marks[entry] = marks_of(self.program, self.program.functions[entry], self.inside(entry))
+        return self._marks[entry]
+
+    def _bound(self, function: Function, context: Context) -> Bound:
+        inside = known(function, context)
+        ways = {start: self.ways(block, inside) for start, block in inside.function.blocks.items()}
+        graph = Graph(function.entry, ways, self.program.where, marks_of(self.program, function, inside))
+        walk = longest(graph)
+        if walk is None:
+            raise AnalysisError(f"{function.name} at {self.program.where(function.entry)} never returns; no bound")
+        return _told(walk)
+
+    def ways(self, block: Block, inside: Known) -> list[Way[int]]:
+        """The ways out of a block, with what is called at its end."""
+        callee, callee_cycles = None, 0
+        for entry in block.calls:
+            cycles = self.callee(entry, block, inside).cycles
+            if callee is None or cycles > callee_cycles:
+                callee, callee_cycles = entry, cycles
+        own = block.body_cycles + callee_cycles
+        if not block.edges:
+            return [Way(block.start, None, own + block.last_cycles, callee, callee_cycles)]
+        edges: dict[int, int] = {}
+        for edge in block.edges:
+            edges[edge.to] = max(edges.get(edge.to, 0), edge.cycles)
+        return [Way(block.start, to, own + cycles, callee, callee_cycles) for to, cycles in edges.items()]
+
+    def callee(self, entry: int, block: Block, inside: Known) -> Bound:
+        """Of what a block calls, with the constants that it hands over."""
+        name = self.program.functions[entry].name
+        if name in COUNTS and inside.before_last(block).word(COUNTS[name]) is None:
+            call = self.program.where(block.instructions[-1].address)
+            raise AnalysisError(
+                f"{name} is called at {call} with a number of bytes that is not a constant; "
+                "expected a constant, or a bounded loop in its place"
+            )
+        return self.bound(entry, inside.handed(block))
+
+
+def _told(walk: Walk[int]) -> Bound:
+    times: dict[int, int] = {}
+    cycles: dict[int, int] = {}
+    callees: dict[int, int] = {}
+    for way, count in walk.ways():
+        times[way.node] = times.get(way.node, 0) + (0 if way.waits else count)
+        cycles[way.node] = cycles.get(way.node, 0) + count * way.cycles
+        if way.callee is not None:
+            callees[way.callee] = callees.get(way.callee, 0) + count * way.callee_cycles
+    path = tuple(Visit(block, times[block], cycles[block]) for block in times)
+    return Bound(walk.cycles, path, callees)

@@ -1,0 +1,1 @@
+"""What a firmware image says: its ELF file, symbols, source lines and instructions."""

@@ -1,0 +1,199 @@
+"""Reads a firmware image: an ELF file for the ATmega328P, as avr-gcc or another compiler links it.
+
+Read are the bytes of the flash, symbols, the sizes of flash and RAM, source lines, and the section `.boebot.loops`, in
+which a firmware may say how often its loops run. The file need not have the last two.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+
+from elftools.common.exceptions import DWARFError, ELFError
+from elftools.construct import ConstructError
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from avr_timing.errors import AnalysisError
+from avr_timing.image.source_lines import source_lines
+from avr_timing.program import LoopBound
+
+LOOPS = ".boebot.loops"  # section of the loop bounds, as boebot's bounds.h writes it in any firmware
+FLASH_SIZE = 0x8000  # bytes
+RAM_START = 0x800100  # avr-gcc gives data memory the addresses from 0x800000
+RAM_END = 0x800900
+DATA_SPACE = 0x800000
+EM_AVR = "EM_AVR"
+PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
+NOT_SAID = 0xFFFFFFFF
+# What pyelftools raises on a damaged file.
+DAMAGE: tuple[type[Exception], ...] = (
+    *(ELFError, DWARFError, ConstructError, struct.error, ValueError, LookupError),
+    *(AttributeError, TypeError, AssertionError, OverflowError, RecursionError),
+)
+STRENGTH = {"STB_GLOBAL": 0, "STB_WEAK": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A name of an address in flash: "STT_FUNC" a function, "STT_OBJECT" data, "STT_NOTYPE" a label."""
+
+    name: str
+    address: int
+    size: int
+    kind: str
+    strength: int  # 0 global, 1 weak, 2 local
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What an ELF file says. Addresses are byte addresses, those of RAM without the 0x800000 of the file."""
+
+    path: str
+    code: bytes  # the flash from address 0; bytes that the file does not give are 0xFF
+    entry: int  # where the program begins after a reset
+    executable: tuple[range, ...]  # addresses that can hold instructions
+    symbols: tuple[Symbol, ...]  # those of flash, by address
+    flash_bytes: int  # written to flash: code, constants, initial values of variables
+    ram_bytes: int  # of all variables
+    stack_start: int  # first value of the stack pointer
+    lines: dict[int, str] = field(default_factory=dict)
+    bounds: tuple[LoopBound, ...] = ()
+
+
+def read_image(path: Path) -> Image:
+    """Reads an ELF file. Raises AnalysisError when it is not a linked program for an AVR, or is damaged."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise AnalysisError(f"{path} cannot be read: {error.strerror or error}") from error
+    return _read(path, data)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, data: bytes) -> Image:
+    """Once, whoever asks again for the same bytes."""
+    try:
+        return _image(path, ELFFile(BytesIO(data)))
+    except DAMAGE as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise AnalysisError(f"{path} is not an ELF file, or is damaged: {reason}") from error
+
+
+def _image(path: Path, elf: ELFFile) -> Image:
+    if elf["e_machine"] != EM_AVR:
+        raise AnalysisError(
+            f"{path} is for another processor ({elf['e_machine']}): an image for the ATmega328P is expected"
+        )
+    if elf["e_type"] != "ET_EXEC":
+        raise AnalysisError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
+    code, written = _flash(path, elf)
+    symbols, stack_start = _symbols(elf)
+    return Image(
+        path=str(path),
+        code=code,
+        entry=elf["e_entry"],
+        executable=_executable(elf, len(code)),
+        symbols=symbols,
+        flash_bytes=written,
+        ram_bytes=_ram(elf),
+        stack_start=stack_start,
+        lines=_lines(elf, len(code)),
+        bounds=_bounds(path, _section(path, elf, LOOPS), len(code)),
+    )
+
+
+def _lines(elf: ELFFile, end: int) -> dict[int, str]:
+    """The source lines; none where the debugging information is not one that pyelftools reads. The program is all the
+    same what it is."""
+    try:
+        return source_lines(elf, end)
+    except DAMAGE:
+        return {}
+
+
+def _flash(path: Path, elf: ELFFile) -> tuple[bytes, int]:
+    """The bytes of flash from address 0, and how many the file gives."""
+    flash, written, end = bytearray(b"\xff" * FLASH_SIZE), 0, 0
+    for segment in elf.iter_segments(PT_LOAD):
+        start, size = segment["p_paddr"], segment["p_filesz"]
+        if start >= RAM_START or size == 0:  # EEPROM, fuses
+            continue
+        data = segment.data()
+        if len(data) < size:
+            raise AnalysisError(
+                f"{path} is cut off: {size} bytes of flash at 0x{start:04X} are said, {len(data)} are there"
+            )
+        if start + size > FLASH_SIZE:
+            raise AnalysisError(f"{path} needs flash up to 0x{start + size:X}: the ATmega328P has {FLASH_SIZE} bytes")
+        flash[start : start + size] = data
+        written, end = written + size, max(end, start + size)
+    if end == 0:
+        raise AnalysisError(f"{path} has nothing for the flash: an image for the ATmega328P is expected")
+    return bytes(flash[:end]), written
+
+
+def _ram(elf: ELFFile) -> int:
+    """Bytes of the sections in RAM."""
+    return sum(
+        section["sh_size"]
+        for section in elf.iter_sections()
+        if section["sh_flags"] & ALLOCATED and RAM_START <= section["sh_addr"] < RAM_END
+    )
+
+
+def _executable(elf: ELFFile, end: int) -> tuple[range, ...]:
+    """The sections with instructions; the whole flash where the file has no sections."""
+    found = tuple(
+        range(section["sh_addr"], min(section["sh_addr"] + section["sh_size"], end))
+        for section in elf.iter_sections()
+        if section["sh_flags"] & EXECUTABLE
+    )
+    return found or (range(end),)
+
+
+def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
+    """The symbols of flash, and the first value of the stack pointer."""
+    stack_start = RAM_END - 1 - DATA_SPACE
+    found = []
+    for section in elf.iter_sections():
+        if not isinstance(section, SymbolTableSection):
+            continue
+        for symbol in section.iter_symbols():
+            info, address = symbol["st_info"], symbol["st_value"]
+            if symbol.name == "__stack":
+                stack_start = address & 0xFFFF
+            if not isinstance(symbol["st_shndx"], int) or not symbol.name or address >= FLASH_SIZE:
+                continue  # of no section, as __SP_L__
+            if info["type"] in ("STT_FUNC", "STT_OBJECT", "STT_NOTYPE"):
+                strength = STRENGTH.get(info["bind"], 2)
+                found.append(Symbol(symbol.name, address, symbol["st_size"], info["type"], strength))
+    return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
+
+
+def _section(path: Path, elf: ELFFile, name: str) -> bytes:
+    section = elf.get_section_by_name(name)
+    if section is None:
+        return b""
+    data: bytes = section.data()
+    if len(data) < section["sh_size"]:
+        raise AnalysisError(f"{path} is cut off: section {name} is not whole")
+    return data
+
+
+def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
+    """The records of the section LOOPS: address in a loop's body, most passes, most cycles, of 32 bits each."""
+    if len(data) % 12:
+        raise AnalysisError(f"{path}: section {LOOPS} has {len(data)} bytes: records of 12 bytes are expected")
+    bounds = []
+    for address, passes, cycles in struct.iter_unpack("<III", data):
+        if address >= end or address % 2:
+            raise AnalysisError(
+                f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction"
+            )
+        most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
+        bounds.append(LoopBound(address, most, longest))
+    return tuple(bounds)

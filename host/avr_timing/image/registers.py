@@ -1,0 +1,64 @@
+"""What instructions do beyond the graph: which registers they write.
+
+After the AVR instruction set manual, and the register conventions of avr-gcc: https://gcc.gnu.org/wiki/avr-gcc.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from avr_timing.program import Block, Function, Instruction
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+REGISTERS = 32  # at data addresses 0 to 31
+ZERO = 1  # holds zero wherever compiled code does not multiply
+CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
+NO_RESULT = _words(
+    "cpse cpc cp cpi tst out sts st std push nop sleep wdr break spm sei cli sec clc sez clz sen cln sev clv ses cls "
+    "seh clh set clt bst sbi cbi sbic sbis sbrc sbrs jmp rjmp ijmp ret reti brcs breq brmi brvs brlt brhs brts brie "
+    "brcc brne brpl brvc brge brhc brtc brid"
+)
+PRODUCTS = _words("mul muls mulsu fmul fmuls fmulsu")
+PAIRS = _words("movw adiw sbiw")
+KEEPS_FLAGS = _words("movw mov ldi ld ldd lds lpm st std sts in out push pop nop sbi cbi sei cli swap bld jmp rjmp")
+
+
+def written(instruction: Instruction) -> frozenset[int]:
+    """Registers that may be different after it; after a call, those that a callee need not keep."""
+    if instruction.mnemonic in ("call", "rcall", "icall"):
+        return CALL_CLOBBERED if not pushes_only(instruction) else frozenset()
+    return _results(instruction.mnemonic, instruction.operands)
+
+
+@cache
+def _results(name: str, operands: tuple[int, ...]) -> frozenset[int]:
+    if name in PRODUCTS:
+        return frozenset((0, 1))
+    result: set[int] = set()
+    if name not in NO_RESULT and operands:
+        result.add(operands[0])
+        if name in PAIRS:
+            result.add(operands[0] + 1)
+    if name in ("ld", "lpm") and operands[-1] in (1, -1):
+        result |= {operands[1], operands[1] + 1}
+    if name == "st" and operands[1] in (1, -1):
+        result |= {operands[0], operands[0] + 1}
+    return frozenset(result)
+
+
+def pushes_only(instruction: Instruction) -> bool:
+    """`rcall .+0`: calls the next instruction, so that two bytes are on the stack."""
+    return instruction.mnemonic == "rcall" and instruction.operands[0] == instruction.address + instruction.size
+
+
+def before(function: Function) -> dict[int, list[Block]]:
+    """Of each block, those that lead to it."""
+    result: dict[int, list[Block]] = {start: [] for start in function.blocks}
+    for block in function.blocks.values():
+        for to in dict.fromkeys(edge.to for edge in block.edges):
+            result[to].append(block)
+    return result

@@ -1,0 +1,1 @@
+"""What interrupts wait for, and what work takes when they come on top of it."""

@@ -1,0 +1,102 @@
+"""The program of an image as a graph: the types that the rooms of this package share.
+
+Addresses are byte addresses in flash. Cycles are those of the CPU's clock, after the AVR instruction set manual for
+cores with a 16-bit program counter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """One machine instruction.
+
+    `cycles` is what it takes when the program goes on behind it, `operands` the decoded numbers in the order of the
+    manual's syntax (registers by number, constants, byte addresses of branches, I/O addresses).
+    """
+
+    address: int
+    size: int  # bytes, 2 or 4
+    mnemonic: str  # as objdump writes it: "ldi", "brne", "rcall", ...
+    operands: tuple[int, ...]
+    cycles: int
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A way out of a block: `cycles` is what the block's last instruction takes on this way, without a callee."""
+
+    to: int  # address of a block of the same function
+    cycles: int
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Instructions that run one after another. A call ends a block; its only edge leads behind the call.
+
+    A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
+    call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
+    instruction takes then.
+    """
+
+    start: int
+    instructions: tuple[Instruction, ...]
+    edges: tuple[Edge, ...]
+    calls: tuple[int, ...] = ()  # entries of the functions that its last instruction may call; mostly one
+    last_cycles: int = 0  # of the last instruction, where there are no edges
+
+    @property
+    def body_cycles(self) -> int:
+        """Cycles of all instructions but the last."""
+        return sum(instruction.cycles for instruction in self.instructions[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: where it begins and its blocks by their addresses."""
+
+    name: str
+    entry: int
+    blocks: dict[int, Block]
+    clobbers: frozenset[int] | None = None  # registers that a call may change; None: all that a callee need not keep
+
+
+@dataclass(frozen=True, slots=True)
+class LoopBound:
+    """What the source says of a loop: `address` lies in its body.
+
+    At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
+    `cycles` in all, to which one more pass may come. None: not said.
+    """
+
+    address: int
+    passes: int | None
+    cycles: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """All functions of an image that can be reached, by entry, and what the image says of itself."""
+
+    path: str
+    functions: dict[int, Function]
+    by_name: dict[str, int]  # entry of each named function
+    bounds: tuple[LoopBound, ...] = ()
+    lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
+    unproven: dict[int, str] = field(default_factory=dict)  # why it is not known where a function leads, by its entry
+
+    def clobbered(self, block: Block) -> frozenset[int] | None:
+        """Registers that what a block calls may change; None: all that a callee need not keep."""
+        found = [self.functions[entry].clobbers for entry in block.calls]
+        known = [one for one in found if one is not None]
+        return frozenset[int]().union(*known) if known and len(known) == len(found) else None
+
+    def where(self, address: int) -> str:
+        """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""
+        text = f"0x{address:04X}"
+        if line := self.lines.get(address):
+            return f"{text} ({line})"
+        entry = max((entry for entry in self.functions if entry <= address), default=None)
+        return text if entry is None else f"{text} (in {self.functions[entry].name})"
