@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from avr_timing.flow.graph import load_program
-from avr_timing.interrupts.receive_times import DATA, RECEIVE
+from avr_timing.interrupts.byte_reads import DATA, RECEIVE
 from avr_timing.program import Program
 from boebot import resources
 from boebot.description import robots

@@ -13,7 +13,7 @@ from avr_image import MARKS
 from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.graph import load_program
-from avr_timing.interrupts.blocked import Blocked
+from avr_timing.interrupts.interrupts_off import InterruptsOff
 from avr_timing.program import Program
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import BoardAccess, Level
@@ -310,7 +310,7 @@ def test_interrupt_is_as_late_as_the_longest_stretch(tmp_path: Path, length: int
     longest occurs. A request in the first cycle of a stretch of n waits for the n - 1 others.
     """
     image = build(tmp_path, LATE.format(off=" nop\n" * length))
-    stretch = Blocked(load_program(image)).of("f").cycles
+    stretch = InterruptsOff(load_program(image)).of("f").cycles
     assert stretch == length + 3
     late: list[int] = []
     for period in range(200, 230):  # so that they meet in every phase

@@ -6,7 +6,10 @@ cores with a 16-bit program counter.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+
+from avr_timing.errors import AnalysisError
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,30 @@ class Program:
     bounds: tuple[LoopBound, ...] = ()
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
     unproven: dict[int, str] = field(default_factory=dict)  # why it is not known where a function leads, by its entry
+
+    def entry(self, function: str | int) -> int:
+        """Of a function by name, or by the entry itself. Raises AnalysisError where there is none of that name."""
+        if isinstance(function, int):
+            return function
+        if function not in self.by_name:
+            raise AnalysisError(f"{self.path} has no function {function}")
+        return self.by_name[function]
+
+    def below(self, entry: int) -> set[int]:
+        """A function with all that it calls, and so on."""
+        found, work = {entry}, [entry]
+        while work:
+            blocks = self.functions[work.pop()].blocks.values()
+            new = {callee for block in blocks for callee in block.calls} - found
+            found |= new
+            work += new
+        return found
+
+    def instructions(self, entries: Iterable[int]) -> Iterator[Instruction]:
+        """All instructions of functions."""
+        for entry in entries:
+            for block in self.functions[entry].blocks.values():
+                yield from block.instructions
 
     def clobbered(self, block: Block) -> frozenset[int] | None:
         """Registers that what a block calls may change; None: all that a callee need not keep."""

@@ -12,7 +12,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.byte_reads import RECEIVE
 from avr_timing.interrupts.response import responses
 from boebot.cli import timing, timing_tables
 from boebot.description.robots import load_robot

@@ -2,21 +2,24 @@
 
 The stack pointer is followed through every instruction: `push`, `pop`, calls (2 bytes: the program counter), `rcall
 .+0` (2 bytes of room) and frames, whose code reads SP into a pair of registers, subtracts a constant and writes it
-back; also where libgcc does so for many functions (`__prologue_saves__`). All ways to a place must have the same depth
-there. A depth that depends on data (alloca, arrays of variable length) is refused.
+back; also where libgcc does so for many functions (`__prologue_saves__`). Such a pair is a part of an unknown word
+(constants.py), the value of SP at the function's entry. All ways to a place must have the same depth there. A depth
+that depends on data (alloca, arrays of variable length) is refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from avr_timing.errors import AnalysisError
-from avr_timing.image.registers import ZERO, pushes_only, written
+from avr_timing.flow.constants import Part, State, step
+from avr_timing.image.registers import ZERO, is_call, pushes_only
 from avr_timing.program import Block, Function, Instruction, Program
 
 ADDRESS = 2  # bytes that a call or an interrupt puts on the stack
 SPL, SPH = 0x3D, 0x3E  # I/O addresses
+AT_ENTRY = -1  # the unknown word that SP is at a function's entry
 VECTORS = range(1, 26)  # as in __vector_N; each at byte address 4 N
 
 
@@ -42,26 +45,10 @@ class ImageDepth:
 
 
 @dataclass(frozen=True, slots=True)
-class _Byte:
-    """What a register holds: a constant (`depth` None), or the low or high byte of the stack pointer as it is when
-    `depth` bytes are in use; `part` was subtracted from the low one, and the borrow is still to be."""
-
-    number: int = 0
-    depth: int | None = None
-    high: bool = False
-    part: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class _State:
     depth: int
-    registers: dict[int, _Byte]
-    high: int | None = None  # SPH is written for this depth, SPL not yet
-
-    def merge(self, other: _State) -> _State:
-        """What holds on both ways; depths are the same."""
-        both = {r: byte for r, byte in self.registers.items() if other.registers.get(r) == byte}
-        return _State(self.depth, both, self.high)
+    known: State
+    high: int | None = None  # the depth for which SPH is written, and SPL not yet
 
 
 class Stack:
@@ -79,10 +66,7 @@ class Stack:
         Raises:
             AnalysisError: no such function; recursion; a depth that is not the same on all ways or depends on data.
         """
-        if isinstance(function, str):
-            if function not in self.program.by_name:
-                raise AnalysisError(f"{self.program.path} has no function {function}")
-            function = self.program.by_name[function]
+        function = self.program.entry(function)
         if function not in self._depths:
             if function in self.program.unproven:
                 raise AnalysisError(self.program.unproven[function])
@@ -104,28 +88,17 @@ class Stack:
         An interrupt that switches interrupts on again is taken to keep itself off meanwhile: each such one is there at
         most once, and on top of them one that does not.
         """
-        vectors = [4 * number for number in VECTORS if 4 * number in self.program.functions]
-        nesting = [self.of(vector) for vector in vectors if self._switches_on(vector)]
-        others = [self.of(vector) for vector in vectors if not self._switches_on(vector)]
+        nesting, others = list[Depth](), list[Depth]()
+        for vector in (4 * number for number in VECTORS if 4 * number in self.program.functions):
+            code = self.program.instructions(self.program.below(vector))
+            lets_others_in = any(instruction.mnemonic == "sei" for instruction in code)
+            (nesting if lets_others_in else others).append(self.of(vector))
         nesting.sort(key=lambda depth: -depth.bytes)
-        top = max(others, key=lambda depth: depth.bytes, default=None)
-        return ImageDepth(self.of("main"), (*nesting, *((top,) if top else ())))
-
-    def _switches_on(self, entry: int) -> bool:
-        seen: set[int] = set()
-        work = [entry]
-        while work:
-            function = self.program.functions[work.pop()]
-            if function.entry not in seen:
-                seen.add(function.entry)
-                for block in function.blocks.values():
-                    if any(instruction.mnemonic == "sei" for instruction in block.instructions):
-                        return True
-                    work += block.calls
-        return False
+        others.sort(key=lambda depth: -depth.bytes)
+        return ImageDepth(self.of("main"), (*nesting, *others[:1]))
 
     def _depth(self, function: Function) -> Depth:
-        begin = _State(0, {ZERO: _Byte(0)})
+        begin = _State(0, State({ZERO: 0}))
         states = {function.entry: begin}
         work = [function.entry]
         deepest = Depth(0, (function.name,))
@@ -141,7 +114,7 @@ class Stack:
                         f"{function.name} reaches {self.program.where(edge.to)} with {known.depth} and with "
                         f"{state.depth} bytes on the stack; expected one depth at each place"
                     )
-                merged = state if known is None else known.merge(state)
+                merged = state if known is None else replace(state, known=known.known.merge(state.known))
                 if known is None or merged != known:
                     states[edge.to] = merged
                     work.append(edge.to)
@@ -155,7 +128,7 @@ class Stack:
             if state.depth > deepest.bytes:
                 deepest = Depth(state.depth, (function.name,))
         last = block.instructions[-1]
-        own = ADDRESS if last.mnemonic in ("call", "rcall", "icall") else 0
+        own = ADDRESS if is_call(last) else 0
         for callee in block.calls:
             called = self.of(callee)
             if state.depth + own + called.bytes > deepest.bytes:
@@ -180,73 +153,25 @@ class Stack:
             depth, high = self._written(instruction, state)
         if depth < 0:
             raise AnalysisError(f"more is popped than was pushed at {self.program.where(instruction.address)}")
-        return _State(depth, _registers(instruction, state), high)
+        known = step(instruction, state.known)
+        if name == "in" and operands[1] in (SPL, SPH):
+            read = Part(AT_ENTRY, -depth & 0xFFFF, operands[1] == SPH)
+            known = replace(known, parts=known.parts | {operands[0]: read})
+        return _State(depth, known, high)
 
     def _written(self, instruction: Instruction, state: _State) -> tuple[int, int | None]:
         """Depth, and SPH's where SPL is still to come, behind a write to one of the two."""
-        byte = state.registers.get(instruction.operands[1])
-        is_high = instruction.operands[0] == SPH
-        fits = byte is not None and byte.depth is not None and byte.part is None and byte.high == is_high
-        if fits and byte is not None and byte.depth is not None:
+        port, register = instruction.operands
+        parts = state.known.parts
+        part, is_high = parts.get(register), port == SPH
+        is_whole = part is not None and part._replace(high=not is_high) in parts.values()  # no borrow is missing
+        if part is not None and part.word == AT_ENTRY and part.high == is_high and is_whole:
+            depth = (-part.more + 0x8000 & 0xFFFF) - 0x8000
             if is_high:
-                return state.depth, byte.depth
-            if state.high in (None, byte.depth):
-                return byte.depth, None
+                return state.depth, depth
+            if state.high in (None, depth):
+                return depth, None
         raise AnalysisError(
             f"the stack pointer gets a value that is not known at {self.program.where(instruction.address)}; "
             "expected frames of constant size (no alloca, no arrays of variable length)"
         )
-
-
-def _registers(instruction: Instruction, state: _State) -> dict[int, _Byte]:
-    """Behind an instruction: constants, and bytes of the stack pointer."""
-    name, operands, known = instruction.mnemonic, instruction.operands, state.registers
-    changed = written(instruction)
-    result = {r: byte for r, byte in known.items() if r not in changed}
-    if name == "ldi":
-        result[operands[0]] = _Byte(operands[1])
-    elif name == "eor" and operands[0] == operands[1]:
-        result[operands[0]] = _Byte(0)
-    elif name == "in" and operands[1] in (SPL, SPH):
-        result[operands[0]] = _Byte(0, state.depth, operands[1] == SPH)
-    elif name == "mov" and operands[1] in known:
-        result[operands[0]] = known[operands[1]]
-    elif name == "movw":
-        result |= {operands[0] + i: known[operands[1] + i] for i in (0, 1) if operands[1] + i in known}
-    elif name in ("sbiw", "adiw"):
-        _add_word(operands[0], operands[1] if name == "sbiw" else -operands[1], known, result)
-    elif name in ("subi", "sub", "add", "sbci", "sbc", "adc"):
-        _add_byte(name, operands, known, result)
-    elif name in ("call", "rcall", "icall") and not pushes_only(instruction):
-        result[ZERO] = _Byte(0)  # avr-gcc's convention
-    return result
-
-
-def _add_word(low: int, number: int, known: dict[int, _Byte], result: dict[int, _Byte]) -> None:
-    one, other = known.get(low), known.get(low + 1)
-    if one and other and one.depth is not None and one.part is None and other == _Byte(0, one.depth, True):
-        result[low] = _Byte(0, one.depth + number)
-        result[low + 1] = _Byte(0, one.depth + number, True)
-
-
-def _add_byte(name: str, operands: tuple[int, ...], known: dict[int, _Byte], result: dict[int, _Byte]) -> None:
-    """The low byte of the stack pointer, or then the high one, less or plus a constant."""
-    to, sign = operands[0], -1 if name in ("add", "adc") else 1
-    number: int | None = operands[1]
-    if name not in ("subi", "sbci"):
-        byte = known.get(operands[1])
-        number = byte.number if byte is not None and byte.depth is None else None
-    old = known.get(to)
-    if number is None or old is None or old.depth is None:
-        return
-    if name in ("subi", "sub", "add"):
-        if not old.high and old.part is None:
-            result[to] = _Byte(0, old.depth, False, sign * number)
-        return
-    low = known.get(to - 1)
-    if low is None or low.part is None or low.depth != old.depth or not old.high:
-        return
-    taken = low.part + (sign * number << 8)
-    taken -= taken + 0x8000 & ~0xFFFF  # subi and sbci add by subtracting the two's complement
-    result[to - 1] = _Byte(0, old.depth + taken)
-    result[to] = _Byte(0, old.depth + taken, True)

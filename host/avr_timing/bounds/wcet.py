@@ -2,16 +2,16 @@
 
 From the function's first instruction to the end of its return, with all that it calls; the call itself is the
 caller's. A function is bounded once for each set of constants that calls hand to it (constants.py). Every path that
-these leave counts as possible; loops are bounded by what the image says of them and by their own code (counted.py).
+these leave counts as possible; loops are bounded by what the image says of them and by their own code (loop_counts.py).
 `main` never returns and so has no bound: one pass of its endless loop is taken apart in costs.py, and what comes before
-that loop is the start-up, of which only the stretches with interrupts off count (blocked.py).
+that loop is the start-up, of which only the stretches with interrupts off count (interrupts_off.py).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from avr_timing.bounds.marks import marks_of
+from avr_timing.bounds.loop_bounds import marks_of
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
@@ -55,11 +55,7 @@ class WorstCase:
         Raises:
             AnalysisError: no such function; a loop without a bound; recursion; it never returns.
         """
-        if isinstance(function, str):
-            if function not in self.program.by_name:
-                raise AnalysisError(f"{self.program.path} has no function {function}")
-            function = self.program.by_name[function]
-        return self.bound(function)
+        return self.bound(self.program.entry(function))
 
     def bound(self, entry: int, context: Context | None = None) -> Bound:
         """The same by entry; `context`: registers that hold constants there, else those of any call."""

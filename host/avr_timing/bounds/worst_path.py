@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 
-from avr_timing.bounds.marks import marks_of
+from avr_timing.bounds.loop_bounds import marks_of
 from avr_timing.bounds.wcet import Visit, WorstCase
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.program import Block

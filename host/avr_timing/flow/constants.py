@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from avr_timing.image.instructions import BRANCHES, SKIPS
-from avr_timing.image.registers import ZERO, pushes_only, written
+from avr_timing.image.registers import ZERO, is_call, pushes_only, written
 from avr_timing.program import Block, Edge, Function, Instruction
 
 ARGUMENTS = range(8, 26)  # registers in which values are handed to a callee
@@ -97,7 +97,7 @@ class Known:
         last = block.instructions[-1]
         known = self.before_last(block).registers
         found = {r: value for r, value in known.items() if r in ARGUMENTS or r == ZERO}
-        if last.mnemonic in ("call", "rcall", "icall"):
+        if is_call(last):
             found[ZERO] = 0
         return tuple(sorted(found.items()))
 
@@ -215,7 +215,7 @@ def _skips(last: Instruction, state: State) -> bool | None:
 def step(instruction: Instruction, state: State) -> State:
     """What is known behind an instruction; behind a call, when its callee has returned."""
     name, operands = instruction.mnemonic, instruction.operands
-    if name in ("call", "rcall", "icall") and not pushes_only(instruction):
+    if is_call(instruction):
         changed = written(instruction)
         kept = {r: part for r, part in state.parts.items() if r not in changed}
         return State(_without(state.registers, changed) | {ZERO: 0}, {}, kept)

@@ -27,7 +27,7 @@ from avr_timing.errors import AnalysisError
 from avr_timing.flow.jumps import NotProvenError, Step, targets_of
 from avr_timing.image.elf import Image, Symbol, read_image
 from avr_timing.image.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
-from avr_timing.image.registers import CALL_CLOBBERED, REGISTERS, written
+from avr_timing.image.registers import CALL_CLOBBERED, REGISTERS, is_call, written
 from avr_timing.program import Block, Edge, Function, Instruction, Program
 
 VECTORS = 26  # the reset's and 25 interrupts'
@@ -52,7 +52,8 @@ def program_of(image: Image) -> Program:
     depths: dict[int, int] = {}
     for entry in list(program.functions):
         _check_depth(program, entry, 1, depths)
-        _note_clobbers(program, entry)
+    for entry, function in program.functions.items():
+        program.functions[entry] = replace(function, clobbers=_clobbers(program, entry))
     # Of several functions with one name, those of no file's own come first, then the first in flash.
     for symbol in sorted(image.symbols, key=lambda symbol: symbol.strength):
         if symbol.kind != "STT_OBJECT" and symbol.address in program.functions:
@@ -74,24 +75,14 @@ def _check_depth(program: Program, entry: int, above: int, depths: dict[int, int
     return depths[entry]
 
 
-def _note_clobbers(program: Program, entry: int) -> frozenset[int]:
+def _clobbers(program: Program, entry: int) -> frozenset[int]:
     """What a call of a function changes: the compiler knows of its library's routines that they leave some registers
     alone which others need not keep."""
-    function = program.functions[entry]
-    if function.clobbers is not None:
-        return function.clobbers
-    program.functions[entry] = replace(
-        function, clobbers=CALL_CLOBBERED
-    )  # while it is worked out: of what calls itself
-    changed = set(CALL_CLOBBERED) if entry in program.unproven else set[int]()
-    for block in function.blocks.values():
-        for instruction in block.instructions[: -1 if block.calls else None]:
-            changed |= written(instruction)
-        for callee in block.calls:
-            changed |= _note_clobbers(program, callee)
-    found = CALL_CLOBBERED.intersection(changed)
-    program.functions[entry] = replace(function, clobbers=found)
-    return found
+    below = program.below(entry)
+    if not below.isdisjoint(program.unproven):
+        return CALL_CLOBBERED
+    own = (each for each in program.instructions(below) if not is_call(each))
+    return CALL_CLOBBERED.intersection(register for each in own for register in written(each))
 
 
 class _Names:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from avr_timing.errors import AnalysisError
+from avr_timing.program import Function
 
 N = TypeVar("N", bound=Hashable)
 
@@ -108,6 +109,19 @@ def natural_loops(order: list[N], successors: Callable[[N], Iterable[N]]) -> lis
                 latches.setdefault(following, []).append(node)
     loops = [Loop(header, _body(header, ends, before), tuple(ends)) for header, ends in latches.items()]
     return _nest(loops)
+
+
+def loops_of(function: Function) -> list[Loop[int]]:
+    """The outermost loops of a function.
+
+    Raises:
+        IrreducibleError: a cycle has two entries.
+    """
+
+    def successors(start: int) -> list[int]:
+        return [edge.to for edge in function.blocks[start].edges]
+
+    return natural_loops(reverse_postorder(function.entry, successors), successors)
 
 
 def _dominates(one: N, other: N, above: Mapping[N, N]) -> bool:

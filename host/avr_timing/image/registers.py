@@ -29,9 +29,9 @@ KEEPS_FLAGS = _words("movw mov ldi ld ldd lds lpm st std sts in out push pop nop
 
 def written(instruction: Instruction) -> frozenset[int]:
     """Registers that may be different after it; after a call, those that a callee need not keep."""
-    if instruction.mnemonic in ("call", "rcall", "icall"):
-        return CALL_CLOBBERED if not pushes_only(instruction) else frozenset()
-    return _results(instruction.mnemonic, instruction.operands)
+    if is_call(instruction):
+        return CALL_CLOBBERED
+    return frozenset() if pushes_only(instruction) else _results(instruction.mnemonic, instruction.operands)
 
 
 @cache
@@ -48,6 +48,11 @@ def _results(name: str, operands: tuple[int, ...]) -> frozenset[int]:
     if name == "st" and operands[1] in (1, -1):
         result |= {operands[0], operands[0] + 1}
     return frozenset(result)
+
+
+def is_call(instruction: Instruction) -> bool:
+    """Calls a function."""
+    return instruction.mnemonic in ("call", "rcall", "icall") and not pushes_only(instruction)
 
 
 def pushes_only(instruction: Instruction) -> bool:

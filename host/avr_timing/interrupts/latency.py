@@ -19,7 +19,7 @@ priority was waiting may be the one at which the request before this one was acc
 was at most L after the request before; so it need not be heeded where no two of its requests come within L and the time
 that passes, by the same formula, from that acceptance on.
 
-Received bytes queue, and are taken by other interrupts than their own: they are looked at in received.py.
+Received bytes queue, and are taken by other interrupts than their own: they are looked at in byte_waits.py.
 
 How often they come, the caller says (`Source`). That is not the rate in the long run: requests may come in bursts.
 """
@@ -29,9 +29,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from avr_timing.errors import AnalysisError
-from avr_timing.interrupts.blocked import Blocked
-from avr_timing.interrupts.receive_times import RECEIVE, Taken
-from avr_timing.interrupts.received import Line, Other, longest_wait
+from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
+from avr_timing.interrupts.byte_waits import Line, Other, longest_wait
+from avr_timing.interrupts.interrupts_off import InterruptsOff
 from avr_timing.interrupts.response import Source
 from avr_timing.interrupts.steps import Steps
 
@@ -43,7 +43,7 @@ class Latencies:
 
     def __init__(
         self,
-        blocked: Blocked,
+        blocked: InterruptsOff,
         requests: Mapping[int, Sequence[Source]],
         *,
         apart: Mapping[int, Collection[int]] | None = None,
@@ -60,7 +60,7 @@ class Latencies:
         """
         self.blocked = blocked
         self.steps: Steps = Steps(blocked) if like is None else like.steps
-        self.taken: dict[int, Taken] = {} if like is None else like.taken
+        self.taken: dict[int, ByteReads] = {} if like is None else like.taken
         self.spans = {vector: blocked.interrupt(vector) for vector in blocked.vectors()}
         self.requests = requests
         self.apart: Mapping[int, Collection[int]] = apart or {}
@@ -109,9 +109,9 @@ class Latencies:
 
         return max(map(wait, self.never_near or (None,)))
 
-    def _taken(self, vector: int) -> Taken:
+    def _taken(self, vector: int) -> ByteReads:
         if vector not in self.taken:
-            self.taken[vector] = Taken(self.blocked.worst_case, 4 * vector)
+            self.taken[vector] = ByteReads(self.blocked.worst_case, 4 * vector)
         return self.taken[vector]
 
     def _behind(self, begun: int, higher: Sequence[int]) -> int:

@@ -8,7 +8,7 @@ of C cycles that begins together with the first request of every interrupt is do
 
 and at no other moment does it take longer. Where R does not exist the interrupts alone are too much: overload.
 
-What an interrupt itself waits is in blocked.py. All times are in cycles.
+What an interrupt itself waits is in interrupts_off.py. All times are in cycles.
 """
 
 from __future__ import annotations

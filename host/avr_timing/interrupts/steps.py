@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avr_timing.flow.flag import Flag
-from avr_timing.interrupts.blocked import Begin, Blocked, Call, Flow, Node
+from avr_timing.interrupts.interrupts_off import Begin, Call, Flow, InterruptsOff, Node
 
 LONGEST_INSTRUCTION = 4  # cycles: call, ret, reti
 ANYWHERE = -1
@@ -74,7 +74,7 @@ def _begins(sizes: Iterable[int]) -> NDArray[np.intp]:
 class Steps:
     """Of a program with a function `main` and vectors."""
 
-    def __init__(self, blocked: Blocked) -> None:
+    def __init__(self, blocked: InterruptsOff) -> None:
         self.blocked = blocked
         self._known = _Known()
         self._places: dict[_Place, int] = {}

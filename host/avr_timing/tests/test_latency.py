@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from avr_image import assembled
 from avr_timing.errors import AnalysisError
-from avr_timing.interrupts import blocked
-from avr_timing.interrupts.blocked import ENTRY, WAKE, Blocked
+from avr_timing.interrupts import interrupts_off
+from avr_timing.interrupts.interrupts_off import ENTRY, WAKE, InterruptsOff
 from avr_timing.interrupts.latency import HORIZON, Latencies
 from avr_timing.interrupts.response import Source
 from avr_timing.interrupts.steps import KEPT, Steps
@@ -30,7 +30,7 @@ NOP = " nop\n"
 
 def latencies(program: Program, *intervals: int) -> Latencies:
     """With requests of vectors 1, 2 and so on, so far apart."""
-    return Latencies(Blocked(program), {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)})
+    return Latencies(InterruptsOff(program), {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)})
 
 
 # ---- by hand -------------------------------------------------------------------------------------------------------
@@ -55,14 +55,14 @@ def test_each_return_may_reach_a_further_stretch(tmp_path: Path) -> None:
     """Round after round: stretches of 3 and 6 cycles, `rjmp` of 2, and between the stretches nothing or a `nop`."""
     source = VECTORS + "main: cli\n sei\n nop\n {} cli\n nop\n nop\n nop\n sei\n nop\n rjmp main\n __vector_1: reti"
     for between, times in (("", [6, 3 + 6, 3 + 6 + 2, 6 + 2 + 3 + 6]), ("nop\n", [6, 6 + 2, 6 + 2 + 3, 3 + 1 + 6 + 2])):
-        found = Steps(Blocked(assembled(tmp_path, source.format(between))))
+        found = Steps(InterruptsOff(assembled(tmp_path, source.format(between))))
         assert [found.most(n) for n in (1, 2, 3, 4)] == times
 
 
 def test_cli_as_first_instruction_of_a_function_called_at_once(tmp_path: Path) -> None:
     """`sei; rcall`: the call is what still runs, and the callee switches interrupts off again."""
     source = VECTORS + "main: cli\n nop\n sei\n rcall f\n rjmp main\n f: cli\n nop\n nop\n sei\n ret\n __vector_1: reti"
-    found = Steps(Blocked(assembled(tmp_path, source)))
+    found = Steps(InterruptsOff(assembled(tmp_path, source)))
     outer, inner, rjmp = 1 + 1 + 1 + 3, 1 + 2 + 1 + 4, 2
     assert found.most(1) == inner
     assert found.most(2) == outer + inner
@@ -72,12 +72,12 @@ def test_cli_as_first_instruction_of_a_function_called_at_once(tmp_path: Path) -
 
 def test_sleep_wakes_in_four_cycles(tmp_path: Path) -> None:
     source = VECTORS + "main: cli\n sei\n sleep\n rjmp main\n __vector_1: reti"
-    assert Steps(Blocked(assembled(tmp_path, source))).most(1) == 1 + 1 + 1 + WAKE
+    assert Steps(InterruptsOff(assembled(tmp_path, source))).most(1) == 1 + 1 + 1 + WAKE
 
 
 def test_steps_beyond_those_kept_are_not_below_them(tmp_path: Path) -> None:
     source = VECTORS + "main: cli\n sei\n nop\n nop\n rjmp main\n __vector_1: reti"
-    found = Steps(Blocked(assembled(tmp_path, source)))
+    found = Steps(InterruptsOff(assembled(tmp_path, source)))
     times = [found.most(n) for n in range(2 * KEPT + 2)]
     assert all(a <= b for a, b in itertools.pairwise(times))
     assert times[2 * KEPT] == 2 * times[KEPT] and times[KEPT + 1] == times[KEPT] + times[1]
@@ -85,7 +85,7 @@ def test_steps_beyond_those_kept_are_not_below_them(tmp_path: Path) -> None:
 
 def test_ways_that_break_off_are_worked_out_once(tmp_path: Path) -> None:
     source = VECTORS + "main: cli\n sei\n nop\n cli\n nop\n nop\n nop\n sei\n nop\n rjmp main\n __vector_1: reti"
-    found = Steps(Blocked(assembled(tmp_path, source)))
+    found = Steps(InterruptsOff(assembled(tmp_path, source)))
 
     def plainly(steps: int, jumps: int) -> int:
         if jumps == 0:
@@ -106,9 +106,9 @@ def test_ways_that_break_off_are_worked_out_once(tmp_path: Path) -> None:
     ids=["a push in a loop without end", "copies of the flag that double at each branch"],
 )
 def test_states_without_end_are_refused(tmp_path: Path, body: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocked, "STATES_MAXIMUM", 5000)
+    monkeypatch.setattr(interrupts_off, "STATES_MAXIMUM", 5000)
     program = assembled(tmp_path, VECTORS + f"main: cli\n {body}\n __vector_1: reti")
-    for judge in (lambda: Steps(Blocked(program)), lambda: Blocked(program).image()):
+    for judge in (lambda: Steps(InterruptsOff(program)), lambda: InterruptsOff(program).image()):
         with pytest.raises(AnalysisError, match=r"\(in main\): there are more than 5,000 states of the interrupt flag"):
             judge()
 
@@ -118,7 +118,7 @@ def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
         calls = "".join(f" f{i}: rcall f{i + 1}\n ret\n" for i in range(1, count))
         return VECTORS + f"main: rcall f1\n 1: rjmp 1b\n{calls} f{count}: cli\n sei\n ret\n __vector_1: reti"
 
-    assert Blocked(assembled(tmp_path, chained(50))).image().cycles > 0
+    assert InterruptsOff(assembled(tmp_path, chained(50))).image().cycles > 0
     for count in (60, 1500):
         with pytest.raises(AnalysisError, match="calls go deeper than 60 functions; expected no deeper call"):
             assembled(tmp_path, chained(count))
@@ -126,7 +126,7 @@ def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
 
 def test_stretch_that_ends_in_another_function_makes_every_step_the_longest(tmp_path: Path) -> None:
     source = VECTORS + "main: rcall f\n nop\n sei\n nop\n nop\n rjmp main\n f: cli\n ret\n __vector_1: reti"
-    found = Steps(Blocked(assembled(tmp_path, source)))
+    found = Steps(InterruptsOff(assembled(tmp_path, source)))
     assert found.most(3) == 3 * (1 + 4 + 1 + 1 + 1)
 
 
@@ -139,7 +139,7 @@ def test_those_of_higher_priority_may_take_all_the_time(tmp_path: Path) -> None:
 def test_how_often_one_of_higher_priority_comes_must_be_said(tmp_path: Path) -> None:
     program = assembled(tmp_path, VECTORS + "main: rjmp main\n __vector_1: reti\n __vector_2: reti")
     with pytest.raises(AnalysisError, match="interrupt 1 goes before interrupt 2"):
-        Latencies(Blocked(program), {2: [Source("i", 1, 100)]}).of(2)
+        Latencies(InterruptsOff(program), {2: [Source("i", 1, 100)]}).of(2)
 
 
 # ---- a machine -----------------------------------------------------------------------------------------------------
@@ -248,7 +248,7 @@ def test_no_machine_waits_longer(
     if handlers[-1][1]:
         intervals = [*intervals[:-1], 4_000]  # it does not ask again before its body has returned
     sources = {n: [Source("i", 1, each, late)] for n, each in enumerate(intervals, 1)}
-    found = Latencies(Blocked(program), sources)
+    found = Latencies(InterruptsOff(program), sources)
     limits = {vector: found.of(vector) for vector in sources}
     draw = Random(seed)
     for _ in range(12):

@@ -22,8 +22,8 @@ from typing import Any
 
 from avr_timing.bounds.stack import Stack
 from avr_timing.errors import AnalysisError
-from avr_timing.interrupts.blocked import WAKE
-from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.byte_reads import RECEIVE
+from avr_timing.interrupts.interrupts_off import WAKE
 from avr_timing.interrupts.response import Responses, Schedule, Source, load, longest_gap, misses, response, responses
 from boebot.errors import TimingError
 from boebot.timing.changes import of_image as changes_of

@@ -24,13 +24,13 @@ from dataclasses import dataclass, field, replace
 from avr_timing.bounds.wcet import Bound, WorstCase
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known
-from avr_timing.flow.loops import Loop, natural_loops, reverse_postorder
+from avr_timing.flow.loops import Loop, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
-from avr_timing.interrupts.blocked import ENTRY, Blocked
+from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
+from avr_timing.interrupts.interrupts_off import ENTRY, InterruptsOff
 from avr_timing.interrupts.latency import Latencies
-from avr_timing.interrupts.receive_times import RECEIVE, Taken
 from avr_timing.interrupts.response import Piece, Schedule, Source
-from avr_timing.program import Block, Function, Program
+from avr_timing.program import Block, Program
 from boebot.errors import TimingError
 from boebot.timing.firmware import Firmware
 from boebot.timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
@@ -76,7 +76,7 @@ class Costs:
 
     def under(self, firmware: Firmware, load: Load) -> Costs:
         """The same under another load, on which only the latencies depend."""
-        blocked = Blocked(firmware.program) if self.found_by is None else self.found_by.blocked
+        blocked = InterruptsOff(firmware.program) if self.found_by is None else self.found_by.blocked
         found = Latencies(blocked, _requests(firmware, load), apart=APART, never_near=NEVER_NEAR, like=self.found_by)
         return replace(self, latencies=_latencies(firmware, load, found), found_by=found)
 
@@ -192,7 +192,7 @@ def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = la
     for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
         interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
         progress(done / rows)
-    latencies = Latencies(Blocked(program, worst), _requests(firmware, load), apart=APART, never_near=NEVER_NEAR)
+    latencies = Latencies(InterruptsOff(program, worst), _requests(firmware, load), apart=APART, never_near=NEVER_NEAR)
     charged, heeding = _charged(firmware, worst, interrupts)
     edges, change = _edges(firmware)
     loop, scheduler = _rounds(firmware, edges)
@@ -230,7 +230,7 @@ def _charged(
     """See `Costs.charged` and `Costs.heeding`."""
     rows = firmware.table.interrupts
     each = next((interrupts[row.name] for row in rows if row.vector == RECEIVE), 0)
-    found = {row.name: Taken(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
+    found = {row.name: ByteReads(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
     taking = {name: taken for name, taken in found.items() if taken.takes}
     charged = {name: taken.charged(each) for name, taken in taking.items()}
     return {**interrupts, **charged}, frozenset(name for name, taken in taking.items() if taken.heeds_switch)
@@ -265,7 +265,7 @@ def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:
     names = (*(f"{row.name}_task" for row in firmware.table.tasks), *AROUND_TASK)
     elsewhere = dict.fromkeys(firmware.entries_of(names), 0)
     polls = dict.fromkeys(firmware.entries_of((CHANGES_POLL, LINK_POLL)), edges)
-    alone = len(_loops(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
+    alone = len(loops_of(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
     cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
     loop = firmware.entry_of(LOOP)
@@ -282,7 +282,7 @@ def _main_loop(firmware: Firmware, elsewhere: Mapping[int, int], called: int) ->
     given = Given(firmware.program, elsewhere)
     known = given.inside(main)
     function = known.function
-    loops = [loop for loop in _loops(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
+    loops = [loop for loop in loops_of(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
     return sum(_once(loop, given, known) for loop in loops)
 
 
@@ -315,13 +315,6 @@ def _within(way: Way[int], nodes: Collection[int]) -> Way[int]:
 
 def _sleeps(block: Block) -> bool:
     return any(instruction.mnemonic == "sleep" for instruction in block.instructions)
-
-
-def _loops(function: Function) -> list[Loop[int]]:
-    def successors(start: int) -> list[int]:
-        return [edge.to for edge in function.blocks[start].edges]
-
-    return natural_loops(reverse_postorder(function.entry, successors), successors)
 
 
 def _passed(program: Program, entry: int, passes: int) -> Program:

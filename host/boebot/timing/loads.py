@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from avr_timing.interrupts.receive_times import RECEIVE
+from avr_timing.interrupts.byte_reads import RECEIVE
 from avr_timing.interrupts.response import Source, Spell
 from boebot.errors import BoebotError
 from boebot.link import messages

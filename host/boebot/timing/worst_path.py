@@ -8,7 +8,7 @@ from typing import Any
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import PathRow
 from avr_timing.bounds.worst_path import worst_path as path_of
-from avr_timing.interrupts.blocked import ENTRY
+from avr_timing.interrupts.interrupts_off import ENTRY
 from boebot.errors import TimingError
 from boebot.timing.firmware import Firmware
 

@@ -1,27 +1,25 @@
 """Bounds of loops that show in the machine code itself: those that the compiler and its library make.
 
 The source has no place for an annotation of them: copies of structures, delays, shifts, divisions, `ATOMIC_BLOCK`.
-Found are loops whose every pass counts a register down that nothing else in the loop writes, from what it is known to
-hold where the loop is entered; and those that end, with what is known there, after a few passes, worked through one by
-one. Shifts by a variable count are bounded by the language: a count that is not less than the width of the
-operand has no meaning (C11, 6.5.7).
+Two kinds are found: loops whose every pass counts a register down that nothing else in the loop writes, from a known
+value; and loops that end after a few passes, executed one by one with the values that are known. Shifts by a variable
+count are bounded by the language: a count of at least the width of the operand is undefined (C11, 6.5.7).
 """
 
 from __future__ import annotations
 
 from avr_timing.flow.constants import Known, State, once_round
 from avr_timing.flow.loops import Loop
-from avr_timing.image.registers import KEEPS_FLAGS, before, written
+from avr_timing.image.registers import KEEPS_FLAGS, before, is_call, written
 from avr_timing.program import Block, Function, Instruction, Program
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
-MOST_WORKED = 1024  # passes that are worked through
+MOST_EXECUTED = 1024  # passes
 SHIFTS = frozenset(("lsr", "ror", "asr", "add", "adc"))  # lsl and rol are an add and adc of a register to itself
-CALLS = frozenset(("call", "rcall", "icall"))
 
 
-def passes(loop: Loop[int], known: Known, program: Program) -> int | None:
-    """How often the header runs at most for each entry of the loop; None if its code does not show it."""
+def by_counter(loop: Loop[int], known: Known, program: Program) -> int | None:
+    """How often the header runs at most for each entry of the loop, by its counter; None: it has none."""
     function = known.function
     entering = _entering(loop, known)
     inner = frozenset(node for each in loop.inner for node in each.nodes)
@@ -35,15 +33,15 @@ def passes(loop: Loop[int], known: Known, program: Program) -> int | None:
     return min(found, default=None)
 
 
-def worked(loop: Loop[int], known: Known) -> int | None:
-    """The same by working through the passes one by one: how often the header runs until what is known of registers and
-    flags lets no way lead back to it. None: it never comes to that, or not soon."""
-    counts = [_worked(loop, known.function, state) for state in _entering(loop, known)]
+def by_execution(loop: Loop[int], known: Known) -> int | None:
+    """The same by executing the passes one by one, until no way leads back to the header with the known registers and
+    flags. None: that does not happen, or not soon."""
+    counts = [_executed(loop, known.function, state) for state in _entering(loop, known)]
     return None if None in counts else max((count for count in counts if count is not None), default=None)
 
 
-def _worked(loop: Loop[int], function: Function, state: State) -> int | None:
-    for count in range(1, MOST_WORKED + 1):
+def _executed(loop: Loop[int], function: Function, state: State) -> int | None:
+    for count in range(1, MOST_EXECUTED + 1):
         after, decided = once_round(function, loop.header, loop.nodes, state)
         if after is None:
             return count
@@ -90,7 +88,7 @@ def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State],
         for instruction in known.function.blocks[start].instructions:
             if instruction in instructions:
                 continue
-            changed = program.clobbered(known.function.blocks[start]) if instruction.mnemonic in CALLS else None
+            changed = program.clobbered(known.function.blocks[start]) if is_call(instruction) else None
             if not (written(instruction) if changed is None else changed).isdisjoint(registers):
                 return None
     stays = branch.operands[-1] in loop.nodes

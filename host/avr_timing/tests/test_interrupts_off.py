@@ -8,7 +8,7 @@ import pytest
 
 from avr_image import assembled, compiled
 from avr_timing.errors import AnalysisError
-from avr_timing.interrupts.blocked import ENTRY, WAKE, Blocked
+from avr_timing.interrupts.interrupts_off import ENTRY, WAKE, InterruptsOff
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_3\n"
 JUMP = 3  # of a vector, where the linker does not relax
@@ -38,12 +38,12 @@ JUMP = 3  # of a vector, where the linker does not relax
     ],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
-    assert Blocked(assembled(tmp_path, source)).of("main").cycles == cycles
+    assert InterruptsOff(assembled(tmp_path, source)).of("main").cycles == cycles
 
 
 def test_stretch_begins_at_its_cli(tmp_path: Path) -> None:
     program = assembled(tmp_path, "main: nop\n cli\n sei\n nop\n ret")
-    assert Blocked(program).of("main").begin == program.by_name["main"] + 2
+    assert InterruptsOff(program).of("main").begin == program.by_name["main"] + 2
 
 
 def test_atomic_block_of_the_library(tmp_path: Path) -> None:
@@ -52,14 +52,14 @@ def test_atomic_block_of_the_library(tmp_path: Path) -> None:
         "int main(void) { ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { a = b; } return 0; }\n"
     )
     # cli; lds, lds; sts, sts; out SREG; and an instruction: ldi of the result
-    assert Blocked(compiled(tmp_path, source)).of("main").cycles == 1 + 4 * 2 + 1 + 1
+    assert InterruptsOff(compiled(tmp_path, source)).of("main").cycles == 1 + 4 * 2 + 1 + 1
 
 
 def test_loop_without_a_bound_counts_only_where_interrupts_are_off(tmp_path: Path) -> None:
     loop = "1: sbis 5, 0\n rjmp 1b\n"
-    assert Blocked(assembled(tmp_path, f"main: cli\n sei\n nop\n {loop} ret")).of("main").cycles == 3
+    assert InterruptsOff(assembled(tmp_path, f"main: cli\n sei\n nop\n {loop} ret")).of("main").cycles == 3
     with pytest.raises(AnalysisError, match="has no bound"):
-        Blocked(assembled(tmp_path, f"main: cli\n {loop} sei\n nop\n ret")).of("main")
+        InterruptsOff(assembled(tmp_path, f"main: cli\n {loop} sei\n nop\n ret")).of("main")
 
 
 def test_stretch_begins_in_the_midst_of_a_loop(tmp_path: Path) -> None:
@@ -68,7 +68,7 @@ def test_stretch_begins_in_the_midst_of_a_loop(tmp_path: Path) -> None:
     ways = " sbrs r24, 0\n rjmp 1b\n cli\n nop\n rjmp 1b\n"
     source = f"main: 1: dec r25\n breq 9f\n {row}{ways} 9: sei\n nop\n ret"
     rest, whole, end = 1 + 1 + 2, 1 + 1 + 2 + 1 + 1 + 2, 1 + 2 + 1 + 1
-    assert Blocked(assembled(tmp_path, source)).of("main").cycles == rest + 5 * whole + end
+    assert InterruptsOff(assembled(tmp_path, source)).of("main").cycles == rest + 5 * whole + end
 
 
 def test_interrupts(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_interrupts(tmp_path: Path) -> None:
         "main: cli\n nop\n nop\n sei\n nop\n ret\n __vector_1: nop\n reti\n"
         "__vector_2: nop\n sei\n nop\n nop\n cli\n nop\n nop\n nop\n reti\n __vector_3: push r0\n pop r0\n reti"
     )
-    blocked = Blocked(assembled(tmp_path, source))
+    blocked = InterruptsOff(assembled(tmp_path, source))
     main = 1 + 1 + 1 + 1 + 1
     first, second, third = ENTRY + JUMP + 1 + 4, ENTRY + JUMP + 1 + 1 + 1, ENTRY + JUMP + 2 + 2 + 4
     assert blocked.of("main").cycles == main
@@ -89,7 +89,7 @@ def test_interrupts(tmp_path: Path) -> None:
 def test_planted_instruction_lengthens_the_stretch(tmp_path: Path) -> None:
     source = "main: in r0, SREG\n cli\n {} out SREG, r0\n nop\n ret"
     lengths = [
-        Blocked(assembled(tmp_path, source.format(text))).of("main").cycles
+        InterruptsOff(assembled(tmp_path, source.format(text))).of("main").cycles
         for text in ("", "nop\n", "push r2\n pop r2\n")
     ]
     assert [length - lengths[0] for length in lengths] == [0, 1, 4]

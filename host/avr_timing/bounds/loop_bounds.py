@@ -1,6 +1,6 @@
 """Which bound belongs to which loop of the machine code, and which of its blocks it counts.
 
-Where the code itself shows how often a loop runs (counted.py), that holds. Else a row of `.boebot.loops` does: it
+Where the code itself shows how often a loop runs (loop_counts.py), that holds. Else a row of `.boebot.loops` does: it
 counts how often its address runs for each entry of the innermost loop around it. Copies of one row have the same line
 of the source, and rows at one address are of different loops, the outer one first: where nothing is to be done in the
 outer loop's body before the inner loop, both bodies begin at the inner loop's header. Copies of one row that run one
@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from avr_timing.bounds import counted
+from avr_timing.bounds import loop_counts
 from avr_timing.flow.constants import Known
-from avr_timing.flow.loops import IrreducibleError, Loop, natural_loops, reverse_postorder
+from avr_timing.flow.loops import IrreducibleError, Loop, loops_of
 from avr_timing.flow.paths import Mark
 from avr_timing.program import Function, Program
 
@@ -35,9 +35,9 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     loops = _with_parents(known.function)
     _drop_others(result, whole, loops)
     for loop, _ in loops:
-        shown = counted.passes(loop, known, program)
+        shown = loop_counts.by_counter(loop, known, program)
         if shown is None:
-            shown = counted.worked(loop, known)
+            shown = loop_counts.by_execution(loop, known)
         if shown is not None:
             for node in _own(loop):
                 result.pop(node, None)
@@ -122,15 +122,10 @@ def _own(loop: Loop[int]) -> frozenset[int]:
 def _with_parents(function: Function) -> _Found:
     """All loops, inner ones before those around them."""
 
-    def successors(start: int) -> list[int]:
-        return [edge.to for edge in function.blocks[start].edges]
-
-    order = reverse_postorder(function.entry, successors)
     try:
-        outermost = natural_loops(order, successors)
+        found: _Found = [(loop, None) for loop in loops_of(function)]
     except IrreducibleError:
-        return []  # refused by whoever looks for paths
-    found: _Found = [(loop, None) for loop in outermost]
+        return []  # the search for the longest walk refuses it
     for loop, _ in found:  # grows meanwhile
         found += [(inner, loop) for inner in loop.inner]
     return found[::-1]

@@ -1,5 +1,5 @@
 """The longest time that a received byte waits in the UART, where other interrupts may take it, too
-(receive_times.py).
+(byte_reads.py).
 
 Bytes queue in the receiver, so they are looked at in their order (after R. Davis, A. Burns, R. Bril, J. Lukkien,
 "Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised", Real-Time Systems 35 (2007)).
@@ -25,7 +25,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
-from avr_timing.interrupts.receive_times import Taken
+from avr_timing.interrupts.byte_reads import ByteReads
 from avr_timing.interrupts.response import Source
 
 QUEUE_MOST = 16  # bytes without a moment at which none waits: more are overload
@@ -36,7 +36,7 @@ WAIT_MOST = 1 << 12  # cycles without such a moment, likewise
 class Other:
     """An interrupt of higher priority: what it takes, what asks for it, how long it waits itself, its longest run."""
 
-    taken: Taken
+    taken: ByteReads
     requests: Sequence[Source]
     latency: int
     span: int
@@ -65,7 +65,7 @@ class Line:
     `lower`: the longest time without interrupts of one of lower priority; `steps(n)`: the longest time of n steps.
     """
 
-    own: Taken
+    own: ByteReads
     bytes_: Sequence[Source]
     others: Mapping[int, Other]
     lower: int
@@ -148,7 +148,7 @@ def _shared(line: Line, q: int, runs: Mapping[int, int], first: Sequence[int]) -
     return times
 
 
-def _after(times: list[int], taken: Taken, number: int) -> list[int]:
+def _after(times: list[int], taken: ByteReads, number: int) -> list[int]:
     """By bytes taken, the longest time with so many runs more of one interrupt."""
     idle = taken.run(0)
     if idle is not None:  # a run that takes none costs no byte

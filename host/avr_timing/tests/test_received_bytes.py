@@ -15,9 +15,9 @@ from test_latency import Machine
 
 from avr_image import assembled, compiled
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.interrupts.blocked import ENTRY, Blocked
+from avr_timing.interrupts.byte_reads import DATA, LOAD, RECEIVE, STATUS, ByteReads
+from avr_timing.interrupts.interrupts_off import ENTRY, InterruptsOff
 from avr_timing.interrupts.latency import HORIZON, Latencies
-from avr_timing.interrupts.receive_times import DATA, LOAD, RECEIVE, STATUS, Taken
 from avr_timing.interrupts.response import Source
 from avr_timing.interrupts.steps import Steps
 from avr_timing.program import Instruction, Program
@@ -37,15 +37,15 @@ ONCE = 1 << 20
 BYTE = 320
 
 
-def taken(program: Program, vector: int) -> Taken:
-    return Taken(WorstCase(program), 4 * vector)
+def taken(program: Program, vector: int) -> ByteReads:
+    return ByteReads(WorstCase(program), 4 * vector)
 
 
 def wait(program: Program, intervals: Sequence[int], byte: int = BYTE) -> int:
     """Of a byte; the interrupts 1, 2 ... come so far apart, 19 once."""
     requests = {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)}
     requests |= {RECEIVE: [Source("bytes", 1, byte)], RECEIVE + 1: [Source("i", 1, ONCE)]}
-    return Latencies(Blocked(program), requests).of(RECEIVE)
+    return Latencies(InterruptsOff(program), requests).of(RECEIVE)
 
 
 # ---- in C --------------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ def test_who_takes_a_byte_at_its_end_ends_the_wait(tmp_path: Path) -> None:
     source = f"{VECTORS}main: rjmp main\n__vector_1: {NOP * 50}{LOOK} reti\n{OWN}{TAKE}"
     to_load = ENTRY + JUMP + 50 + LOAD + 1 + 3 + LOAD
     program = assembled(tmp_path, source)
-    assert wait(program, [ONCE]) == OWN_REST + Steps(Blocked(program)).most(1) + to_load - READ
+    assert wait(program, [ONCE]) == OWN_REST + Steps(InterruptsOff(program)).most(1) + to_load - READ
 
 
 def test_bytes_that_queue_wait_for_those_before_them(tmp_path: Path) -> None:
@@ -234,7 +234,7 @@ def test_no_byte_waits_longer(
     )
     vectors = (1, 2, RECEIVE + 1)
     requests = {n: [Source("i", 1, each)] for n, each in zip(vectors, intervals, strict=True)}
-    limit = Latencies(Blocked(program), requests | {RECEIVE: [Source("bytes", 1, byte)]}).of(RECEIVE)
+    limit = Latencies(InterruptsOff(program), requests | {RECEIVE: [Source("bytes", 1, byte)]}).of(RECEIVE)
     draw = Random(seed)
     for _ in range(10):
         times = {

@@ -4,7 +4,7 @@ A stretch begins with the first cycle of `cli`, or with the acceptance of an int
 (data sheet, 7.7.1). It ends with the instruction behind the one that sets the flag; where that is `sleep`, the CPU
 wakes in 4 cycles more (10.1).
 
-Taken for granted: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
+Assumed: until `main` has switched interrupts on for the first time nobody waits for one, so the start-up does
 not count. An interrupt whose body switches interrupts on keeps itself off meanwhile. What an interrupt waits, all in
 all, is in latency.py.
 """
@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from avr_timing.bounds.stack import VECTORS
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.errors import AnalysisError
-from avr_timing.flow.flag import Flag, State, after
-from avr_timing.flow.loops import IrreducibleError, natural_loops, reverse_postorder
+from avr_timing.flow.flag import SREG, Flag, State, after
+from avr_timing.flow.loops import IrreducibleError, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
 from avr_timing.program import Block, Function, Instruction, Program
 
@@ -97,7 +97,7 @@ class Flow:
     returns: dict[Node, int] = field(default_factory=dict)  # cycles, wherever interrupts can come by its end
 
 
-class Blocked:
+class InterruptsOff:
     """Stretches of the functions of a program, each worked out once."""
 
     def __init__(self, program: Program, worst_case: WorstCase | None = None) -> None:
@@ -114,10 +114,7 @@ class Blocked:
         Raises:
             AnalysisError: no such function; a loop without a bound while interrupts are off.
         """
-        if isinstance(function, str):
-            if function not in self.program.by_name:
-                raise AnalysisError(f"{self.program.path} has no function {function}")
-            function = self.program.by_name[function]
+        function = self.program.entry(function)
         effect = self.effect(function, on=True)
         return max(effect.within, effect.tail or NONE, key=_cycles)
 
@@ -165,14 +162,8 @@ class Blocked:
     def _is_plain(self, entry: int) -> bool:
         """Nothing in it or below it writes the flag."""
         if entry not in self._plain:
-            below, work = {entry}, [entry]
-            for at in work:  # grows meanwhile
-                blocks = self.program.functions[at].blocks.values()
-                more = {callee for block in blocks for callee in block.calls} - below
-                below |= more
-                work += more
-            blocks_below = (block for at in below for block in self.program.functions[at].blocks.values())
-            self._plain[entry] = not any(map(_writes_flag, blocks_below))
+            code = self.program.instructions(self.program.below(entry))
+            self._plain[entry] = not any(map(_writes_flag, code))
         return self._plain[entry]
 
     def _effect(self, function: Function, on: bool) -> Effect:
@@ -226,14 +217,9 @@ class Blocked:
 
     def _around(self, entry: int, start: Node) -> dict[int, frozenset[int]]:
         """The loops that a node is in the midst of: headers and blocks."""
-        blocks = self.worst_case.inside(entry).function.blocks
-
-        def following(start: int) -> list[int]:
-            return [edge.to for edge in blocks[start].edges]
-
         try:
-            loops = natural_loops(reverse_postorder(entry, following), following)
-        except IrreducibleError:  # refused by whoever looks for paths
+            loops = loops_of(self.worst_case.inside(entry).function)
+        except IrreducibleError:  # the search for the longest walk refuses it
             return {}
         found = {}
         while loops:
@@ -380,12 +366,9 @@ def _returned(flow: Flow, node: Node) -> Iterable[int]:
     return [cycles for off, cycles in flow.returned.get(node, ()) if off]
 
 
-def _writes_flag(block: Block) -> bool:
-    return any(
-        instruction.mnemonic in ("cli", "sei", "reti")
-        or (instruction.mnemonic == "out" and instruction.operands[0] == 0x3F)
-        for instruction in block.instructions
-    )
+def _writes_flag(instruction: Instruction) -> bool:
+    name = instruction.mnemonic
+    return name in ("cli", "sei", "reti") or (name == "out" and instruction.operands[0] == SREG)
 
 
 def _leaving(block: Block) -> list[tuple[int | None, int, int | None]]:

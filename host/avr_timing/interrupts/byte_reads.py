@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.paths import Graph, Mark, Way, longest
 from avr_timing.image.registers import ZERO, written
-from avr_timing.interrupts.blocked import ENTRY
+from avr_timing.interrupts.interrupts_off import ENTRY
 from avr_timing.program import Block, Instruction
 
 RECEIVE = 18  # vector of the receive interrupt (data sheet, table 12-6)
@@ -49,7 +49,7 @@ class _Step:
     is_on: bool = False  # the receive interrupt was found switched on
 
 
-class Taken:
+class ByteReads:
     """Of an interrupt, by the entry of its vector."""
 
     def __init__(self, worst_case: WorstCase, entry: int) -> None:
@@ -237,11 +237,7 @@ class Taken:
     def _contains(self, entry: int) -> bool:
         """Whether a function, or one that it calls, takes bytes."""
         if entry not in self._reads:
-            self._reads[entry] = False  # while it is worked out
-            blocks = self.program.functions[entry].blocks.values()
-            self._reads[entry] = any(
-                any(map(_takes, block.instructions)) or any(map(self._contains, block.calls)) for block in blocks
-            )
+            self._reads[entry] = any(map(_takes, self.program.instructions(self.program.below(entry))))
         return self._reads[entry]
 
 
