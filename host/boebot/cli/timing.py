@@ -27,7 +27,7 @@ _HELP = """What the firmware may take, what it took, and whether that fits its b
 
   boebot timing                         the bundled image, emulator too
 
-  boebot timing --elf F --no-measure    any image, by its machine code
+  boebot timing --elf F --no-measure    an image, by its machine code
 
   boebot timing --port /dev/ttyACM0     with what a board measures itself
 
