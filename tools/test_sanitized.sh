@@ -5,6 +5,8 @@ set -eu
 cd "$(dirname "$0")/.."
 python=build/venv/bin/python
 
+# Python's files anew: one that has gone from the sources must not stay.
+[ ! -d build/sanitized/lib ] || find build/sanitized/lib -type f -not -name '*.so' -delete
 BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --build-lib build/sanitized/lib \
   >build/sanitized.log 2>&1 || { cat build/sanitized.log; exit 1; }
 
