@@ -11,17 +11,19 @@ int vehicle_sensors_find_room(vehicles *self, size_t i) {
   sensor_slot *slots = &self->slots[i * m->sensors_count];
   for (size_t k = 0; k < m->sensors_count; k++) {
     const vehicle_sensor *sensor = &m->sensors[k];
-    void **work = &slots[k].memory.work;
-    if (sensor->kind->work != NULL && *work == NULL && (*work = sensor->kind->work(sensor->made)) == NULL) return 0;
+    sensor_slot *slot = &slots[k];
+    if (sensor->kind->work == NULL || slot->memory.work != NULL) continue;
+    slot->free_work = sensor->kind->free_work;
+    slot->memory.work = sensor->kind->work(sensor->made);
+    if (slot->memory.work == NULL) return 0;
   }
   return 1;
 }
 
-void vehicle_sensors_free_room(vehicles *self, size_t i) {
-  const vehicle_model *m = self->model;
-  for (size_t k = 0; k < m->sensors_count; k++) {
-    void *work = self->slots[i * m->sensors_count + k].memory.work;
-    if (work != NULL) m->sensors[k].kind->free_work(work);
+void vehicle_sensors_free_room(vehicles *self) {
+  for (size_t k = 0; k < self->slots_count; k++) {
+    const sensor_slot *slot = &self->slots[k];
+    if (slot->memory.work != NULL) slot->free_work(slot->memory.work);
   }
 }
 
@@ -57,7 +59,8 @@ void vehicle_sensors_start(vehicles *self, size_t i) {
     sensor_slot *slot = &self->slots[i * m->sensors_count + k];
     *slot = (sensor_slot){.key = noise_key(w->state.seed, w->state.id, sensor->device),
                           .hold = {.period = sensor->period},
-                          .memory = {.work = slot->memory.work}};
+                          .memory = {.work = slot->memory.work},
+                          .free_work = slot->free_work};
     if (sensor->kind->start != NULL) sensor->kind->start(sensor->made, &slot->memory, &s);
   }
 }

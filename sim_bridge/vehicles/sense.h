@@ -12,7 +12,7 @@ void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint 
 
 /* Room to work in for the sensors of world `i` that need it; 0 without memory. */
 int vehicle_sensors_find_room(vehicles *self, size_t i);
-void vehicle_sensors_free_room(vehicles *self, size_t i);
+void vehicle_sensors_free_room(vehicles *self); /* of all worlds; the model may be gone already */
 
 /* Sensors at the beginning of a run. */
 void vehicle_sensors_start(vehicles *self, size_t i);

@@ -98,6 +98,7 @@ typedef struct {
   uint64_t key; /* of its noise */
   sample_hold hold;
   sensor_memory memory;
+  void (*free_work)(void *work); /* of the memory */
 } sensor_slot;
 
 /* What changes in a world, without pointers. */
@@ -135,6 +136,7 @@ struct vehicles {
   const vehicle_model *model;
   size_t count, state_size;
   vehicle *worlds;
+  size_t slots_count;
   sensor_slot *slots; /* as many for each world as the model has sensors */
   double *readings;
   unsigned char *brains;

@@ -18,7 +18,8 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   self->count = count;
   self->state_size = block;
   self->worlds = calloc(count + 1, sizeof *self->worlds);
-  self->slots = calloc(count * model->sensors_count + 1, sizeof *self->slots);
+  self->slots_count = count * model->sensors_count;
+  self->slots = calloc(self->slots_count + 1, sizeof *self->slots);
   self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
   self->brains = calloc(count + 1, block + 1);
   if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
@@ -35,7 +36,7 @@ static void leave(vehicle *w) {
 void vehicles_destroy(vehicles *self) {
   if (self == NULL) return;
   for (size_t i = 0; self->worlds != NULL && i < self->count; i++) leave(&self->worlds[i]);
-  for (size_t i = 0; self->slots != NULL && i < self->count; i++) vehicle_sensors_free_room(self, i);
+  if (self->slots != NULL) vehicle_sensors_free_room(self);
   free(self->worlds);
   free(self->slots);
   free(self->readings);

@@ -30,6 +30,7 @@ from sysconfig import get_path
 from types import ModuleType
 from typing import Any
 
+from boebot import arguments
 from boebot.brain import Brain, Process, StateVariable, composition
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
@@ -103,8 +104,8 @@ def load_brain(source: object) -> LoadedBrain:
         _check_step(source, name)
         return LoadedBrain(name, source, _period(source, name), _needs(source, name))
     raise BrainError(
-        f"{source!r} is no brain; expected a name, a Python or TOML file, a boebot.brain.Brain, or something with "
-        "step(robot)"
+        f"{arguments.shown(source)} is no brain; expected a name, a Python or TOML file, a boebot.brain.Brain, or "
+        "something with step(robot)"
     )
 
 
