@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,31 +15,10 @@ import boebot.behaviors
 import boebot.brain
 import boebot.cognition
 from boebot.robot import Observation
+from tools import imports
+from tools.imports import imported, included
 
 ROOT = Path(__file__).resolve().parents[2]
-INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
-
-
-def imported(source: Path) -> Iterator[str]:
-    """Full names of the modules that a Python file imports."""
-    for node in ast.walk(ast.parse(source.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-
-
-def included(folder: str) -> Iterator[tuple[Path, str]]:
-    """Each C file below a folder with each header that it includes, our own ones as path from the repository's root."""
-    for source in sorted(path for kind in ("[ch]", "def") for path in (ROOT / folder).rglob(f"[!_]*.{kind}")):
-        for name in INCLUDE.findall(source.read_text()):
-            for base in (source.parent, ROOT / "sim_bridge", ROOT / "host/boebot/arenas", ROOT / "firmware" / "src"):
-                if (base / name).is_file():
-                    yield source, str((base / name).resolve().relative_to(ROOT))
-                    break
-            else:
-                yield source, name
 
 
 def test_host_never_imports_the_simulator() -> None:
@@ -105,7 +82,9 @@ def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str
     if folder == "sim_bridge/boards":  # the AVR board is built on simavr's headers, which begin with sim_ too
         forbidden = tuple(name for name in forbidden if name != "sim_")
     guilty = [
-        f"{source.relative_to(ROOT)} includes {name}" for source, name in included(folder) if name.startswith(forbidden)
+        f"{source.relative_to(ROOT)} includes {name}"
+        for source, name in included(ROOT, folder)
+        if name.startswith(forbidden)
     ]
     assert not guilty
 
@@ -124,85 +103,26 @@ def firmware_code() -> dict[str, str]:
     return {name: text for name, text in found.items() if not name.startswith("generated/")}
 
 
-def closure(start: str, includes: dict[str, set[str]]) -> set[str]:
-    """All that a file includes, directly or by what it includes."""
-    found: set[str] = set()
-    waiting = [start]
-    while waiting:
-        new = includes.get(waiting.pop(), set()) - found
-        found |= new
-        waiting += new
-    return found
-
-
-def circles(knows: dict[str, set[str]]) -> list[str]:
-    """Those that lead back to themselves, directly or by others."""
-    return sorted(name for name in knows if name in closure(name, knows))
-
-
-@pytest.mark.parametrize("folder", ["firmware/src", "sim_bridge", "host"])
+@pytest.mark.parametrize("folder", imports.C_ROOMS)
 def test_modules_in_c_make_no_circle(folder: str) -> None:
-    """A module is a .c file with the header of its name."""
-    knows: dict[str, set[str]] = {}
-    for source, name in included(folder):
-        if not {"tests", "fuzz"} & set(source.parts):
-            knows.setdefault(str(source.relative_to(ROOT).with_suffix("")), set()).add(str(Path(name).with_suffix("")))
-    for module, others in knows.items():
-        others.discard(module)
+    knows = imports.c_modules(ROOT, folder)
     assert knows
-    assert not circles(knows)
-
-
-PYTHON_FOLDERS = [*(path.parent for path in (ROOT / "host").glob("*/__init__.py")), ROOT / "sim_bridge", ROOT / "tools"]
-
-
-def modules() -> dict[str, Path]:
-    """Our Python modules but tests and what only builds: full name -> file."""
-    found = {}
-    for folder in (*PYTHON_FOLDERS, ROOT / "hil_tests"):
-        for source in folder.rglob("*.py"):
-            if "tests" not in source.parts and not source.name.startswith("build_"):
-                parts = source.relative_to(folder.parent).with_suffix("").parts
-                found[".".join(parts).removesuffix(".__init__")] = source
-    return found
-
-
-def for_type_checkers(tree: ast.Module) -> list[ast.stmt]:
-    """What stands under `if TYPE_CHECKING:`."""
-    tests = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
-    return [line for node in tests if ast.unparse(node.test) == "TYPE_CHECKING" for line in node.body]
-
-
-def needed(source: Path, known: dict[str, Path], *, types: bool) -> set[str]:
-    """Modules that a file imports, also within functions; with `types` those for type checkers as well."""
-    tree = ast.parse(source.read_text(encoding="utf-8"))
-    left_out = set() if types else set(for_type_checkers(tree))
-    found = set()
-    for node in ast.walk(tree):
-        if node in left_out:
-            continue
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            for alias in node.names:
-                name = f"{node.module}.{alias.name}"
-                found.add(name if name in known else node.module)
-    return found & known.keys()
+    assert not imports.circles(knows)
 
 
 def test_python_modules_make_no_circle() -> None:
     """The library may point back for type checkers alone: a run's result saves itself by what draws results."""
-    known = modules()
-    assert not circles({name: needed(source, known, types=False) - {name} for name, source in known.items()})
+    known = imports.python_modules(ROOT)
+    assert not imports.circles(imports.python_imports(known, types=False))
     ours = {name: source for name, source in known.items() if not name.startswith("boebot") or ".arenas" in name}
-    assert not circles({name: needed(source, known, types=True) - {name} for name, source in ours.items()})
+    assert not imports.circles(imports.python_imports(ours, types=True))
 
 
 @pytest.fixture(scope="module")
 def firmware_includes() -> dict[str, set[str]]:
     """What each C file of the firmware includes directly."""
     found: dict[str, set[str]] = {}
-    for source, name in included("firmware/src"):
+    for source, name in included(ROOT, "firmware/src"):
         found.setdefault(source.relative_to(ROOT).as_posix(), set()).add(name)
     return found
 
@@ -223,7 +143,9 @@ def test_below_the_link_nothing_knows_it(firmware_includes: dict[str, set[str]])
 @pytest.mark.parametrize("source", ["link/frame.c", "link/frame.h", "link/crc21.h"])
 def test_frames_are_made_without_a_board(source: str, firmware_includes: dict[str, set[str]]) -> None:
     allowed = ("link/frame.h", "link/crc21.h", "bounds.h", "generated/")
-    own = {name for name in closure(f"firmware/src/{source}", firmware_includes) if name.startswith("firmware/")}
+    own = {
+        name for name in imports.closure(f"firmware/src/{source}", firmware_includes) if name.startswith("firmware/")
+    }
     assert own
     assert all(name.removeprefix("firmware/src/").startswith(allowed) for name in own), own
 
@@ -267,7 +189,7 @@ def test_the_firmware_is_compiled_by_the_platforms_options() -> None:
 def test_only_the_avr_board_includes_simavr_and_says_its_licence() -> None:
     users = {
         source
-        for source, name in included("sim_bridge")
+        for source, name in included(ROOT, "sim_bridge")
         if re.match(r"(sim_avr|avr_\w+|sim_\w+)\.h$", Path(name).name) and not (ROOT / name).exists()
     }
     assert users
