@@ -192,7 +192,7 @@ class LightSensor:
 
 
 class Held:
-    """A sensor with a clock of its own: what was there when a measurement began comes out `late` cycles after its end,
+    """A sensor with its own clock: what was there when a measurement began comes out `late` cycles after its end,
     and stays until the next one does."""
 
     def __init__(

@@ -248,7 +248,7 @@ class Host:
 
 
 def pulses(board: BoardAccess, pin: int, log: list[Any]) -> list[tuple[int, int]]:
-    """(rise, width) of each whole pulse since the log began; the log is taken along."""
+    """(rise, width) of each whole pulse since the log began; the log is emptied."""
     log += board.log()
     found, rise = [], None
     for edge in log:

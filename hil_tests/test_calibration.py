@@ -203,7 +203,7 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_board_on_a_port(
     tmp_path: Path, avrdude: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Flashing stands in; the rest is real: a port, an emulated Shield-Bot behind it, its answers."""
+    """Flashing is replaced; the rest is real: a port, an emulated Shield-Bot behind it, its answers."""
     elf = tmp_path / "calibration.elf"
     elf.write_bytes(image())
     monkeypatch.setattr(avr8js, "FOLDER", tmp_path / "nothing")

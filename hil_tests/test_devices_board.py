@@ -50,10 +50,10 @@ def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: DeviceRig)
     device = compass(bench)
     for x, y, z in ((1, -2, 3), (-4096, 2047, -2048), (255, 256, -256)):
         device.registers[3:9] = b"".join(value.to_bytes(2, "big", signed=True) for value in (x, z, y))
-        told = bench.devices(after_s=0.12)
-        assert told.compass_status == CompassStatus.OK
-        assert (told.compass_x, told.compass_y, told.compass_z) == (x, y, z)
-        assert told.compass_age <= 6
+        reported = bench.devices(after_s=0.12)
+        assert reported.compass_status == CompassStatus.OK
+        assert (reported.compass_x, reported.compass_y, reported.compass_z) == (x, y, z)
+        assert reported.compass_age <= 6
     assert device.registers[:3] == bytes([0x78, 0x20, 0x00])
 
 
@@ -66,8 +66,8 @@ def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: DeviceRig) ->
     device.holds = True
     assert bench.devices(after_s=0.15).compass_status == CompassStatus.BUS_STUCK
     device.holds = False
-    told = bench.devices(after_s=0.4)
-    assert told.compass_status == CompassStatus.OK and told.compass_age <= 6
+    reported = bench.devices(after_s=0.4)
+    assert reported.compass_status == CompassStatus.OK and reported.compass_age <= 6
     assert bench.latest().overruns == 0
 
 
@@ -77,10 +77,10 @@ def test_light_is_the_decay_time(bench: DeviceRig, us: int) -> None:
         Capacitor(bench.bench.access, LIGHT_LEFT, us),
         Capacitor(bench.bench.access, LIGHT_RIGHT, us + 1000),
     ]
-    told = bench.devices(after_s=0.08)
-    assert abs(told.light_left - us) <= 6  # a slice is 2 us
-    assert abs(told.light_right - (us + 1000)) <= 6
-    assert told.light_age <= 2
+    reported = bench.devices(after_s=0.08)
+    assert abs(reported.light_left - us) <= 6  # a slice is 2 us
+    assert abs(reported.light_right - (us + 1000)) <= 6
+    assert reported.light_age <= 2
 
 
 @pytest.mark.parametrize("us", [7, 400, 2_500, 13_000, 20_000])
@@ -89,21 +89,21 @@ def test_light_sensors_of_the_basic_shieldbot(board_url: str, us: int) -> None:
     with DeviceRig(board_url, "shieldbot-basic") as rig:
         rig.start()
         rig.bench.devices += [Capacitor(rig.bench.access, 8, us), Capacitor(rig.bench.access, LIGHT_RIGHT, us + 500)]
-        told = rig.devices(after_s=0.08)
-        assert abs(told.light_left - min(us, 14_000)) <= 6
-        assert abs(told.light_right - min(us + 500, 14_000)) <= 6
-        assert told.light_age <= 2
+        reported = rig.devices(after_s=0.08)
+        assert abs(reported.light_left - min(us, 14_000)) <= 6
+        assert abs(reported.light_right - min(us + 500, 14_000)) <= 6
+        assert reported.light_age <= 2
 
 
 def test_analog_inputs_are_ratios_of_the_supply(bench: DeviceRig) -> None:
     for battery, sharp in ((3.1, 0.42), (2.2, 2.9), (0.0, 4.9)):
         bench.bench.access.analog(0, battery)
         bench.bench.access.analog(2, sharp)
-        told = bench.devices(after_s=0.08)
-        assert abs(told.battery - battery / 5.0 * 1024) <= 1
-        assert abs(told.analog_infrared - sharp / 5.0 * 1024) <= 1
-        assert told.battery_age <= 3 and told.analog_infrared_age <= 3
-        assert abs(told.supply - 5000) <= 25
+        reported = bench.devices(after_s=0.08)
+        assert abs(reported.battery - battery / 5.0 * 1024) <= 1
+        assert abs(reported.analog_infrared - sharp / 5.0 * 1024) <= 1
+        assert reported.battery_age <= 3 and reported.analog_infrared_age <= 3
+        assert abs(reported.supply - 5000) <= 25
 
 
 @pytest.mark.parametrize("angle", [-1.2, -0.3, 0.0, 0.7, 1.5])
@@ -143,8 +143,8 @@ def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Device
     bench.set("infrared_sweep", 1)
     assert bench.devices(after_s=0.15).infrared_zone_left == 0
     bench.bench.devices.append(Receiver(bench.bench.access, led=9, pin=10))
-    told = bench.devices(after_s=0.15)
-    assert (told.infrared_zone_left, told.infrared_zone_right) == (5, 0)
+    reported = bench.devices(after_s=0.15)
+    assert (reported.infrared_zone_left, reported.infrared_zone_right) == (5, 0)
     bench.bench.access.log()
     bench.listen(0.1)
     rises = np.array([e.cycle for e in bench.bench.access.log() if e.pin == 9 and e.level == Level.HIGH])
@@ -211,7 +211,7 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
         widths = np.array([b.cycle - a.cycle for a, b in itertools.pairwise(turret) if a.level == Level.HIGH])
         assert np.all(np.abs(widths - (24000 + 4584)) <= 16)
         assert len([a for a in rig.answers if isinstance(a, messages.DevicesTelemetry)]) >= 20
-        told = rig.devices(after_s=0.05)
-        assert device.bytes_moved > moved + 50 and told.compass_status == CompassStatus.OK
-        assert abs(told.light_right - 2100) <= 6 and abs(told.light_left - 1300) <= 6
-        assert told.buzzer_token == 3 and told.infrared_zone_age <= 7
+        reported = rig.devices(after_s=0.05)
+        assert device.bytes_moved > moved + 50 and reported.compass_status == CompassStatus.OK
+        assert abs(reported.light_right - 2100) <= 6 and abs(reported.light_left - 1300) <= 6
+        assert reported.buzzer_token == 3 and reported.infrared_zone_age <= 7

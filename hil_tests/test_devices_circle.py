@@ -46,9 +46,9 @@ def test_analog_infrared_follows_its_curve_before_a_wall(board_url: str) -> None
         sharp = SharpSensor(pin="A2", position_m=(0, 0), heading_rad=0)
         for distance in (0.10, 0.15, 0.25, 0.40, 0.60, 0.75):
             rig.place(2.0 - SHARP_X - distance, 0.3)
-            told = rig.devices(after_s=0.15)
-            assert abs(told.analog_infrared - sharp_volts(distance) / SUPPLY_V * 1024) <= 1.5
-            seen = read(sharp, "analog_infrared", told)
+            reported = rig.devices(after_s=0.15)
+            assert abs(reported.analog_infrared - sharp_volts(distance) / SUPPLY_V * 1024) <= 1.5
+            seen = read(sharp, "analog_infrared", reported)
             step_m = 0.01 * 33.9 / sharp_volts(distance) ** 2 * (SUPPLY_V / 1024)  # of the converter
             assert seen.valid and seen.distance is not None
             # half a per cent of the supply is what the bandgap resolves
@@ -61,9 +61,9 @@ def test_analog_infrared_follows_its_curve_before_a_wall(board_url: str) -> None
 def test_analog_infrared_looks_slantwise_and_folds_back(board_url: str) -> None:
     with circle(board_url, arena_of(wall_at(1.0))) as rig:
         rig.place(0.5, 0.0, 0.6)  # along the ray: (1 - x) / cos
-        told = rig.devices(after_s=0.15)
+        reported = rig.devices(after_s=0.15)
         distance = 0.5 / math.cos(0.6) - SHARP_X
-        assert abs(told.analog_infrared - sharp_volts(distance) / SUPPLY_V * 1024) <= 1.5
+        assert abs(reported.analog_infrared - sharp_volts(distance) / SUPPLY_V * 1024) <= 1.5
         near, far = 0.04, 0.0
         rig.place(1.0 - SHARP_X - near, 0.0)
         folded = rig.devices(after_s=0.15).analog_infrared / 1024 * SUPPLY_V
@@ -82,10 +82,10 @@ def test_analog_infrared_holds_its_value_until_the_next_measurement(board_url: s
             placed = rig.board.cycle / CYCLES_PER_S
             rig.place(0.7 if rig.robot.body().x < 0.5 else 0.2, 0.0)
             due = math.ceil(placed / PERIOD_S) * PERIOD_S + LATE_S
-            told = rig.devices()
-            while told.analog_infrared == old:
-                told = rig.devices()
-            converted = (rig.transport.now() - TICK_S * told.analog_infrared_age) - due
+            reported = rig.devices()
+            while reported.analog_infrared == old:
+                reported = rig.devices()
+            converted = (rig.transport.now() - TICK_S * reported.analog_infrared_age) - due
             assert -0.5 * TICK_S <= converted <= 4.5 * TICK_S
             old = rig.devices(after_s=0.1).analog_infrared
 
@@ -120,22 +120,22 @@ def light_mounts(x: float, y: float, heading: float) -> list[tuple[float, float,
 
 
 # The interrupt that stamps the edge waits, on a busy line, for a byte received and one sent (tasks.def: 54 and 50
-# cycles), and reads the time some 30 cycles after it began: 134 cycles, 8.4 us, told in whole us. It never stamps
+# cycles), and reads the time some 30 cycles after it began: 134 cycles, 8.4 us, reported in whole us. It never stamps
 # early, but the expected time is rounded too, and the release is timed up to 1 us after it.
 STAMP_LATE_US = (-2, 9)
 
 
-def is_punctual(told: int, true: float) -> bool:
+def is_punctual(reported: int, true: float) -> bool:
     """Whether a decay time (us) is right but for what its stamp may be late."""
-    return STAMP_LATE_US[0] <= told - true <= STAMP_LATE_US[1]
+    return STAMP_LATE_US[0] <= reported - true <= STAMP_LATE_US[1]
 
 
 def assert_light(rig: CircleRig, pose: tuple[float, float, float], lamps: list[Light]) -> None:
     rig.place(*pose)
-    told = rig.devices(after_s=0.15)
+    reported = rig.devices(after_s=0.15)
     left, right = (decay_us(*mount, lamps) for mount in light_mounts(*pose))
-    assert is_punctual(told.light_left, left) and is_punctual(told.light_right, right)
-    assert told.light_age <= 4
+    assert is_punctual(reported.light_left, left) and is_punctual(reported.light_right, right)
+    assert reported.light_age <= 4
 
 
 @pytest.mark.parametrize("robot", ["boebot", "shieldbot-basic"])
@@ -158,8 +158,8 @@ def test_light_sensors_are_where_the_description_has_them(board_url: str) -> Non
     lamps = [Light(1.0, 0.4, 3.0)]
     mount = {"position_m": (0.0, 0.0), "heading_rad": math.pi / 2}
     with circle(board_url, arena_of(light=lamps), robot_of(light_left=mount)) as rig:
-        told = rig.devices(after_s=0.15)
-        assert is_punctual(told.light_left, decay_us(0.0, 0.0, math.pi / 2, lamps))
+        reported = rig.devices(after_s=0.15)
+        assert is_punctual(reported.light_left, decay_us(0.0, 0.0, math.pi / 2, lamps))
 
 
 # ---- compass ---------------------------------------------------------------------------------------------------------
@@ -169,12 +169,12 @@ HEADINGS = np.linspace(-math.pi, math.pi, 12, endpoint=False) + 0.1
 
 
 def fields_over_a_turn(rig: CircleRig) -> list[messages.DevicesTelemetry]:
-    told = []
+    reported = []
     for heading in HEADINGS:
         rig.place(0.0, 0.0, float(heading))
-        told.append(rig.devices(after_s=0.15))
-        assert told[-1].compass_status == CompassStatus.OK
-    return told
+        reported.append(rig.devices(after_s=0.15))
+        assert reported[-1].compass_status == CompassStatus.OK
+    return reported
 
 
 def wrapped(angle: float) -> float:
@@ -185,11 +185,11 @@ def test_compass_gives_the_heading_of_the_placed_robot(board_url: str) -> None:
     """1,090 counts a gauss: 0.19 G along the floor is a circle of 207 counts, half a count of it 0.0035 rad."""
     with circle(board_url, arena_of()) as rig:
         compass = MagneticCompass(sda_pin="A4", scl_pin="A5")
-        for heading, told in zip(HEADINGS, fields_over_a_turn(rig), strict=True):
-            reading = read(compass, "compass", told)
+        for heading, reported in zip(HEADINGS, fields_over_a_turn(rig), strict=True):
+            reading = read(compass, "compass", reported)
             assert reading.valid and reading.heading is not None
             assert abs(wrapped(reading.heading - heading)) <= 0.0036
-            assert abs(told.compass_z + 0.45 * 1090) <= 1
+            assert abs(reported.compass_z + 0.45 * 1090) <= 1
 
 
 @pytest.mark.parametrize("seed", [1, 4])
@@ -200,12 +200,12 @@ def test_a_turn_finds_the_compass_of_this_unit(board_url: str, seed: int) -> Non
     iron = compass_model.COMPASS_IRON * math.hypot(draw(61, 1), draw(61, 2))
     counts = compass_model.COMPASS_HORIZONTAL_G * 1090
     with circle(board_url, arena_of(), noise=True, seed=seed) as rig:
-        told = fields_over_a_turn(rig)
-        centre = float(np.mean([t.compass_x for t in told])), float(np.mean([t.compass_y for t in told]))
+        reported = fields_over_a_turn(rig)
+        centre = float(np.mean([t.compass_x for t in reported])), float(np.mean([t.compass_y for t in reported]))
         assert abs(math.hypot(*centre) - iron * counts) <= 3
         compass = MagneticCompass(sda_pin="A4", scl_pin="A5", offset_counts=centre)
         errors = []
-        for heading, message in zip(HEADINGS, told, strict=True):
+        for heading, message in zip(HEADINGS, reported, strict=True):
             reading = read(compass, "compass", message)
             assert reading.heading is not None
             errors.append(wrapped(reading.heading - heading))
@@ -314,9 +314,9 @@ def test_infrared_zones_rise_as_a_wall_nears(board_url: str, distance: float, zo
     with circle(board_url, arena_of(wall_at(1.0))) as rig:
         rig.set("infrared_sweep", 1)
         rig.place(1.0 - 0.05 - distance * math.cos(first_ray), 0.0)
-        told = rig.devices(after_s=0.3)
-        assert (told.infrared_zone_left, told.infrared_zone_right) == (zone, zone)
-        assert told.infrared_zone_age <= 6
+        reported = rig.devices(after_s=0.3)
+        assert (reported.infrared_zone_left, reported.infrared_zone_right) == (zone, zone)
+        assert reported.infrared_zone_age <= 6
 
 
 # ---- heights ---------------------------------------------------------------------------------------------------------
@@ -338,14 +338,14 @@ def test_low_obstacles_are_seen_by_those_sensors_that_sit_low_enough(
     """Heights above the floor: whiskers 0.03, infra-red 0.06, Ping and Sharp 0.08, light sensors 0.09 m."""
     lamp = Light(1.0, 0.0, 5.0)
     with circle(board_url, arena_of(wall_at(0.085, height), light=[lamp])) as rig:
-        told = rig.devices(after_s=0.3)
+        reported = rig.devices(after_s=0.3)
         now = rig.latest()
         left, _ = (decay_us(*mount, [lamp]) for mount in light_mounts(0.0, 0.0, 0.0))
         seen = {
             "whiskers": now.whiskers == messages.Whiskers.LEFT | messages.Whiskers.RIGHT,
             "infrared": now.infrared == messages.Infrared.LEFT | messages.Infrared.RIGHT,
             "ping": 0 < now.ping_echo < 1000,  # 18.5 ms stand for no echo
-            "analog_infrared": told.analog_infrared > 0,
-            "shade": abs(told.light_left - left) > 50,
+            "analog_infrared": reported.analog_infrared > 0,
+            "shade": abs(reported.light_left - left) > 50,
         }
         assert {name for name, is_seen in seen.items() if is_seen} == seen_by

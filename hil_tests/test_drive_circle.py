@@ -77,8 +77,10 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
         battery = BatteryDivider(pin="A0")
         idle = pack.full_v - pack.resistance_ohm * battery_model.BOARD_A
         assert idle == pytest.approx(5.3)
-        told = read(battery, "battery", rig.devices(after_s=0.3))
-        assert told.valid and told.voltage == pytest.approx(idle, abs=0.035)  # bandgap and converter resolve that
+        reported = read(battery, "battery", rig.devices(after_s=0.3))
+        assert reported.valid and reported.voltage == pytest.approx(
+            idle, abs=0.035
+        )  # bandgap and converter resolve that
         volts = idle
         for _ in range(20):
             speed = wheel_speed(robot, volts / 5.0, 0.0)
@@ -87,8 +89,8 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
             volts = pack.full_v - pack.resistance_ohm * amperes
         assert volts == pytest.approx(4.6, abs=0.05), "what was measured on a robot"
         rig.drive_for(1.0, 1.0, 2.0)
-        told = read(battery, "battery", rig.devices())
-        assert told.voltage == pytest.approx(volts, abs=0.035)
+        reported = read(battery, "battery", rig.devices())
+        assert reported.voltage == pytest.approx(volts, abs=0.035)
         assert rig.robot.body().speed == pytest.approx(speed, rel=0.005)
         assert abs(rig.latest().supply - 1000 * volts) <= 25, "the board's rail is the pack"
         assert lowest_pack(rig, -1.0, -1.0, 0.6) < 4.25, "both servos reverse"

@@ -40,8 +40,8 @@ def speak(rig: Rig) -> messages.Telemetry:
     return rig.telemetry[-1]
 
 
-def told(rig: Rig) -> list[EventKind]:
-    """What a new session is told of, in its order."""
+def first_events(rig: Rig) -> list[EventKind]:
+    """Kinds of the events that a new session gets, in their order."""
     rig.events.clear()
     rig.acknowledges = True
     rig.start(arm=False)
@@ -65,7 +65,7 @@ def test_it_wanders_through_the_room_and_touches_nothing(board_url: str) -> None
 
 
 def test_with_whiskers_alone_it_pushes_against_nothing(board_url: str) -> None:
-    """Its whiskers tell what is ahead; behind it is blind, and goes back for half a second at most. So it is never in
+    """Its whiskers feel what is ahead; behind it is blind, and goes back for half a second at most. So it is never in
     contact for a second without getting anywhere. It may slide along a wall, beside its whiskers."""
     with circle(board_url, load_arena("room"), pose=START) as rig:
         rig.set("devices", DEVICES & ~messages.Devices.INFRARED)
@@ -130,7 +130,7 @@ def test_the_dead_mans_stop_comes_first_and_the_host_is_told_of_both(board_url: 
         assert 0.27 < (starts[ends[0]] - begun) / CYCLES_PER_S < 0.33
         assert WAITS_S <= np.diff(starts)[ends[0]] / CYCLES_PER_S < WAITS_S + 0.06
         assert rig.telemetry[-1].status & Status.FALLBACK
-        assert told(rig) == [EventKind.DEAD_MAN, EventKind.FALLBACK, EventKind.LATCH, EventKind.FALLBACK]
+        assert first_events(rig) == [EventKind.DEAD_MAN, EventKind.FALLBACK, EventKind.LATCH, EventKind.FALLBACK]
 
 
 def test_the_host_has_the_motors_back_when_it_speaks(board_url: str) -> None:

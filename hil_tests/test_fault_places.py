@@ -1,4 +1,4 @@
-"""What people are told of an image that goes wrong in the emulator: where, by address, function and source line."""
+"""Where an image goes wrong in the emulator, as people read it: by address, function and source line."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FUNCTION = "safety_accept"  # runs when a set-point comes, in the link's poll, w
 PLACE = r"in safety_accept \(safety\.c:\d+\)"
 
 # The firmware's own sources with lines more; which of them goes wrong says the variable `planted`, whose first value is
-# put into the image. Each stands in a line of its own: number -> line.
+# put into the image. Each is on its own line: number -> line.
 FUNCTIONS = """
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -65,7 +65,7 @@ class Variants:
     places: dict[int, tuple[str, int]]  # file and line of each
 
     def one(self, number: int, folder: Path) -> Path:
-        """An image that goes wrong at one of them, in a folder of its own."""
+        """An image that goes wrong at one of them, in its own folder."""
         folder.mkdir(exist_ok=True)
         content = bytearray(self.image.read_bytes())
         elf = ELFFile(io.BytesIO(bytes(content)))
@@ -79,7 +79,7 @@ class Variants:
         return path
 
     def place(self, number: int) -> str:
-        """What is told of its line."""
+        """What is reported about its line."""
         file, line = self.places[number]
         return rf"in \w+ \({re.escape(file)}:{line}\)"
 
@@ -136,11 +136,11 @@ def as_shieldbot(image: str) -> Path:
 def test_a_hang_is_told_with_its_source_line(
     tmp_path: Path, command: Callable[..., tuple[object, str]], variants: Variants, number: int
 ) -> None:
-    """As on the robot, where the run goes on after the reset; only the emulated board tells the place."""
+    """As on the robot, where the run goes on after the reset; only the emulated board knows the place."""
     code, error = command(variants.one(number, tmp_path), "--seconds", "0.8", "--out", str(tmp_path / "out"))
     place = variants.place(number)
-    told = rf"the watchdog reset the program, which it found at address 0x([0-9A-F]{{4}}) in cycle \d+ {place}"
-    found = re.search(told, error)
+    reported = rf"the watchdog reset the program, which it found at address 0x([0-9A-F]{{4}}) in cycle \d+ {place}"
+    found = re.search(reported, error)
     assert found is not None, error
     assert "Traceback" not in error
     assert error.count("the last reset of the board") <= 1

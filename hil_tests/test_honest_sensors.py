@@ -1,4 +1,4 @@
-"""What is no reading is not told as one: a Ping that is missing, cut off or too near, encoders that bounce, an IR
+"""What is no reading is not reported as one: a Ping that is missing, cut off or too near, encoders that bounce, an IR
 receiver that is stuck."""
 
 from __future__ import annotations
@@ -126,8 +126,8 @@ def test_a_short_echo_is_measured_or_too_near(rig: Rig) -> None:
         before = len(rig.telemetry)
         rig.flood(rig.signal(0.3, -0.3), 0.25)
         for frame in rig.telemetry[before + 10 :]:
-            told = (frame.ping_status, frame.ping_echo)
-            assert told in [(PingStatus.TOO_NEAR, 0), *((PingStatus.OK, length_us + d) for d in (-1, 0, 1))]
+            reported = (frame.ping_status, frame.ping_echo)
+            assert reported in [(PingStatus.TOO_NEAR, 0), *((PingStatus.OK, length_us + d) for d in (-1, 0, 1))]
 
 
 # ---- encoders --------------------------------------------------------------------------------------------------------
@@ -153,8 +153,8 @@ def test_a_bouncing_encoder_counts_each_edge_once(rig: Rig) -> None:
     bouncing(rig, one_line(75, period))
     frames = rig.listen(0.1)
     assert frames[-1].encoder_left - before == 75
-    told = {f.edge_period_left * 16 for f in rig.telemetry[-40:] if f.edge_period_left}
-    assert told and all(abs(period_us - 19_000) <= 32 for period_us in told)
+    reported = {f.edge_period_left * 16 for f in rig.telemetry[-40:] if f.edge_period_left}
+    assert reported and all(abs(period_us - 19_000) <= 32 for period_us in reported)
 
 
 def test_without_a_gap_every_edge_counts(rig: Rig) -> None:
@@ -199,12 +199,12 @@ def test_two_lines_that_bounce_count_each_edge_once(board_url: str, steps: list[
         frames = rig.listen(0.1)
         assert frames[-1].encoder_left - before == sum(steps)
         if abs(sum(steps)) == len(steps):
-            told = {f.edge_period_left * 16 for f in rig.telemetry[-30:] if f.edge_period_left}
-            assert told and all(abs(period_us - 9_500) <= 32 for period_us in told)
+            reported = {f.edge_period_left * 16 for f in rig.telemetry[-30:] if f.edge_period_left}
+            assert reported and all(abs(period_us - 9_500) <= 32 for period_us in reported)
 
 
 def test_a_wheel_that_rocks_within_the_gap_comes_back(board_url: str) -> None:
-    """Back over an edge of A within the gap, then on backward: what A did is known when B tells."""
+    """Back over an edge of A within the gap, then on backward: what A did is known when B changes."""
     with Rig.open(board_url, robot="shieldbot-quad") as rig:
         rig.start()
         for pin in (14, 15):

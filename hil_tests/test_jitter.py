@@ -106,16 +106,18 @@ def test_latencies_keep_what_the_schedule_gives(run: Run, found: dict[str, Distr
 
 def test_nothing_is_lost_but_in_an_overload_and_no_tick_there(run: Run) -> None:
     """No frame, no byte, no edge, no tick; no line is masked, nothing resets. In an overload the tick is kept, what is
-    lost is told, and so is the noise, in each tick."""
+    lost is reported, and so is the noise, in each tick."""
     losses = lost(run)
     if not run.load.is_overload:
         assert not losses.anything, losses
         return
     assert (losses.ticks, losses.late_ticks, losses.resets) == (0, 0, 0)
     (*_, counted) = (heard.message for heard in run.line.heard if isinstance(heard.message, messages.Counters))
-    assert losses.bytes == 0 or counted.overrun > 0, "it is told that bytes were lost"
-    told = [heard.message for heard in run.line.telemetry if run.begun + 3 * TICK_CYCLES < heard.first < run.ended]
-    assert len(told) > seconds_of(run) * 90 and sum(bool(one.status & MASKED) for one in told) > 0.97 * len(told)
+    assert losses.bytes == 0 or counted.overrun > 0, "lost bytes are reported"
+    reported = [heard.message for heard in run.line.telemetry if run.begun + 3 * TICK_CYCLES < heard.first < run.ended]
+    assert len(reported) > seconds_of(run) * 90 and sum(bool(one.status & MASKED) for one in reported) > 0.97 * len(
+        reported
+    )
 
 
 def test_the_loads_are_what_they_are_said_to_be(run: Run) -> None:
@@ -168,9 +170,9 @@ def test_all_is_normal_100_ms_after_an_overload() -> None:
         before = [heard.message for heard in line.heard if isinstance(heard.message, messages.Counters)][-1]
         bench.run(90 * TICK_CYCLES)
         after = [heard.message for heard in line.heard if isinstance(heard.message, messages.Counters)][-1]
-        told = [heard.message for heard in line.telemetry if heard.first > begun + TICK_CYCLES]
-        assert np.all(np.diff([message.tick for message in told]) == 1) and len(told) > 80
-        assert not any(message.status & (MASKED | messages.Status.TICK_OVERRUN) for message in told)
+        reported = [heard.message for heard in line.telemetry if heard.first > begun + TICK_CYCLES]
+        assert np.all(np.diff([message.tick for message in reported]) == 1) and len(reported) > 80
+        assert not any(message.status & (MASKED | messages.Status.TICK_OVERRUN) for message in reported)
         assert (after.bad, after.dropped, after.overrun) == (before.bad, before.dropped, before.overrun)
         assert len(bench.pulses(LEFT, begun + 5 * TICK_CYCLES)) > 30
 

@@ -41,12 +41,12 @@ def test_identity_names_firmware_compiler_and_pin_map(rig: Rig) -> None:
 
 def test_board_describes_every_message(rig: Rig) -> None:
     hello = rig.next(messages.Hello, within_s=0.3)
-    told = {}
+    reported = {}
     for index in range(len(messages.MESSAGES)):
         said = rig.ask(messages.Describe(index, hello.board_nonce), messages.Description)
         assert (said.index, said.count) == (index, len(messages.MESSAGES))
-        told[said.id] = (said.length, said.hash)
-    assert told == {number: (kind.LENGTH, messages.HASHES[number]) for number, kind in messages.MESSAGES.items()}
+        reported[said.id] = (said.length, said.hash)
+    assert reported == {number: (kind.LENGTH, messages.HASHES[number]) for number, kind in messages.MESSAGES.items()}
 
 
 def test_telemetry_comes_once_per_tick_with_board_time(rig: Rig) -> None:
@@ -104,7 +104,7 @@ def test_frames_of_an_earlier_session_are_refused(rig: Rig) -> None:
 
 
 def test_stops_that_no_host_has_heard_of_are_told_in_the_next_session(rig: Rig) -> None:
-    """A host has gone in mid-drive: dead-man, end of the session. The next one is told of both, with their times."""
+    """A host has gone in mid-drive: dead-man, end of the session. The next one gets both events, with their times."""
     rig.drive_for(0.5, 0.5, 0.1)
     rig.drive(0.5, 0.5)
     answered, since = rig.telemetry[-1], len(rig.events)
@@ -115,13 +115,13 @@ def test_stops_that_no_host_has_heard_of_are_told_in_the_next_session(rig: Rig) 
     rig.acknowledges = True
     rig.start()
     rig.listen(0.1)
-    told = rig.events[since:]
-    assert [(event.number, event.kind, event.value) for event in told] == [
+    reported = rig.events[since:]
+    assert [(event.number, event.kind, event.value) for event in reported] == [
         (1, messages.EventKind.DEAD_MAN, answered.tick & 0xFFFF),
         (2, messages.EventKind.LATCH, messages.Latch.SESSION_ENDED),
         (3, messages.EventKind.LATCH, messages.Latch.NONE),
     ]
-    after_ms = [(event.time - answered.time) / 1000 for event in told]
+    after_ms = [(event.time - answered.time) / 1000 for event in reported]
     assert 250 <= after_ms[0] < 270 and 1000 <= after_ms[1] <= 1040 and after_ms[2] > 2900
 
 

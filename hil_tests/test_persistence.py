@@ -201,15 +201,15 @@ def test_line_has_the_saved_rate_after_the_next_reset(board: BoardAccess, hundre
 def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
     host = MinimalHost(board)
     assert host.hello().reset_cause == messages.ResetCause.POWER
-    for cause, told in (
+    for cause, reported in (
         (ResetCause.EXTERNAL, messages.ResetCause.EXTERNAL),
         (ResetCause.BROWN_OUT, messages.ResetCause.BROWN_OUT),
         (ResetCause.WATCHDOG, messages.ResetCause.WATCHDOG),
         (ResetCause.POWER, messages.ResetCause.POWER),
     ):
         board.reset(cause)
-        # the watchdog's may have come while a task was running, which is then told, too
-        assert messages.ResetCause(host.hello().reset_cause).name.partition("_IN_")[0] == told.name
+        # the watchdog's may have come while a task was running, which is then reported, too
+        assert messages.ResetCause(host.hello().reset_cause).name.partition("_IN_")[0] == reported.name
 
 
 def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:
@@ -245,7 +245,7 @@ WATCHDOG, EXTERNAL, POWER = messages.ResetCause.WATCHDOG, messages.ResetCause.EX
 
 
 @pytest.mark.parametrize(
-    ("code", "bootloader", "told", "reset_s"),
+    ("code", "bootloader", "reported", "reset_s"),
     [
         (HANGS, False, WATCHDOG, 0.141),
         (HANGS_DEAF, False, WATCHDOG, 0.250),
@@ -255,10 +255,10 @@ WATCHDOG, EXTERNAL, POWER = messages.ResetCause.WATCHDOG, messages.ResetCause.EX
     ids=["hangs", "hangs with interrupts off", "hangs behind a bootloader", "with interrupts off behind a bootloader"],
 )
 def test_a_hang_is_told(
-    tmp_path: Path, code: bytes, bootloader: bool, told: messages.ResetCause, reset_s: float
+    tmp_path: Path, code: bytes, bootloader: bool, reported: messages.ResetCause, reset_s: float
 ) -> None:
     """The watchdog warns after 125 ms and resets 16 ms later, or another 125 ms later if nobody heard it; then nobody
-    marks the record, either, by which a program behind a bootloader tells it."""
+    marks the record, either, by which a program behind a bootloader knows it."""
     image = patched(tmp_path, HANG_AT, code)
     board = power_on("avr", image=str(with_bootloader(image, tmp_path) if bootloader else image))
     host = MinimalHost(board)
@@ -267,7 +267,7 @@ def test_a_hang_is_told(
     host.listen(reset_s - 0.003)
     assert board.counters()["resets"] == 0
     cause = messages.ResetCause(host.hello().reset_cause)
-    assert cause.name.partition("_IN_")[0] == told.name  # it may say in which task
+    assert cause.name.partition("_IN_")[0] == reported.name  # it may say in which task
     assert board.counters()["resets"] == 1
     board.reset(ResetCause.EXTERNAL)
     assert host.hello(2.0).reset_cause == EXTERNAL
@@ -276,11 +276,11 @@ def test_a_hang_is_told(
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map: str) -> None:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
-    leaves it whole cannot be told from an external reset."""
+    leaves it whole looks like an external reset."""
     image = with_bootloader(resources.folder("images") / f"{pin_map}.elf", tmp_path)
     host = MinimalHost(power_on("avr", image=str(image)))
     assert host.hello().reset_cause == POWER
-    for cause, told in [
+    for cause, reported in [
         (ResetCause.EXTERNAL, EXTERNAL),
         (ResetCause.EXTERNAL, EXTERNAL),
         (ResetCause.POWER, POWER),
@@ -289,7 +289,7 @@ def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map:
         (ResetCause.POWER, POWER),
     ]:
         host.board.reset(cause)
-        assert host.hello(2.0).reset_cause == told
+        assert host.hello(2.0).reset_cause == reported
 
 
 @pytest.mark.parametrize("pin_map", IMAGES)

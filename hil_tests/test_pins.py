@@ -72,7 +72,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
 @pytest.mark.parametrize("kind", ["native", "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
-    """Who knows what is wired to the board before it was told?"""
+    """Who knows what is wired to the board before anyone says so?"""
     host = MinimalHost(power_on(kind, pin_map))
     seen = levels(host, 1.5)
     for device, pins in device_pins(pin_map).items():

@@ -36,7 +36,7 @@ LEDS = (9, 2)  # left and right, infra-red
 LIGHTS = (15, 6)
 BATTERY_CHANNEL, SHARP_CHANNEL = 0, 2
 ECHO_LONGEST_US = 18_500  # Parallax #28015
-LIGHT_LONGEST_US = 14_000  # what is darker is told as this
+LIGHT_LONGEST_US = 14_000  # what is darker is reported as this
 SHARP_PERIOD, SHARP_LATE = 766_400, 121_600  # cycles: 38.3 + 9.6 ms, 7.6 ms (GP2Y0A21)
 COMPASS_PERIOD = 13_333 * CYCLES_PER_US  # 75 Hz (HMC5883L)
 COMPASS_RUNS = COMPASS_PERIOD * 97 // 100  # 3 transfers' and 9 measurements' time would else stay in step
@@ -62,7 +62,7 @@ BATTERY_V, SHARP_V, SUPPLY_V = (1.0, 3.0), (0.4, 2.4), (5.0, 4.6)
 
 @pytest.fixture(scope="module")
 def around() -> Iterator[Surroundings]:
-    """All sensors of the map but the compass, each of its own."""
+    """All sensors of the map but the compass, each one's."""
     here = Surroundings(IMAGE)
     bench, board = here.bench, here.board
     for pin in (WHISKER, 7, RECEIVER, 3):
@@ -103,55 +103,57 @@ def is_of(value: float, pair: tuple[float, float], on: bool) -> bool:
     return abs(value - pair[on]) < abs(value - pair[not on])
 
 
-def volts(told: int) -> float:
+def volts(reported: int) -> float:
     """Of a ratio in 1/1024 of the supply, whichever of the two that is."""
-    return told / 1024 * SUPPLY_V[0]
+    return reported / 1024 * SUPPLY_V[0]
 
 
 def test_whiskers(around: Surroundings) -> None:
-    check(around.ages("whisker", Telemetry, lambda told, on: bool(told.whiskers & 1) == on), "whisker", 0.5)
+    check(around.ages("whisker", Telemetry, lambda reported, on: bool(reported.whiskers & 1) == on), "whisker", 0.5)
 
 
 def test_infrared(around: Surroundings) -> None:
     """The left receiver, which is looked at first."""
-    check(around.ages("receiver", Telemetry, lambda told, on: bool(told.infrared & 1) == on), "infrared", 0.9)
+    check(around.ages("receiver", Telemetry, lambda reported, on: bool(reported.infrared & 1) == on), "infrared", 0.9)
 
 
 def test_infrared_zone(around: Surroundings) -> None:
-    found = around.ages("receiver", DevicesTelemetry, lambda told, on: bool(told.infrared_zone_left == (0, 5)[on]))
+    found = around.ages(
+        "receiver", DevicesTelemetry, lambda reported, on: bool(reported.infrared_zone_left == (0, 5)[on])
+    )
     check(found, "infrared_zone", 0.9)
 
 
 def test_ping(around: Surroundings) -> None:
     """Echoes as late as they come."""
     told_as = (PingStatus.OK, PingStatus.NOTHING_NEAR)
-    check(around.ages("ping", Telemetry, lambda told, on: told.ping_status == told_as[on]), "ping", 0.9)
+    check(around.ages("ping", Telemetry, lambda reported, on: reported.ping_status == told_as[on]), "ping", 0.9)
 
 
 def test_analog_infrared(around: Surroundings) -> None:
     """The slowest sensor of its kind, at its worst phase."""
     found = around.ages(
-        "analog_infrared", DevicesTelemetry, lambda told, on: is_of(volts(told.analog_infrared), SHARP_V, on)
+        "analog_infrared", DevicesTelemetry, lambda reported, on: is_of(volts(reported.analog_infrared), SHARP_V, on)
     )
     check(found, "analog_infrared", 0.9)
 
 
 def test_battery(around: Surroundings) -> None:
-    found = around.ages("battery", DevicesTelemetry, lambda told, on: is_of(volts(told.battery), BATTERY_V, on))
+    found = around.ages("battery", DevicesTelemetry, lambda reported, on: is_of(volts(reported.battery), BATTERY_V, on))
     check(found, "battery", 0.5)
 
 
 def test_supply(around: Surroundings) -> None:
     """The row is of the worst slot that the bandgap's conversion may have come to; here it is that of the start."""
-    found = around.ages("supply", Telemetry, lambda told, on: is_of(told.supply / 1000, SUPPLY_V, on))
+    found = around.ages("supply", Telemetry, lambda reported, on: is_of(reported.supply / 1000, SUPPLY_V, on))
     check(found, "supply", 0.5)
 
 
 def test_light(around: Surroundings) -> None:
     """A decay that the light changed in has old light in it."""
 
-    def shows(told: DevicesTelemetry, on: bool) -> bool:
-        return all(abs(us - DECAYS_US[on]) <= 20 for us in (told.light_left, told.light_right))
+    def shows(reported: DevicesTelemetry, on: bool) -> bool:
+        return all(abs(us - DECAYS_US[on]) <= 20 for us in (reported.light_left, reported.light_right))
 
     check(around.ages("light", DevicesTelemetry, shows), "light", 0.9)
 
@@ -198,7 +200,7 @@ def test_compass() -> None:
             """In the steps that the bus needs where it may be at work: from slot 3 of a tick on."""
             begin, end = 113_000, 145_000
             while bench.now < until:
-                into = (bench.now - told) % TICK_CYCLES
+                into = (bench.now - reported) % TICK_CYCLES
                 if begin <= into < end:
                     around.board.run(SLICE)
                     device.step()
@@ -209,13 +211,13 @@ def test_compass() -> None:
             device.registers[3:5] = told_x[on].to_bytes(2, "big")
 
         around.begin(Devices.COMPASS | Devices.BATTERY)
-        told = around.line.telemetry[-1].first
+        reported = around.line.telemetry[-1].first
         start = bench.now + 20 * TICK_CYCLES
         around.change("compass", start + 1, 8 * COMPASS_RUNS + 1, lambda on: None)
         Held(around, "compass", start, (COMPASS_RUNS, 0), hold)
         hold(False)
         around.run(2.5, advance)
-        found = around.ages("compass", DevicesTelemetry, lambda told, on: bool(told.compass_x == told_x[on]))
+        found = around.ages("compass", DevicesTelemetry, lambda reported, on: bool(reported.compass_x == told_x[on]))
     finally:
         bench.close()
     check(found, "compass", 0.85)
@@ -242,7 +244,7 @@ def test_infrared_takes_two_bursts_and_a_zone_five_of_both(around: Surroundings)
 
 
 def test_ping_takes_trigger_hold_off_and_echo(around: Surroundings) -> None:
-    """The longest echo is measured, not given up; see test_ping for its being told."""
+    """The longest echo is measured, not given up; that it is reported is in test_ping."""
     triggers = around.bench.pulses(PING)
     widths = triggers[triggers[:, 1] < 1_000, 1] / CYCLES_PER_US
     assert len(widths) >= SECONDS * 19
@@ -278,15 +280,15 @@ def test_analog_conversions_take_13_of_the_converters_clocks() -> None:
 
 @pytest.mark.parametrize("decay_us", [13_900, 16_000])
 def test_light_takes_its_longest_decay(decay_us: int) -> None:
-    """All of it is waited for, and no more is told."""
+    """All of it is waited for, and no more is reported."""
     around = Surroundings(IMAGE)
     try:
         around.begin(Devices.LIGHT | Devices.BATTERY)
         around.bench.sources += [LightSensor(pin, (decay_us, decay_us)) for pin in LIGHTS]
         around.run(0.2)
-        told = next(one.message for one in reversed(around.line.heard) if isinstance(one.message, DevicesTelemetry))
+        reported = next(one.message for one in reversed(around.line.heard) if isinstance(one.message, DevicesTelemetry))
     finally:
         around.bench.close()
     assert ROWS["light"].conversion == LIGHT_LONGEST_US
-    for us in (told.light_left, told.light_right):
+    for us in (reported.light_left, reported.light_right):
         assert -2 <= us - min(decay_us, LIGHT_LONGEST_US) <= 9, "interrupts keep its stamp waiting"

@@ -202,13 +202,13 @@ def test_bounce_of_a_millisecond_is_one_press(rig: Rig, phase_s: float) -> None:
     shown += [bool(f.whiskers & messages.Whiskers.LEFT) for f in rig.listen(0.1)]
     assert sum(a != b for a, b in itertools.pairwise(shown)) == 1 and shown[-1]
     presses = {event.number for event in rig.events if event.kind == messages.EventKind.WHISKERS}
-    assert len(presses) == 1, "told once, however often it is repeated"
+    assert len(presses) == 1, "reported once, however often it is repeated"
 
 
 @pytest.mark.parametrize("phase_s", PHASES_S)
 def test_noise_on_the_ping_pin_is_no_echo(rig: Rig, phase_s: float) -> None:
     """Of a measurement that begins in the noise. One that was under way ends with the first edge of the noise: in an
-    empty field the Ping holds its pulse for 18.5 ms, and noise that cuts it short cannot be told from an echo."""
+    empty field the Ping holds its pulse for 18.5 ms, and noise that cuts it short looks like an echo."""
     rig.listen(0.05 + phase_s)
     rig.board.square_wave(8, period=160, seconds=0.5)
     period_s = TICK_S * rig.request(messages.GetParameter, messages.PARAMETERS["ping_period"].id).value

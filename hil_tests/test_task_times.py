@@ -1,4 +1,4 @@
-"""The board times its tasks and tells in which one it hung: the very image, with one task replaced by code whose length
+"""The board times its tasks and says in which one it hung: the very image, with one task replaced by code whose length
 in cycles is known from the data sheet."""
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def session(image: str | None = None) -> MinimalHost:
     return host
 
 
-def told(host: MinimalHost, task: messages.Task) -> int:
-    """The next that the board tells of a task; it keeps the session open meanwhile."""
+def next_time(host: MinimalHost, task: messages.Task) -> int:
+    """The next time that the board sends of a task; meanwhile the session is kept open."""
     host.send(messages.ClockProbe(0))
     return host.wait_for(
         messages.TaskTime, lambda time: time.task == task, ROUND_S + TICK_S, f"the time of {task}"
@@ -48,19 +48,19 @@ def test_a_task_of_known_length_is_timed(tmp_path: Path, cycles: int) -> None:
     host = session(planted(tmp_path, "turret_task", CLI + delay(cycles) + SEI + RETURN))
     least = cycles - ROUND_CYCLES + CALL_CYCLES
     most = least + 2 * ROUND_CYCLES + READING_CYCLES + 3 * BYTE_CYCLES  # two received, one to send
-    assert least <= told(host, messages.Task.TURRET) <= most
+    assert least <= next_time(host, messages.Task.TURRET) <= most
 
 
 @pytest.mark.parametrize("cycles", [66_000, 72_000, 79_000, 90_000, 140_000])
 def test_a_task_longer_than_the_timer_counts_is_told_as_the_longest(tmp_path: Path, cycles: int) -> None:
     host = session(planted(tmp_path, "turret_task", delay(cycles) + RETURN))
-    assert told(host, messages.Task.TURRET) == LONGEST
+    assert next_time(host, messages.Task.TURRET) == LONGEST
 
 
 @pytest.mark.parametrize("cycles", [4000, 20_000, 50_000])
 def test_interrupts_are_in_the_time_of_a_task_also_of_one_longer_than_a_slot(tmp_path: Path, cycles: int) -> None:
     host = session(planted(tmp_path, "turret_task", delay(cycles) + RETURN))
-    assert cycles - ROUND_CYCLES < told(host, messages.Task.TURRET) < cycles + 10_000
+    assert cycles - ROUND_CYCLES < next_time(host, messages.Task.TURRET) < cycles + 10_000
 
 
 def test_each_task_is_told_within_a_round_and_its_time_never_falls() -> None:
@@ -85,17 +85,17 @@ def test_each_task_is_told_within_a_round_and_its_time_never_falls() -> None:
 def test_the_longest_times_start_anew_with_each_session(closes: bool) -> None:
     """Storing the parameters takes the task `storage` longer than anything else that it does."""
     host = session()
-    idle = told(host, messages.Task.STORAGE)
+    idle = next_time(host, messages.Task.STORAGE)
     assert host.ask(messages.SaveParameters).status == messages.AnswerStatus.OK
-    stored = told(host, messages.Task.STORAGE)
+    stored = next_time(host, messages.Task.STORAGE)
     assert stored > 1.5 * idle
-    assert told(host, messages.Task.STORAGE) == stored
+    assert next_time(host, messages.Task.STORAGE) == stored
     if closes:
         host.send(messages.Close(host.seed))
         host.open()
     else:
         host.take_over()
-    assert told(host, messages.Task.STORAGE) < stored / 1.5
+    assert next_time(host, messages.Task.STORAGE) < stored / 1.5
 
 
 @pytest.mark.parametrize("deaf", [False, True], ids=["", "with interrupts off"])
@@ -109,11 +109,11 @@ def test_the_task_that_hung_is_told_by_the_next_hello(tmp_path: Path, task: str,
     assert board.counters()["resets"] == 1
     board.reset(ResetCause.EXTERNAL)
     host.listen(0.001)
-    assert host.hello().reset_cause == messages.ResetCause.EXTERNAL, "told once"
+    assert host.hello().reset_cause == messages.ResetCause.EXTERNAL, "reported once"
 
 
 def after_reset(host: MinimalHost) -> int:
-    """The cause that the first hello after a reset tells."""
+    """The cause in the first hello after a reset."""
     return host.wait_for(
         messages.Hello, lambda hello: hello.reset_cause != messages.ResetCause.POWER, 1.0, "a hello after a reset"
     ).reset_cause
@@ -149,7 +149,7 @@ def linked(url: str, image: str | None = None) -> Iterator[Link]:
 
 def test_the_link_keeps_what_was_told() -> None:
     for link in linked("avr"):
-        assert set(link.task_times.values()) == {None}, "not yet told"
+        assert set(link.task_times.values()) == {None}, "not yet sent"
         shares: list[float] = []
         times = link.measure_task_times(FRAME_S, shares.append)
         assert times == link.task_times
@@ -188,7 +188,7 @@ def test_the_host_says_in_words_that_the_link_hangs_at_each_opening(tmp_path: Pa
 
 
 def test_on_a_slow_line_telemetry_is_not_left_out_for_the_times_of_tasks() -> None:
-    """9,600 baud: telemetry every 10 ticks, and each task is told within ten times as long."""
+    """9,600 baud: telemetry every 10 ticks, and each task's time comes within ten times as long."""
     host = session()
     baud = messages.PARAMETERS["baud_rate"]
     for request in ((messages.SetParameter, baud.id, 96), (messages.SaveParameters,)):

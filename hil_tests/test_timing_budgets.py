@@ -56,7 +56,7 @@ def test_step_of_the_brain_is_realisable(judged: dict[str, Report]) -> None:
 
 @pytest.mark.soak
 def test_planted_slow_task_breaks_the_gate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """So many nops at the turret task's beginning are so many cycles more; its budget is less."""
+    """Nops at the turret task's beginning are as many cycles more; its budget is less."""
     sources = tmp_path / "src"
     shutil.copytree(avr_program.SOURCES, sources)
     file, begins = sources / "turret.c", "void turret_task(void) {\n"

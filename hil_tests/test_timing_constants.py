@@ -15,7 +15,7 @@ from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
 
 PIN = 13  # PB5 goes high when the program has ended
-TOLD = 0x200  # of the program in data memory: from here on the flags and 16 registers after each instruction
+STORED = 0x200  # of the program in data memory: from here on the flags and 16 registers after each instruction
 LENGTH = 90
 FIRST, LAST = 16, 25  # registers in use
 FLAGS = {"C": 0, "Z": 1, "N": 2, "V": 3}  # bits of SREG
@@ -50,10 +50,10 @@ def test_known_values_are_those_of_the_emulator(tmp_path: Path, seed: int) -> No
     chance = random.Random(seed)
     instructions = chain(chance)
     begin = [f"ldi r{r}, {chance.choice((*EDGES, chance.randrange(256)))}" for r in range(FIRST, LAST + 1)]
-    told = ["in r0, SREG", "st X+, r0", *(f"st X+, r{r}" for r in range(FIRST, LAST + 1))]
+    stored = ["in r0, SREG", "st X+, r0", *(f"st X+, r{r}" for r in range(FIRST, LAST + 1))]
     lines = ["ldi r26, lo8(0x200)", "ldi r27, hi8(0x200)", *begin, "cp r16, r16"]
     for line in instructions:
-        lines += [line, *told]
+        lines += [line, *stored]
     source = "#define __SFR_OFFSET 0\n#include <avr/io.h>\n.global main, begin\nmain: sbi DDRB, 5\nbegin: "
     source += "\n".join(lines) + "\nend: sbi PORTB, 5\n1: rjmp 1b\n"
     program, image = tmp_path / "program.S", tmp_path / "program.elf"
@@ -63,7 +63,7 @@ def test_known_values_are_those_of_the_emulator(tmp_path: Path, seed: int) -> No
     board.run(50_000)
     assert [edge.level for edge in board.log() if edge.pin == PIN][-1] == Level.HIGH
     width = 1 + LAST - FIRST + 1
-    seen = board.read_memory(TOLD, LENGTH * width)
+    seen = board.read_memory(STORED, LENGTH * width)
 
     code = read_image(image)
     (address,) = (symbol.address for symbol in code.symbols if symbol.name == "begin")
@@ -74,8 +74,8 @@ def test_known_values_are_those_of_the_emulator(tmp_path: Path, seed: int) -> No
         state = step(instruction, state)
         address += instruction.size
         at = number - len(begin) - 3
-        if at >= 0 and at % (1 + len(told)) == 0:
-            sreg, *registers = seen[at // (1 + len(told)) * width :][:width]
+        if at >= 0 and at % (1 + len(stored)) == 0:
+            sreg, *registers = seen[at // (1 + len(stored)) * width :][:width]
             assert [state.registers.get(r) for r in range(FIRST, LAST + 1)] == registers, lines[number]
             assert state.flags == {name: sreg >> bit & 1 == 1 for name, bit in FLAGS.items()}, lines[number]
             compared += 1

@@ -162,7 +162,7 @@ def comment(owner: str, text: str) -> str:
 
 
 def attributes(spec: schema.Schema, rows: list[tuple[CanFrame, schema.Message]]) -> list[str]:
-    """What the format has no place of its own for: the message behind a CAN frame, its class, the schema's hash."""
+    """What the format has no field for: the message behind a CAN frame, its class, the schema's hash."""
     classes = ",".join(f'"{name}"' for name in URGENCY)
     lines = [
         'BA_DEF_ "SchemaHash" STRING ;',

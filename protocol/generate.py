@@ -174,7 +174,7 @@ def parameters_header(spec: schema.Schema) -> str:
     table = ",".join(f"{p.id} {p.name} {p.type} {p.min} {p.max}" for p in spec.parameter)
     lines += [f"#define PARAMETER_COUNT {len(spec.parameter)}u"]
     lines += [
-        f"#define PARAMETER_TABLE 0x{zlib.crc32(table.encode()) & 0xFFFF:04X}u /* tells tables of parameters apart */",
+        f"#define PARAMETER_TABLE 0x{zlib.crc32(table.encode()) & 0xFFFF:04X}u /* differs for another table */",
         "",
     ]
     lines += ["/* X(NAME, type, min, max, default) for each; a DEFAULT_... is the robot's, from its pins header. */"]

@@ -1,7 +1,7 @@
 /* bounds.h: how often a loop runs at most, for the loops of which the analysis of the image cannot see it in the code.
  *
  *   LOOP_BOUND(passes);     in a loop's body: the body runs at most so often each time that the loop is entered
- *   LOOP_CYCLES(cycles);    in the body of a loop that waits for a time: it takes at most so many cycles, and then the pass
+ *   LOOP_CYCLES(cycles);    in the body of a loop that waits for a time: it takes at most these cycles, and then the pass
  *                           that is under way; interrupts come on top
  *
  * On the AVR each is a row of the section .boebot.loops, which is not loaded: three little-endian words of 32 bits, the

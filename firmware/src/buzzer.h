@@ -22,7 +22,7 @@ void buzzer_start_beep(void);
 /* A new session: no token has been heard. */
 void buzzer_start_session(void);
 
-/* A tone of so many ticks, or silence (frequency or length 0), unless its token is the last one's. False if it is refused:
+/* A tone for a number of ticks, or silence (frequency or length 0), unless its token is the last one's. False if it is refused:
  * switched off, or no such frequency. */
 bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t token);
 

@@ -88,7 +88,7 @@ void encoder_set_levels(uint8_t pins, uint8_t bits) { levels = (uint8_t)((levels
 
 /* One edge of a line. A line that bounces makes pairs of them, close together: of two lines the steps of a pair cancel, of one
  * line they do not count. None of them is a time. The time of an edge long ago may have rolled over: after a silence none is
- * close. Where both lines change at once, these are two edges that tell no step and no time. */
+ * close. Where both lines change at once, these are two edges that give no step and no time. */
 static __attribute__((noinline)) void encoder_edge(wheel *w, uint8_t line, int8_t step, uint16_t time) {
   if (--edges_left[line] == 0) {
     encoder_mask(line_pins[line]);
@@ -153,7 +153,7 @@ void encoder_start(void) {
   begin_tick();
 }
 
-/* The time between two edges as it is told. */
+/* The time between two edges as it is reported. */
 static uint16_t period_of(uint16_t gap) { return gap == 0 ? 1u : gap >= PERIOD_LONGEST ? 0u : gap; }
 
 /* Makes the reading of a wheel from the tick that ends. */

@@ -40,7 +40,7 @@ void encoder_lose_time(void);
 /* These pins are noise: masked until the next tick. */
 void encoder_mask(uint8_t pins);
 
-/* A tick begins: all pins count again. Once, before encoder_task(), which tells what was masked. */
+/* A tick begins: all pins count again. Once, before encoder_task(), which reports what was masked. */
 void encoder_lift_masks(void);
 
 /* Edges since reset, at the start of this tick. */

@@ -1,4 +1,4 @@
-/* events.h: what has happened, kept in its order until somebody collects it: the link tells the host (link/event_delivery.h).
+/* events.h: what has happened, kept in its order until it is collected: the link sends it to the host (link/event_delivery.h).
  *
  * Four wait at most. When there is no room, changes of one kind merge into the latest, which follows when there is. */
 #ifndef EVENTS_H

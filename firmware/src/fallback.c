@@ -33,7 +33,7 @@
 #define BLOCKED_TIME 500u /* two whole turns in place: a sensor is broken, or there is no way out */
 #define INFRARED_AGE_MAX 20u
 
-/* Whiskers and IR pairs tell of the same sides. */
+/* Whiskers and IR pairs have the same bits for the sides. */
 #define SIDE_LEFT WHISKERS_LEFT
 #define SIDE_RIGHT WHISKERS_RIGHT
 _Static_assert(SIDE_LEFT == INFRARED_LEFT && SIDE_RIGHT == INFRARED_RIGHT, "one meaning of the bits");

@@ -7,8 +7,9 @@
 #include "hal/hal.h"
 
 typedef struct {
-  uint16_t minimum; /* as the values are kept; of an i16 it is negative, of a u16 below 32768, which tells them apart */
-  uint16_t span;    /* from minimum to maximum */
+  uint16_t
+      minimum;   /* as the values are kept; of an i16 it is negative, of a u16 below 32768: so the two types differ */
+  uint16_t span; /* from minimum to maximum */
 } parameter_range;
 
 #define RANGE(name, type, minimum, maximum, initial) \

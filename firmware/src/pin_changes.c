@@ -67,7 +67,7 @@ void pin_changes_on_change(uint16_t time, uint8_t port_bits) {
   }
 }
 
-/* Those bits of a number below RING that tell whether it is DUE or more. */
+/* Those bits of a number below RING that are set where it is DUE or more. */
 #define DUE_BITS ((uint8_t)(RING - DUE))
 _Static_assert((RING & (RING - 1u)) == 0 && (DUE & (DUE - 1u)) == 0, "powers of two");
 
@@ -83,7 +83,7 @@ static void mask(uint8_t pins) {
   light_mask(pins);
 }
 
-/* `now` ends with a unit of the encoders' time, so that whole units can be taken off it. */
+/* `now` ends with a unit of the encoders' time, so that whole units can be subtracted from it. */
 static void work_off(uint16_t time, uint8_t bits, uint32_t now) {
   const uint8_t changed = (uint8_t)(bits ^ before) & watched;
   before = bits;

@@ -28,7 +28,7 @@ static volatile uint8_t state;
 static volatile uint16_t triggered, rise, fall;  /* hal_time() */
 static volatile uint8_t trigger_slot, rise_slot; /* clock_slot then */
 static volatile uint32_t fall_slot_cycles;       /* clock_slot_cycles then */
-static volatile uint8_t noise_left;              /* edges at other times than the sensor's that are still taken */
+static volatile uint8_t noise_left;              /* edges at other times than the sensor's that still count */
 
 static uint32_t triggered_cycles; /* clock_now() */
 static uint8_t status;
@@ -88,7 +88,7 @@ void ping_on_edge(uint16_t time) {
   }
 }
 
-static void tell(uint8_t what, uint16_t us) {
+static void report(uint8_t what, uint16_t us) {
   status = what;
   echo = us;
   state = IDLE;
@@ -99,7 +99,7 @@ static void tell(uint8_t what, uint16_t us) {
 static void take(void) {
   if ((uint8_t)(rise_slot - trigger_slot) > 1u) {
     age = 0;
-    tell(PING_STATUS_ABSENT, 0);
+    report(PING_STATUS_ABSENT, 0);
     return;
   }
   const uint32_t up = triggered_cycles + (uint16_t)(rise - triggered);
@@ -107,11 +107,11 @@ static void take(void) {
   const uint32_t us = (down - up + HAL_CYCLES_PER_US / 2u) / HAL_CYCLES_PER_US;
   age = (uint8_t)((uint16_t)((clock_now() - down) / AGE_UNIT) / TICK_UNITS);
   if (us < ECHO_MIN) {
-    tell(PING_STATUS_TOO_NEAR, 0);
+    report(PING_STATUS_TOO_NEAR, 0);
   } else if (us > ECHO_MAX) {
-    tell(PING_STATUS_NOTHING_NEAR, 0);
+    report(PING_STATUS_NOTHING_NEAR, 0);
   } else {
-    tell(PING_STATUS_OK, (uint16_t)us);
+    report(PING_STATUS_OK, (uint16_t)us);
   }
 }
 

@@ -15,7 +15,7 @@
 #define WATCHDOG_MARK 0xB17Eu
 #define BOOT_SHIFT 11 /* the counts of two boot counters lie 2048 apart */
 
-/* In memory that a reset leaves alone; `check` tells it from what RAM holds when the power comes. */
+/* In memory that a reset leaves alone; RAM holds something else when the power comes, and `check` is then wrong. */
 typedef struct {
   uint16_t magic;
   uint16_t mark;  /* WATCHDOG_MARK: the watchdog is about to reset the chip */
@@ -40,7 +40,7 @@ static void set_count(uint32_t count) {
   record()->check = check_of(record());
 }
 
-/* Behind a bootloader that has taken the chip's own answer. */
+/* Behind a bootloader that has cleared the chip's own answer. */
 static uint8_t cause_by_record(const reset_record *of, bool whole) {
   if (!whole) {
     return RESET_CAUSE_POWER;

@@ -1,6 +1,6 @@
-/* reset.h: why the microcontroller started, and a number that tells this start from others.
+/* reset.h: why the microcontroller started, and a number that differs from start to start.
  *
- * The chip tells the cause, unless a bootloader has cleared it. Then a record in memory that a reset leaves alone helps:
+ * The chip knows the cause, unless a bootloader has cleared it. Then a record in memory that a reset leaves alone helps:
  * the watchdog's interrupt marks it before the watchdog resets the chip. A whole record without a mark means an external
  * reset, a broken one that the power came. A reset by the watchdog whose interrupt was off, and a brown-out so short that
  * memory stayed whole, then look like external ones. */

@@ -6,7 +6,7 @@
  * stopped, there are no more pulses from the next servo frame on (motion.h); the turret is released and the buzzer silenced
  * with them.
  *
- * The board's own brain (fallback.h) has a permission of its own. The host gives it by arming; every latch takes it away, but
+ * The board's own brain (fallback.h) has its own permission. The host gives it by arming; every latch takes it away, but
  * for one: the session's end by silence, which latches for the host alone. So silence never takes it away, and whatever
  * somebody or a fault has stopped stays stopped. At start it is given by the parameter fallback_at_start, after power and
  * the reset button only. A set-point in force comes first: its dead-man stop ends it before the fallback may drive. */

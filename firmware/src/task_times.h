@@ -17,7 +17,7 @@ void task_times_start(void);
 void task_begins(uint8_t task) __attribute__((noinline));
 void task_has_ended(void);
 
-#define TASK_TIME_LONGEST 0xFFFFu /* so long or longer; no run is so long on purpose */
+#define TASK_TIME_LONGEST 0xFFFFu /* this long or longer; no run is this long on purpose */
 
 /* The longest that a task took since task_times_start(); 0: it has not run, or this image has no such task. Main
  * loop only. */

@@ -1,4 +1,4 @@
-/* version.h: the firmware's version, as it tells it. */
+/* version.h: the firmware's version, as the board reports it. */
 #ifndef VERSION_H
 #define VERSION_H
 

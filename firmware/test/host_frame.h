@@ -19,7 +19,7 @@ typedef struct {
 void host_decoder_start(host_decoder *decoder, uint32_t seed);
 void host_decoder_seed(host_decoder *decoder, uint32_t seed);
 
-/* Takes one byte; true when it completes an accepted message: then the functions below tell of it. */
+/* Takes one byte; true when it completes an accepted message: then the functions below read it. */
 bool host_decode(host_decoder *decoder, uint8_t byte);
 uint8_t host_message_id(const host_decoder *decoder);
 uint8_t host_message_sequence(const host_decoder *decoder);

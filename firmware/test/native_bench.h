@@ -1,6 +1,6 @@
 /* native_bench.h: the whole firmware on the bench: a native machine (hal/native/machine.h) whose pins and line the tests
  * hold in their hands, and the least of a host: it opens a session, numbers its requests, acknowledges events if it is
- * told to, and remembers what the board said. Each bench is a fresh power-on. */
+ * asked to, and remembers what the board said. Each bench is a fresh power-on. */
 #ifndef NATIVE_BENCH_H
 #define NATIVE_BENCH_H
 

@@ -53,7 +53,7 @@ ANSWERS = '{ name = "answers_tick", type = "u16" }'
         parameter("i16", -5, 5),
     ],
 )
-def test_what_keeps_the_rules_is_taken(tmp_path: Path, extra: str) -> None:
+def test_what_keeps_the_rules_is_accepted(tmp_path: Path, extra: str) -> None:
     assert load(tmp_path, extra).hash != schema.load().hash
 
 

@@ -111,7 +111,7 @@ void hal_serial_send(const uint8_t *bytes, uint8_t count);
 
 /* ---- devices ---- */
 
-/* Sends a carrier by the IR LED of one side: so many toggles, an even number, half a period (at most 256 cycles) apart. In an
+/* Sends a carrier by the IR LED of one side: `toggles` toggles, an even number, half a period (at most 256 cycles) apart. In an
  * interrupt. hal_burst_seen(): whether the receiver of that side saw it (its output was low) at its end. */
 void hal_burst_start(uint8_t side, uint8_t half_period, uint8_t toggles);
 bool hal_burst_seen(uint8_t side);

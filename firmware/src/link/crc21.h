@@ -1,7 +1,7 @@
 /* crc21.h: the checksum of frames, CRC-21 with the polynomial 0x1DBF6F (0x1edfb7 in Koopman's notation: Hamming distance 6 up
  * to 1004 bits), most significant bit first. Portable C.
  *
- * A table has the remainder of each byte (generated/crc21_table.h). The register stands in the top 21 of 24 bits, so that
+ * A table has the remainder of each byte (generated/crc21_table.h). The register is the top 21 of 24 bits, so that
  * bytes enter from the left, and in three variables, which suits 8-bit CPUs as long as they are in line. */
 #ifndef CRC21_H
 #define CRC21_H

@@ -1,4 +1,4 @@
-/* event_delivery.h: tells the host what has happened (events.h), exactly once and in order (protocol/PROTOCOL.md, "Delivery"): the
+/* event_delivery.h: sends the host what has happened (events.h), exactly once and in order (protocol/PROTOCOL.md, "Delivery"): the
  * oldest event is under way and is sent again until the host acknowledges it. */
 #ifndef LINK_EVENT_DELIVERY_H
 #define LINK_EVENT_DELIVERY_H

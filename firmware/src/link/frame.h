@@ -5,8 +5,8 @@
  *
  * c2 c1 c0: CRC-21 of the stuffed bytes as on the wire, seven bits each under a set top bit, so that 00 occurs only as
  * the delimiter. A frame is accepted only if its length is exactly that of its id, its checksum is right, its
- * stuffing ends exactly at its end, and it is not the rest of a frame that a wrong bit has cut. Each frame has two delimiters
- * of its own.
+ * stuffing ends exactly at its end, and it is not the rest of a frame that a wrong bit has cut. Each frame has its own two
+ * delimiters.
  *
  * Either end makes frames of both directions. The board's end accepts messages to the board; compiled with
  * -DFRAME_OF_HOST this is the host's end and accepts messages to the host. */

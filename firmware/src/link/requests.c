@@ -39,7 +39,7 @@ static inline bool must_wait(uint8_t id) {
   return storage_busy();
 }
 
-/* Returns the answer's status and, where it tells one, its value, which is 0 before. */
+/* Returns the answer's status and its value where it has one, which is 0 before. */
 static inline uint8_t carry_out(uint8_t id, const uint8_t *payload, int32_t *value) {
   if (must_wait(id)) {
     return ANSWER_STATUS_BUSY;
@@ -95,7 +95,7 @@ bool requests_take(uint8_t id, const uint8_t *payload) {
   return true;
 }
 
-/* In every tick: answers what has taken its time. */
+/* In every tick: answers requests that took longer than a tick. */
 void requests_task(void) {
   if (answer.status == SAVING && !storage_busy() && send_has_room(MSG_ANSWER_LENGTH)) {
     answer.status = storage_result();

@@ -82,7 +82,7 @@ TEST_CASE("the clock runs at 100 kHz at most, and data change while it is low") 
   CHECK(stops >= 4);
 }
 
-TEST_CASE("a compass that is not there is told, and found when it comes") {
+TEST_CASE("a compass that is not there is reported, and found when it comes") {
   compass_bench bench;
   bench.device.plugged = false;
   bench.run(20 * TICK);

@@ -26,15 +26,15 @@ std::vector<uint64_t> gaps(const std::vector<message> &all) {
 constexpr uint64_t TURN = 4;                        /* ticks from one message about the board itself to the next */
 constexpr uint64_t ROUND = TURN * (TASK_COUNT + 1); /* each task's time, and the counters */
 
-/* As if a task had run for so long. */
+/* As if a task had run for these cycles. */
 void ran(native_bench &bench, uint8_t task, uint32_t cycles) {
   task_begins(task);
   bench.machine.now += cycles;
   task_has_ended();
 }
 
-/* What the board tells of a task; waits for it. */
-uint16_t told(native_bench &bench, uint8_t task) {
+/* The time that the board sends of a task; waits for it. */
+uint16_t task_time(native_bench &bench, uint8_t task) {
   bench.messages.clear();
   bench.run_in_session(ROUND * TICK);
   std::vector<uint16_t> found;
@@ -69,7 +69,7 @@ TEST_CASE("the counters are sent once in a round of all tasks in a session, and 
   }
 }
 
-TEST_CASE("the times of the tasks are told one after another, the counters between the last and the first") {
+TEST_CASE("the times of the tasks are sent one after another, the counters between the last and the first") {
   attended_bench bench;
   bench.run(3 * ROUND * TICK);
   std::vector<message> own;
@@ -90,18 +90,18 @@ TEST_CASE("the times of the tasks are told one after another, the counters betwe
   }
 }
 
-TEST_CASE("what is told of a task is its longest run of the session, and stays") {
+TEST_CASE("the time of a task is that of its longest run of the session, and stays") {
   native_bench bench;
   bench.start();
-  CHECK(told(bench, TASK_turret) == 0);
+  CHECK(task_time(bench, TASK_turret) == 0);
   ran(bench, TASK_turret, 1234);
   ran(bench, TASK_turret, 1233);
   ran(bench, TASK_whisker, 4321);
-  CHECK(told(bench, TASK_turret) == 1234);
-  CHECK(told(bench, TASK_turret) == 1234);
+  CHECK(task_time(bench, TASK_turret) == 1234);
+  CHECK(task_time(bench, TASK_turret) == 1234);
   ran(bench, TASK_turret, 1235);
-  CHECK(told(bench, TASK_turret) == 1235);
-  CHECK(told(bench, TASK_whisker) == 4321);
+  CHECK(task_time(bench, TASK_turret) == 1235);
+  CHECK(task_time(bench, TASK_whisker) == 4321);
 }
 
 TEST_CASE("the longest times start anew with each session, also where it takes the place of another") {
@@ -109,15 +109,15 @@ TEST_CASE("the longest times start anew with each session, also where it takes t
   bench.start();
   for (uint32_t nonce : {0x11111u, 0x22222u}) {
     ran(bench, TASK_turret, 1234);
-    CHECK(told(bench, TASK_turret) == 1234);
+    CHECK(task_time(bench, TASK_turret) == 1234);
     bench.run_in_session(20 * TICK); /* a hello with the next nonce */
     bench.open(nonce);
-    CHECK(told(bench, TASK_turret) == 0);
+    CHECK(task_time(bench, TASK_turret) == 0);
   }
   ran(bench, TASK_turret, 1234);
   bench.run(2000 * MILLISECOND); /* silence ends the session */
   bench.open(0x33333);
-  CHECK(told(bench, TASK_turret) == 0);
+  CHECK(task_time(bench, TASK_turret) == 0);
 }
 
 TEST_CASE("good frames, damaged ones and the finding back are counted") {
@@ -156,7 +156,7 @@ TEST_CASE("every counter goes on across 65535") {
   CHECK(after.duplicate == 0);
 }
 
-TEST_CASE("bytes that were lost are counted once a tick and told in the next telemetry") {
+TEST_CASE("bytes that were lost are counted once a tick and reported in the next telemetry") {
   native_bench bench;
   bench.start();
   /* Waiting for the room of an answer keeps the ring's bytes where they are: more than it holds come meanwhile. */
@@ -164,11 +164,11 @@ TEST_CASE("bytes that were lost are counted once a tick and told in the next tel
     bench.probe(1);
   }
   bench.run(6 * TICK);
-  bool told = false;
+  bool reported = false;
   for (const message &m : bench.all(MSG_TELEMETRY_ID)) {
-    told |= (m.as<msg_telemetry>().status & STATUS_RECEIVE_OVERRUN) != 0;
+    reported |= (m.as<msg_telemetry>().status & STATUS_RECEIVE_OVERRUN) != 0;
   }
-  CHECK(told);
+  CHECK(reported);
   bench.run_in_session(40 * TICK);
   CHECK((bench.telemetry().status & STATUS_RECEIVE_OVERRUN) == 0);
   const uint16_t overrun = bench.counters().overrun;

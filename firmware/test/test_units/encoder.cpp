@@ -22,8 +22,8 @@ class encoder_bench : public attended_bench {
   encoder_bench() { set(PARAMETER_ENCODER_GAP, 0); }
 };
 
-/* Times are told in 16 us; both edges' are rounded down to that. */
-bool is_period(uint16_t told, uint64_t cycles) { return told == cycles / 256 || told == cycles / 256 + 1; }
+/* Times are reported in 16 us; both edges' are rounded down to that. */
+bool is_period(uint16_t reported, uint64_t cycles) { return reported == cycles / 256 || reported == cycles / 256 + 1; }
 
 /* Toggles one line `count` times, `period` cycles apart, from `first` on. */
 void toggle(native_bench &bench, uint8_t pin, uint64_t first, uint64_t period, int count) {

@@ -1,4 +1,4 @@
-/* Events on the line: told once each and in order, sent again until acknowledged; what a new session hears. */
+/* Events on the line: sent once each and in order, sent again until acknowledged; what a new session hears. */
 #include <doctest.h>
 
 #include <initializer_list>
@@ -23,7 +23,7 @@ void acknowledge(native_bench &bench, uint16_t number) {
 }
 
 /* The events in the order of their first sending. */
-std::vector<msg_event> told(const native_bench &bench) {
+std::vector<msg_event> events_of(const native_bench &bench) {
   std::vector<msg_event> found;
   for (const message &m : bench.all(MSG_EVENT_ID)) {
     const auto one = m.as<msg_event>();
@@ -44,7 +44,7 @@ TEST_CASE("a whisker's touch and its end are events, within 10 ms, with their ti
   bench.drive(touch, PIN_WHISKER_LEFT, NATIVE_LOW);
   bench.drive(end, PIN_WHISKER_LEFT, NATIVE_RELEASED);
   bench.run_to(bench.tick(30));
-  const std::vector<msg_event> events = told(bench);
+  const std::vector<msg_event> events = events_of(bench);
   REQUIRE(events.size() == 2);
   CHECK(events[0].number == 1);
   CHECK(events[0].kind == EVENT_KIND_WHISKERS);
@@ -68,7 +68,7 @@ TEST_CASE("arming, latching and the dead-man are events") {
   bench.run(5 * TICK);
   bench.stop(2); /* changes nothing */
   bench.run(5 * TICK);
-  const std::vector<msg_event> events = told(bench);
+  const std::vector<msg_event> events = events_of(bench);
   REQUIRE(events.size() == 3);
   CHECK(events[0].kind == EVENT_KIND_LATCH);
   CHECK(events[0].value == LATCH_NONE);
@@ -175,7 +175,7 @@ TEST_CASE("a retry is in time across the roll-over of the board's time") {
   }
 }
 
-TEST_CASE("what found no room in the queue is told afterwards, and counted") {
+TEST_CASE("what found no room in the queue is sent afterwards, and counted") {
   native_bench bench;
   begin(bench);
   for (uint16_t value = 1; value <= 9; value++) {
@@ -183,7 +183,7 @@ TEST_CASE("what found no room in the queue is told afterwards, and counted") {
   }
   bench.acknowledges = true;
   bench.run(20 * TICK);
-  const std::vector<msg_event> events = told(bench);
+  const std::vector<msg_event> events = events_of(bench);
   REQUIRE(events.size() == 5);
   CHECK(events[4].value == 9);
   CHECK(bench.counters().deferred == 5);

@@ -77,7 +77,7 @@ TEST_CASE("behind the full queue one of each kind waits: the latest, in the orde
   }
 }
 
-TEST_CASE("touches that merge tell the latest state and all that closed since") {
+TEST_CASE("touches that merge have the latest state and all that closed since") {
   native_bench bench;
   raise_all(bench, {{LATCH, 1}, {LATCH, 2}, {LATCH, 3}, {LATCH, 4}});
   events_raise(WHISKERS, 0x0101); /* left closed */

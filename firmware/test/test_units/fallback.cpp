@@ -38,7 +38,7 @@ bool is_wandering(const driven &now) {
 }
 
 /* Kind of event and its value; of a dead-man stop 0. */
-using told = std::vector<std::pair<int, int>>;
+using event_list = std::vector<std::pair<int, int>>;
 constexpr std::pair<int, int> DEAD_MAN{EVENT_KIND_DEAD_MAN, 0}, TAKES_OVER{EVENT_KIND_FALLBACK, 1},
     HANDS_BACK{EVENT_KIND_FALLBACK, 0}, SESSION_ENDED{EVENT_KIND_LATCH, LATCH_SESSION_ENDED};
 
@@ -87,15 +87,15 @@ class fallback_bench : public native_bench {
 
   void touch(uint8_t pin, bool touching) { drive(machine.now, pin, touching ? NATIVE_LOW : NATIVE_HIGH); }
 
-  /* The next session is told what has been queued. */
-  told events_of_next_session() {
+  /* The next session gets what has been queued. */
+  event_list events_of_next_session() {
     messages.clear();
     acknowledges = true;
     run(15 * TICK); /* a hello without a session */
     open();
     run(20 * TICK);
     acknowledges = false;
-    told found;
+    event_list found;
     int number = 0;
     for (const message &m : all(MSG_EVENT_ID)) {
       const auto event = m.as<msg_event>();
@@ -149,7 +149,7 @@ TEST_CASE("it takes over after the silence that the parameter says, waits, and w
   }
 }
 
-TEST_CASE("a set-point in force comes first: its dead-man stop, then the fallback, as they are told") {
+TEST_CASE("a set-point in force comes first: its dead-man stop, then the fallback, as they are sent") {
   for (const uint16_t after : std::initializer_list<uint16_t>{20, 600}) {
     fallback_bench bench;
     bench.arm_and_switch_on(after);
@@ -162,8 +162,8 @@ TEST_CASE("a set-point in force comes first: its dead-man stop, then the fallbac
     CHECK(bench.now() == NONE);
     bench.be_silent(1500);
     CHECK(is_wandering(bench.now()));
-    /* No latch is told when the host comes back: the session's end has latched already. */
-    CHECK(bench.events_of_next_session() == told{DEAD_MAN, TAKES_OVER, SESSION_ENDED, HANDS_BACK});
+    /* No latch is sent when the host comes back: the session's end has latched already. */
+    CHECK(bench.events_of_next_session() == event_list{DEAD_MAN, TAKES_OVER, SESSION_ENDED, HANDS_BACK});
   }
 }
 
@@ -254,7 +254,7 @@ TEST_CASE("stop and close keep it off until the motors are armed again") {
   }
 }
 
-TEST_CASE("a low supply stops it, is told as the latch, and keeps it off when it is back") {
+TEST_CASE("a low supply stops it, is sent as the latch, and keeps it off when it is back") {
   fallback_bench bench;
   bench.arm_and_switch_on();
   bench.run_until_it_drives();
@@ -268,7 +268,7 @@ TEST_CASE("a low supply stops it, is told as the latch, and keeps it off when it
   bench.be_silent(5000);
   CHECK_FALSE(bench.has_flag());
   CHECK(bench.events_of_next_session() ==
-        told{TAKES_OVER, SESSION_ENDED, {EVENT_KIND_LATCH, LATCH_SUPPLY_LOW}, HANDS_BACK});
+        event_list{TAKES_OVER, SESSION_ENDED, {EVENT_KIND_LATCH, LATCH_SUPPLY_LOW}, HANDS_BACK});
   bench.arm();
   bench.run_until_it_drives();
 }
@@ -328,7 +328,7 @@ TEST_CASE("after such a start it waits until the supply has been measured") {
   CHECK_FALSE(low.has_flag());
 }
 
-TEST_CASE("it needs the servos, and IR pairs or whiskers; IR pairs that are on must tell something fresh") {
+TEST_CASE("it needs the servos, and IR pairs or whiskers; IR pairs that are on must have a fresh reading") {
   struct needs {
     uint16_t off;
     uint16_t infrared_period;

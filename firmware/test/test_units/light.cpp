@@ -8,7 +8,7 @@
 
 namespace {
 
-/* The capacitors: high while they are charged, low so many us after they are let go; negative: never. */
+/* The capacitors: high while they are charged, low that many us after they are let go; negative: never. */
 class light_bench : public attended_bench {
  public:
   double left_us = 1000, right_us = 1000;
@@ -92,7 +92,7 @@ TEST_CASE("each capacitor is charged for 2.5 ms, once in 20 ms") {
 }
 
 #if ENCODER_LINES == 1
-TEST_CASE("encoders beside it miss no edge and count none of its own") {
+TEST_CASE("encoders beside it miss no edge and count none of the sensor's") {
   light_bench bench;
   bench.run(4 * TICK);
   const int32_t before = bench.telemetry().encoder_left;

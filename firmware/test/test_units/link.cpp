@@ -6,7 +6,7 @@
 
 namespace {
 
-/* Sends so many probes, back to back: their answers are longer than they, so the line out cannot carry them all. Runs until
+/* Sends probes, back to back: their answers are longer than they, so the line out cannot carry them all. Runs until
  * reception has stopped. */
 void fill(native_bench &bench, uint16_t probes) {
   for (uint16_t token = 1; token <= probes; token++) {

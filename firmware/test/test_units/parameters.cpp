@@ -95,7 +95,7 @@ TEST_CASE_FIXTURE(started, "the line has eight rates and no other") {
   }
 }
 
-TEST_CASE_FIXTURE(started, "a number that is no parameter is told") {
+TEST_CASE_FIXTURE(started, "a number that is no parameter is reported") {
   const std::vector<int32_t> before = all();
   for (int id = PARAMETER_COUNT; id < 256; id++) {
     CHECK(parameters_set(static_cast<uint8_t>(id), 1) == ANSWER_STATUS_UNKNOWN_PARAMETER);
@@ -118,7 +118,7 @@ TEST_CASE_FIXTURE(started, "the defaults come back when asked for, and at a rese
   }
 }
 
-TEST_CASE_FIXTURE(started, "kept values are taken all or not at all") {
+TEST_CASE_FIXTURE(started, "kept values are used all or not at all") {
   const std::vector<int32_t> defaults = all();
   std::vector<uint16_t> kept(parameters_values(), parameters_values() + PARAMETER_COUNT);
   kept[PARAMETER_INFRARED_PERIOD] = 17;

@@ -98,7 +98,7 @@ TEST_CASE("arm is carried out once: a copy that comes after a stop does not arm 
   CHECK(bench.telemetry().latch == LATCH_STOP_COMMAND);
 }
 
-TEST_CASE("a save is answered when it is done, copies meanwhile are silent, and who would change it is told busy") {
+TEST_CASE("a save is answered when it is done, copies meanwhile are silent, and a change is answered by busy") {
   native_bench bench;
   begin(bench);
   set(bench, 1, PARAMETER_TIME_TO_LIVE, 123);
@@ -135,7 +135,9 @@ TEST_CASE("the request after a save is dropped until the save was answered, so t
   CHECK(bench.answer().number == 2);
 }
 
-TEST_CASE("a new session while a save goes on: nobody is answered for it, and changes are told busy until it is done") {
+TEST_CASE(
+    "a new session while a save goes on: nobody is answered for it, and changes are answered by busy until it is "
+    "done") {
   native_bench bench;
   begin(bench);
   bench.say(MSG_SAVE_PARAMETERS_ID, msg_save_parameters{1});
@@ -159,7 +161,7 @@ TEST_CASE("a new session while a save goes on: nobody is answered for it, and ch
   CHECK(bench.answer().status == ANSWER_STATUS_OK);
 }
 
-TEST_CASE("reset_parameters brings the defaults back; an unknown parameter and a value out of range are told") {
+TEST_CASE("reset_parameters brings the defaults back; an unknown parameter and a value out of range are reported") {
   native_bench bench;
   begin(bench);
   set(bench, 1, PARAMETER_TIME_TO_LIVE, 123);

@@ -1,4 +1,4 @@
-/* Reset: causes as the chip tells them or as the record tells, and nonces. */
+/* Reset: causes from the chip or from the record, and nonces. */
 #include <doctest.h>
 
 #include <set>
@@ -24,7 +24,7 @@ int distance(uint32_t a, uint32_t b) {
 
 }  // namespace
 
-TEST_CASE("a cause that the chip tells is told") {
+TEST_CASE("a cause that the chip knows is reported") {
   memory_bench bench;
   bench.power_on();
   CHECK(reset_cause() == RESET_CAUSE_POWER);
@@ -34,7 +34,7 @@ TEST_CASE("a cause that the chip tells is told") {
   }
 }
 
-TEST_CASE("behind a bootloader that takes the cause a whole record tells an external reset") {
+TEST_CASE("behind a bootloader that clears the cause a whole record means an external reset") {
   memory_bench bench;
   bench.power_on();
   for (int i = 0; i < 3; i++) {
@@ -43,7 +43,7 @@ TEST_CASE("behind a bootloader that takes the cause a whole record tells an exte
   }
 }
 
-TEST_CASE("behind such a bootloader a watchdog that spoke before it bit is told, once") {
+TEST_CASE("behind such a bootloader a watchdog that spoke before it bit is reported, once") {
   memory_bench bench;
   bench.power_on();
   bench.run(memory_bench::TICK);
@@ -54,7 +54,7 @@ TEST_CASE("behind such a bootloader a watchdog that spoke before it bit is told,
   CHECK(reset_cause() == RESET_CAUSE_EXTERNAL);
 }
 
-TEST_CASE("a watchdog reset is told with the task that ran, and with none between tasks") {
+TEST_CASE("a watchdog reset is reported with the task that ran, and with none between tasks") {
   for (const uint8_t chip : {RESET_CAUSE_WATCHDOG, RESET_CAUSE_UNKNOWN}) { /* the latter behind such a bootloader */
     memory_bench bench;
     bench.power_on();
@@ -75,7 +75,7 @@ TEST_CASE("a watchdog reset is told with the task that ran, and with none betwee
   }
 }
 
-TEST_CASE("a task that ran at a reset of another cause is not told, nor at the next watchdog reset") {
+TEST_CASE("a task that ran at a reset of another cause is not reported, nor at the next watchdog reset") {
   memory_bench bench;
   bench.power_on();
   for (const uint8_t cause : {RESET_CAUSE_EXTERNAL, RESET_CAUSE_BROWN_OUT}) {
@@ -98,7 +98,7 @@ TEST_CASE("a number that is no task's is not believed") {
   }
 }
 
-TEST_CASE("after a power failure no task is told") {
+TEST_CASE("after a power failure no task is reported") {
   memory_bench bench;
   for (int i = 0; i < 100; i++) {
     bench.power_on();
@@ -109,7 +109,7 @@ TEST_CASE("after a power failure no task is told") {
   }
 }
 
-TEST_CASE("what the chip tells counts more than the record") {
+TEST_CASE("what the chip knows counts more than the record") {
   memory_bench bench;
   bench.power_on();
   reset_on_watchdog();
@@ -119,7 +119,7 @@ TEST_CASE("what the chip tells counts more than the record") {
   CHECK(reset_cause() == RESET_CAUSE_EXTERNAL);
 }
 
-TEST_CASE("behind such a bootloader a broken record tells that the power came") {
+TEST_CASE("behind such a bootloader a broken record means that the power came") {
   memory_bench bench;
   for (int i = 0; i < 1000; i++) {
     bench.power_on();
@@ -130,7 +130,7 @@ TEST_CASE("behind such a bootloader a broken record tells that the power came") 
   }
 }
 
-TEST_CASE("a record with a wrong bit tells no watchdog") {
+TEST_CASE("a record with a wrong bit means no watchdog") {
   memory_bench bench;
   for (int bit = 0; bit < 8 * 12; bit++) {
     bench.power_on();

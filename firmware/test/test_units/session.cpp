@@ -320,7 +320,7 @@ TEST_CASE("identity names version, compiler and pin map") {
   CHECK(identity.image_size == 0);
 }
 
-TEST_CASE("describe tells id, length and hash of each message, to who names the nonce in force") {
+TEST_CASE("describe answers with id, length and hash of each message, to who names the nonce in force") {
   struct known {
     uint8_t id, length;
     uint32_t hash;

@@ -259,7 +259,7 @@ TEST_CASE("a wrong bit anywhere in the newer copy brings the older one back") {
   }
 }
 
-TEST_CASE("a copy of other parameters is not taken") {
+TEST_CASE("a copy of other parameters is not used") {
   const saved s = save_twice();
   eeprom_image image = s.twice;
   for (const size_t copy : COPIES) {
@@ -275,7 +275,7 @@ TEST_CASE("a copy of other parameters is not taken") {
   CHECK(after_start(image) == s.second);
 }
 
-TEST_CASE("a copy with a value out of its range is not taken") {
+TEST_CASE("a copy with a value out of its range is not used") {
   const saved s = save_twice();
   const size_t copy = copy_written(s);
   eeprom_image image = s.twice;

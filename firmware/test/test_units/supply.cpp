@@ -15,7 +15,7 @@ int expected(double volts, int bandgap) {
   return bandgap * 1024 / result;
 }
 
-/* Runs until a measurement at that voltage has been taken. */
+/* Runs until a measurement at that voltage has been made. */
 void measure(memory_bench &bench, double volts) {
   bench.volts = volts;
   bench.run(TICK);

@@ -1,4 +1,4 @@
-/* hal_avr.h: the ATmega328P's part of hal.h that is small enough to stand in line: pins, time, edges.
+/* hal_avr.h: the ATmega328P's part of hal.h that is small enough for inline functions: pins, time, edges.
  *
  *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots (timers.c)
  *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier (carrier.c)
@@ -76,7 +76,7 @@ enum {
 #define HAL_EDGE_PROLOGUE 110u /* cycles of it, with the registers that are saved before */
 #define HAL_EDGE_LEAD ((uint16_t)HAL_LATENCY_edge + HAL_EDGE_PROLOGUE)
 #define HAL_EDGE_CLOSE 110u /* cycles before it from which nothing else is done: longer than a turn that takes a byte */
-_Static_assert(HAL_EDGE_CLOSE < 128u, "then the low byte of the count tells");
+_Static_assert(HAL_EDGE_CLOSE < 128u, "then the low byte of the count is enough");
 
 HAL_INLINE void hal_edge_arm(uint16_t time) {
   OCR1A = (uint16_t)(time - HAL_EDGE_LEAD);
@@ -86,7 +86,7 @@ HAL_INLINE void hal_edge_arm(uint16_t time) {
 
 HAL_INLINE void hal_edge_disarm(void) { TIMSK1 = (uint8_t)(TIMSK1 & (uint8_t)~_BV(OCIE1A)); }
 
-/* Far from it received bytes are taken, for the receiver holds two and no more. The last turns look at the low byte of the
+/* Far from it received bytes are read, for the receiver holds only two. The last turns look at the low byte of the
  * count alone, 8 cycles each. */
 HAL_INLINE uint16_t hal_edge_wait(uint16_t time) {
   uint16_t left = (uint16_t)(time - TCNT1);

@@ -1,4 +1,4 @@
-/* machine.h: what surrounds the firmware in a PC process, the border between hal/native and whoever loads it.
+/* machine.h: what surrounds the firmware in a PC process, the border between hal/native and the program that loads it.
  *
  * The library exports one function, firmware_board_api(). Its owner keeps a native_machine: everything that outlives a
  * reset of the microcontroller (time, levels that the outside drives, bytes under way, EEPROM, counters). Each loaded copy

@@ -47,7 +47,7 @@ void hal_serial_resume(void) { stopped = false; }
 bool hal_serial_overrun(void) { return false; }
 
 bool hal_serial_room(uint8_t count) {
-  /* Bytes not yet wholly sent stand in the ring, but for the one being shifted out. */
+  /* Bytes not yet wholly sent are in the ring, but for the one being shifted out. */
   const uint64_t byte_cycles = native_byte_cycles(native->baud);
   const uint64_t queued = sender_free > native->now ? (sender_free - native->now) / byte_cycles : 0;
   if (queued + count <= SEND_RING) {
