@@ -20,7 +20,6 @@ test -s "$BOEBOT_STATE_FILE"
 # modules, as compiling takes long under sanitizers.
 rm -rf build/sanitized/lib/sim_bridge/tests
 cp -Rp sim_bridge/tests build/sanitized/lib/sim_bridge/tests
-cp -p conftest.py build/sanitized/lib/
 $python -m compileall -q -x /tests/ build/sanitized/lib
 
 asan=$(cc -print-file-name=libasan.so)

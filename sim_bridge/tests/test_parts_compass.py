@@ -245,7 +245,7 @@ def test_averaging_lowers_the_noise(average: int, samples: int) -> None:
     master.write(0, average << 5 | 6 << 2)
     master.write(2, 0)
     values = []
-    for _ in range(150):
+    for _ in range(80):
         master.wait(1 / 75)
         values.append(master.field()[1])
     mean = sum(values) / len(values)

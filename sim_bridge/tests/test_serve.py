@@ -19,6 +19,8 @@ from boebot.link import frame, messages
 from boebot.link.transport import Transport
 from sim_bridge.serve import serve
 
+pytestmark = pytest.mark.wall_clock
+
 PORTS = [0] + ([None] if os.name == "posix" else [])
 
 
@@ -126,7 +128,6 @@ def test_client_that_does_not_read_stops_nobody() -> None:
         client.close()
 
 
-@pytest.mark.unsanitized
 def test_what_cannot_be_served_is_told() -> None:
     with served(0) as url:
         taken = int(url.rpartition(":")[2])
