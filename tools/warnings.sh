@@ -20,14 +20,14 @@ compile() {
 # Most files of the firmware are the same for all pin maps: a file is compiled once for each text that the preprocessor
 # makes of it.
 touch "$lists/texts"
-for pin_map in SHIELDBOT SHIELDBOT_BASIC SHIELDBOT_QUAD SHIELDBOT_LINE BOEBOT; do
+for pin_map in $(grep -o 'PIN_MAP_[A-Z_]*' platformio.ini | sort -u); do
   touch "$lists/$pin_map"
   for source in $(find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c); do
-    text="$source $(gcc -E -P -DPIN_MAP_$pin_map -Ifirmware/src "$source" | cksum)"
+    text="$source $(gcc -E -P -D$pin_map -Ifirmware/src "$source" | cksum)"
     grep -qxF "$text" "$lists/texts" || echo "$source" >>"$lists/$pin_map"
     echo "$text" >>"$lists/texts"
   done
-  compile $pin_map -DPIN_MAP_$pin_map -Ifirmware/src
+  compile $pin_map -D$pin_map -Ifirmware/src
 done
 
 find host -name '*.c' -not -name '_*.c' >"$lists/host"

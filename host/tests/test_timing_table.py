@@ -13,6 +13,7 @@ from boebot import resources
 from boebot.errors import TimingError
 from boebot.timing.table import InterruptRow, SensorRow, Table, TaskRow, read_table, table_of
 from timing_program import build
+from tools.avr_program import IMAGES
 
 ROWS = """
 main: ret
@@ -20,7 +21,7 @@ main: ret
 """
 
 
-@pytest.mark.parametrize("pin_map", ["boebot", "shieldbot", "shieldbot-basic", "shieldbot-line", "shieldbot-quad"])
+@pytest.mark.parametrize("pin_map", IMAGES)
 def test_table_is_that_of_the_section(pin_map: str) -> None:
     image = resources.folder("images") / f"{pin_map}.elf"
     with image.open("rb") as stream:

@@ -153,7 +153,7 @@ def test_a_stack_in_the_registers_is_a_fault_in_both() -> None:
 
 @pytest.mark.parametrize(
     ("scenario", "pin_map", "seconds"),
-    [("figures", "shieldbot", 0.1), ("overload", "shieldbot-quad", 0.05), ("everything", "boebot", 0.4)],
+    [("figures", "shieldbot", 0.1), ("overload", "shieldbot-quad", 0.05), ("everything", "boebot", 0.9)],
 )
 def test_what_is_recorded_of_a_firmware_is_what_each_instruction_by_itself_gives(
     scenario: str, pin_map: str, seconds: float, monkeypatch: pytest.MonkeyPatch

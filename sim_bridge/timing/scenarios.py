@@ -33,7 +33,10 @@ CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how 
 SHORT_LIFE_MS = 18  # of a set-point in "faults": telemetry is a tick old at most when it is answered
 DEVICES = messages.Devices
 STUCK, NEVER_AGAIN = 1_600_000, 1 << 60  # cycles for which the two-wire bus is held, once
-SILENCE = 5_600_000  # cycles at the end of "everything": the dead man's 250 ms and the tasks that follow
+SILENCE = (
+    13_600_000  # cycles at the end of "everything": the dead man's 250 ms, then the fallback waits 500 ms and drives
+)
+FALLBACK_AFTER_MS = 20  # the host never pauses for that long before
 CHANGED = ("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain")
 FIGURE_DEVICES = DEVICES.SERVO | DEVICES.ENCODER | DEVICES.WHISKER | DEVICES.INFRARED | DEVICES.PING
 FAULT_DEVICES = FIGURE_DEVICES | DEVICES.TURRET | DEVICES.BUZZER
@@ -232,6 +235,7 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     line.set("ping_period", messages.PARAMETERS["ping_period"].minimum)
     if scenario == "everything":
         line.set("devices_period", 1)
+        line.set("fallback_after", FALLBACK_AFTER_MS)
     line.arm()
     return line
 

@@ -69,6 +69,13 @@ TEST_CASE("in the dark the longest time, also where the next reading has begun")
   CHECK(bench.devices().light_left == 14000);
 #endif
   CHECK(bench.devices().light_right == 14000);
+
+  bench.left_us = bench.right_us = 14600; /* falls after the longest time, collected 15 ms after the release */
+  bench.run(8 * TICK);
+#ifdef PIN_LIGHT_LEFT
+  CHECK(bench.devices().light_left == 14000);
+#endif
+  CHECK(bench.devices().light_right == 14000);
 }
 
 TEST_CASE("each capacitor is charged for 2.5 ms, once in 20 ms") {
