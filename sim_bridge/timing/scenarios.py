@@ -33,9 +33,7 @@ CONTACT_PERIOD, BOUNCE = 799_999, 20_011  # cycles between two touches, and how 
 SHORT_LIFE_MS = 18  # of a set-point in "faults": telemetry is a tick old at most when it is answered
 DEVICES = messages.Devices
 STUCK, NEVER_AGAIN = 1_600_000, 1 << 60  # cycles for which the two-wire bus is held, once
-SILENCE = (
-    13_600_000  # cycles at the end of "everything": the dead man's 250 ms, then the fallback waits 500 ms and drives
-)
+SILENCE = 13_600_000  # cycles at the end of "everything": 250 ms to the dead man, 500 ms to the fallback's first move
 FALLBACK_AFTER_MS = 20  # the host never pauses for that long before
 CHANGED = ("track_width", "infrared_period", "ping_period", "encoder_limit", "servo_left_gain")
 FIGURE_DEVICES = DEVICES.SERVO | DEVICES.ENCODER | DEVICES.WHISKER | DEVICES.INFRARED | DEVICES.PING
