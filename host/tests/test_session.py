@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import struct
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -168,7 +169,8 @@ def test_host_that_knows_more_talks_to_a_board_and_leaves_out_what_came_later(mo
     link = Link(InProcess(peer))
     link.open()
     assert listen(link, 0.1) and "later" not in link.parameters and "start_beep" in link.parameters
-    link.line.send(SimpleNamespace(ID=ADDED & 0x7F, pack=lambda: b"more"))  # type: ignore[arg-type]
+    added = SimpleNamespace(ID=ADDED & 0x7F, STRUCT=struct.Struct("4s"))
+    link.line.send_fields(added, b"more")  # type: ignore[arg-type]
     listen(link, 0.1)
     assert (peer.decoder.unknown, peer.decoder.bad) == (1, 0)
 

@@ -15,8 +15,6 @@ is tangent at the end of a window W passes an old bound by at most w W^2 / 2: ea
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
 
@@ -150,21 +148,16 @@ class BoardClock:
             self._bound + abs(since_s) * self._slope_bound,
         )
 
-    def observe_all(self, raw_us: Sequence[int], received_s: float) -> list[Stamp]:
-        """As `observe`, of messages that were received together, oldest first. Only the newest tells something of the
-        line: the others have come before."""
-        newest = self.observe(raw_us[-1], received_s)
-        if len(raw_us) == 1:
-            return [newest]
-        us, raw, at_s, middle, bound = self._us, raw_us[-1], self._at_s, self._middle, self._bound
-        rate, slope_bound = 1.0 + self._slope, self._slope_bound
-        stamps: list[Stamp] = []
-        for earlier in raw_us[:-1]:
-            board_s = (us - (raw - earlier) % _WRAP_US) * 1e-6
-            since_s = board_s - at_s
-            stamps.append((board_s, middle + since_s * rate, bound + abs(since_s) * slope_bound))
-        stamps.append(newest)
-        return stamps
+    def stamp_earlier(self, raw_us: int) -> Stamp:
+        """The stamp of a tick before the one that was observed last. It bounds nothing: its message was received
+        together with the later one, so when it came is not known."""
+        board_s = (self._us - (self._us - raw_us) % _WRAP_US) * 1e-6
+        since_s = board_s - self._at_s
+        return (
+            board_s,
+            self._middle + since_s * (1.0 + self._slope),
+            self._bound + abs(since_s) * self._slope_bound,
+        )
 
     # ---- inside --------------------------------------------------------------------------------------------
 

@@ -52,7 +52,11 @@ class Line:
 
     def send(self, message: messages.Message) -> None:
         """Sends one message."""
-        frame = encode(message.ID, self._sequence, message.pack(), self._session)
+        self.send_fields(type(message), *message)
+
+    def send_fields(self, kind: type[messages.Message], *fields: object) -> None:
+        """As `send`, without an object for the message: set-points are sent at every step."""
+        frame = encode(kind.ID, self._sequence, kind.STRUCT.pack(*fields), self._session)
         self._sequence = (self._sequence + 1) & 0xFF
         self.transport.write(frame)
         if self._record is not None:

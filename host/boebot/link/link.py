@@ -194,17 +194,17 @@ class Link:
 
     def send_signal(self, left: float, right: float, time_to_live_ms: int, tick: int) -> None:
         """Motor signals -1..1, in answer to the observation of `tick`."""
-        counts = round(left * 10000), round(right * 10000)
-        self.line.send(messages.SetpointSignal(*counts, time_to_live_ms, tick & 0xFFFF))
+        signals = round(left * 10000), round(right * 10000)
+        self.line.send_fields(messages.SetpointSignal, *signals, time_to_live_ms, tick & 0xFFFF)
 
     def send_speed(self, left_m_s: float, right_m_s: float, time_to_live_ms: int, tick: int) -> None:
         """Wheel speeds along the ground (m/s), in answer to the observation of `tick`."""
-        counts = round(left_m_s * 10000), round(right_m_s * 10000)
-        self.line.send(messages.SetpointSpeed(*counts, time_to_live_ms, tick & 0xFFFF))
+        speeds = round(left_m_s * 10000), round(right_m_s * 10000)
+        self.line.send_fields(messages.SetpointSpeed, *speeds, time_to_live_ms, tick & 0xFFFF)
 
     def send_coast(self, time_to_live_ms: int, tick: int) -> None:
         """No pulses, in answer to the observation of `tick`; nothing is latched."""
-        self.line.send(messages.SetpointCoast(time_to_live_ms, tick & 0xFFFF))
+        self.line.send_fields(messages.SetpointCoast, time_to_live_ms, tick & 0xFFFF)
 
     # ---- slow devices ------------------------------------------------------------------------------------------------
 

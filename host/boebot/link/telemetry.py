@@ -74,11 +74,12 @@ class TelemetryBuffer:
         payloads = self._piece
         if not payloads:
             return
-        estimate = self._clock.estimate
-        stamps = estimate.observe_all([_TIME(payload)[0] for payload in payloads], now_s)
-        self.waiting += [(payload, *stamp) for payload, stamp in zip(payloads, stamps, strict=True)]
+        estimate, newest = self._clock.estimate, payloads.pop()
+        board_s, host_s, bound_s = estimate.observe(_TIME(newest)[0], now_s)
+        self.waiting += [(payload, *estimate.stamp_earlier(_TIME(payload)[0])) for payload in payloads]
+        self.waiting.append((newest, board_s, host_s, bound_s))
         payloads.clear()
-        if now_s - stamps[-1][1] > self._late_after_s and estimate.bounded:  # the others have come before
+        if now_s - host_s > self._late_after_s and estimate.bounded:  # the others have come before
             self._counts.late += 1
         if (excess := len(self.waiting) - self.ROOM) > 0:
             self._counts.dropped += excess
