@@ -23,7 +23,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import MotorBehavior
 from boebot.brain.utility import HOLD
 from boebot.cognition.proximity import left_nearness, right_nearness
@@ -47,9 +47,9 @@ class Avoid(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "turn")
-        parameters.signals(self, "turn")
-        parameters.not_negative(self, "clear", "after")
+        checks.positive(self, "turn")
+        checks.signals(self, "turn")
+        checks.not_negative(self, "clear", "after")
 
     def enter(self, robot: Robot) -> None:
         left, right = left_nearness(robot) or 0.0, right_nearness(robot) or 0.0

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.phototaxis import brightness, steered
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.battery import BatteryLevel
@@ -56,9 +56,9 @@ class ChargeBattery(MotorBehavior):
         super().__post_init__()
         if not 0 < self.passed < 1:
             raise BrainError(f"{self.name}: passed is {self.passed!r}; expected a share between 0 and 1")
-        parameters.positive(self, "signal", "creep")
-        parameters.signals(self, "signal", "creep")
-        parameters.not_negative(self, "patience", "dark", "straight")
+        checks.positive(self, "signal", "creep")
+        checks.signals(self, "signal", "creep")
+        checks.not_negative(self, "patience", "dark", "straight")
 
     def forget(self) -> None:
         self.charging = False

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.phototaxis import steered
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import CognitiveProcess, MotorBehavior
 from boebot.brain.utility import HOLD
@@ -62,15 +62,15 @@ class Evade(MotorBehavior):
             raise BrainError(
                 f"{self.name}: weak is {self.weak!r} and strong {self.strong!r}; expected 0 <= weak < strong"
             )
-        parameters.positive(self, "erratic", "beat", "drop")
-        parameters.shares(self, "signal", "spread")
+        checks.positive(self, "erratic", "beat", "drop")
+        checks.shares(self, "signal", "spread")
 
     def companions(self) -> tuple[CognitiveProcess, ...]:
         return (Hearing(moth=self, name=f"{self.name}_hearing"),)
 
     def hear(self, robot: Robot) -> tuple[float, float]:
         """S_l and S_r."""
-        left, right = (parameters.reading(self, function, robot) or 0.0 for function in (self.left, self.right))
+        left, right = (checks.reading(self, function, robot) or 0.0 for function in (self.left, self.right))
         return max(left, 0.0), max(right, 0.0)
 
     @property

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.straight_run import within_signals
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ class FollowLine(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.signals(self, "signal", "gain")
-        parameters.not_negative(self, "patience")
+        checks.signals(self, "signal", "gain")
+        checks.not_negative(self, "patience")
 
     def enter(self, robot: Robot) -> None:
         self._error = 0.0

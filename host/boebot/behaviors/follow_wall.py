@@ -18,7 +18,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Literal
 
 from boebot.behaviors.straight_run import within_signals
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.proximity import left_nearness, nearness_ahead, ping_nearness, right_nearness
 from boebot.errors import BrainError
@@ -55,7 +55,7 @@ class FollowWall(MotorBehavior):
         super().__post_init__()
         if self.side not in ("left", "right"):
             raise BrainError(f"{self.name}: side is {self.side!r}; expected 'left' or 'right'")
-        parameters.signals(self, "signal", "turn")
+        checks.signals(self, "signal", "turn")
 
     def enter(self, robot: Robot) -> None:
         self._by_turret = robot.has("turret") and robot.has("ping")

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.straight_run import within_signals
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.odometry import wrapped
@@ -56,8 +56,8 @@ class Homing(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "arrival", "pitch", "signal", "search_signal", "turn", "gain")
-        parameters.signals(self, "signal", "search_signal", "turn")
+        checks.positive(self, "arrival", "pitch", "signal", "search_signal", "turn", "gain")
+        checks.signals(self, "signal", "search_signal", "turn")
 
     def forget(self) -> None:
         self.arrived: float | None = None
@@ -68,7 +68,7 @@ class Homing(MotorBehavior):
         self.machine = Machine(robot, self.inbound)
 
     def step(self, robot: Robot) -> None:
-        if self.home is None and self.found is not None and (parameters.reading(self, self.found, robot) or 0.0) >= 0.5:
+        if self.home is None and self.found is not None and (checks.reading(self, self.found, robot) or 0.0) >= 0.5:
             self.home = robot.time
             self.machine.go(robot, self.stay)
         self.machine.step(robot)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ class Kinesis(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.signals(self, "fast", "slow")
-        parameters.not_negative(self, "spread")
+        checks.signals(self, "fast", "slow")
+        checks.not_negative(self, "spread")
 
     def step(self, robot: Robot) -> None:
-        stimulus = min(max(parameters.reading(self, self.stimulus, robot) or 0.0, 0.0), 1.0)
+        stimulus = min(max(checks.reading(self, self.stimulus, robot) or 0.0, 0.0), 1.0)
         signal = self.fast * (1 - stimulus) + self.slow * stimulus
         size = robot.dimensions
         rate = self.spread * self.random.gauss(0.0, 1.0) / math.sqrt(self.step_time)  # rad/s

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.behaviors.straight_run import within_signals
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ class Phototaxis(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.signals(self, "signal")
-        parameters.not_negative(self, "dark")
+        checks.signals(self, "signal")
+        checks.not_negative(self, "dark")
 
     def step(self, robot: Robot) -> None:
         left, right = brightness(robot.light_left), brightness(robot.light_right)
@@ -70,9 +70,9 @@ class Klinotaxis(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.signals(self, "signal")
-        parameters.positive(self, "seconds")
-        parameters.not_negative(self, "swing")
+        checks.signals(self, "signal")
+        checks.positive(self, "seconds")
+        checks.not_negative(self, "swing")
 
     def enter(self, robot: Robot) -> None:
         self._side = 1  # +1: swings to the left

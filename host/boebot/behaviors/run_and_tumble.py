@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.leaky import LeakyIntegrator
 from boebot.brain.process import MotorBehavior
 
@@ -46,15 +46,15 @@ class RunAndTumble(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "a", "b", "turn")
-        parameters.signals(self, "signal", "turn")
-        parameters.not_negative(self, "run_on")
+        checks.positive(self, "a", "b", "turn")
+        checks.signals(self, "signal", "turn")
+        checks.not_negative(self, "run_on")
 
     def forget(self) -> None:
         self.value = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self._stimulus = parameters.reading(self, self.stimulus, robot) or 0.0
+        self._stimulus = checks.reading(self, self.stimulus, robot) or 0.0
         self._memory = LeakyIntegrator(self.a, self.b, self.b / self.a * self._stimulus)
         self._time = robot.time
         self._turning_until = self._running_until = -math.inf
@@ -62,7 +62,7 @@ class RunAndTumble(MotorBehavior):
 
     def step(self, robot: Robot) -> None:
         now = robot.time
-        read = parameters.reading(self, self.stimulus, robot)
+        read = checks.reading(self, self.stimulus, robot)
         self._stimulus = self._stimulus if read is None else read
         self.value = self._stimulus - self._memory.advance(self._stimulus, now - self._time)
         self._time = now

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 from boebot.cognition.odometry import Odometry, wrapped
@@ -42,9 +42,9 @@ class StraightRun(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "goal", "threshold")
-        parameters.signals(self, "signal")
-        parameters.shares(self, "least")
+        checks.positive(self, "goal", "threshold")
+        checks.signals(self, "signal")
+        checks.shares(self, "least")
 
     def forget(self) -> None:
         self.distance = 0.0

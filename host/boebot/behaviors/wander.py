@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.machine import Machine, State
 from boebot.brain.process import MotorBehavior
 
@@ -39,8 +39,8 @@ class Wander(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.signals(self, "forward", "turn")
-        parameters.shares(self, "turn_probability", "stop_turn_probability", "left_turn_probability")
+        checks.signals(self, "forward", "turn")
+        checks.shares(self, "turn_probability", "stop_turn_probability", "left_turn_probability")
 
     def forget(self) -> None:
         self.left = False

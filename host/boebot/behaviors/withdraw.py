@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess, MotorBehavior
 from boebot.brain.utility import HOLD
 from boebot.errors import BrainError
@@ -69,8 +69,8 @@ class Withdraw(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "back", "turn")
-        parameters.shares(self, "signal")
+        checks.positive(self, "back", "turn")
+        checks.shares(self, "signal")
         self.fresh()  # refuses times that are none
 
     def forget(self) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
 from boebot.brain.utility import HOLD, Utility
 from boebot.errors import BrainError
@@ -46,9 +46,9 @@ class FixedActionPattern(MotorBehavior):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.not_negative(self, "refractory")
+        checks.not_negative(self, "refractory")
         if not callable(self.releaser):
-            raise parameters.refused(self, "releaser", "a function of the robot")
+            raise checks.refused(self, "releaser", "a function of the robot")
         self._actions = [self._checked(action) for action in self.actions]
 
     def _checked(self, action: Action | tuple[float, float, float]) -> Action:

@@ -27,7 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.utility import Utility
 from boebot.errors import BrainError
 
@@ -62,7 +62,7 @@ class Process:
             raise BrainError(f"a process is called {self.name!r}; expected a text")
         if not isinstance(self.utility, Utility):
             raise BrainError(f"{self.name}: utility is {self.utility!r}; expected a Utility(...)")
-        parameters.check_numbers(self)
+        checks.check_numbers(self)
         if self.period is not None and not (isinstance(self.period, int | float) and 0 < self.period < math.inf):
             raise BrainError(f"{self.name}: period is {self.period!r}; expected seconds from step to step")
         self.random = random.Random()

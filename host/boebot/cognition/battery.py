@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.leaky import LeakyIntegrator
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
@@ -56,7 +56,7 @@ class BatteryLevel(CognitiveProcess):
         super().__post_init__()
         if not self.full > self.empty:
             raise BrainError(f"{self.name}: full is {self.full!r} V; expected more than empty, {self.empty!r} V")
-        parameters.positive(self, "tau", "rise", "fall")
+        checks.positive(self, "tau", "rise", "fall")
 
     def forget(self) -> None:
         self.voltage: float | None = None

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry
@@ -28,7 +28,7 @@ class Drift(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "distance")
+        checks.positive(self, "distance")
 
     def forget(self) -> None:
         self.value = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 
@@ -30,7 +30,7 @@ class LightSense(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "scale")
+        checks.positive(self, "scale")
 
     def forget(self) -> None:
         self.left: float | None = None

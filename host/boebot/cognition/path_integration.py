@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry, wrapped
@@ -44,7 +44,7 @@ class PathIntegration(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "scale")
+        checks.positive(self, "scale")
 
     def forget(self) -> None:
         self.set_home()

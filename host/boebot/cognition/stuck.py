@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from boebot.brain import parameters
+from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess
 from boebot.brain.variables import StateVariable
 from boebot.cognition.odometry import Odometry, wrapped
@@ -33,7 +33,7 @@ class StuckDetector(CognitiveProcess):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parameters.positive(self, "window", "least")
+        checks.positive(self, "window", "least")
 
     def forget(self) -> None:
         self.share = 0.0

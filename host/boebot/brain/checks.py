@@ -1,4 +1,4 @@
-"""Checks of what processes are given: a wrong parameter is one sentence where it is given, not a fault in the run."""
+"""Checks of a process's fields: a wrong one is one sentence when the process is made, not a fault in the run."""
 
 from __future__ import annotations
 
