@@ -112,7 +112,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
         assert link.request(messages.SetParameter, PING.id, value, what="set").value == value
         latencies.append(line.now() - begun)
         if index % 10 == 0:
-            assert link.get_parameter("ping_period") == value
+            assert link.parameters.get("ping_period") == value
     latencies.sort()
     assert link.counts.sessions == 1
     assert line.flipped > (10 if bit_errors < 1e-3 else 100), "the line was bad"
@@ -152,7 +152,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     line = BadLine(board)
     link = Link(line)
     link.open()
-    link.set_parameter("session_time_out", 1000)
+    link.parameters.set("session_time_out", 1000)
     link.arm()
     listen(link, 0.05)
     assert link.telemetry.latest is not None

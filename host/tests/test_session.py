@@ -12,7 +12,7 @@ import pytest
 from channel import Channel, uniform
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import messages, mismatch
+from boebot.link import messages, mismatch, task_times
 from boebot.link.counters import HostCounters
 from boebot.link.errors import LatchedAgainError, SessionLostError, TakenOverError
 from boebot.link.fields import text
@@ -152,7 +152,7 @@ def test_host_talks_to_a_board_that_has_more_messages(monkeypatch: pytest.Monkey
     link = Recorded(session)
     link.open()
     seen = listen(link, 0.5)
-    assert len(seen) >= 45 and link.get_parameter("track_width") > 0
+    assert len(seen) >= 45 and link.parameters.get("track_width") > 0
     counters = link.counters()
     assert counters.unknown >= 45 and (counters.bad, counters.lost, counters.stray) == (0, 0, 0)
     assert link.telemetry.latest is not None
@@ -168,7 +168,7 @@ def test_host_that_knows_more_talks_to_a_board_and_leaves_out_what_came_later(mo
     monkeypatch.setitem(messages.PARAMETERS, "later", later)
     link = Link(InProcess(peer))
     link.open()
-    assert listen(link, 0.1) and "later" not in link.parameters and "start_beep" in link.parameters
+    assert listen(link, 0.1) and "later" not in link.parameters.names and "start_beep" in link.parameters.names
     added = SimpleNamespace(ID=ADDED & 0x7F, STRUCT=struct.Struct("4s"))
     link.line.send_fields(added, b"more")  # type: ignore[arg-type]
     listen(link, 0.1)
@@ -338,7 +338,7 @@ def test_reset_during_a_request_is_said() -> None:
     listen(link, 0.1)
     assert isinstance(request.error, SessionLostError)
     assert "whether it was done is not known" in str(request.error) or "it was not done" in str(request.error)
-    assert link.session.is_open and link.set_parameter("infrared_period", 9) == 9
+    assert link.session.is_open and link.parameters.set("infrared_period", 9) == 9
 
 
 def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
@@ -354,7 +354,7 @@ def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
 @pytest.mark.parametrize("time_out_ms", [200, 1000, 1500])
 def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
     link, _peer, _session = joined()
-    link.set_parameter("session_time_out", time_out_ms)
+    link.parameters.set("session_time_out", time_out_ms)
     before = len([kind for kind in sent_kinds(link) if kind == "clock_probe"])
     listen(link, 6 + 20 * time_out_ms / 1000)
     probes = [at for at, frame in sent(link) if frame[2] == messages.ClockProbe.ID][before:]
@@ -425,7 +425,7 @@ def test_request_is_repeated_until_it_is_answered_and_carried_out_once() -> None
         return whole(way, frame, at_s)
 
     session.channel.carry = lossy  # type: ignore[method-assign]
-    assert link.set_parameter("infrared_period", 7) == 7
+    assert link.parameters.set("infrared_period", 7) == 7
     assert [message for _, message in peer.carried_out] == [messages.SetParameter(1, 7, 7)]
     assert link.counters().retransmitted >= 2 and peer.counts["duplicate"] >= 1
 
@@ -440,10 +440,10 @@ def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_ans
     with pytest.raises(
         BoardError, match=r"did not set parameter infrared_period within 0\.5 s, though asked \d+ times"
     ):
-        link.set_parameter("infrared_period", 7)
+        link.parameters.set("infrared_period", 7)
     assert session.now() - begun < 0.6
     session.channel.carry = whole  # type: ignore[method-assign]
-    assert link.get_parameter("infrared_period") == 5
+    assert link.parameters.get("infrared_period") == 5
     assert peer.parameter("infrared_period") == 5
 
 
@@ -453,7 +453,7 @@ def test_slow_line_is_not_flooded_with_retries() -> None:
     listen(link, 1.0)
     before = link.counters().retransmitted
     for _ in range(10):
-        link.get_parameter("infrared_period")
+        link.parameters.get("infrared_period")
     assert link.counters().retransmitted == before
 
 
@@ -461,35 +461,35 @@ def test_slow_line_is_not_flooded_with_retries() -> None:
 def test_parameter_out_of_range_is_refused_before_it_is_sent(value: float) -> None:
     link, peer, _ = joined()
     with pytest.raises(BoebotError, match=r"infrared_period cannot be .* ticks; expected 2 to 250"):
-        link.set_parameter("infrared_period", value)
+        link.parameters.set("infrared_period", value)
     assert peer.carried_out == []
 
 
 def test_unknown_parameter_is_named() -> None:
     link, _, _ = joined()
     with pytest.raises(BoebotError, match="no parameter 'speed'; expected one of devices"):
-        link.get_parameter("speed")
+        link.parameters.get("speed")
 
 
 def test_parameter_travels_in_its_unit() -> None:
     link, peer, _ = joined()
-    assert link.set_parameter("servo_left_centre", 1499.5) == 1499.5
+    assert link.parameters.set("servo_left_centre", 1499.5) == 1499.5
     assert peer.parameter("servo_left_centre") == 23992
-    assert link.get_parameter("servo_left_centre") == 1499.5
+    assert link.parameters.get("servo_left_centre") == 1499.5
 
 
 def test_parameters_are_saved_and_reset() -> None:
     link, peer, session = joined()
-    link.set_parameter("ping_period", 9)
+    link.parameters.set("ping_period", 9)
     begun = session.now()
-    link.save_parameters()
+    link.parameters.save()
     assert session.now() - begun >= 0.2, "answered when it is written"
     assert peer.saved is not None
-    link.reset_parameters()
-    assert link.get_parameter("ping_period") != 9
+    link.parameters.reset()
+    assert link.parameters.get("ping_period") != 9
     peer.reset()
     listen(link, 0.1)
-    assert link.get_parameter("ping_period") == 9 and link.open().parameters_saved == 1
+    assert link.parameters.get("ping_period") == 9 and link.open().parameters_saved == 1
 
 
 def test_board_that_is_busy_writing_is_asked_again() -> None:
@@ -502,7 +502,7 @@ def test_board_that_is_busy_writing_is_asked_again() -> None:
     listen(link, 0.2)
     assert saving.done and request.done
     peer._saving_until = session.now() + 0.2
-    assert link.set_parameter("ping_period", 9) == 9
+    assert link.parameters.set("ping_period", 9) == 9
     assert peer._saving_until is None
 
 
@@ -513,7 +513,7 @@ def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) ->
     link, peer, _ = joined()
     peer._set = lambda message, saving: (status, 0)  # type: ignore[method-assign]
     with pytest.raises(BoardError, match=f"refuses parameter devices: {reason}"):
-        link.set_parameter("devices", 3)
+        link.parameters.set("devices", 3)
 
 
 # ---- arming and stop -------------------------------------------------------------------------------------------------
@@ -643,7 +643,7 @@ def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
     channel = Channel()
     peer = Peer(protections=without(age=protected))
     link, peer, _session = joined(peer, channel)
-    link.set_parameter("session_time_out", 1500)
+    link.parameters.set("session_time_out", 1500)
     link.arm()
     channel.stalled = True
     for _ in range(100):
@@ -771,22 +771,22 @@ def test_board_counters_are_unwrapped() -> None:
 
 def test_longest_times_of_tasks_are_those_of_this_session() -> None:
     link, peer, _ = joined()
-    assert set(link.task_times.values()) == {None}
+    assert set(link.task_times.cycles.values()) == {None}
     names = [task.name.lower() for task in messages.Task]
     peer.task_times = [100 + number for number in range(len(names))]
-    assert link.measure_task_times(0.0) == dict(zip(names, peer.task_times, strict=True))
+    assert task_times.measure(link, 0.0) == dict(zip(names, peer.task_times, strict=True))
     peer.task_times[3] = 65535
-    assert link.measure_task_times(0.0)[names[3]] == link.task_times[names[3]] == 65535
+    assert task_times.measure(link, 0.0)[names[3]] == link.task_times.cycles[names[3]] == 65535
     peer.reset()
     listen(link, 0.1)
-    assert link.session.is_open and link.task_times[names[3]] is None
-    assert set(link.measure_task_times(0.0).values()) == {0}
+    assert link.session.is_open and link.task_times.cycles[names[3]] is None
+    assert set(task_times.measure(link, 0.0).values()) == {0}
 
 
 def test_longest_times_lost_on_the_line_come_again() -> None:
     link, peer, _ = joined(channel=Channel(loss=0.2))
     peer.task_times = [7] * len(messages.Task)
-    assert set(link.measure_task_times(0.0).values()) == {7}
+    assert set(task_times.measure(link, 0.0).values()) == {7}
     assert link.counters().lost > 10
 
 
@@ -796,7 +796,7 @@ def test_measuring_the_tasks_lasts_as_long_as_asked_and_a_round(period: int) -> 
     peer.telemetry_period = period
     link, peer, _ = joined(peer)
     begun, round_s = link.transport.now(), ROUND_S * period
-    link.measure_task_times(1.0)
+    task_times.measure(link, 1.0)
     assert 1.0 + round_s <= link.transport.now() - begun < 1.0 + round_s + 0.1
 
 
@@ -805,14 +805,14 @@ def test_a_board_that_leaves_out_a_task_is_named_with_it() -> None:
     peer.untold = {messages.Task.TURRET, messages.Task.DEVICES}
     begun = link.transport.now()
     with pytest.raises(BoardError, match=f"tasks turret, devices within {0.5 + 4 * ROUND_S:.1f} s"):
-        link.measure_task_times(0.5)
+        task_times.measure(link, 0.5)
     assert link.transport.now() - begun < 0.7 + 4 * ROUND_S
 
 
 def test_a_task_that_this_kit_does_not_know_is_left_out() -> None:
     link, _, _ = joined()
     link._handlers[messages.TaskTime.ID](messages.TaskTime(len(messages.Task), 9).pack(), 0.0)
-    assert set(link.task_times.values()) == {None}
+    assert set(link.task_times.cycles.values()) == {None}
 
 
 def test_same_run_twice_is_the_same_to_the_last_byte() -> None:

@@ -49,7 +49,7 @@ def info(
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
             ],
         }
-        parameters = {name: round(link.get_parameter(name), 6) for name in link.parameters if name != "devices"}
+        parameters = {name: round(link.parameters.get(name), 6) for name in link.parameters.names if name != "devices"}
         telemetry = _latest(link)
         link.close()
     finally:

@@ -101,7 +101,8 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
         "task_longest_us": {
-            name: None if cycles is None else cycles / _CYCLES_PER_US for name, cycles in watched.task_times.items()
+            name: None if cycles is None else cycles / _CYCLES_PER_US
+            for name, cycles in watched.task_times.cycles.items()
         },
     }
 

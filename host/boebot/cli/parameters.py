@@ -14,7 +14,7 @@ from boebot.cli import options, output
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.link import Link
-from boebot.link.parameter_values import parameter_counts, parameter_spec
+from boebot.link.parameter_requests import parameter_counts, parameter_spec
 
 app = typer.Typer(help="List, read, set, save and reset the board's parameters.", no_args_is_help=True)
 
@@ -60,7 +60,7 @@ def _was_reset_since(link: Link, begun_s: float) -> bool:
 
 
 def _save(link: Link, on: str) -> None:
-    link.save_parameters()
+    link.parameters.save()
     if not is_live(on):
         output.say(f"the EEPROM of the emulated board {on!r} ends with this command, and what is saved in it, too")
 
@@ -96,7 +96,7 @@ def _show(name: str, value: float, as_json: bool) -> None:
 def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
     """All parameters: value, unit, range, meaning."""
     with _link(on, robot) as link:
-        rows = [described(name, link.get_parameter(name)) for name in link.parameters]
+        rows = [described(name, link.parameters.get(name)) for name in link.parameters.names]
         saved = bool(link.open().parameters_saved)
     if json:
         output.print_json({"saved": saved, "parameters": rows})
@@ -124,7 +124,7 @@ def get(
     """One parameter's value."""
     parameter_spec(name)
     with _link(on, robot) as link:
-        value = link.get_parameter(name)
+        value = link.parameters.get(name)
     _show(name, value, json)
 
 
@@ -140,7 +140,7 @@ def set_one(
     """Set a parameter until the board's next reset; --save keeps it. Opening a port resets most boards."""
     parameter_counts(name, value)
     with _link(on, robot, changes=True) as link:
-        now = link.set_parameter(name, value)
+        now = link.parameters.set(name, value)
         if save:
             _save(link, on)
     if json:
@@ -167,7 +167,7 @@ def reset_all(
 ) -> None:
     """All parameters to the image's defaults, until the board's next reset; --save keeps that."""
     with _link(on, robot, changes=True) as link:
-        link.reset_parameters()
+        link.parameters.reset()
         if save:
             _save(link, on)
     if json:

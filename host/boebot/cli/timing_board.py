@@ -32,6 +32,7 @@ def maxima(
     """
     from avr_timing.image.elf import read_image
     from boebot.boards import BoardRequest, open_board
+    from boebot.link import task_times
     from boebot.link.link import Link
 
     code = read_image(image).code
@@ -47,7 +48,7 @@ def maxima(
         check_image(link.identity(), code, image.name, port)
         label = f"listening to {port}"
         with output.share_bars([label]) as watch:
-            found = link.measure_task_times(seconds, lambda share: watch({label: share}))
+            found = task_times.measure(link, seconds, lambda share: watch({label: share}))
         link.close()
     finally:
         session.close()

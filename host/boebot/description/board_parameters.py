@@ -48,12 +48,12 @@ def configure(link: Link, robot: RobotDescription) -> RobotDescription:
     """
     hello = link.session.hello
     assert hello is not None
-    wanted = {name: value for name, value in parameters_of(robot).items() if name in link.parameters}
+    wanted = {name: value for name, value in parameters_of(robot).items() if name in link.parameters.names}
     if hello.parameters_saved:
-        return adapted(robot, {name: link.get_parameter(name) for name in wanted})
+        return adapted(robot, {name: link.parameters.get(name) for name in wanted})
     for parameter, value in wanted.items():
         if parameter != "baud_rate":  # the board speaks at the right one, or nothing would come
-            link.set_parameter(parameter, value)
+            link.parameters.set(parameter, value)
     return robot
 
 

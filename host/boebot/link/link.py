@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import random
 import secrets
-from collections.abc import Callable
 from functools import partial
 
 from boebot.errors import BoardError
-from boebot.link import messages, mismatch, reset_cause
+from boebot.link import messages, reset_cause
 from boebot.link.clock_sync import ClockSync
 from boebot.link.counters import BoardCounters, HostCounters
 from boebot.link.errors import LatchedAgainError
@@ -24,10 +23,11 @@ from boebot.link.events import Events
 from boebot.link.fields import reader
 from boebot.link.line import AT_ONCE, NEVER, Append, Handlers, Line
 from boebot.link.motor_stop import MotorStop
-from boebot.link.parameter_values import parameter_counts, parameter_spec
-from boebot.link.requests import Request, RequestKind, Requests
+from boebot.link.parameter_requests import BoardParameters
+from boebot.link.requests import Request, RequestKind, Requests, check
 from boebot.link.session import Session
 from boebot.link.slow_devices import SlowDevices
+from boebot.link.task_times import TaskTimes
 from boebot.link.telemetry import StampedTelemetry, TelemetryBuffer
 from boebot.link.times import LinkTimes
 from boebot.link.transport import CountsOverruns, Transport
@@ -38,11 +38,6 @@ _SHORTEST_S = 1e-4  # a wait that rounds to nothing would never end on a clock t
 _ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop this much before what was waited for
 _STOP_BYTES = 20
 _FRAME_TICKS = 2  # of the servos: no pulse shows sooner
-_BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
-_ROUND_PERIODS = 4 * (len(messages.Task) + 1)  # of telemetry: each task's time and the counters, a message in four
-_ROUNDS = 4  # in which each task's time came at least once, or something is wrong
-_LOOK_S = 0.05
-_TASKS = tuple(task.name.lower() for task in messages.Task)
 
 _LATCH = reader(messages.Telemetry, "latch")
 _LATCHES = reader(messages.Telemetry, "latches")
@@ -56,13 +51,10 @@ class Link:
         transport: where the board is.
         times: time-outs.
         notices: sentences for the user; a program that shows them takes them out.
-        line, session, clock, telemetry, devices, events: the parts.
+        line, session, clock, telemetry, devices, events, parameters: the parts.
         counts: what the host's end has counted; `counters` brings the frames' counts up to date.
         board_counters: what the board's end has counted.
-        task_times: the longest time of each task of the firmware since the session was opened, by its name: cycles of
-            1/16 us, interrupts on top included; 65535: so long or longer; 0: it took no time, as on the native board
-            (where only the Ping's pulse does); None: not yet known. The board sends one after another, all of them in
-            0.9 s where the line is fast.
+        task_times: the longest time of each task of the firmware.
         polled_s: when `poll_until` returned last, by the transport's clock.
     """
 
@@ -87,7 +79,7 @@ class Link:
         self.times = times or LinkTimes()
         self.notices: list[str] = []
         self.board_counters = BoardCounters()
-        self.task_times: dict[str, int | None] = dict.fromkeys(_TASKS)
+        self.task_times = TaskTimes()
         self.polled_s = 0.0
         self.counts = counts = HostCounters()
         self.line = line = Line(transport, record)
@@ -108,6 +100,7 @@ class Link:
         self._requests = Requests(line.send, counts, transport.name, self.session.restart)
         self.events = Events(line.send, counts, self.clock)
         self._stop = MotorStop(line.send, counts)
+        self.parameters = BoardParameters(line, self.session, self.times, self.request, self._turn)
         self._now = line.now
         self._due = NEVER  # when something is to be sent next
         handshake: Handlers = self.session.handlers | {messages.Hello.ID: self._receive_hello}
@@ -117,7 +110,7 @@ class Link:
             messages.Event.ID: self.events.receive,
             messages.Stopped.ID: self._stop.receive,
             messages.Counters.ID: lambda payload, _: self.board_counters.add(messages.Counters.unpack(payload)),
-            messages.TaskTime.ID: self._receive_task_time,
+            messages.TaskTime.ID: self.task_times.receive,
             messages.ClockAnswer.ID: self.clock.receive,
             **{kind.ID: partial(self._receive_devices, kind) for kind in messages.DEVICE_MESSAGES},
         }
@@ -274,7 +267,7 @@ class Link:
         self._due = AT_ONCE
         return request
 
-    # ---- motors and parameters ---------------------------------------------------------------------------------------
+    # ---- arming ------------------------------------------------------------------------------------------------------
 
     def arm(self) -> None:
         """Ends the latch: set-points that answer a later tick move the motors.
@@ -302,7 +295,7 @@ class Link:
         if answer.status == messages.AnswerStatus.SUPPLY_LOW:
             known = f" ({supply_v:.2f} V)" if supply_v else ""
             raise BoardError(f"the board at {where} does not arm its motors: its supply is low{known}")
-        self._check(answer, "does not arm its motors")
+        check(answer, where, "does not arm its motors")
 
     def _fresh_telemetry(self, end: float) -> bytes:
         """Telemetry of this session that comes from now on."""
@@ -314,94 +307,6 @@ class Link:
                 before, sessions = None, self.counts.sessions
             self._turn(end)
         return self.telemetry.latest
-
-    @property
-    def parameters(self) -> list[str]:
-        """Names of the parameters that the board knows: those of its minor version."""
-        assert self.session.hello is not None, "a session is open"
-        minor = mismatch.minor_of(self.session.hello)
-        return [name for name, spec in messages.PARAMETERS.items() if spec.since <= minor]
-
-    def get_parameter(self, name: str) -> float:
-        """The value of a parameter, in its unit."""
-        spec = parameter_spec(name)
-        answer = self.request(messages.GetParameter, spec.id, what=f"send parameter {name}")
-        self._check(answer, f"refuses parameter {name}")
-        return answer.value * spec.scale
-
-    def set_parameter(self, name: str, value: float) -> float:
-        """Sets a parameter until the board's next reset; returns the value now in force, in its unit."""
-        counts = parameter_counts(name, value)
-        spec = parameter_spec(name)
-        answer = self._request_when_free(messages.SetParameter, spec.id, counts, what=f"set parameter {name}")
-        self._check(answer, f"refuses parameter {name}")
-        return answer.value * spec.scale
-
-    def save_parameters(self) -> None:
-        """Writes all parameters to the board's EEPROM, so that they outlast resets and power cuts.
-
-        Raises:
-            BoardError: the supply is low, what was written does not read back; or as `request`.
-        """
-        what = "save its parameters"
-        answer = self._request_when_free(messages.SaveParameters, what=what, limit_s=self.times.save_limit_s)
-        self._check(answer, f"did not {what}")
-
-    def reset_parameters(self) -> None:
-        """All parameters to the image's defaults; what is saved stays."""
-        what = "reset its parameters"
-        self._check(self._request_when_free(messages.ResetParameters, what=what), f"did not {what}")
-
-    # ---- the board's own timing --------------------------------------------------------------------------------------
-
-    def measure_task_times(
-        self, seconds: float, progress: Callable[[float], object] = lambda _: None
-    ) -> dict[str, int]:
-        """Lets the board work for a time and returns `task_times` then: of all since the session was opened. Telemetry
-        and events that come meanwhile are dropped.
-
-        Args:
-            seconds: by the transport's clock. The board sends the times of one task after another, so that it takes up
-                to 0.9 s longer, or more where the line is slow.
-            progress: called with the share of it that is over, 0 to 1.
-
-        Raises:
-            BoardError: the board has not sent all of them, in four times the time that it needs; or as `poll`.
-        """
-        round_s = _ROUND_PERIODS * self.session.telemetry_s
-        begun = self._now()
-        least, most = seconds + round_s, seconds + _ROUNDS * round_s
-        while (passed := self._now() - begun) < least or (None in self.task_times.values() and passed < most):
-            progress(min(passed / least, 1.0))
-            self.poll(_LOOK_S)
-            self.events.fetch()
-        missing = [name for name, cycles in self.task_times.items() if cycles is None]
-        if missing:
-            raise BoardError(
-                f"the board at {self.transport.name} did not send the times of its tasks {', '.join(missing)} within "
-                f"{most:.1f} s; expected one task after another"
-            )
-        return {name: cycles for name, cycles in self.task_times.items() if cycles is not None}
-
-    def _request_when_free(
-        self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None
-    ) -> messages.Answer:
-        """As `request`; asks again while the board writes its EEPROM."""
-        end = self._now() + self.times.save_limit_s
-        while True:
-            answer = self.request(kind, *arguments, what=what, limit_s=limit_s)
-            now = self._now()
-            if answer.status != messages.AnswerStatus.BUSY or now >= end:
-                return answer
-            again = now + _BUSY_AGAIN_S
-            while self._now() < again:
-                self._turn(again)
-
-    def _check(self, answer: messages.Answer, what: str) -> None:
-        """Raises unless the board agrees; `what`: what it does, for the sentence."""
-        if answer.status != messages.AnswerStatus.OK:
-            reason = messages.AnswerStatus(answer.status).name.lower().replace("_", " ")
-            raise BoardError(f"the board at {self.transport.name} {what}: {reason}")
 
     # ---- the loop ----------------------------------------------------------------------------------------------------
 
@@ -448,7 +353,7 @@ class Link:
         self._requests.session_opened()
         self.events.session_opened()
         self._stop.session_opened()
-        self.task_times = dict.fromkeys(_TASKS)
+        self.task_times.session_opened()
         self._due = AT_ONCE
 
     def _session_ended(self) -> None:
@@ -500,11 +405,6 @@ class Link:
         self._due = AT_ONCE  # the next may go
         if request.arguments[:1] == (_TIME_OUT.id,) and request.answer.status == messages.AnswerStatus.OK:
             self.session.time_out_s = request.answer.value * _TIME_OUT.scale / 1000
-
-    def _receive_task_time(self, payload: bytes, _: float) -> None:
-        task, longest = messages.TaskTime.unpack(payload)
-        if task < len(_TASKS):
-            self.task_times[_TASKS[task]] = longest
 
     def _report_thinning(self) -> None:
         """Where the line is slow the board sends telemetry less often than its parameter says."""

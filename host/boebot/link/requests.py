@@ -44,6 +44,13 @@ class Request:
         return self.answer is not None or self.error is not None
 
 
+def check(answer: messages.Answer, where: str, what: str) -> None:
+    """Raises BoardError unless the board at `where` agrees; `what`: what it does instead, for the sentence."""
+    if answer.status != messages.AnswerStatus.OK:
+        reason = messages.AnswerStatus(answer.status).name.lower().replace("_", " ")
+        raise BoardError(f"the board at {where} {what}: {reason}")
+
+
 class Requests:
     """The requests of one link: one is under way at a time, the others wait."""
 

@@ -195,7 +195,7 @@ class BoardDriver:
         equipment = Equipment(self.description, self.tick_s)
         if not equipment.needs_messages:
             return equipment
-        period = int(self.link.get_parameter("devices_period"))
+        period = int(self.link.parameters.get("devices_period"))
         ticks = message_ticks(period, self.link.line.byte_s, self.tick_s)
         return Equipment(self.description, self.tick_s, message_ticks=ticks)
 
