@@ -18,9 +18,8 @@ import pytest
 
 from boebot import cli
 from boebot.boards import BoardRequest, board_kinds, imperfections
+from boebot.cli import board_link, teleop
 from boebot.cli import link as link_command
-from boebot.cli import parameters as parameters_command
-from boebot.cli import teleop
 from boebot.link import messages, mismatch
 from boebot.link.link import Link
 from boebot.robot import Robot
@@ -468,8 +467,7 @@ def board(monkeypatch: pytest.MonkeyPatch) -> InProcess:
         session.closed = False
         return session
 
-    for command in (link_command, parameters_command):
-        monkeypatch.setattr(command, "open_board", opened)
+    monkeypatch.setattr(board_link, "open_board", opened)
     return session
 
 

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.boards import BoardRequest, open_board
+from boebot.boards import BoardRequest
 from boebot.cli import options, output
+from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages, mismatch, reset_cause
@@ -24,13 +25,11 @@ def info(
     json: options.Json = False,
 ) -> None:
     """Say who is at a port: firmware, compiler, image, devices."""
-    session = open_board(url, BoardRequest(robot=load_robot(robot), record=False))
-    try:
-        link = Link(session.transport)
+    with board_link(url, BoardRequest(robot=load_robot(robot), record=False)) as (link, description):
         hello = link.open()
         identity = link.identity()
         values: dict[str, Any] = {
-            "board": session.description,
+            "board": description,
             "robot": text(hello.robot),
             "protocol_version": mismatch.version_name(hello.protocol_version),
             "schema": f"{hello.schema_hash:08x}",
@@ -51,11 +50,6 @@ def info(
         }
         parameters = {name: round(link.parameters.get(name), 6) for name in link.parameters.names if name != "devices"}
         telemetry = _latest(link)
-        link.close()
-    finally:
-        session.close()
-    for notice in link.notices:
-        output.say(notice)
     values["supply_v"] = telemetry.supply / 1000 or None
     values["latch"] = _name(messages.Latch, telemetry.latch)
     values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)

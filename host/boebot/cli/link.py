@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.boards import BoardRequest, open_board
+from boebot.boards import BoardRequest
 from boebot.cli import options, output
+from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.link import reset_cause
 from boebot.link.fields import text
@@ -31,21 +32,14 @@ def link(
     ] = False,
 ) -> None:
     """Watch the link: counters of both ends, round trips, the board's clock. Ctrl-C ends it; nothing moves."""
-    session = open_board(on, BoardRequest(robot=load_robot(robot), record=False, realtime=True))
-    try:
-        watched = Link(session.transport)
-        watched.open()
-        for notice in watched.notices:
-            output.say(notice)
+    request = BoardRequest(robot=load_robot(robot), record=False, realtime=True)
+    with board_link(on, request) as (watched, _):
         if once:
             seconds = min(seconds, _PERIOD_S)
         if json:
             _watch(watched, seconds, lambda look: output.print_json(look, indent=None), once)
         else:
             _show_table(watched, seconds, once)
-        watched.close()
-    finally:
-        session.close()
 
 
 def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None], once: bool) -> None:

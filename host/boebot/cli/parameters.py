@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.boards import BoardRequest, is_live, open_board
+from boebot.boards import BoardRequest, is_live
 from boebot.cli import options, output
+from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.link import Link
@@ -31,21 +32,13 @@ def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
     """A session with the board, for as long as the block lasts. Nothing moves. Where parameters are to be changed, a
     reset by the opening is reported: it forgets those that were set before and not saved."""
     begun_s = time.monotonic()
-    session = open_board(on, BoardRequest(robot=load_robot(robot), record=False))
-    try:
-        link = Link(session.transport)
-        link.open()
-        for notice in link.notices:
-            output.say(notice)
+    with board_link(on, BoardRequest(robot=load_robot(robot), record=False)) as (link, _):
         if changes and is_live(on) and _was_reset_since(link, begun_s):
             output.say(
                 f"opening {link.transport.name} has reset the board: it has the parameters that were saved, or its "
                 "image's defaults; what was set and not saved is lost"
             )
         yield link
-        link.close()
-    finally:
-        session.close()
 
 
 def _was_reset_since(link: Link, begun_s: float) -> bool:

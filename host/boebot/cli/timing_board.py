@@ -31,27 +31,19 @@ def maxima(
         AnalysisError: the image cannot be read.
     """
     from avr_timing.image.elf import read_image
-    from boebot.boards import BoardRequest, open_board
+    from boebot.boards import BoardRequest
+    from boebot.cli.board_link import board_link
     from boebot.link import task_times
-    from boebot.link.link import Link
 
     code = read_image(image).code
     request = BoardRequest(
         robot=robot, record=False, realtime=True, image=None if loaded is None else str(loaded.resolve())
     )
-    session = open_board(port, request)
-    try:
-        link = Link(session.transport)
-        link.open()
-        for notice in link.notices:
-            output.say(notice)
+    with board_link(port, request) as (link, _):
         check_image(link.identity(), code, image.name, port)
         label = f"listening to {port}"
         with output.share_bars([label]) as watch:
             found = task_times.measure(link, seconds, lambda share: watch({label: share}))
-        link.close()
-    finally:
-        session.close()
     measured = {name: cycles for name, cycles in found.items() if cycles}
     if not measured:
         output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
