@@ -253,10 +253,9 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
         BoardError: no such board, or it cannot be opened, or the robot has none; no such imperfection.
     """
     check_board(url, request.robot)
-    for point in entry_points(group=BOARDS_GROUP):
-        if point.name == url:
-            factory: BoardFactory = _load(point.load, url)
-            return factory(request)
+    for point in entry_points(group=BOARDS_GROUP, name=url):
+        factory: BoardFactory = _load(point.load, url)
+        return factory(request)
     if is_live(url):
         if request.without:
             raise BoardError(f"nothing can be switched off of the robot at {url!r}: that is for simulated runs")
@@ -278,12 +277,11 @@ def open_together(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
     with_boards = [request.robot for request in requests if request.robot.has_board]
     for robot in with_boards or [request.robot for request in requests]:
         check_board(url, robot)
-    for point in entry_points(group=BOARDS_GROUP if with_boards else VEHICLES_GROUP):
-        if point.name == url:
-            factory = _load(point.load, url)
-            if not isinstance(factory, TogetherFactory):
-                raise BoardError(f"board {url!r} cannot share a world with others")
-            return factory.together(requests)
+    for point in entry_points(group=BOARDS_GROUP if with_boards else VEHICLES_GROUP, name=url):
+        factory = _load(point.load, url)
+        if not isinstance(factory, TogetherFactory):
+            raise BoardError(f"board {url!r} cannot share a world with others")
+        return factory.together(requests)
     raise BoardError(_unknown(url))
 
 

@@ -4,6 +4,7 @@ whether a robot, a brain and a line are realisable in time."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -89,12 +90,40 @@ def timing(
 ) -> None:
     """See `_HELP`."""
     from avr_timing.errors import AnalysisError
+    from boebot import view
+    from boebot.description.robots import load_robot
+    from boebot.running.tasks import DEFAULT_PERIOD
+    from boebot.timing import budget, loads, realisable
 
     try:
         if where is not None:
             _show_where(elf, robot, where, json)
             return
-        answer = _answer(elf, robot, load, measure, seconds, seed, port, brain, step, period, baud, jitter, out)
+        if not _SHORTEST_S <= seconds <= _LONGEST_S:
+            raise TimingError(f"{seconds:g} s cannot be measured; expected --seconds {_SHORTEST_S:g} to {_LONGEST_S:g}")
+        if seed < 0:
+            raise TimingError(f"{seed} is no seed; expected --seed 0 or more")
+        description = load_robot(robot)
+        asked = loads.load_named(load)
+        if out is not None:
+            view.make_folder(out)
+        image = _image(elf, description)
+        found = None
+        if image is not None:
+            board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
+            measured = _measured("emulated", image, seconds, seed) if measure else None
+            label = f"bounds of {image.name}"
+            with output.share_bars([label]) as watch:
+                watch({label: 0.0})
+                found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
+        brain_s, own_period = _brain(brain, step, description, seed)
+        period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
+        times = None if found is None else _board_times(found)
+        verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
+        distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
+        answer = Answer(found, verdict, distributions)
+        if out is not None:
+            answer.files = _write(answer, out)
     except (BoebotError, AnalysisError) as error:
         output.say(str(error))
         raise typer.Exit(EXIT_INPUT) from None
@@ -109,14 +138,14 @@ def timing(
 timing.__doc__ = _HELP
 
 
+@dataclass
 class Answer:
     """All that was found out."""
 
-    def __init__(self, report: Report | None, verdict: Verdict, jitter: Any, files: Sequence[Path]) -> None:
-        self.report = report
-        self.verdict = verdict
-        self.jitter = jitter
-        self.files = files
+    report: Report | None
+    verdict: Verdict
+    jitter: Any
+    files: Sequence[Path] = ()
 
     @property
     def is_broken(self) -> bool:
@@ -144,55 +173,6 @@ class Answer:
             timing_tables.show_jitter(self.jitter)
         if self.files:
             output.line(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
-
-
-def _answer(
-    elf: Path | None,
-    robot: str,
-    load: str,
-    measure: bool,
-    seconds: float,
-    seed: int,
-    port: str | None,
-    brain: str | None,
-    step: float | None,
-    period: float | None,
-    baud: int | None,
-    jitter: bool,
-    out: Path | None,
-) -> Answer:
-    """Raises BoebotError or AnalysisError where what was asked for is none."""
-    from boebot import view
-    from boebot.description.robots import load_robot
-    from boebot.running.tasks import DEFAULT_PERIOD
-    from boebot.timing import budget, loads, realisable
-
-    if not _SHORTEST_S <= seconds <= _LONGEST_S:
-        raise TimingError(f"{seconds:g} s cannot be measured; expected --seconds {_SHORTEST_S:g} to {_LONGEST_S:g}")
-    if seed < 0:
-        raise TimingError(f"{seed} is no seed; expected --seed 0 or more")
-    description = load_robot(robot)
-    asked = loads.load_named(load)
-    if out is not None:
-        view.make_folder(out)
-    image = _image(elf, description)
-    found = None
-    if image is not None:
-        board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
-        measured = _measured("emulated", image, seconds, seed) if measure else None
-        label = f"bounds of {image.name}"
-        with output.share_bars([label]) as watch:
-            watch({label: 0.0})
-            found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
-    brain_s, own_period = _brain(brain, step, description, seed)
-    period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
-    times = None if found is None else _board_times(found)
-    verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
-    distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
-    answer = Answer(found, verdict, distributions, ())
-    if out is not None:
-        answer.files = _write(answer, out)
-    return answer
 
 
 def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
@@ -228,7 +208,7 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
 
 def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
     """What the entry point of that name measures of the image; None: it is not installed."""
-    points = [point for point in entry_points(group=GROUP) if point.name == name]
+    points = list(entry_points(group=GROUP, name=name))
     if not points:
         output.say(f"nothing is measured: no emulator is installed that can ({GROUP}: {name})")
         return None

@@ -202,11 +202,8 @@ class BoardClock:
 
     def _refresh(self, board_s: float) -> None:
         """Estimate, bounds and what `observe` needs to know, for about this board time."""
-        x = board_s - self._began[0]
-        values = [o + r * x for o, r in self._polygons[0]]
-        slopes = [r for _, r in self._polygons[0]]
-        low, high = min(values), max(values)
-        slowest, fastest = min(slopes), max(slopes)
+        values, slopes = self._corners(0, board_s)
+        low, high, slowest, fastest = min(values), max(values), min(slopes), max(slopes)
         value, slope = _centroid(values, slopes)
         if high - low > _FAR_S / 2:  # bounded from one side only
             value, slope = high, 0.0
@@ -218,17 +215,19 @@ class BoardClock:
         self._slope = slope
         self._slope_bound = max(fastest - slope, slope - slowest)
         if len(self._polygons) > 1:
-            x = board_s - self._began[1]
-            values = [o + r * x for o, r in self._polygons[1]]
-            slopes = [r for _, r in self._polygons[1]]
-            low, high = min(values), max(values)
-            slowest, fastest = min(slopes), max(slopes)
+            values, slopes = self._corners(1, board_s)
+            low, high, slowest, fastest = min(values), max(values), min(slopes), max(slopes)
         # a later bound between these cuts little or nothing off any polygon
         loosened_s = self._loosened_s + _WORTH_S + _WORTH * min(self._bound, _WORTH_MOST_S)
         self._useful_below = self._zero + high - loosened_s
         self._useful_above = self._zero + low + loosened_s
         self._useful_fastest = fastest
         self._useful_slowest = slowest
+
+    def _corners(self, index: int, board_s: float) -> tuple[list[float], list[float]]:
+        """Of a polygon at that board time: o + r (b - b0), and r."""
+        x = board_s - self._began[index]
+        return [o + r * x for o, r in self._polygons[index]], [r for _, r in self._polygons[index]]
 
 
 def _plane() -> _Polygon:
