@@ -1,4 +1,4 @@
-"""Numbers that people give: taken as they are, or refused by a sentence that names them and what was expected."""
+"""Numbers that people give: returned, or refused by a sentence that names them and what was expected."""
 
 from __future__ import annotations
 

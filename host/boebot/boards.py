@@ -1,4 +1,4 @@
-"""Boards by URL: what the host asks of a board, whoever emulates or is it.
+"""Boards by URL: what the host asks of a board, emulated or real.
 
 One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group
 `boebot.boards` offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`,
@@ -37,7 +37,7 @@ SERVERS_GROUP = "boebot.servers"  # any name -> Server
 
 @dataclass(frozen=True, kw_only=True)
 class BoardRequest:
-    """What is wanted of a board. Real boards heed `robot` only."""
+    """The request for a board. Real boards heed `robot` only."""
 
     robot: RobotDescription
     arena: str | None = None  # bundled name or .toml file; None: the simulator's default

@@ -19,7 +19,7 @@ def printable(text: str) -> str:
 
 
 class BoebotError(Exception):
-    """Something the user can mend. Its text is one sentence: what is wrong, where, what was expected."""
+    """Something the user can mend. Its text is one sentence: the error, where it is, and what was expected."""
 
 
 class RobotError(BoebotError):
@@ -43,4 +43,4 @@ class ProtocolError(BoebotError):
 
 
 class TimingError(BoebotError):
-    """An image's timing cannot be told: no bound, no graph, no table, or one that contradicts itself."""
+    """An image's timing is not known: no bound, no graph, no table, or one that contradicts itself."""

@@ -18,7 +18,7 @@ HOLD_S = 0.06
 
 
 class WheelDirection:
-    """The way in which a wheel is taken to turn: +1 or -1."""
+    """The assumed direction of a wheel's turning: +1 or -1."""
 
     def __init__(self) -> None:
         self.sign = 1

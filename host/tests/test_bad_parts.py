@@ -76,7 +76,7 @@ class Meddler(CognitiveProcess):
     [
         (lambda: Brain([]), "a brain needs at least one motor behavior"),
         (lambda: Brain([Think()]), "a brain needs at least one motor behavior"),
-        (lambda: Brain([Drive(), Drive()]), "two processes are called 'drive'; expected a name= of its own for each"),
+        (lambda: Brain([Drive(), Drive()]), "two processes are called 'drive'; expected another name= for each"),
         (lambda: Brain([Drive()], [variable("z", lambda t: 0)] * 2), "two state variables are called 'z'"),
         (
             lambda: Brain([Drive(utility=Utility(w={"near": 1}))]),

@@ -168,7 +168,7 @@ def test_robots_do_not_share_a_brain(tmp_path: Path) -> None:
     brain, wander = composed(), Wander()
     for one, two in ((brain, brain), (Brain([wander]), Brain([Stop(), wander]))):
         members = [boebot.Member(brain=one), boebot.Member(brain=Brain([Stop()])), boebot.Member(brain=two)]
-        with pytest.raises(BrainError, match="robots 1 and 3 share the brain of 'wander'; expected a Brain of its own"):
+        with pytest.raises(BrainError, match="robots 1 and 3 share the brain of 'wander'; expected another Brain for"):
             boebot.run_together(members, "room", 1.0)
     path = write(tmp_path, COMPOSED)
     result = boebot.run_together([boebot.Member(brain=path), boebot.Member(brain=path)], "room", 5.0)

@@ -6,7 +6,7 @@ a little longer. The limit is the utility's, against Wander's tanh(0.5) with "ne
     Utility(b=-0.5, w={"near": 10.0}, tau=0.05)        above tanh(0.5) where 10 S - 0.5 > 0.5, that is, S > 0.10
 
 S > 0.3, clear below 0.15, 0.2 s longer, as were first tried, are too little for a body that is wider than its
-sensors' beams. Of a pillar's corner at the beam's edge one ray of three tells, S = (c_1/d² + c_2) cos(γ/2) / 3 (3.12),
+sensors' beams. At the beam's edge one ray of three hits a pillar's corner, S = (c_1/d² + c_2) cos(γ/2) / 3 (3.12),
 (3.13). On the notes' robot with sensors at ±0.3324 rad that is 0.3 at d = 0.19 m, where the corner lies 0.17 m beside
 the path of a body with a radius of 0.20 m: those from 0.17 to 0.20 m are grazed. S = 0.10 is at 0.39 m, 0.28 m beside.
 What lies farther to the side is in no beam: who turns that way next to a corner and then drives grazes it, which is

@@ -7,8 +7,8 @@ Stentor bends away, reverses its cilia, contracts and at last detaches itself; a
 off, stops, and calls for help. Mild answers react first (b_i falls with i), drastic ones are stronger in the end
 (b_i / a_i rises) and last longer (a_i falls). After a rest the chain may skip what did not help a moment ago.
 
-Stentor is irritated as long as it feeds (7.14): where it is, the stimulus does not end. A robot's whiskers tell, so X
-follows what they say.
+Stentor is irritated as long as it feeds (7.14): where it is, the stimulus does not end. A robot has whiskers, so X
+follows their touches.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class LeakyChain:
         return utilities.index(max(utilities))
 
     def advance(self, stimulus: float, elapsed: float) -> int:
-        """By `elapsed` seconds with that stimulus; what is chosen now."""
+        """By `elapsed` seconds with that stimulus; returns `chosen`."""
         for integrator in self._integrators:
             integrator.advance(stimulus, elapsed)
         return self.chosen
@@ -86,8 +86,8 @@ ANSWERS = ("turn", "reverse", "stop", "call")
 class Escalate(MotorBehavior):
     """Answers touches that do not end ever more drastically: turns away, reverses, stops, calls for help.
 
-    It brings along a cognitive process of its own, which feels the touches whatever the robot does, and calls it. A
-    robot without a buzzer calls by turning on the spot, as one that waves.
+    It brings along a cognitive process, which always feels touches, and calls it. A robot without a buzzer calls by
+    turning on the spot, as one that waves.
 
     Attributes:
         answer: "" (at rest), "turn", "reverse", "stop" or "call".

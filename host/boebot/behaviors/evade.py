@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 class Evade(MotorBehavior):
     """Steers away from what is weak, and becomes unpredictable before what is strong.
 
-    It brings along a cognitive process of its own, which listens whatever the robot does, and calls it.
+    It brings along a cognitive process, which always listens, and calls it.
     """
 
     left: Callable[[Robot], float | None] = left_nearness

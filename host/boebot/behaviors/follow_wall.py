@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 LOOK_RAD = 1.047  # 60 degrees: obliquely ahead, so that the robot also notices when it heads for the wall or from it
 SETTLING_S = 0.4  # the turret's way there, and a new echo
-HELD = 0.05  # rad; the turret has been told to look elsewhere, or has been released
+HELD = 0.05  # rad; farther off the turret was turned elsewhere, or released
 ECHOES = 3  # Ping misses some: the median of the last ones counts
 
 
@@ -75,7 +75,7 @@ class FollowWall(MotorBehavior):
 
     def exit(self, robot: Robot) -> None:
         if self._by_turret:
-            robot.turn_turret(0.0)  # others take Ping for what is ahead
+            robot.turn_turret(0.0)  # others use Ping to look ahead
 
     def _look(self, robot: Robot) -> tuple[float | None, float]:
         """Nearness beside it, and ahead or on the other side."""

@@ -2,7 +2,7 @@
 
     τ_w dW/dt = S - W (warm-up),   τ_f dF/dt = W - F (fatigue),   ρ = max(0, W - g F)
 
-A stimulus that lasts is answered less and less: what is tired is the reflex, not muscles or sensors.
+A stimulus that lasts is answered less and less: the reflex is tired, not muscles or sensors.
 """
 
 from __future__ import annotations

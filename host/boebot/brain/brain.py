@@ -30,7 +30,7 @@ class Switch(NamedTuple):
     off: str
     """what was active, or "" """
     on: str
-    """what is active now, or "" """
+    """the behavior that is active now, or "" """
     reason: str
     """utilities, and what drives them most"""
 
@@ -57,7 +57,7 @@ class Brain:
         processes: all of them, with those that others brought along.
         variables: the state variables.
         steps: one BrainStep for each step of the present or last run.
-        switches: one Switch for each change of what is active.
+        switches: one Switch for each change of the active behavior.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class Brain:
         ):
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
-                raise BrainError(f"two {kind} are called {twice!r}; expected a name= of its own for each")
+                raise BrainError(f"two {kind} are called {twice!r}; expected another name= for each")
         if not (isinstance(self.PERIOD, int | float) and 0 < self.PERIOD < math.inf):
             raise BrainError(f"a brain's period of {self.PERIOD!r}; expected seconds from step to step")
         if not (isinstance(self._margin, int | float) and 0 <= self._margin < math.inf):

@@ -119,7 +119,7 @@ class _Places:
 
     @contextlib.contextmanager
     def at(self, place: str) -> Iterator[None]:
-        """For what is made of the table of that place; the line is that of the key which the sentence names first."""
+        """Errors about the table at that place get the line of the key that the sentence names first."""
         try:
             yield
         except BrainError as error:

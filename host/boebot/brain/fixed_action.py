@@ -1,7 +1,7 @@
 """Fixed action patterns (section 4.4.3 of the notes): once released, run to the end.
 
-A sign stimulus releases the pattern; a goose rolls its egg home to the end, even if the egg is taken away meanwhile.
-The releasing mechanism is a cognitive process of its own, which watches whatever the robot does at the time, and holds
+A sign stimulus releases the pattern; a goose rolls its egg home to the end, even if the egg is removed meanwhile.
+The releasing mechanism is a cognitive process, which watches whatever the robot does at the time, and holds
 the pattern's gamma parameter up until the pattern is done.
 """
 

@@ -42,7 +42,7 @@ class Process:
     """One process of a brain; see `MotorBehavior` and `CognitiveProcess`.
 
     Attributes:
-        random: a `random.Random` of its own: what others draw changes none of its numbers. Seeded by the run's seed and
+        random: its own `random.Random`: what others draw changes none of its numbers. Seeded by the run's seed and
             the process's name.
         step_time: seconds from one of its steps to the next.
     """
@@ -104,7 +104,7 @@ class Process:
     # ---- for use in enter, step and exit -----------------------------------------------------------------------
 
     def chance(self, probability: float, per: float | None = None) -> bool:
-        """True with that probability, of its own chance.
+        """True with that probability, by its `random`.
 
         Args:
             probability: 0..1, of happening within `per` seconds: behaves alike whatever the time from step to step is,

@@ -4,8 +4,8 @@ A state variable is a number from 0 to 1, made at each step of the brain from wh
 
     z = (1/j) Σ Σ_i  (8.1)        z = min Σ_i  (8.2)        z = max Σ_i  (8.3)
 
-What is missing or stale is left out of the sums; where nothing is left, z is 0. The lag of the utilities filters such
-gaps out.
+Missing and stale readings are left out of the sums; where nothing is left, z is 0. The lag of the utilities filters
+such gaps out.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class StateVariable:
     read: Read
     """gives its value; beyond 0..1 it is limited, None: nothing is known, 0"""
     needs: tuple[str, ...] = ()
-    """devices without which it cannot be told, as `Robot.has` names them"""
+    """devices without which it is not known, as `Robot.has` names them"""
 
     def value(self, robot: Robot) -> float:
         """z, from 0 to 1.

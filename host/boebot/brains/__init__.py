@@ -10,8 +10,8 @@ or a TOML file that composes such processes (boebot.brain.composition). A Python
 (seconds from step to step) and `NEEDS = ["whiskers", "ping"]` (devices without which it cannot work); a brain of
 processes knows both by itself.
 
-Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that whoever made
-it can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
+Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that its maker
+can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
 time.
 """
 
@@ -54,7 +54,7 @@ class LoadedBrain:
     path: Path | None = None
     """The brain's file, if it came from one."""
     brain: Brain | None = None
-    """The brain of processes behind `step`, if it is one: its `steps` and `switches` tell of the run."""
+    """The brain of processes behind `step`, if it is one: its `steps` and `switches` record the run."""
 
     @property
     def odometry(self) -> str | None:
@@ -110,7 +110,7 @@ def load_brain(source: object) -> LoadedBrain:
 
 
 def place(error: BaseException, path: Path | None) -> str:
-    """Where in the user's own files the error arose: "wander.py, line 12", or "" if it cannot be told.
+    """Where in the user's own files the error arose: "wander.py, line 12", or "" if that is not known.
 
     The innermost line of the brain's file. Of a brain from a script or a notebook, or one whose fault is in a file that
     it imports: of the first file that is the user's.
@@ -179,7 +179,7 @@ def _find(source: str | Path) -> Path:
 
 
 def _execute(path: Path) -> ModuleType:
-    """Runs the brain's file as a module of its own, afresh."""
+    """Runs the brain's file as a new module."""
     name = f"boebot_brain_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -1,4 +1,4 @@
-"""Three behaviors chosen by utility: wander about, avoid what is near, charge the battery when it runs low.
+"""Three behaviors chosen by utility: wander about, avoid near things, charge the battery when it runs low.
 
 It is for `shieldbot-charging` in the arena `station`: `boebot run demo --robot shieldbot-charging --arena station`. The
 weights are chosen; E is the battery's level, low = 1 - E:

@@ -87,7 +87,7 @@ def _say(sentence: str, error: BaseException) -> None:
 
 
 def _ask_again(ignored: sys.UnraisableHookArgs) -> None:
-    """Python drops a KeyboardInterrupt that comes in a callback of its own, as while it imports: it comes again."""
+    """Python drops a KeyboardInterrupt in its own callbacks, as while it imports: it is raised again."""
     if not issubclass(ignored.exc_type, KeyboardInterrupt) or not hasattr(signal, "setitimer"):
         sys.__unraisablehook__(ignored)
         return

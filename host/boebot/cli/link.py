@@ -25,7 +25,7 @@ _TABLES = ("host", "board_end", "task_longest_us")
 def link(
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
-    seconds: Annotated[float, typer.Option(metavar="S", min=0, help="End by itself after so long.")] = float("inf"),
+    seconds: Annotated[float, typer.Option(metavar="S", min=0, help="End by itself after this time.")] = float("inf"),
     once: Annotated[bool, typer.Option("--once", help="Print one look, after a second of listening, and end.")] = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object every second in place of the table.")
@@ -43,7 +43,7 @@ def link(
 
 
 def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None], once: bool) -> None:
-    """Polls for so long; shows a look every second, or only the last."""
+    """Polls for `seconds`; shows a look every second, or only the last."""
     now = watched.transport.now
     begun = next_look = now()
     next_look += _PERIOD_S

@@ -38,7 +38,7 @@ def step(robot: Robot) -> None:
     # More to do:       robot.drive_speed(0.1, 0.1) (m/s)   robot.stop()                robot.chance(0.02)
 '''
 
-SEVERAL_BEHAVIORS = '''"""{name}: wanders, turns away from what is near, and backs off from what it touches.
+SEVERAL_BEHAVIORS = '''"""{name}: wanders, turns away from near things, and backs off from what it touches.
 
 Of the motor behaviors, the one of the highest utility drives. A utility follows tanh(b + sum of w * state variable +
 gamma) with a lag of tau seconds; gamma is what `kick` sets, and decays.

@@ -50,5 +50,5 @@ class Command(TyperCommand):
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         """Name and line of each; they are the simulator's to say."""
-        with formatter.section("Imperfections, and what is so --without them"):
+        with formatter.section("Imperfections, and how it is --without them"):
             formatter.write_dl(list(imperfections().items()))

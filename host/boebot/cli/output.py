@@ -74,7 +74,7 @@ def print_json(values: Mapping[str, Any], indent: int | None = 1) -> None:
 
 
 def print_table(values: Mapping[str, Any]) -> None:
-    """Names, values and units as a table on standard output; what is not known is left out."""
+    """Names, values and units as a table on standard output; unknown values are left out."""
     console().print(table(values))
 
 

@@ -55,11 +55,11 @@ def _was_reset_since(link: Link, begun_s: float) -> bool:
 def _save(link: Link, on: str) -> None:
     link.parameters.save()
     if not is_live(on):
-        output.say(f"the EEPROM of the emulated board {on!r} ends with this command, and what is saved in it, too")
+        output.say(f"the EEPROM of the emulated board {on!r} ends with this command, and all that is saved in it")
 
 
 def _say_how_long(what: str, on: str, saved: bool) -> None:
-    """What is set and not saved does not last."""
+    """Says how long a change lasts that is not saved."""
     if not saved:
         until = "until the board's next reset" if is_live(on) else "until this command ends, and its emulated board"
         output.say(f"{what} only {until}; --save keeps it")

@@ -28,7 +28,7 @@ Several robots in one simulated world:
 
   boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
 
-What is given once goes for all of them; what is given several times goes to robot 1, 2 and so on.
+An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
 
 Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --brain, one of several behaviors."""
 

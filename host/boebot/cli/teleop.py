@@ -23,7 +23,7 @@ from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 
-HOLD_S = 0.6  # a key counts as held so long: terminals begin to repeat it after half a second
+HOLD_S = 0.6  # a key counts as held: terminals begin to repeat it after half a second
 TURN = 0.35
 HELP = "arrows or W A S D drive, 1..9 set the speed, space stops and latches, Q ends"
 _ARROWS = {"A": "w", "B": "s", "C": "d", "D": "a"}  # last byte of an arrow key's escape sequence
@@ -107,7 +107,7 @@ def teleop(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
-    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after so long.")] = float("inf"),
+    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after this time.")] = float("inf"),
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
     json: options.Json = False,
 ) -> None:

@@ -42,7 +42,7 @@ measured; slack: what the bound leaves of the budget; response: the latest end a
 --out DIR writes the timing diagram, timing.png and timing.svg, and timing.json; with --jitter also the distributions.
 
 Exit code: 0 all is well; 1 a budget or a limit is broken, or the robot is not realisable; 2 bad input, or an image
-whose timing cannot be told; 130 after Ctrl-C."""
+whose timing is not known; 130 after Ctrl-C."""
 
 
 def timing(
@@ -243,8 +243,8 @@ def _board_times(report: Report) -> Any:
 
     if report.responses is None:
         return BoardTimes.of(report.table)
-    telemetry, taken = report.responses.pieces.get("telemetry", 0), report.taken or 0
-    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, taken / _CYCLES_PER_S)
+    telemetry, frame = report.responses.pieces.get("telemetry", 0), report.taken or 0
+    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, frame / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:

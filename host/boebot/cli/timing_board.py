@@ -1,5 +1,5 @@
-"""The board's column of `boebot timing`: what a connected board measures of its own tasks, if it runs the image that is
-judged."""
+"""The board's column of `boebot timing`: what a connected board measures of its own tasks, if it runs the judged
+image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def maxima(
     port: str, robot: RobotDescription, image: Path, seconds: float, loaded: Path | None = None
 ) -> Mapping[str, int]:
-    """What a board measures of its own tasks in a session of so long, in cycles by their names. Nothing moves.
+    """What a board measures of its tasks in a session of `seconds`, in cycles by their names. Nothing moves.
 
     Args:
         image: the one that is judged.

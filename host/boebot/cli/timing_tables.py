@@ -1,4 +1,4 @@
-"""What `boebot timing` shows to people: tables that fit 80 columns, and in words what is broken and by how much."""
+"""What `boebot timing` shows to people: tables that fit 80 columns, and in words the broken limits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
 
 
 def show_report(report: Report) -> None:
-    """Two tables, the sums, and what is broken."""
+    """Two tables, the sums, and the broken limits."""
     console = output.console()
     console.print(Text.assemble((Path(report.path).name, "bold"), f"  under the load {report.load.name!r}"))
     console.print(Text(report.load.says, style=_ASIDE))

@@ -1,6 +1,6 @@
 """How much is left in the battery, by its voltage, which sags while motors run; and whether it is being charged.
 
-    τ dV/dt + V = v + sag (|s_L| + |s_R|) / 2       v: what is measured, s: the motor signals that make it sag
+    τ dV/dt + V = v + sag (|s_L| + |s_R|) / 2       v: the measured voltage, s: the motor signals that make it sag
 
 No robot of the notes has a sensor for its charger: the voltage rises on it, and that is all. So it is charging from
 when V has risen by `rise` above its lowest value since it last left a charger, and no more from when V has fallen by
@@ -46,9 +46,9 @@ class BatteryLevel(CognitiveProcess):
     sag: float = 0.0
     """volts that the pack sags while both motors run at full signal"""
     rise: float = 0.1
-    """volts of rise that tell of a charger; more than noise and than what `sag` leaves over"""
+    """volts of rise that show a charger; more than noise and than what `sag` leaves over"""
     fall: float = 0.05
-    """volts of fall that tell of its end"""
+    """volts of fall that show its end"""
     lift: float = 0.0
     """volts that the pack stands higher at once on a charger: the charging current times its internal resistance"""
 
@@ -114,7 +114,7 @@ class BatteryLevel(CognitiveProcess):
 
 
 def _effort(robot: Robot) -> float:
-    """How hard both motors are told to run, 0 to 1."""
+    """Mean size of both motors' set-points, 0 to 1 (full)."""
     kind, left, right = robot.command
     if kind == "stop":
         return 0.0

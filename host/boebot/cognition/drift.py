@@ -41,7 +41,7 @@ class Drift(CognitiveProcess):
         self.value = 1 - math.exp(-(self.other(Odometry).travelled - self._from) / self.distance)
 
     def set_right(self) -> None:
-        """Called by whoever has corrected the pose."""
+        """Called when the pose has been corrected."""
         self._from = self.other(Odometry).travelled
         self.value = 0.0
 

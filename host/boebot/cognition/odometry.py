@@ -1,7 +1,7 @@
 """Where the robot believes it is: the cognitive process behind all navigation (notes, equations (2.7) to (2.9)).
 
 It takes the best that the robot has: its odometer; else wheel encoders, by the midpoint rule and, where they know no
-direction, the sign rule of boebot.odometry; else what the motors were told, which knows nothing of slip, load or
+direction, the sign rule of boebot.odometry; else the motors' commands, which know nothing of slip, load or
 battery. `source` says which; brains that need to know how far to trust the pose should look.
 """
 
@@ -43,7 +43,7 @@ class Odometry(CognitiveProcess):
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """pose at the beginning (m, m, rad); an odometer has its own"""
     factors: tuple[float, float] = (1.0, 1.0)
-    """k_w: metres that the left and the right wheel really roll for each metre that encoders or commands tell"""
+    """k_w: metres that the left and the right wheel really roll for each metre by encoders or commands"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,7 +70,7 @@ class Odometry(CognitiveProcess):
             raise BrainError(f"{self.name}: robot {robot.name!r} has no {self.use}")
         self._time = robot.time
         if self.source == "odometer":
-            self.pose = self._told(robot)
+            self.pose = self._pose_of_odometer(robot)
             return
         self._reckoning = DeadReckoning(robot.dimensions.track_width, *self.start)
         self._directions = WheelDirection(), WheelDirection()
@@ -85,7 +85,7 @@ class Odometry(CognitiveProcess):
         self._time = robot.time
         x, y, heading = self.pose
         if self._reckoning is None:
-            self.pose = self._told(robot)
+            self.pose = self._pose_of_odometer(robot)
         else:
             rolled = self._counted(robot, elapsed) if self.source == "encoders" else self._commanded(robot, elapsed)
             self._reckoning.update(self.factors[0] * rolled[0], self.factors[1] * rolled[1])
@@ -106,11 +106,11 @@ class Odometry(CognitiveProcess):
         """rad in (-pi, pi]"""
         return self.pose[2]
 
-    def _told(self, robot: Robot) -> tuple[float, float, float]:
+    def _pose_of_odometer(self, robot: Robot) -> tuple[float, float, float]:
         """What the odometer says; where that is no pose, the last one."""
         odometer = robot.odometer
-        told = odometer.x, odometer.y, odometer.heading
-        return told if odometer.valid and all(math.isfinite(value) for value in told) else self.pose
+        pose = odometer.x, odometer.y, odometer.heading
+        return pose if odometer.valid and all(math.isfinite(value) for value in pose) else self.pose
 
     def _counted(self, robot: Robot, elapsed: float) -> tuple[float, float]:
         """What the wheels have rolled by their encoders (m)."""
@@ -124,7 +124,7 @@ class Odometry(CognitiveProcess):
         return rolled[0], rolled[1]
 
     def _commanded(self, robot: Robot, elapsed: float) -> tuple[float, float]:
-        """What the wheels would roll as told (m): their speeds follow the signals with a lag,
+        """What the wheels would roll by the commands (m): their speeds follow the signals with a lag,
 
         v(t) = v_1 + (v_0 - v_1) e^(-t/τ),   s = v_1 t + (v_0 - v_1) τ (1 - e^(-t/τ))
         """
@@ -146,7 +146,7 @@ def _rolled(before: Encoder, now: Encoder) -> float:
 
 
 def _signals(robot: Robot) -> tuple[float, float]:
-    """Motor signals now in force: as the servos are driven, else as they were last told."""
+    """Motor signals now in force: as the servos are driven, else those of the last command."""
     if robot.has("servos"):
         return robot.observation.servo_left.signal, robot.observation.servo_right.signal
     kind, left, right = robot.command

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class PathIntegration(CognitiveProcess):
     """Keeps the home vector. Home is where the robot is when this begins, or when `set_home` is called.
 
-    Stands behind the brain's Odometry, which tells it the way; its heading is used only while the compass says nothing.
+    Comes after the brain's Odometry, which gives it the way; its heading is used only while the compass says nothing.
 
     Attributes:
         vector: h, from the robot to home (m east, m north: along the compass's 0 and π/2).

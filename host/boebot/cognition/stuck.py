@@ -1,4 +1,4 @@
-"""A stuck robot: the motors are told to move it, and it does not move."""
+"""A stuck robot: the motors are commanded to move it, and it does not move."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class StuckDetector(CognitiveProcess):
     Odometry that comes from commands (`Odometry.source`) believes what was asked: with it, nothing is ever missing.
 
     Attributes:
-        share: how much of the asked motion is missing over the time, 0 (moves as told) to 1 (stands still).
+        share: how much of the asked motion is missing over the time, 0 (moves as commanded) to 1 (stands still).
     """
 
     window: float = 1.0

@@ -2,7 +2,7 @@
 
     φ = θ_sky + ψ(t),   ψ(t) = ψ_0 + ω_s t,   ω_s = 2π / 86,400 s
 
-θ_sky is the heading against the pattern, ψ the sun's azimuth, taken to grow evenly through the day (notes,
+θ_sky is the heading against the pattern, ψ the sun's azimuth, assumed to grow evenly through the day (notes,
 section 4.4.4). Here a magnetic or given heading plays the sky's part.
 """
 

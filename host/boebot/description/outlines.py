@@ -13,7 +13,7 @@ CORNER_DEG = 15.0  # an outward corner's angle, at least: a sharper one would be
 
 
 def polygon_fault(corners: Sequence[Point], most: int) -> str:
-    """What is wrong with these corners (m) as an outline, to stand behind their key; "" if nothing is."""
+    """The error of these corners (m) as an outline, as the words behind their key; "": none."""
     count = len(corners)
     if not 3 <= count <= most:
         return f" has {count} corners; expected 3 to {most}"

@@ -1,7 +1,7 @@
 """Robot descriptions: what a robot is, said once in `protocol/robots/*.toml`.
 
 From one description come the firmware's pin header and parameter defaults (`protocol/generate.py`), what the host
-expects of the board (`boebot.run`) and how the simulated world is joined to the pins (`sim_bridge`). Units stand in the
+expects of the board (`boebot.run`) and how the simulated world is joined to the pins (`sim_bridge`). Units are in the
 keys' names; lengths are in the robot's frame, x forward, y left, origin at the middle of the axle.
 """
 
@@ -274,7 +274,7 @@ def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file:
             raise RobotError(f"{at} is one sensor too many; expected at most {VEHICLE_SENSORS_MAXIMUM}")
 
 
-_ALWAYS = ("servo_left", "servo_right", "uart")  # what no firmware image can do without
+_ALWAYS = ("servo_left", "servo_right", "uart")  # in every firmware image
 
 
 def _check_image(robot: RobotDescription, path: Path) -> None:
@@ -285,7 +285,7 @@ def _check_image(robot: RobotDescription, path: Path) -> None:
             raise RobotError(f"{file}: device.{name} is missing or off; every robot needs it")
     owner = resources.folder("robots") / f"{robot.pin_map}.toml"
     if not owner.is_file() or owner.samefile(path):
-        return  # a map of its own, with an image of its own
+        return  # the robot has its own pin map, and so its own image
     image = load_robot(owner)
     for name, device in robot.device.items():
         built = image.device.get(name)

@@ -1,6 +1,6 @@
 """TOML descriptions (robots, arenas): found by bundled name or path, read, and checked against their types.
 
-What is wrong is said in one sentence with the file, the line, the full key and what was expected there.
+Errors are one sentence with the file, the line, the full key and what was expected there.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Table(dict[str, Any]):
 
 
 class Fault(NamedTuple):
-    """What is wrong with a table.
+    """An error in a table.
 
     Attributes:
         place: where, as `toml_lines` writes it.

@@ -18,7 +18,7 @@ _KEY = re.compile(rf"#.*|{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*")
 
 
 def fault_of_text(text: str) -> str:
-    """What is too long or too deep in a text that has not been read, with its line first; "": nothing."""
+    """The error in a text that has not been read, one too long or too deep, with its line first; "": none."""
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") < DEPTH_MAXIMUM:
             continue
@@ -31,7 +31,7 @@ def fault_of_text(text: str) -> str:
 
 
 def fault_of_table(table: dict[str, Any]) -> str:
-    """What is too long or too deep in a table; "": nothing."""
+    """The error in a table that is too long or too deep; "": none."""
     level: list[Any] = [table]
     for _ in range(DEPTH_MAXIMUM):
         below: list[Any] = []

@@ -1,4 +1,4 @@
-"""In which line of a TOML text a key stands: what tomllib does not tell.
+"""In which line of a TOML text a key is: tomllib does not say it.
 
 The text is known to be valid TOML (tomllib has read it), so that a small scan is enough: table headers, keys, and the
 brackets and quotes of values.

@@ -1,6 +1,6 @@
 """TOML texts with long rows of points, read many times faster than tomllib reads them: arenas of 100,000 edges.
 
-Arrays of pairs of plain numbers mean the same in TOML and in JSON. They are taken out, a float that stands nowhere else
+Arrays of pairs of plain numbers mean the same in TOML and in JSON. They are cut out, a float that occurs nowhere else
 takes their place, and tomllib reads the rest. Whatever does not go smoothly is read by tomllib alone, so that errors
 are its own.
 """
@@ -32,7 +32,7 @@ def loads(text: str) -> dict[str, Any]:
     mark = max(re.findall(r"0\.5e-319*", text), key=len, default="0.5e-31") + "9"
     rows: dict[str, list[Any]] = {}
 
-    def taken(match: re.Match[str]) -> str:
+    def cut(match: re.Match[str]) -> str:
         if match["rows"] is None:
             return match[0]
         place = f"{mark}{len(rows):07}"
@@ -40,7 +40,7 @@ def loads(text: str) -> dict[str, Any]:
         return match["key"] + place
 
     try:
-        rest = _PAIRS.sub(taken, text)
+        rest = _PAIRS.sub(cut, text)
         table = tomllib.loads(rest, parse_float=lambda number: _Place(number) if number in rows else float(number))
     except (ValueError, RecursionError):
         return tomllib.loads(text)
@@ -49,7 +49,7 @@ def loads(text: str) -> dict[str, Any]:
 
 
 class _Place(str):
-    """Of rows that were taken out."""
+    """Of rows that were cut out."""
 
 
 def _put_back(value: dict[str, Any] | list[Any], rows: dict[str, list[Any]]) -> None:

@@ -20,7 +20,7 @@ class Acceleration(NamedTuple):
     value: float
     """m/s^2, forward positive"""
     age: float
-    """Seconds since it was taken."""
+    """Seconds since it was sampled."""
     valid: bool
     """Whether the value may be trusted."""
 

@@ -1,7 +1,7 @@
 """Analog infra-red distance sensor, Sharp GP2Y0A21 or GP2D12 (their data sheets).
 
 V ≈ 33.9 / (d + 4.74)   with d in cm, from 10 to 80 cm; so   d = 33.9 / V - 4.74.
-Nearer than 10 cm the voltage falls again: what is read there looks farther away than it is.
+Nearer than 10 cm the voltage falls again: things there look farther away than they are.
 
 Wiring: 5 V, ground, the output to an analog pin.
 

@@ -38,7 +38,7 @@ class Encoder(NamedTuple):
     directed: bool
     """The encoder knows forward from backward."""
     age: float
-    """Seconds since the count was taken."""
+    """Seconds since the count was read."""
     valid: bool
     """False while the line fires so fast that the firmware masks it."""
 

@@ -38,7 +38,7 @@ class NoDeviceError(BrainError, AttributeError):
 
 
 class Dimensions(NamedTuple):
-    """What is known of a robot by its description; those of the one at hand may be a little different."""
+    """Measures of a robot by its description; those of the one at hand may be a little different."""
 
     track_width: float
     """m, between the wheels' middles"""

@@ -31,7 +31,7 @@ class Scan(NamedTuple):
     angles: tuple[float, ...]
     """rad from straight ahead, counter-clockwise"""
     age: float
-    """Seconds since it was taken."""
+    """Seconds since it was sampled."""
     valid: bool
     """Whether the value may be trusted."""
 

@@ -40,6 +40,6 @@ def without_readings(kind: Any) -> Any:
 
 
 def fresh_ticks(period_ticks: int, message_ticks: int) -> int:
-    """Up to which age (ticks) a reading is fresh: three of its own periods, or of those of the messages if these are
+    """Up to which age (ticks) a reading is fresh: three of its periods, or of those of the messages if these are
     longer."""
     return STALE_PERIODS * max(period_ticks, message_ticks)

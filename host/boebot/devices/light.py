@@ -67,7 +67,7 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "lights"
     NAMES: ClassVar[tuple[str, ...]] = ("light_left", "light_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    # Port D has a pin-change interrupt of its own; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
+    # Port D has its own pin-change interrupt; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
     COLUMNS: ClassVar = (("decay_time", "", "s", 6),)
     SHOWN: ClassVar = ("", "ms", 1e3, 3)

@@ -24,7 +24,7 @@ class OdometerPose(NamedTuple):
     heading: float
     """rad, counter-clockwise from the x axis"""
     age: float
-    """Seconds since it was taken."""
+    """Seconds since it was sampled."""
     valid: bool
     """Whether the value may be trusted."""
 

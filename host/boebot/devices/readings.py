@@ -18,7 +18,7 @@ class Readings(NamedTuple):
     status: int
     """flags as in telemetry: MOTORS_ENABLED"""
     ages: tuple[float, ...]
-    """s since each was taken"""
+    """s since each was sampled"""
     values: tuple[float, ...]
     """SI units; which stands where says the layout"""
 

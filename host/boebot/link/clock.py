@@ -24,7 +24,7 @@ Stamp = tuple[float, float, float]
 DRIFT_LIMIT = 5.5e-3  # of h's slope: clocks of +-5000 ppm, as ceramic resonators have at worst, and some to spare
 WANDER = 0.02e-6  # 1/s: the change of rate that the bound allows for; a resonator that warms up by 1 K in a minute
 WINDOW_S = 40.0
-RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and what is lost in rounding here
+RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and rounding here
 _WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
 _WORTH_S = 4e-6
 _WORTH_MOST_S = 1e-3  # of the present bound
@@ -32,7 +32,7 @@ _ON_LINE_S = 1e-10
 _WRAP_US = 1 << 32
 _FAR_S = 1e4  # o at the beginning
 
-# A delimiter may be shared with the neighbour, so it is not counted: the frame needs at least so long.
+# A delimiter may be shared with the neighbour, so it is not counted: the frame needs at least these.
 _PROBE_BYTES = messages.ClockProbe.LENGTH + FRAME_OVERHEAD - 1
 _ANSWER_BYTES = messages.ClockAnswer.LENGTH + FRAME_OVERHEAD - 1
 _TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD - 1
@@ -45,7 +45,7 @@ class BoardClock:
 
     Attributes:
         restarts: times that the bounds contradicted each other: a clock that jumped or drifts beyond the limit.
-        probes: clock answers taken.
+        probes: clock answers received.
     """
 
     def __init__(self, byte_s: float = 0.0, wander: float = WANDER, window_s: float = WINDOW_S) -> None:
@@ -103,7 +103,7 @@ class BoardClock:
             self._us, self._received_s = round(board_s * 1e6), received_s
 
     def unwrap(self, raw_us: int, received_s: float) -> int:
-        """Board time (us) since reset from its low 32 bits, received at that host time: nearest to what is expected."""
+        """Board time (us) since reset from its low 32 bits, received at that host time: nearest to the expected one."""
         if not (self._known or self._expected):
             return raw_us
         expected = self._us + int((received_s - self._received_s) * 1e6)

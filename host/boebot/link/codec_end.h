@@ -1,4 +1,4 @@
-/* codec_end.h: one end's decoder. Included once by each end, with END(name) as prefix of its own functions; the
+/* codec_end.h: one end's decoder. Included once by each end, with END(name) as prefix of its functions; the
  * firmware's functions get it too, since the two ends' versions of them are linked into one library. */
 #define frame_encode END(frame_encode)
 #define frame_decoder_start END(frame_decoder_start)

@@ -1,4 +1,4 @@
-"""Errors of the link that a program may want to tell apart."""
+"""Errors of the link that a program may want to distinguish."""
 
 from __future__ import annotations
 

@@ -242,7 +242,7 @@ class Link:
         Args:
             kind: the message; its number is given here.
             arguments: its other fields, in wire counts.
-            what: what is asked of the board, for the sentence of an error: "arm".
+            what: the wish in words, for the sentence of an error: "arm".
 
         Raises:
             SessionLostError: the session ended meanwhile; whether it was done is not known.
@@ -311,13 +311,13 @@ class Link:
     # ---- the loop ----------------------------------------------------------------------------------------------------
 
     def _turn(self, until: float) -> None:
-        """One step: sends what is due and receives what comes, at the latest until the given time."""
+        """One step: sends all that is due and receives what comes, at the latest until the given time."""
         now = self._now()
         self._service(now)
         self._receive(max(min(until, self._due) - now, _SHORTEST_S), 0.0)
 
     def _service(self, now: float) -> None:
-        """Sends what is due by now, and notes when the next is."""
+        """Sends all that is due by now, and notes when something is next."""
         session = self.session
         if session.is_open:
             due = min(

@@ -79,7 +79,7 @@ class Requests:
         self._waiting.append(request)
 
     def service(self, now_s: float, retry_s: float) -> float:
-        """In a session: sends what is due; returns when it is the next time (s)."""
+        """In a session: sends a request that is due; returns when it is the next time (s)."""
         request = self._under_way
         if request is None:
             if not self._waiting:

@@ -38,7 +38,7 @@ OPEN_LIMIT_RESET_S = 4.0  # where opening the port resets the board: its boot lo
 
 
 class Session:
-    """The handshake of one link, and what is known by it.
+    """The handshake of one link, and what the host knows by it.
 
     Attributes:
         hello: the board's last; None: there was none, or the link was closed.
@@ -162,7 +162,7 @@ class Session:
             self._replaced_since = NEVER
 
     def service(self, now_s: float) -> float:
-        """While no session is open: sends what is due; returns when it is the next time (s)."""
+        """While no session is open: sends the open that is due; returns when it is the next time (s)."""
         if now_s - self._hello_s > _PATIENCE_S:
             self._open_due = NEVER
         elif now_s >= self._open_due:

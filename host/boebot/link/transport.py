@@ -1,6 +1,6 @@
 """What carries a board's bytes: the interface that the link is written against. A transport knows no frames.
 
-The ports of this computer are in boebot.link.ports; an in-process board brings a transport of its own.
+The ports of this computer are in boebot.link.ports; an in-process board brings its own transport.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""From "run this brain" to the last step: what is asked for, the drivers, guarded steps, Ctrl-C, several robots."""
+"""From "run this brain" to the last step: requests, drivers, guarded steps, Ctrl-C, several robots."""

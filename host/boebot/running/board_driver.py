@@ -38,7 +38,7 @@ from boebot.running.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
 TIME_TO_LIVE_LIMIT_MS = 2000
-SILENCE_S = 3.0  # a board that says nothing for so long is lost; after a reset its boot loader waits for up to 2 s
+SILENCE_S = 3.0  # a board silent for longer is lost; after a reset its boot loader waits for up to 2 s
 SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
 STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
 _READY_TRIES = 10  # sessions that may end, one after another, before the board is configured and armed
@@ -46,8 +46,8 @@ _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late cop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
 _LINE_SHARE = 4  # messages of slow devices fill a quarter of the line at most (PROTOCOL.md, "Delivery")
-# How long before telemetry is expected to look for it. Live, so many ticks: one reading that came late does not make
-# all later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
+# How long before telemetry is expected to look for it. Live, in ticks: one reading that came late does not make all
+# later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
 # idle; so the look begins when this many bytes of the telemetry are still to come, and ends with the last one.
 _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
@@ -136,7 +136,7 @@ class BoardDriver:
     # ---- before the first step, and after each new session ---------------------------------------------------
 
     def _fitting_period(self, period_s: float, telemetry_ticks: int) -> int:
-        """The brain's period in ticks, such that each step has telemetry of its own tick."""
+        """The brain's period in ticks, such that each step has the telemetry of its tick."""
         ticks = whole_ticks(period_s, self.tick_s)
         fitting = -(-ticks // telemetry_ticks) * telemetry_ticks
         if fitting != ticks:

@@ -1,6 +1,6 @@
 """What a brain meets of a robot without a board: its readings as an observation, its command as motor signals.
 
-Motor signals go in, readings come out; whoever has the world steps it. A command in speed becomes a motor signal as in
+Motor signals go in, readings come out; the owner of the world steps it. A command in speed becomes a motor signal as in
 the firmware: the share of the wheels' greatest speed.
 """
 

@@ -1,7 +1,7 @@
 """What drives a robot in a run, behind one small interface: over the link to its board, or direct.
 
 A run is one loop (boebot.running.runner): each turn of `Driver.steps` shows the brain a new observation, the brain
-steps, and the next turn carries out its command. A brain cannot tell one driver from another.
+steps, and the next turn carries out its command. A brain sees no difference between drivers.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Driver(Protocol):
         """Stops the motors and lets go of the robot, whatever happened before."""
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
-        """What came of the run, which took so long by the wall clock; `error`: why it ended before its time."""
+        """The run's result; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
 
 
 def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:

@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 from boebot.boards import WatchdogReset
 
-PLACES_AT_MOST = 4  # that are told one by one
+PLACES_AT_MOST = 4  # that get a sentence each
 
 
 def sentences(resets: Sequence[WatchdogReset]) -> list[str]:
     """For people: one for each place, by its first reset."""
-    told = []
+    found = []
     for first, count in _by_place(resets):
         times = "" if count == 1 else f"; {count} times in all"
-        told.append(f"{first}{times}")
+        found.append(f"{first}{times}")
     if others := _others(resets):
-        told.append(f"the watchdog reset the program {others} times more, at other places")
-    return told
+        found.append(f"the watchdog reset the program {others} times more, at other places")
+    return found
 
 
 def places(resets: Sequence[WatchdogReset]) -> str | None:
@@ -37,7 +37,7 @@ def _place(reset: WatchdogReset) -> str:
 
 
 def _by_place(resets: Sequence[WatchdogReset]) -> list[tuple[WatchdogReset, int]]:
-    """The first reset at each place and how many there were, those places that are told one by one."""
+    """The first reset at each place and how many there were, for the places that get a sentence each."""
     counts = Counter(map(_place, resets))
     first = {_place(reset): reset for reset in reversed(resets)}
     return [(first[name], count) for name, count in list(counts.items())[:PLACES_AT_MOST]]

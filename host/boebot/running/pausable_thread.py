@@ -30,7 +30,7 @@ class PausableThread:
         self.error: BaseException | None = None
         self._work = work
         self._thrown: BaseException | None = None
-        self._running = False  # whose turn it is; what is in the queues only wakes who waits for it
+        self._running = False  # whose turn it is; entries of the queues only wake who waits for them
         self._go: SimpleQueue[None] = SimpleQueue()
         self._paused: SimpleQueue[None] = SimpleQueue()
         threading.Thread(target=self._run, name=name, daemon=True).start()
@@ -82,6 +82,6 @@ class PausableThread:
         try:
             self._await_turn()
             self._work()
-        except BaseException as error:  # whoever resumes the thread hears of it
+        except BaseException as error:  # raised where the thread is resumed
             self.error = error
         self._give_back(DONE)

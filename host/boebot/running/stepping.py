@@ -144,7 +144,7 @@ class StepWatch:
 
     @property
     def sentence(self) -> str:
-        """What is said of a step that took too long."""
+        """The error of a step that took too long."""
         return f"a step of the brain has not ended after {self.limit.seconds:g} s; {self.limit.reason}"
 
     def __enter__(self) -> StepWatch:

@@ -56,7 +56,7 @@ def run_together(
         progress: called with the seconds that have passed, about ten times a second.
 
     Returns:
-        A result per robot, and what is common to them.
+        A result per robot, and the figures common to them.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, no free place, an error in a brain (with its robot and
@@ -105,7 +105,7 @@ def _check_own_brains(loaded: Sequence[LoadedBrain]) -> None:
             first = owner.setdefault(id(process), number)
             if first != number:
                 raise BrainError(
-                    f"robots {first} and {number} share the brain of {process.name!r}; expected a Brain of its own for "
+                    f"robots {first} and {number} share the brain of {process.name!r}; expected another Brain for "
                     "each (a file, or a function that makes one, gives that)"
                 )
 

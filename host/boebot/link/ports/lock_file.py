@@ -1,5 +1,5 @@
 """Lock files of serial ports, as UUCP began them and minicom, picocom and others heed them: LCK..NAME holds the owner's
-process number. They keep programs apart that do not lock the port itself, and tell who has it.
+process number. They keep programs apart that do not lock the port itself, and say who has it.
 
 Within this process a register keeps threads apart. What lies there in this process's name and is not in the register
 was left by another one of that number, as numbers come again soon in a container.
