@@ -26,6 +26,6 @@ def boebot(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, st
 
 
 def heed_signals() -> None:
-    """A shell may have told this process, and so its children, to ignore Ctrl-C."""
+    """A shell may have started this process so that it, and so its children, ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)

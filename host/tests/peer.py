@@ -75,8 +75,8 @@ class Peer:
         carried_out: requests carried out, in order, as (session, message).
         setpoints: those that arrived, and `setpoint_ticks`, when; `accepted`, those that count.
         tones: (frequency in Hz, length in s) of those that were begun, in order.
-        task_times: the longest of each task in this session, in cycles, at its opening `usual_task_times`; those of
-            `untold` it does not tell.
+        task_times: the longest of each task in this session, in cycles, at its opening `usual_task_times`; not sent for
+            `silent_tasks`.
         starts: how often it was started. openings: sessions that were opened.
     """
 
@@ -103,7 +103,7 @@ class Peer:
         self.light_us = (800, 1600)
         self.telemetry_period = 1
         self.usual_task_times = [0] * len(messages.Task)
-        self.untold: set[int] = set()
+        self.silent_tasks: set[int] = set()
         self.saved: dict[int, int] | None = None
         self.carried_out: list[tuple[int, messages.Message]] = []
         self.setpoints: list[Setpoint] = []
@@ -468,7 +468,7 @@ class Peer:
 
     def _send_of_itself(self) -> None:
         if self._own < len(messages.Task):
-            if self._own not in self.untold:
+            if self._own not in self.silent_tasks:
                 self._send(messages.TaskTime(self._own, self.task_times[self._own]))
         else:
             self.counts["good"], self.counts["bad"] = self.decoder.good, self.decoder.bad
@@ -535,7 +535,7 @@ class Peer:
     # ---- events ------------------------------------------------------------------------------------------------------
 
     def _happened(self, kind: int, value: int) -> None:
-        """Something to be told exactly once."""
+        """Something to be delivered exactly once."""
         us = self.board_us()
         if len(self._events) + (self._event is not None) < QUEUE and not self._merged:
             self._events.append((kind, value, us))
@@ -649,7 +649,7 @@ class InProcess:
         self._now = 0.0
         self._buffer: list[tuple[float, bytes]] = []
         self._order = itertools.count()
-        self._coming: list[tuple[float, int, str, bytes]] = []  # heap of what is under way
+        self._coming: list[tuple[float, int, str, bytes]] = []  # heap of pieces under way
         self._free = {"board": 0.0, "host": 0.0}  # when the line in that direction is free
         self._calls: dict[int, Callable[[], None]] = {}
         peer.now = self.now

@@ -92,7 +92,7 @@ class Stepped:
 
 
 class SteppedVehicle(Stepped):
-    """The same for a robot without a board: its readings, in the order of LAYOUT; what is not given is 0."""
+    """The same for a robot without a board: its readings, in the order of LAYOUT; those not given are 0."""
 
     def __init__(self, period: float = 0.01, seed: int = 1) -> None:
         super().__init__(period, seed, VEHICLE)

@@ -162,8 +162,8 @@ def test_parameters_that_do_not_fit_get_one_sentence(make: Callable[[], object],
 @pytest.mark.parametrize(
     "make", [lambda f: Evade(left=f), lambda f: Kinesis(stimulus=f), lambda f: RunAndTumble(stimulus=f)]
 )
-@pytest.mark.parametrize("told", [math.nan, math.inf, "loud"])
-def test_a_stimulus_that_is_no_number_is_said_to_be_none(make: Callable[..., MotorBehavior], told: Any) -> None:
-    behavior = make(lambda robot: told)
-    with pytest.raises(BrainError, match=f"{behavior.name}: a signal of {told!r}; expected a finite number or None"):
+@pytest.mark.parametrize("signal", [math.nan, math.inf, "loud"])
+def test_a_stimulus_that_is_no_number_is_said_to_be_none(make: Callable[..., MotorBehavior], signal: Any) -> None:
+    behavior = make(lambda robot: signal)
+    with pytest.raises(BrainError, match=f"{behavior.name}: a signal of {signal!r}; expected a finite number or None"):
         Stepped().step(alone(behavior))

@@ -23,26 +23,26 @@ def test_values_come_from_the_robot() -> None:
     )
 
 
-def test_board_is_told_all_of_them() -> None:
+def test_board_gets_all_of_them() -> None:
     peer = Peer()
     link = Link(InProcess(peer))
     link.open()
     robot = load_robot("shieldbot")
     configure(link, robot)
-    told = {
+    values = {
         name_of(message.parameter): message.value
         for _, message in peer.carried_out
         if isinstance(message, messages.SetParameter)
     }
-    assert told["servo_left_centre"] == 24000
-    assert told["wheel_speed_maximum"] == 1700
+    assert values["servo_left_centre"] == 24000
+    assert values["wheel_speed_maximum"] == 1700
     owners = {name: spec.default_from.partition(".")[0] for name, spec in messages.PARAMETERS.items()}
     described = {name for name, owner in owners.items() if owner in ("robot", "body") or robot.has(owner)} | {
         "devices",
         "infrared_sweep",
     }
     assert {"turret_centre", "turret_gain"}.isdisjoint(described), "its turret is off"
-    assert set(told) == described - {"baud_rate"}, "the rate at which it is heard is the right one"
+    assert set(values) == described - {"baud_rate"}, "the rate at which it is heard is the right one"
 
 
 def test_description_gives_way_to_what_the_board_has_saved() -> None:

@@ -34,7 +34,7 @@ def test_emulated_boards_are_found_by_entry_point() -> None:
         ("COMET", False),
     ],
 )
-def test_ports_and_emulated_boards_are_told_apart(url: str, live: bool) -> None:
+def test_ports_and_emulated_boards_are_distinguished(url: str, live: bool) -> None:
     assert is_live(url) is live
 
 

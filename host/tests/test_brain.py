@@ -45,23 +45,23 @@ def during(begin: float, end: float, inside: float, outside: float) -> Callable[
 
 @dataclass(kw_only=True)
 class Drive(MotorBehavior):
-    """Drives with one signal, and tells what happens to it."""
+    """Drives with one signal, and records its calls."""
 
     signal: float = 0.1
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.told: list[str] = []
+        self.calls: list[str] = []
 
     def enter(self, robot: Robot) -> None:
-        self.told.append("enter")
+        self.calls.append("enter")
 
     def step(self, robot: Robot) -> None:
-        self.told.append("step")
+        self.calls.append("step")
         robot.drive(self.signal, self.signal)
 
     def exit(self, robot: Robot) -> None:
-        self.told.append("exit")
+        self.calls.append("exit")
 
 
 @dataclass(kw_only=True)
@@ -198,8 +198,8 @@ def test_a_switch_ends_one_behavior_begins_the_other_and_says_why() -> None:
     brain = Brain([calm, flee], [variable("near", during(0.1, 0.5, 0.9, 0.0))])
     stepped = Stepped(0.05)
     commands = [stepped.step(brain).left for _ in range(30)]
-    assert calm.told.index("exit") == 1 + commands.index(-0.3)
-    assert [name for name in flee.told if name != "step"] == ["enter", "exit"]
+    assert calm.calls.index("exit") == 1 + commands.index(-0.3)
+    assert [name for name in flee.calls if name != "step"] == ["enter", "exit"]
     assert [(switch.off, switch.on) for switch in brain.switches] == [("", "calm"), ("calm", "flee"), ("flee", "calm")]
     into = brain.switches[1]
     assert into.reason == f"flee {brain.steps[round(into.time / 0.05)].utilities[1]:.3f} (near +2.70, b -1.00), " + (
@@ -249,7 +249,7 @@ def test_declared_periods_hold() -> None:
     for _ in range(40):
         stepped.step(brain)
     assert slow.times == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8])
-    assert drive.told.count("step") == 20
+    assert drive.calls.count("step") == 20
 
 
 def test_a_step_that_comes_late_costs_none() -> None:
@@ -260,7 +260,7 @@ def test_a_step_that_comes_late_costs_none() -> None:
     for time in late:
         stepped.robot.observation = stepped.robot.observation._replace(time=time)
         brain.step(stepped.robot)
-    assert each.times == late and drive.told.count("step") == len(late)
+    assert each.times == late and drive.calls.count("step") == len(late)
     assert second.times == late[::2]
 
 
@@ -285,7 +285,7 @@ class Dice(CognitiveProcess):
         self.thrown.append(self.random.random())
 
 
-def test_each_process_has_chance_of_its_own() -> None:
+def test_each_process_has_its_own_chance() -> None:
     def thrown(*others: Process, seed: int = 1) -> list[float]:
         dice = Dice()
         brain, stepped = Brain([Drive(), *others, dice]), Stepped(seed=seed)
@@ -401,7 +401,7 @@ def test_a_fixed_action_pattern_rests_after_its_end() -> None:
 
 
 @given(st.lists(st.one_of(st.none(), st.floats(0, 1)), max_size=6))
-def test_preprocessing_leaves_out_what_is_missing(readings: list[float | None]) -> None:
+def test_preprocessing_leaves_out_missing_readings(readings: list[float | None]) -> None:
     known = [reading for reading in readings if reading is not None]
     if known:
         assert mean(readings) == pytest.approx(sum(known) / len(known))
@@ -416,10 +416,10 @@ def test_state_variables_stay_within_zero_and_one(raw: float | None) -> None:
     assert 0 <= value <= 1 and value == (0 if raw is None else min(max(raw, 0), 1))
 
 
-# ---- what is refused -----------------------------------------------------------------------------------------------
+# ---- errors ---------------------------------------------------------------------------------------------------------
 
 
-def test_kicks_and_questions_name_what_is_not_there() -> None:
+def test_kicks_and_questions_name_the_missing_process() -> None:
     @dataclass(kw_only=True)
     class Asking(CognitiveProcess):
         asks: Callable[[Process], object]

@@ -184,7 +184,7 @@ def test_share_is_of_time_and_not_of_steps() -> None:
     assert utility_panel.segments(record, 4.0) == [(0, 0.0, 1.0), (1, 1.0, 3.0), (0, 3.0, 4.0)]
 
 
-def test_run_of_another_robot_is_not_taken_for_this_one() -> None:
+def test_run_of_another_robot_is_not_confused_with_this_one() -> None:
     """A run that ends before its brain steps must not show the steps of the run before."""
     brain, first, second = Brain([Ahead()]), Stepped(), Stepped()
     first.step(brain)

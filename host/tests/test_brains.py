@@ -1,4 +1,4 @@
-"""Brains: how they are found and loaded, and what is said of those that cannot be."""
+"""Brains: how they are found and loaded, and the errors of those that cannot be."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def test_file_object_and_toml_are_the_same_brain(tmp_path: Path) -> None:
     assert len({step[2:] for step in commands(runs[0])}) > 2, "they do not just drive on"
 
 
-def test_loaded_brain_tells_what_it_decided(tmp_path: Path) -> None:
+def test_loaded_brain_records_its_decisions(tmp_path: Path) -> None:
     brain = load_brain(write(tmp_path, COMPOSED))
     assert isinstance(brain.brain, Brain) and brain.step == brain.brain.step
     mine = composed()
@@ -159,7 +159,7 @@ def test_second_run_begins_afresh() -> None:
     second = boebot.run(brain, robot="arsim", seconds=10, seed=5)
     assert commands(first) == commands(second)
     assert brain.steps == steps and brain.switches == switches, "the same figures"
-    assert brain.steps is not steps, "in lists of their own"
+    assert brain.steps is not steps, "in new lists"
     other = boebot.run(brain, robot="arsim", seconds=10, seed=6)
     assert commands(other) != commands(first)
 

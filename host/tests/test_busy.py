@@ -1,4 +1,4 @@
-"""A port beside a thread that computes: what its C thread and the short switch interval do, and what is without them.
+"""A port beside a thread that computes: what its C thread and the short switch interval do, and how it is without them.
 
 Each is compared with its counterpart on the same machine; `make bench` measures times, and the round trip.
 """

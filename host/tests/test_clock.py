@@ -18,7 +18,7 @@ DRIFTS = [0.0, 100e-6, -100e-6, 5000e-6, -5000e-6]
 
 
 class Line:
-    """A board with a clock of its own, probes at the link's intervals, telemetry at every tick, and latencies."""
+    """A board with its own clock, probes at the link's intervals, telemetry at every tick, and latencies."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ def test_error_is_small_and_the_bound_holds(latency: Latency, batch_s: float, li
 
 @pytest.mark.parametrize("before_s", [0.5, 15.0])
 def test_board_time_rolls_over(before_s: float) -> None:
-    """Starts so long before the roll-over after 71.6 min; the stamps go on."""
+    """Starts that time before the roll-over after 71.6 min; the stamps go on."""
     line = Line(5000e-6, 1, USB, first_us=2**32 - round(before_s * 1e6))
     times = []
     for _, error, bound in line.run(30.0):
@@ -160,7 +160,7 @@ def test_nothing_is_claimed_before_both_sides_are_bounded() -> None:
 
 
 def test_drift_beyond_resonators_is_beyond_the_model() -> None:
-    """What is not promised: the bounds contradict each other, and that is counted."""
+    """Not promised: the bounds contradict each other, and that is counted."""
     line = Line(2 * DRIFT_LIMIT, 1)
     for _ in line.run(5.0):
         pass
@@ -168,7 +168,7 @@ def test_drift_beyond_resonators_is_beyond_the_model() -> None:
 
 
 def test_bounds_that_meet_in_a_point_pile_up_no_corners() -> None:
-    """Delays that are always the same, as in a simulated run: what is kept of the past stays small."""
+    """Delays that are always the same, as in a simulated run: the polygons stay small."""
     clock = BoardClock(BYTE_S)
     most = 0
     for tick in range(1, 6000):

@@ -176,7 +176,7 @@ def test_a_stuck_robot_lacks_the_share_of_what_was_asked(moves: float, share: fl
     for index in range(60):
         vehicle.steer(brain, 0, 0, moves * asked * 0.05 * index)
         if vehicle.time < 0.8:
-            assert stuck.share == 0.0, "too early to tell"
+            assert stuck.share == 0.0, "too early to know"
     assert stuck.share == pytest.approx(share, abs=0.01)
 
 
@@ -398,7 +398,7 @@ ANYTHING = st.fixed_dictionaries(
 
 
 def numbers_of(process: CognitiveProcess) -> list[float]:
-    """All numbers that it tells."""
+    """All its numbers."""
     found: list[float] = []
     for name in dir(process):
         value = None if name.startswith("_") else getattr(process, name)

@@ -146,7 +146,7 @@ def test_several_robots_print_a_row_each(capsys: pytest.CaptureFixture[str], tmp
     assert [robot["seed"] for robot in values["robots"]] == [1, 2, 3]
 
 
-def test_what_is_given_several_times_goes_to_one_robot_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_options_given_several_times_go_to_one_robot_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "still.py").write_text("def step(robot):\n    robot.stop()\n")
     arguments = ("wander", str(tmp_path / "still.py"), "--robot", "shieldbot", "--robot", "shieldbot-quad")
     poses = ("--pose", "0,0,0", "--pose", "0,2,90", "--arena", "empty", "--seconds", "2", "--json")
@@ -663,7 +663,7 @@ def test_wrong_parameters_are_said_before_the_board_is_asked(
 # ---- teleop ----------------------------------------------------------------------------------------------------------
 
 
-def test_keys_are_told_apart() -> None:
+def test_keys_are_distinguished() -> None:
     assert list(teleop.keys("w\x1b[A\x1b[D\x1bOC 5Q\x03")) == ["w", "w", "a", "d", " ", "5", "q", "q"]
 
 

@@ -1,4 +1,4 @@
-"""Brains composed in TOML: every kind of process, the same commands as in Python, and what is said of bad files."""
+"""Brains composed in TOML: every kind of process, the same commands as in Python, and the errors of bad files."""
 
 from __future__ import annotations
 

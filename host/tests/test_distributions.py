@@ -46,7 +46,7 @@ def test_each_kind_of_loss_counts() -> None:
         assert Losses("saturated", *(int(other == number) for other in range(len(names)))).anything
 
 
-def test_table_says_cycles_or_milliseconds_and_what_is_broken() -> None:
+def test_table_says_cycles_or_milliseconds_and_broken_limits() -> None:
     table = rows([distribution([0, 3], -2, 2), distribution([16_000, 32_000])])
     assert table[1] == ("width", "figures", "2", "cycles", "0", "0", "3", "3", "-2 .. 2", "1 broken")
     assert table[2][3:] == ("ms", "1.00", "1.00", "2.00", "2.00", "", "")

@@ -113,7 +113,7 @@ def test_words_say_what_cannot_be_seen() -> None:
     assert figure.axes[0].get_xlabel() == "x (m)" and figure.axes[0].get_ylabel() == "y (m)"
 
 
-def test_legend_has_only_what_is_there() -> None:
+def test_legend_has_only_kinds_that_are_drawn() -> None:
     words = [str(entry.get_label()) for entry in legend_entries(PLAN)]
     assert words == ["low: some sensors look over it", "throws back less", "moves, shown at the start", "lamp"]
     assert legend_entries(FloorPlan(solids=[Solid(kind="outline", points=box(0, 0))])) == []
@@ -160,8 +160,8 @@ def run_of(robot: str, monkeypatch: pytest.MonkeyPatch, plan: FloorPlan | None =
     result = boebot.run(lambda it: it.drive(0.5, 0.45), robot=robot, seconds=seconds)
     if plan is not None:
         assert result.truth is not None
-        told = {name: getattr(result.truth, name) for name in ("time", "x", "y", "heading", "contact")}
-        result.truth = Truth(**told, plan=plan)
+        series = {name: getattr(result.truth, name) for name in ("time", "x", "y", "heading", "contact")}
+        result.truth = Truth(**series, plan=plan)
     return result
 
 

@@ -179,7 +179,7 @@ def test_folder_that_cannot_be_written_is_said_before_the_run(
     assert (code, out) == (1, "") and "cannot be written to" in err
 
 
-def test_what_is_missed_or_fails_is_said_and_the_others_go_on(
+def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
     four: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     code, out, err = boebot(capsys, "experiment", "--all", "--jobs", "1", "--out", str(tmp_path))

@@ -20,7 +20,7 @@ from tools import experiment_pages
 EXPERIMENTS = all_experiments()
 QUICK = [name for name, one in EXPERIMENTS.items() if not one.slow]
 SAME = 1e-3  # of a figure on a page: another computer's last digits may differ
-NOTHING = 1e-9  # and what is rounding alone
+NOTHING = 1e-9  # and rounding alone
 
 
 @cache

@@ -95,7 +95,7 @@ def test_two_shieldbots_meet_e22_and_e24() -> None:
     believers = [straight_line.runner(period=0.05, least=0.06, hold=0.5) for _ in range(2)]
     runs = [straight_line.drive(brain, "shieldbot", 13.0, seed, "native") for seed, brain in enumerate(believers, 1)]
     assert missed(straight_line.judge_shieldbot(runs)) == []
-    assert "mean error" in missed(odometric_ghost.judge_shieldbots(runs))  # nobody told them a wrong wheel factor
+    assert "mean error" in missed(odometric_ghost.judge_shieldbots(runs))  # they have no wrong wheel factor
     deceived = straight_line.runner(period=0.05, least=0.06, hold=0.5, factors=(1.02, 1.0))
     assert (
         missed(odometric_ghost.judge_shieldbots([straight_line.drive(deceived, "shieldbot", 13.0, 1, "native")])) == []
@@ -135,7 +135,7 @@ def test_wheel_factors_that_are_none_are_refused(factors: tuple[float, ...]) -> 
         Odometry(factors=factors)  # type: ignore[arg-type]
 
 
-def test_whoever_flees_the_light_fails_e27() -> None:
+def test_a_robot_that_flees_the_light_fails_e27() -> None:
     fleeing = taxis.trials(replace(taxis.ARSIM, seconds=4.0), 1, ignore, flee=True, starts=6)
     times = [taxis.time_to_lamp(trial) for trial in fleeing]
     found = missed(taxis.judge(taxis.ARSIM, times, taxis.ARSIM.straight))

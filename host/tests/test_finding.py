@@ -63,7 +63,7 @@ def test_rate_that_was_given_and_is_wrong_is_said() -> None:
 
 
 def test_board_in_a_session_of_another_host_is_found_too() -> None:
-    """It says hello only five times a second; its telemetry tells the rate."""
+    """It says hello only five times a second; its telemetry shows the rate."""
     peer = Peer()
     port = Port(peer, 57_600)
     port.read(0.05)
@@ -73,8 +73,8 @@ def test_board_in_a_session_of_another_host_is_found_too() -> None:
 
 
 @pytest.mark.parametrize("spoilt", [0.01, 0.02, 0.05])
-def test_line_that_spoils_bytes_is_not_taken_for_another_rate(spoilt: float) -> None:
-    """Of a hundred bytes so many are wrong. Where no session comes about in time that is said."""
+def test_line_that_spoils_bytes_is_not_confused_with_another_rate(spoilt: float) -> None:
+    """`spoilt` bytes of a hundred are wrong. Where no session comes about in time, that is the error."""
     opened, lines = 0, 30
     for seed in range(lines):
         port = Port(Peer(), 500_000)
@@ -161,7 +161,7 @@ class Silent(Port):
     ],
     ids=["silent", "sketch", "garbage", "version", "dumb"],
 )
-def test_what_else_may_answer_is_told_apart_in_time(port: Port, error: type[BoebotError], sentence: str) -> None:
+def test_other_answers_are_distinguished_in_time(port: Port, error: type[BoebotError], sentence: str) -> None:
     with pytest.raises(error, match=sentence):
         Link(port).open()
     assert port.now() <= 2.05

@@ -29,7 +29,7 @@ TURNING = msgspec.structs.replace(SHIELDBOT, device=SHIELDBOT.device | {"turret"
 
 
 class Followed(Stepped):
-    """shieldbot with a turret that does at once what it is told."""
+    """shieldbot with a turret that does at once what it is commanded."""
 
     def __init__(self, brain: Brain) -> None:
         self.pulse = 0
@@ -50,8 +50,8 @@ class Followed(Stepped):
         return self.robot.command[1:]
 
     @property
-    def told(self) -> float | None:
-        """The angle that the turret was told last."""
+    def commanded(self) -> float | None:
+        """The angle that the turret was commanded last."""
         command = self.robot.slow_command
         return None if command is None or command.turret is None else command.turret.angle * turret_device.ANGLE_SCALE
 
@@ -74,7 +74,7 @@ def test_scale_of_the_turrets_pulse() -> None:
 def test_it_turns_its_ping_to_the_wall_and_waits_for_it(side: str, sign: int) -> None:
     one = Followed(Brain([FollowWall(side=side)]))  # type: ignore[arg-type]
     assert one.look(0.3) == (0.0, 0.0)
-    assert one.told == pytest.approx(sign * LOOK_RAD, abs=1e-4)
+    assert one.commanded == pytest.approx(sign * LOOK_RAD, abs=1e-4)
     assert one.look(0.3, turret=sign * LOOK_RAD) == (0.0, 0.0)  # the pulse is there before the turret is
     for _ in range(round(SETTLING_S / 0.05)):
         one.look(0.3)
@@ -107,7 +107,7 @@ def test_it_turns_from_what_the_pairs_see_ahead(seen: int) -> None:
     assert one.look(0.3, infrared=int(seen)) == (-0.3, 0.3)
 
 
-def test_a_ping_that_looks_aside_says_nothing_about_what_is_ahead() -> None:
+def test_a_ping_that_looks_aside_says_nothing_about_the_way_ahead() -> None:
     one = settled(FollowWall(), 0.1)
     assert nearness_ahead(one.robot) is None
     assert near().value(one.robot) == 0.0
@@ -123,4 +123,4 @@ def test_the_turret_looks_ahead_again_when_others_drive() -> None:
     asked[0] = 1.0
     one.look(0.3)
     one.look(0.3)
-    assert one.brain.active == "stop" and one.told == 0.0
+    assert one.brain.active == "stop" and one.commanded == 0.0

@@ -328,7 +328,7 @@ def test_any_stream_cut_anywhere_is_decoded_as_the_page_says(data: st.DataObject
     assert (receiver.resynchronised, receiver.lost) == (plain.resynchronised, plain.lost)
 
 
-def test_large_buffers_are_taken_whole() -> None:
+def test_large_buffers_are_decoded_whole() -> None:
     """Shortest frames with shared delimiters, more than one call into C takes: as many messages as can be."""
     count = 10_000
     one = [frame.encode(messages.Identify.ID, n & 0xFF, b"")[1:] for n in range(256)]

@@ -1,4 +1,4 @@
-"""What the resets of a board's watchdog are told as."""
+"""The sentences about resets by a board's watchdog."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def reset(number: int, address: int, place: str = "") -> WatchdogReset:
 IN_A, IN_B = "in a (a.c:5)", "in b (b.c:7)"
 
 
-def test_nothing_is_told_of_no_reset() -> None:
+def test_no_reset_has_no_sentence() -> None:
     assert hangs.sentences([]) == []
     assert hangs.places([]) is None
 
 
-def test_each_place_is_told_once_by_its_first_reset() -> None:
+def test_each_place_has_one_sentence_by_its_first_reset() -> None:
     """Two instructions of one line are one place; without lines each address is."""
     resets = [reset(1, 0x1A2, IN_A), reset(2, 0x30, IN_B), reset(3, 0x1A4, IN_A), reset(4, 0x40)]
     assert hangs.sentences(resets) == [
@@ -34,7 +34,7 @@ def test_each_place_is_told_once_by_its_first_reset() -> None:
 @pytest.mark.parametrize("count", [5, 50])
 def test_many_places_are_counted(count: int) -> None:
     resets = [reset(number, 2 * number) for number in range(1, count + 1)]
-    told = hangs.sentences(resets)
-    assert len(told) == hangs.PLACES_AT_MOST + 1
-    assert told[-1] == f"the watchdog reset the program {count - 4} times more, at other places"
+    found = hangs.sentences(resets)
+    assert len(found) == hangs.PLACES_AT_MOST + 1
+    assert found[-1] == f"the watchdog reset the program {count - 4} times more, at other places"
     assert str(hangs.places(resets)).endswith(f"; elsewhere {count - 4} times")

@@ -1,4 +1,4 @@
-"""Path integration and homing against closed forms: home vectors, the spiral, what is missing or stale, wrap-around.
+"""Path integration and homing against closed forms: home vectors, the spiral, missing and stale readings, wrap-around.
 
 The robot is arsim without its motors: tests say what its odometer and its compass read (notes, section 4.4.4).
 """
@@ -301,7 +301,7 @@ def test_no_reading_makes_a_command_that_is_none(readings: list[tuple[float, flo
         assert -1 <= left <= 1 and -1 <= right <= 1
 
 
-# ---- what is refused, and TOML --------------------------------------------------------------------------------------
+# ---- errors, and TOML -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

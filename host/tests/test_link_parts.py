@@ -562,7 +562,7 @@ def test_turret_of_a_latched_board_waits_and_its_release_does_not() -> None:
 
 
 @pytest.mark.parametrize("end", ["stop", "session_opened"])
-def test_stop_and_new_session_end_what_is_pending(end: str) -> None:
+def test_stop_and_new_session_end_pending_commands(end: str) -> None:
     sent = Sent()
     devices = SlowDevices(sent.append, HostCounters())
     devices.set_turret(messages.Turret(1000, 1), 24_900)

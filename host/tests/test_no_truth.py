@@ -3,9 +3,9 @@
 What these tests guarantee:
 
 * The modules that brains are made of import neither the simulator nor any module of the library that holds truth, runs
-  robots or talks to boards, not even by way of others: whoever has imported all of them has loaded none of those.
+  robots or talks to boards, not even by way of others: a program that imports all of them has loaded none of those.
 * From the `Robot` that a brain gets, and from its `Observation`, nothing leads to the world: what is walked, and what
-  may be met, stands in boebot.experiments.contract.
+  may be met, is in boebot.experiments.contract.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def test_the_test_of_imports_sees_what_it_looks_for() -> None:
     assert "boebot.boards" in [name for name in found if is_within(name, FORBIDDEN)]
 
 
-def test_no_module_of_brains_imports_what_is_forbidden_even_when_called() -> None:
+def test_no_module_of_brains_imports_a_forbidden_one_even_when_called() -> None:
     found = imports()
     assert "boebot.behaviors.avoid" in found
     assert [name for names in found.values() for name in names if is_within(name, FORBIDDEN)] == []
@@ -98,7 +98,7 @@ def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     ],
     ids=["attribute", "private container", "closure", "default", "bound method"],
 )
-def test_the_walk_finds_what_is_hidden(plant: Callable[[Robot, Truth], None]) -> None:
+def test_the_walk_finds_hidden_truth(plant: Callable[[Robot, Truth], None]) -> None:
     found: list[list[str]] = []
     truth = boebot.run(lambda robot: None, "arsim", arena="arsim", seconds=0.05).truth
     assert truth is not None

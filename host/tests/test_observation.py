@@ -1,4 +1,4 @@
-"""What a brain is told: each value with its unit, its age and whether it is valid, and nothing of it can be changed."""
+"""What a brain sees: each value with its unit, its age and whether it is valid, and nothing of it can be changed."""
 
 from __future__ import annotations
 

@@ -52,6 +52,6 @@ def test_stop_and_dead_band_keep_the_sign() -> None:
     wheel = WheelDirection()
     for signal in (0.0, -DEAD_BAND / 2):
         assert {wheel.update(signal, 0.01) for _ in range(50)} == {1}
-    for _ in range(3):  # reversals that are taken back in time
+    for _ in range(3):  # reversals that are undone in time
         assert {wheel.update(-0.5, 0.01) for _ in range(4)} == {1}
         assert wheel.update(0.5, 0.01) == 1

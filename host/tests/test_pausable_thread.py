@@ -1,4 +1,4 @@
-"""A pausable thread runs a stretch at a time, hears what is thrown, and Ctrl-C waits for the end of its stretch."""
+"""A pausable thread runs a stretch at a time, raises errors thrown into it, and Ctrl-C waits for its stretch's end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from boebot.errors import BoardError
 from boebot.running.pausable_thread import DONE, PAUSED, PausableThread
 
 
-def test_stretches_alternate_with_whoever_resumes() -> None:
+def test_stretches_alternate_with_the_resuming_thread() -> None:
     heard: list[object] = []
 
     def work() -> None:
@@ -61,7 +61,7 @@ def test_error_is_thrown_where_it_paused() -> None:
         except BoardError as error:
             caught.append(str(error))
         thread.pause("cleared up")
-        raise ValueError("of its own")
+        raise ValueError("inside")
 
     thread = PausableThread(work, "test")
     assert thread.resume() == PAUSED

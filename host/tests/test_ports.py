@@ -394,7 +394,7 @@ def test_missing_port_is_named_with_those_that_are_there(monkeypatch: pytest.Mon
         open_port("/dev/ttyACM9", 500_000)
 
 
-def test_what_is_no_serial_port_is_told(tmp_path: Path) -> None:
+def test_a_path_that_is_no_serial_port_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for path in ("/dev/null", str(tmp_path), str(tmp_path / "file")):
         with refused(f"{path} is no serial port"):
@@ -405,10 +405,10 @@ SOMEBODY = 65534  # nobody's numbers
 
 
 def refusal_for_somebody(path: str) -> str:
-    """What a user without rights is told: asked in a copy of this process that has given up its own."""
+    """The error for a user without rights: from a copy of this process that has given up its rights."""
     if os.getuid() != 0:
         pytest.skip("only root can give the port to others, and ask as another user")
-    answer, tell = os.pipe()
+    reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
         try:
@@ -417,13 +417,13 @@ def refusal_for_somebody(path: str) -> str:
             os.setuid(SOMEBODY)
             open_port(path, 500_000)
         except BaseException as error:
-            os.write(tell, str(error).encode())
+            os.write(writing, str(error).encode())
         finally:
             os._exit(0)
-    os.close(tell)
+    os.close(writing)
     os.waitpid(child, 0)
-    with os.fdopen(answer) as told:
-        return told.read()
+    with os.fdopen(reading) as answer:
+        return answer.read()
 
 
 def test_forbidden_port_says_what_to_do(board: Line) -> None:
@@ -480,7 +480,7 @@ def free_port() -> int:
 
 
 @pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
-def test_connection_that_fails_is_told_in_time(scheme: str) -> None:
+def test_connection_that_fails_is_an_error_in_time(scheme: str) -> None:
     port = free_port()
     with refused(rf"^{scheme}://127\.0\.0\.1:{port} cannot be opened: nobody listens there$"):
         open_port(f"{scheme}://127.0.0.1:{port}", 500_000)
@@ -503,7 +503,7 @@ def test_host_that_does_not_answer_is_given_up_in_time(scheme: str) -> None:
             open_port(f"{scheme}://127.0.0.1:{address[1]}", 500_000)
 
 
-def test_socket_whose_other_side_does_not_read_is_told() -> None:
+def test_socket_whose_other_side_does_not_read_is_an_error() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         transport = open_port(f"socket://127.0.0.1:{server.getsockname()[1]}", 500_000)
         connection, _ = server.accept()
@@ -581,6 +581,6 @@ def test_shared_port_that_goes_away_is_noticed() -> None:
             transport.write(b"x")
 
 
-def test_something_else_than_rfc2217_is_told() -> None:
+def test_server_without_rfc2217_is_refused() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server, refused("is no RFC 2217 server: something else listens"):
         open_port(f"rfc2217://127.0.0.1:{server.getsockname()[1]}", 500_000)

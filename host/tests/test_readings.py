@@ -1,4 +1,4 @@
-"""What robots without a board tell: descriptions, views, ages, arrays."""
+"""Readings of robots without a board: descriptions, views, ages, arrays."""
 
 from __future__ import annotations
 
@@ -85,12 +85,12 @@ def test_names_that_a_brain_could_not_read_are_refused(tmp_path: Path, name: str
 
 @given(st.floats(0.011, 0.5), st.integers(0, 2000))
 def test_age_of_a_held_reading(period_s: float, tick: int) -> None:
-    """Against the definition: it was taken in the first step at or after the last due multiple of its period."""
+    """Against the definition: it was sampled in the first step at or after the last due multiple of its period."""
     tick_s = 0.01
     due = [math.ceil(round(k * period_s / tick_s, 6)) for k in range(int(tick * tick_s / period_s) + 2)]
-    taken = max(step for step in due if step <= tick)
+    sampled = max(step for step in due if step <= tick)
     (age,) = ages((period_s,), tick * tick_s, tick_s)
-    assert age == pytest.approx((tick - taken) * tick_s, abs=1e-9) or abs(round(age / period_s, 6) % 1) < 1e-6
+    assert age == pytest.approx((tick - sampled) * tick_s, abs=1e-9) or abs(round(age / period_s, 6) % 1) < 1e-6
     assert 0.0 <= age < period_s + tick_s
 
 

@@ -178,8 +178,8 @@ def test_page_says_which_behavior_is_active_and_why(
     assert {switch.on for switch in record.switches} == {"ahead", "spin"}
 
 
-def test_page_tells_of_the_brain_of_the_robot_that_is_chosen(composed_run: RunResult, tmp_path: Path) -> None:
-    """Robots 1 and 2 of three have one of processes, each its own; the third has nothing to tell."""
+def test_page_shows_the_brain_of_the_chosen_robot(composed_run: RunResult, tmp_path: Path) -> None:
+    """Robots 1 and 2 of three have one of processes, each its own; the third has none."""
     brains = [Brain([Spin(name="only")]), composed(), lambda robot: robot.drive(0.1, 0.1)]
     members = [
         boebot.Member(brain=brain, robot="arsim", pose=(x, 0.0, 0.0))

@@ -60,7 +60,7 @@ def test_echo_becomes_distance(distance: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "echo_us", "ticks", "shown", "valid"),
+    ("status", "echo_us", "ticks", "shown", "valid"),
     [
         (PingStatus.NOTHING_NEAR, 0, 2, PingStatus.NOTHING_NEAR, True),
         (PingStatus.OK, 17_600, 2, PingStatus.OK, True),
@@ -73,9 +73,9 @@ def test_echo_becomes_distance(distance: float) -> None:
     ],
 )
 def test_ping_says_what_it_does_not_know(
-    told: PingStatus, echo_us: int, ticks: int, shown: PingStatus, valid: bool
+    status: PingStatus, echo_us: int, ticks: int, shown: PingStatus, valid: bool
 ) -> None:
-    ping = observe(ping_echo=echo_us, ping_age=ticks, ping_status=told).ping
+    ping = observe(ping_echo=echo_us, ping_age=ticks, ping_status=status).ping
     assert ping.status == shown and ping.valid is valid
     assert (ping.distance is not None) is (shown == PingStatus.OK)
     assert (ping.too_near, ping.absent) == (shown == PingStatus.TOO_NEAR, shown == PingStatus.ABSENT)

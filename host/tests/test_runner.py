@@ -174,7 +174,7 @@ def test_run_that_ends_early_stops_the_motors_and_keeps_its_record(
     assert '"ended"' in (tmp_path / "summary.json").read_text()
 
 
-def test_brain_that_names_a_missing_device_is_told_where(session: InProcess, tmp_path: Path) -> None:
+def test_brain_that_names_a_missing_device_is_refused_with_its_place(session: InProcess, tmp_path: Path) -> None:
     path = tmp_path / "blind.py"
     path.write_text("def step(robot):\n    robot.drive(1.5, 0)\n")
     with pytest.raises(BrainError, match=r"blind\.py, line 2: drive\(1\.5, 0\): motor signals go from -1 to 1"):
@@ -238,13 +238,13 @@ def test_board_with_another_pin_map_is_refused(session: InProcess) -> None:
 
 def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> None:
     peer = session.peer
-    told: list[int] = []
+    counts: list[int] = []
 
     def reset(tick: int) -> None:
         if tick == 57 and peer.starts == 1:
             peer.parameters.clear()
             peer.reset()
-        told.append(len(peer.parameters))
+        counts.append(len(peer.parameters))
 
     session.before_tick = reset
     times: list[float] = []
@@ -256,7 +256,7 @@ def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> 
     result = boebot.run(step, seconds=2)
     assert result.resets == 1
     assert result.lost_frames == 0
-    assert len(peer.parameters) == told[0], "the parameters were set again"
+    assert len(peer.parameters) == counts[0], "the parameters were set again"
     assert (np.diff(times) > 0).all() and times[-1] < 2.0, "the run's clock goes on"
     assert session.now() == pytest.approx(2.0 + result.clock_offset, abs=0.05)
     assert abs(result.odometry.x[-1] - result.odometry.x[0]) < 0.4, "counts that begin afresh are no motion"
@@ -376,7 +376,7 @@ def test_session_that_the_board_ends_is_opened_and_armed_again(session: InProces
 
 
 def test_dead_man_stop_that_came_with_the_end_of_the_session_is_counted(session: InProcess) -> None:
-    """The line to the board is cut until its session has ended, and the other one before the board could tell of it."""
+    """The line to the board is cut until its session has ended, and the other one before the board could report it."""
     session.peer.parameters[messages.PARAMETERS["session_time_out"].id] = 400
     carry = session.channel.carry
     ends_s = {"board": 1.6, "host": 1.5}
@@ -392,7 +392,7 @@ def test_dead_man_stop_that_came_with_the_end_of_the_session_is_counted(session:
     assert stop.earlier and stop.time == pytest.approx(1.25, abs=0.05)
 
 
-def test_stop_of_before_the_run_is_told_and_is_not_the_runs(session: InProcess) -> None:
+def test_stop_before_the_run_is_a_notice_and_not_the_runs(session: InProcess) -> None:
     session.peer._happened(messages.EventKind.DEAD_MAN, 7)
     session.read(0.5, 0.5)
     result = boebot.run(straight, seconds=1)
@@ -477,7 +477,7 @@ def test_progress_is_reported(session: InProcess) -> None:
 
 
 def test_encoder_counts_roll_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 2^31 - 1, and for a wheel that is taken to turn backwards, too."""
+    """At 2^31 - 1, and for a wheel that is assumed to turn backwards, too."""
     plain, near = Peer(), Peer()
     near.first_edges = (2**31 - 20, 2**31 - 30)
 

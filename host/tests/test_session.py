@@ -28,7 +28,7 @@ ROUND_S = 0.04 * (len(messages.Task) + 1)
 
 
 def joined(peer: Peer | None = None, channel: Channel | None = None, **options: object) -> tuple[Link, Peer, InProcess]:
-    """A link with an open session, its board, and what is between them."""
+    """A link with an open session, its board, and the channel between them."""
     peer = peer or Peer()
     session = InProcess(peer, channel)
     link = Recorded(session, **options)
@@ -802,7 +802,7 @@ def test_measuring_the_tasks_lasts_as_long_as_asked_and_a_round(period: int) -> 
 
 def test_a_board_that_leaves_out_a_task_is_named_with_it() -> None:
     link, peer, _ = joined()
-    peer.untold = {messages.Task.TURRET, messages.Task.DEVICES}
+    peer.silent_tasks = {messages.Task.TURRET, messages.Task.DEVICES}
     begun = link.transport.now()
     with pytest.raises(BoardError, match=f"tasks turret, devices within {0.5 + 4 * ROUND_S:.1f} s"):
         task_times.measure(link, 0.5)

@@ -73,36 +73,36 @@ def test_analog_infrared_beyond_its_range(result: int, distance: float | None) -
 
 
 def test_light_is_brighter_where_the_time_is_shorter() -> None:
-    told = NOTHING._replace(light_left=500, light_right=1000, light_age=1)
-    left, right = read(LIGHT, "light_left", told), read(LIGHT, "light_right", told)
+    message = NOTHING._replace(light_left=500, light_right=1000, light_age=1)
+    left, right = read(LIGHT, "light_left", message), read(LIGHT, "light_right", message)
     assert left.decay_time == pytest.approx(500e-6)
     assert left.brightness is not None and right.brightness is not None
     assert left.brightness == pytest.approx(2 * right.brightness)
     assert left.valid and not left.dark
-    assert read(LIGHT, "light_left", told._replace(light_left=14_000)).dark
-    assert not read(LIGHT, "light_left", told._replace(light_left=0)).valid
-    assert not read(LIGHT, "light_left", told._replace(light_age=7)).valid
+    assert read(LIGHT, "light_left", message._replace(light_left=14_000)).dark
+    assert not read(LIGHT, "light_left", message._replace(light_left=0)).valid
+    assert not read(LIGHT, "light_left", message._replace(light_age=7)).valid
 
 
 @given(heading=st.floats(-3.1, 3.1), x0=st.integers(-200, 200), y0=st.integers(-200, 200))
 def test_compass_gives_the_heading_that_turned_the_field(heading: float, x0: int, y0: int) -> None:
     """North lies at -heading in the robot's frame: a field of 300 counts turned by that, and the robot's own."""
     x, y = round(x0 + 300 * math.cos(heading)), round(y0 - 300 * math.sin(heading))
-    told = NOTHING._replace(compass_x=x, compass_y=y, compass_z=-400, compass_age=1, compass_status=CompassStatus.OK)
-    view = read(MagneticCompass(sda_pin="A4", scl_pin="A5", offset_counts=(x0, y0)), "compass", told)
+    message = NOTHING._replace(compass_x=x, compass_y=y, compass_z=-400, compass_age=1, compass_status=CompassStatus.OK)
+    view = read(MagneticCompass(sda_pin="A4", scl_pin="A5", offset_counts=(x0, y0)), "compass", message)
     assert view.heading is not None and view.valid
     assert abs(math.remainder(view.heading - heading, 2 * math.pi)) < 1.0 / 300
     assert view.field is not None and view.field[2] == pytest.approx(-400 / 1090 * 1e-4)
 
 
 def test_compass_that_overflows_or_is_gone_is_not_valid() -> None:
-    told = NOTHING._replace(compass_x=100, compass_age=1, compass_status=CompassStatus.OK)
-    assert read(COMPASS, "compass", told).valid
-    assert not read(COMPASS, "compass", told._replace(compass_y=-4096)).valid
-    assert not read(COMPASS, "compass", told._replace(compass_x=0)).valid
-    gone = read(COMPASS, "compass", told._replace(compass_status=CompassStatus.NO_ANSWER))
+    message = NOTHING._replace(compass_x=100, compass_age=1, compass_status=CompassStatus.OK)
+    assert read(COMPASS, "compass", message).valid
+    assert not read(COMPASS, "compass", message._replace(compass_y=-4096)).valid
+    assert not read(COMPASS, "compass", message._replace(compass_x=0)).valid
+    gone = read(COMPASS, "compass", message._replace(compass_status=CompassStatus.NO_ANSWER))
     assert not gone.valid and gone.status == CompassStatus.NO_ANSWER
-    assert not read(COMPASS, "compass", told._replace(compass_age=13)).valid
+    assert not read(COMPASS, "compass", message._replace(compass_age=13)).valid
 
 
 def test_zone_of_each_side() -> None:
@@ -121,7 +121,7 @@ def test_zone_of_each_side() -> None:
 
 
 @given(st.floats(-1.5, 1.5))
-def test_turret_told_and_read_back_is_the_same_angle(angle: float) -> None:
+def test_turret_commanded_and_read_back_is_the_same_angle(angle: float) -> None:
     message = turret.command(angle)
     pulse = round((1500.0 + 573.0 * message.angle * 1e-4) / 0.0625)
     view = read(TURRET, "turret", NOTHING._replace(turret_pulse=pulse))

@@ -1,4 +1,4 @@
-"""Slow devices from the board to the brain and back: what it sees of them, what it asks of them, what is kept.
+"""Slow devices from the board to the brain and back: what it sees and asks of them, and what the record keeps.
 
 The board is the model of peer.py, whose truth is the protocol's page.
 """
@@ -47,7 +47,7 @@ def run_on(
     return runner.execute(Request.single(brain, robot=peer.robot, **options))  # type: ignore[arg-type]
 
 
-def test_brain_sees_what_the_board_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_brain_sees_what_the_board_sends(monkeypatch: pytest.MonkeyPatch) -> None:
     peer = Peer(BOEBOT)
     seen: list[Observation] = []
     result = run_on(peer, lambda robot: seen.append(robot.observation), monkeypatch, seconds=1)
@@ -68,8 +68,8 @@ def test_ages_count_on_between_messages(monkeypatch: pytest.MonkeyPatch) -> None
     peer.parameters[messages.PARAMETERS["devices_period"].id] = 50
     run_on(peer, lambda robot: ages.append((robot.tick, robot.light_left.age)), monkeypatch, seconds=2, period=0.01)
     # Messages go out at every fiftieth tick, after telemetry: in their own tick they are still on the line.
-    told_at = [(tick - 1) // 50 * 50 for tick, _ in ages]
-    expected = [at % 4 * TICK_S + (tick - at) * TICK_S for (tick, _), at in zip(ages, told_at, strict=True)]
+    sent_at = [(tick - 1) // 50 * 50 for tick, _ in ages]
+    expected = [at % 4 * TICK_S + (tick - at) * TICK_S for (tick, _), at in zip(ages, sent_at, strict=True)]
     known = [(age, wanted) for (_, age), wanted in zip(ages, expected, strict=True) if not math.isinf(age)]
     assert len(known) > 150
     assert [age for age, _ in known] == pytest.approx([wanted for _, wanted in known])
@@ -252,7 +252,7 @@ def test_link_counts_lost_messages_of_slow_devices_as_lost_frames(monkeypatch: p
     assert len(link.devices.fetch()) > 30 and link.devices.latest and link.devices.fetch() == []
 
 
-# ---- what is kept ----------------------------------------------------------------------------------------------------
+# ---- the record ------------------------------------------------------------------------------------------------------
 
 
 def test_run_csv_has_the_slow_devices(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -273,7 +273,7 @@ def test_arrays_have_the_newest_message_of_each_tick(data: st.DataObject) -> Non
     """Against the definition, over restarts of the board and the roll-over of its ticks."""
     ticks: list[int] = []
     starts: list[int] = []
-    told_at: list[tuple[int, messages.DevicesTelemetry]] = []
+    sent_at: list[tuple[int, messages.DevicesTelemetry]] = []
     expected: list[tuple[int, int] | None] = []  # (token, ticks since)
     for start in range(data.draw(st.integers(1, 3))):
         first = data.draw(st.sampled_from([5, 1000, 2**32 - 7]) if start == 0 else st.just(3))
@@ -283,14 +283,14 @@ def test_arrays_have_the_newest_message_of_each_tick(data: st.DataObject) -> Non
         for gap in gaps:
             at += gap
             if data.draw(st.booleans()):
-                newest = (len(told_at) % 200 + 1, at - data.draw(st.integers(0, gap - 1)))
+                newest = (len(sent_at) % 200 + 1, at - data.draw(st.integers(0, gap - 1)))
                 message = NOTHING._replace(tick=(first + newest[1]) % 2**32, buzzer_token=newest[0])
-                told_at.append((len(ticks), message))
+                sent_at.append((len(ticks), message))
             expected.append(None if newest is None else (newest[0], at - newest[1]))
             ticks.append((first + at) % 2**32)
             starts.append(start)
     restarted = np.diff(np.array(starts), prepend=0) > 0
-    rows, sent = [row for row, _ in told_at], [message for _, message in told_at]
+    rows, sent = [row for row, _ in sent_at], [message for _, message in sent_at]
     newest_of, since = newest_messages(rows, sent, np.array(ticks, dtype=np.uint32), restarted)
     for index, age, wanted in zip(newest_of, since, expected, strict=True):
         if wanted is None:
@@ -313,7 +313,7 @@ def test_messages_take_a_quarter_of_the_line_at_most(period: int, baud: int, tic
 
 @pytest.mark.parametrize("period", [2, 20])
 def test_readings_stay_fresh_from_message_to_message(period: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However rarely the board was told to tell: fresh up to three periods of the messages."""
+    """However rarely the board sends: fresh up to three periods of the messages."""
     peer = Peer(BASIC)
     peer.parameters[messages.PARAMETERS["devices_period"].id] = period
     seen: list[tuple[float, bool]] = []
@@ -325,6 +325,6 @@ def test_readings_stay_fresh_from_message_to_message(period: int, monkeypatch: p
 
     run_on(peer, step, monkeypatch, seconds=2.5, period=0.01)
     limit = 3 * max(period, 2) * TICK_S + 1e-9
-    told = [(age, valid) for age, valid in seen if not math.isinf(age)]
-    assert all(valid == (age <= limit) for age, valid in told)
-    assert all(valid for _, valid in told[:80]) and not told[-1][1]
+    found = [(age, valid) for age, valid in seen if not math.isinf(age)]
+    assert all(valid == (age <= limit) for age, valid in found)
+    assert all(valid for _, valid in found[:80]) and not found[-1][1]

@@ -126,20 +126,20 @@ def test_measured_above_its_bound_is_a_fault(image: Path, measured: Measurement,
 
 
 @pytest.mark.parametrize(
-    ("taken", "sentence"),
+    ("figure", "sentence"),
     [
         ("worst_tick", "tasks and interrupts of a tick took"),
         ("busiest_tick", "instructions ran in"),
         ("between_polls", "cycles passed between two polls in the emulator"),
     ],
 )
-def test_scenario_is_compared_with_its_own_load(image: Path, report: budget.Report, taken: str, sentence: str) -> None:
+def test_scenario_is_compared_with_its_own_load(image: Path, report: budget.Report, figure: str, sentence: str) -> None:
     """What a tick took under another load says nothing about the bounds under this one."""
     assert report.gap is not None
-    most = {"worst_tick": report.demand, "busiest_tick": report.executed, "between_polls": report.gap}[taken]
+    most = {"worst_tick": report.demand, "busiest_tick": report.executed, "between_polls": report.gap}[figure]
     quiet = replace(measurement(), worst_tick=0)
-    less: dict[str, Any] = {taken: most}
-    more: dict[str, Any] = {taken: most + 1}
+    less: dict[str, Any] = {figure: most}
+    more: dict[str, Any] = {figure: most + 1}
     full, over = replace(quiet, **less), replace(quiet, **more)
     other = replace(over, scenarios=("noise",))
     assert budget.prove(image, FIGURES, merged([full, other])).faults == []
@@ -172,7 +172,7 @@ def test_overload_judges_the_tick_and_no_ring(image: Path, report: budget.Report
     assert found.responses.tick == report.responses.tick, "it has neither line nor encoders"
 
 
-def test_ring_that_is_needed_stands_beside_the_one_there_is(
+def test_ring_that_is_needed_is_shown_beside_the_one_there_is(
     report: budget.Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
     full = replace(report, ring=129)

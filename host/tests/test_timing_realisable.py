@@ -24,7 +24,7 @@ PING = SensorRow("ping", 18_500, 5, 20_000)
 
 
 def with_readings(count: int, reading_s: float, **more: float) -> RobotDescription:
-    """The notes' robot with so many IR sensors, each of which takes so long to read."""
+    """The notes' robot with that number of IR sensors, each of which takes that time to read."""
     robot = load_robot("arsim")
     sensor = msgspec.structs.replace(robot.device["infrared_left"], reading_s=reading_s, **more)
     others = {name: device for name, device in robot.device.items() if not name.startswith("infrared")}

@@ -44,7 +44,7 @@ def test_file_without_a_table_has_no_rows(tmp_path: Path) -> None:
     ("data", "sentence"),
     [(b"", "is not an ELF file"), (b"\x7fELF\x02\x01" + bytes(60), "32 bits"), (b"\x7fELF\x01\x01", "damaged")],
 )
-def test_what_is_no_image_is_refused(tmp_path: Path, data: bytes, sentence: str) -> None:
+def test_a_file_that_is_no_image_is_refused(tmp_path: Path, data: bytes, sentence: str) -> None:
     path = tmp_path / "garbage.elf"
     path.write_bytes(data)
     with pytest.raises(TimingError, match=sentence):

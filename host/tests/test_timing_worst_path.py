@@ -16,7 +16,7 @@ from boebot.timing.firmware import load_firmware
 from boebot.timing.worst_path import ACCEPTANCE, WorstPath, worst_path
 from command import boebot as command
 
-# Five passes of 2 nops, dec and brne (2, at last 1), a function of 10 nops; on lines of their own.
+# Five passes of 2 nops, dec and brne (2, at last 1), a function of 10 nops; on separate lines.
 LINES = [
     "__attribute__((noinline)) void helper(void) { NOPS(10); }",
     "__attribute__((noinline, naked)) void first_task(void) {",

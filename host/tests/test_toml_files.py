@@ -136,7 +136,7 @@ class Whole(msgspec.Struct, forbid_unknown_fields=True):
         (f"x = {'[' * 100_000}", "it.toml is "),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, sentence: str) -> None:
+def test_errors_have_their_line(tmp_path: Path, text: str, sentence: str) -> None:
     file = tmp_path / "it.toml"
     file.write_text(text)
     with pytest.raises(RobotError) as caught:

@@ -63,14 +63,14 @@ def test_a_spoilt_arena_means_what_it_means_to_tomllib(text: str, at: int, inste
     assert outcome(toml_numbers.loads, spoilt) == outcome(tomllib.loads, spoilt)
 
 
-def test_rows_are_taken_out_and_all_else_is_not() -> None:
+def test_rows_are_cut_out_and_all_else_is_not() -> None:
     assert toml_numbers._PAIRS.sub("", PIECES[0] + PIECES[2]) == "a \n[[shape]]\ncorners_m \n"
     for piece in PIECES[3:13]:
         rest = toml_numbers._PAIRS.sub(lambda match: match[0] if match["rows"] is None else "", piece)
         assert rest == piece
 
 
-def test_a_large_file_is_told_of_and_its_errors_have_their_line(
+def test_reading_a_large_file_is_announced_and_its_errors_have_their_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "large.toml"

@@ -125,7 +125,7 @@ def test_any_pattern_of_sending_and_reading_keeps_every_byte(sent: list[bytes], 
 
 
 @pytest.mark.parametrize("thread", THREADS)
-def test_end_is_told_after_what_came_before_it(board: Line, thread: bool) -> None:
+def test_end_is_an_error_after_the_bytes_before_it(board: Line, thread: bool) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         transport = SocketTransport("127.0.0.1", server.getsockname()[1], thread=thread)
         connection, _ = server.accept()
@@ -164,7 +164,7 @@ def test_unplugging_is_noticed_at_once_by_reader_and_writer(thread: bool) -> Non
 
 
 @pytest.mark.parametrize("thread", THREADS)
-def test_other_side_that_does_not_read_is_told_within_two_seconds(board: Line, thread: bool) -> None:
+def test_other_side_that_does_not_read_is_an_error_within_two_seconds(board: Line, thread: bool) -> None:
     transport = SerialTransport(board.path, thread=thread)
     begun = time.monotonic()
     with pytest.raises(BoardError, match="takes no bytes: its other side does not read"):
@@ -263,7 +263,7 @@ def test_no_thread_or_descriptor_is_left_behind() -> None:
 
 @pytest.mark.skipif(not HAS_THREAD, reason="not built on this system")
 def test_port_that_gets_no_thread_is_one_sentence_and_no_crash() -> None:
-    """In a process of its own: what is asked here has crashed it. There is room for the port, not for the pipe."""
+    """In another process: this has crashed it. There is room for the port, not for the pipe."""
     script = (
         "import gc, os, resource\n"
         "from boebot.errors import BoardError\n"
