@@ -11,7 +11,7 @@ from boebot.brain import Brain, StateVariable, Utility
 from boebot.cognition import near, nearness_ahead
 from boebot.devices import turret as turret_device
 from boebot.devices.latest import Latest, without_readings
-from boebot.devices.ping import speed_of_sound
+from boebot.devices.ping import SPEED_OF_SOUND
 from boebot.devices.turret import PositionServo
 from boebot.link import messages
 from boebot.link.messages import PingStatus
@@ -41,7 +41,7 @@ class Followed(Stepped):
         if turret is not None:
             message = turret_device.command(turret)
             self.pulse = TURRET.pulse_of(message)
-        echo = 18500 if wall is None else round(2 * wall / speed_of_sound() * 1e6)
+        echo = 18500 if wall is None else round(2 * wall / SPEED_OF_SOUND * 1e6)
         self.see(ping_echo=echo, ping_status=PingStatus.OK, infrared=infrared)
         devices = without_readings(messages.DevicesTelemetry)._replace(turret_pulse=self.pulse)
         self.robot.observation = self.robot.observation._replace(slow=Latest({messages.DevicesTelemetry: devices}, 0))

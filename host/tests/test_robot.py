@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
 from boebot.devices.infrared import Infrared
-from boebot.devices.ping import speed_of_sound
+from boebot.devices.ping import SPEED_OF_SOUND
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.messages import PingStatus
@@ -53,7 +53,7 @@ def test_infrared_never_read() -> None:
 
 @given(st.floats(0.02, 3.0))
 def test_echo_becomes_distance(distance: float) -> None:
-    echo_us = round(2 * distance / speed_of_sound() * 1e6)
+    echo_us = round(2 * distance / SPEED_OF_SOUND * 1e6)
     ping = observe(ping_echo=echo_us, ping_age=3, ping_status=PingStatus.OK).ping
     assert ping.distance == pytest.approx(distance, abs=0.0002)
     assert ping.valid and ping.age == pytest.approx(0.03)

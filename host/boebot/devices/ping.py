@@ -46,15 +46,9 @@ from boebot.devices.readings import Readings
 from boebot.link.messages import PingStatus, Telemetry
 
 TEMPERATURE_C = 20.0
+SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
+METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
 _SHADE = 0.10
-
-
-def speed_of_sound(temperature_c: float = TEMPERATURE_C) -> float:
-    """Speed of sound in air (m/s)."""
-    return 331.5 + 0.6 * temperature_c
-
-
-METRES_PER_US = speed_of_sound() / 2 * 1e-6
 
 
 class Ping(NamedTuple):

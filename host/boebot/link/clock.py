@@ -22,8 +22,9 @@ Stamp = tuple[float, float, float]
 """(board time in s since its reset, host time in s on the transport's clock, error bound of the host time in s)"""
 
 DRIFT_LIMIT = 5.5e-3  # of h's slope: clocks of +-5000 ppm, as ceramic resonators have at worst, and some to spare
-WANDER = 0.02e-6  # 1/s: the change of rate that the bound allows for; a resonator that warms up by 1 K in a minute
-WINDOW_S = 40.0
+WANDER = 0.02e-6  # 1/s: greatest change of the clocks' relative rate; a resonator that warms up by 1 K in a minute
+WINDOW_S = 40.0  # how long a bound counts
+_LOOSENED_S = WANDER * WINDOW_S**2 / 2
 RESOLUTION_S = 2e-6  # the board rounds its time down to whole microseconds; and rounding here
 _WORTH = 0.02  # share of the present bound, and time, that a new one has to win to be worth the work
 _WORTH_S = 4e-6
@@ -48,16 +49,10 @@ class BoardClock:
         probes: clock answers received.
     """
 
-    def __init__(self, byte_s: float = 0.0, wander: float = WANDER, window_s: float = WINDOW_S) -> None:
-        """Args:
-        byte_s: time that a byte needs on the line; 0 where that is not known, which loosens the bounds. Once the
-            bounds have contradicted each other it is not believed any more.
-        wander: greatest change of the clocks' relative rate (1/s).
-        window_s: how long a bound counts.
-        """
+    def __init__(self, byte_s: float = 0.0) -> None:
+        """`byte_s`: time that a byte needs on the line; 0 where that is not known, which loosens the bounds. Once the
+        bounds have contradicted each other it is not believed any more."""
         self._byte_s = byte_s
-        self._window_s = window_s
-        self._loosened_s = wander * window_s**2 / 2
         self.restarts = 0
         self.probes = 0
         self.forget()
@@ -177,7 +172,7 @@ class BoardClock:
     def _bound_by(self, board_s: float, host_s: float, side: float) -> None:
         """h(board_s) is at most (side 1) or at least (side -1) `host_s`."""
         self._turn_window(board_s)
-        limit = host_s - board_s - self._zero + side * self._loosened_s
+        limit = host_s - board_s - self._zero + side * _LOOSENED_S
         for index, polygon in enumerate(self._polygons):
             cut = _cut(polygon, board_s - self._began[index], limit, side)
             if len(cut) < 3:  # nothing is left: the clock has jumped, or drifts faster than it may
@@ -193,10 +188,10 @@ class BoardClock:
 
     def _turn_window(self, board_s: float) -> None:
         if len(self._polygons) == 1:
-            if board_s - self._began[0] > self._window_s / 2:
+            if board_s - self._began[0] > WINDOW_S / 2:
                 self._polygons.append(_plane())
                 self._began.append(board_s)
-        elif board_s - self._began[0] > self._window_s:
+        elif board_s - self._began[0] > WINDOW_S:
             self._polygons = [self._polygons[1], _plane()]
             self._began = [self._began[1], board_s]
 
@@ -218,7 +213,7 @@ class BoardClock:
             values, slopes = self._corners(1, board_s)
             low, high, slowest, fastest = min(values), max(values), min(slopes), max(slopes)
         # a later bound between these cuts little or nothing off any polygon
-        loosened_s = self._loosened_s + _WORTH_S + _WORTH * min(self._bound, _WORTH_MOST_S)
+        loosened_s = _LOOSENED_S + _WORTH_S + _WORTH * min(self._bound, _WORTH_MOST_S)
         self._useful_below = self._zero + high - loosened_s
         self._useful_above = self._zero + low + loosened_s
         self._useful_fastest = fastest
