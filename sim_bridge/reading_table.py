@@ -61,7 +61,7 @@ class ReadingTable:
 
     @classmethod
     def load(cls, path: str | Path) -> ReadingTable:
-        """From a CSV file with the columns distance_m, angle_rad, reading; a row for each reading that was taken.
+        """From a CSV file with the columns distance_m, angle_rad, reading; a row for each reading.
 
         Raises:
             RobotError: it cannot be read, a cell is no number, or a distance was not measured at all angles.

@@ -50,7 +50,7 @@ class SavedRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     firmware: str
     """SHA-256 of the firmware; empty for a robot without a board"""
     waiting: int
-    """bytes that had come from its board and were not yet taken"""
+    """bytes that had come from its board and were not yet read"""
 
 
 class Simulation(msgspec.Struct, forbid_unknown_fields=True, frozen=True, tag_field="kind", tag="simulation"):

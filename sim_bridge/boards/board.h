@@ -80,7 +80,7 @@ typedef struct {
 } board_eeprom;
 
 /* Where the program was that the board's own watchdog reset: byte address in flash of the instruction that was next, and
- * the cycle of that. With a watchdog that warns by an interrupt: when that came; what runs behind it does not tell who
+ * the cycle of that. With a watchdog that warns by an interrupt: when that came; what runs behind it does not show who
  * hung. */
 typedef struct {
   uint64_t cycle;

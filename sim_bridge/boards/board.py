@@ -21,7 +21,7 @@ from sim_bridge.boards.code_places import with_place
 CLOCK_HZ = 16_000_000
 DATA_SIZE = 0x900
 EEPROM_SIZE = 1024
-ROOM = 4096  # bytes that are taken from the line at once
+ROOM = 4096  # bytes that are read from the line at once
 
 EDGE = np.dtype(  # board_edge of board_access.h, sim_edge of loop.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
@@ -152,7 +152,7 @@ class BoardMemory(ABC):
 
     def watchdog_log(self) -> list[tuple[int, int]]:
         """Cycle and address (bytes) at which its watchdog found the program, for each of its resets since power-on,
-        oldest first (board.h); empty where the board has none of its own, and of resets in its name from outside."""
+        oldest first (board.h); empty where the board has no watchdog, and of resets in its name from outside."""
         log = self._memory_lib.board_watchdog_log_of(self._board)
         if log == self._memory_ffi.NULL:
             return []

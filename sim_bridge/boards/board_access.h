@@ -64,7 +64,7 @@ uint8_t *board_memory(board *self);
 /* NULL on a board that has none. */
 board_eeprom *board_eeprom_of(board *self);
 
-/* NULL on a board that has no watchdog of its own. */
+/* NULL on a board that has no watchdog. */
 const board_watchdog_log *board_watchdog_log_of(board *self);
 
 #endif

@@ -21,7 +21,7 @@ COMPASS_IRON = 0.2  # (chosen)
 COMPASS_PER_AMPERE = 0.05  # (chosen)
 
 SWITCHES = {
-    "compass_noise": off("the compass tells the same each time", "COMPASS_SIGMA", "HeadingCompass.sigma_rad"),
+    "compass_noise": off("the compass reads the same each time", "COMPASS_SIGMA", "HeadingCompass.sigma_rad"),
     "compass_bias": off(
         "no turned mounting, iron or motor current deflects the compass",
         "COMPASS_BIAS_RAD",

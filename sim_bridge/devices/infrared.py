@@ -22,7 +22,7 @@ INFRARED_FALSE_HIT = 0.001  # per burst (chosen)
 
 SWITCHES = {
     "infrared_noise": off(
-        "infra-red sensors tell the same each time, and never falsely",
+        "infra-red sensors read the same each time, and never falsely",
         "INFRARED_SPREAD",
         "INFRARED_FALSE_HIT",
         "InfraredProximity.sigma",

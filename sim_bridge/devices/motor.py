@@ -1,4 +1,4 @@
-"""The notes' motors of a robot without a board: what they are like stands in the robot's file."""
+"""The notes' motors of a robot without a board: their parameters are in the robot's file."""
 
 from __future__ import annotations
 

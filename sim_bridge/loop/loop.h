@@ -116,7 +116,7 @@ int sim_replay(sim *self, const uint8_t *inputs, size_t size, size_t *at, uint64
 /* Forgets what was received of that robot but for the newest bytes. */
 void sim_forget_received(sim *self, int robot, size_t keep);
 
-/* Bytes that were received and not yet taken. */
+/* Bytes that were received and not yet read. */
 size_t sim_waiting(const sim *self, int robot);
 
 /* Of all that can be had of the state: bodies, supplies, what boards did, counted and hold. */

@@ -78,7 +78,7 @@ struct sim {
   int crashed;   /* 1: a board has */
 };
 
-/* What comes from outside, and what its words and bytes are in the notes; the numbers stand in saved simulations. */
+/* What comes from outside, and what its words and bytes are in the notes; the numbers are in saved simulations. */
 typedef enum {
   INPUT_SEND = 1,      /* bytes */
   INPUT_LINE_RATE = 2, /* bit/s */

@@ -1,4 +1,4 @@
-/* truth.c: see loop.h. Here: what the simulation tells of itself. */
+/* truth.c: see loop.h. Here: what the simulation reports of itself. */
 #include <string.h>
 
 #include "state.h"

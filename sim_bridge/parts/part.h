@@ -113,7 +113,7 @@ typedef struct part_kind {
   size_t size;    /* of its struct */
   uint32_t noise; /* key of the first one's noise; of the others it is higher by their index */
   int pins;       /* how many it has */
-  /* Makes it at those pins, with parameters of its own type. Returns 0, or -1: there is no such part. */
+  /* Makes it at those pins, with the parameters of its type. Returns 0, or -1: there is no such part. */
   int (*init)(part *self, const part_place *place, const uint8_t *pins, const void *parameters);
 } part_kind;
 

@@ -1,6 +1,6 @@
 /* servo.h: the pin of a continuous-rotation servo: it measures the width of each pulse, which the motor behind it takes.
  *
- * A pulse is taken at its falling edge. What the servo then does is world/servo_motor; a wheel is on its shaft.
+ * A pulse counts at its falling edge. What the servo then does is world/servo_motor; a wheel is on its shaft.
  */
 #ifndef PART_SERVO_H
 #define PART_SERVO_H

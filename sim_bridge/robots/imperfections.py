@@ -1,6 +1,6 @@
 """What a built robot is like: its body and tyres, and one robot drawn from the spreads of its devices by seed.
 
-What each device does not do ideally stands in its file in sim_bridge/devices. Sources are named beside the values:
+What each device does not do ideally is in its file in sim_bridge/devices. Sources are named beside the values:
 "data" is a manufacturer's or published measurement, "chosen" is ours and to be measured. Without noise every part is
 nominal; what else can be switched off, and by which name, is in switches.py.
 """

@@ -1,7 +1,7 @@
 """Which imperfections of a simulated robot can be switched off, by name, and what each switch sets.
 
-What `boebot run --without`, `BoardRequest.without` and docs/reference/imperfections.md name; most stand in the devices'
-files (sim_bridge/devices). A parameter in capitals is one of these files or of imperfections.py, `supply.key` stands in
+What `boebot run --without`, `BoardRequest.without` and docs/reference/imperfections.md name; most are in the devices'
+files (sim_bridge/devices). A parameter in capitals is one of these files or of imperfections.py, `supply.key` is in
 the robot's file, `Type.key` is a key of a device of a robot without a board. Its value here is the neutral one: with it
 the model is the ideal closed form.
 """
@@ -22,7 +22,7 @@ from sim_bridge.devices.catalogue import Switch, off
 
 _BODY = {
     "slip": off("wheels roll, whatever the floor", "TYRE_SLIP", TYRE_GRIP=10.0),
-    "sampling": off("sensors of a robot without a board tell at every step", "Sensor.period_s"),
+    "sampling": off("sensors of a robot without a board read at every step", "Sensor.period_s"),
 }
 
 

@@ -127,7 +127,7 @@ class Body:
         return float(0.5 * (mass * (v**2 + s.lateral**2) + turning))
 
     def core(self) -> tuple[Any, float]:
-        """What of it makes contact, by shapely: all within so many metres of a point or polygon."""
+        """What of it makes contact, by shapely: all within a distance (m) of a point or polygon."""
         x, y, heading = self.pose
         if self.corners is None:
             return shapely.Point(x, y), float(self.parameters.radius)

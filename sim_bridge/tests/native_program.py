@@ -11,7 +11,7 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess
 from sim_bridge.boards.emulated import native_board
 
-# The tests may stand in a copy of the package below the checkout.
+# The tests may lie in a copy of the package below the checkout.
 FIRMWARE = next(
     folder / "firmware" / "src" for folder in Path(__file__).resolve().parents if (folder / "firmware" / "src").is_dir()
 )

@@ -119,7 +119,7 @@ def add_scripted(
     number: int | None = None,
     without: Sequence[str] = (),
 ) -> Scripted:
-    """One more robot on a script board of its own."""
+    """One more robot, on another script board."""
     script, board = script_board()
     description = load_robot("shieldbot") if robot is None else robot
     return Scripted(sim.add(board, description, pose=pose, number=number, without=without), script)

@@ -1,4 +1,4 @@
-"""Arena files: what can stand in one, whatever is wrong with one, and the schema and page made from the types."""
+"""Arena files: what one may contain, what may be wrong with one, and the schema and page made from the types."""
 
 from __future__ import annotations
 
@@ -230,8 +230,8 @@ def test_page_shows_every_arena_and_an_example_that_loads(tmp_path: Path) -> Non
     example = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)[0]
     assert load_text(tmp_path, example).ray(0, 0.3, 0, 5) == pytest.approx(0.2)
     assert lib.arena_moving_count(load_text(tmp_path, example).handle) == 1
-    told = re.search(r"`yard\.toml(:\d+: disc.*?)`", PAGE)
-    assert told and error_of(tmp_path, example.replace("radius_m = 0.1", "radius_m = 0")) == f"mine.toml{told[1]}"
+    shown = re.search(r"`yard\.toml(:\d+: disc.*?)`", PAGE)
+    assert shown and error_of(tmp_path, example.replace("radius_m = 0.1", "radius_m = 0")) == f"mine.toml{shown[1]}"
 
 
 @pytest.mark.unsanitized

@@ -49,8 +49,8 @@ def test_a_conversion_takes_13_clocks_and_the_first_25(prescaler: int, divider: 
     machine.board.run(40 * divider + 400)
     _, start_1, end_1, start_2, end_2 = edges_of(machine.board.log(), 13)
     for start, end, clocks in ((start_1, end_1, 25), (start_2, end_2, 13)):
-        taken = end - WAKE_AND_MARK - (start - START_TO_MARK)
-        assert clocks * divider < taken + 1 and taken <= (clocks + 1) * divider + 1
+        elapsed = end - WAKE_AND_MARK - (start - START_TO_MARK)
+        assert clocks * divider < elapsed + 1 and elapsed <= (clocks + 1) * divider + 1
     assert int.from_bytes(machine.avr.data(16, 2), "little") == int(2.0 * 1024 / 5.0)
 
 

@@ -14,7 +14,7 @@ from sim_bridge.tests.symbols import entry_of
 
 SBI_CYCLES = 2
 
-# Timer 1 matches at a known cycle, shown by the edge of its own output pin 9; the interrupt moves pin 13.
+# Timer 1 matches at a known cycle, shown by the edge of its output, pin 9; the interrupt moves pin 13.
 MATCH_INTERRUPT = """
 .global __vector_11
 __vector_11:

@@ -1,5 +1,5 @@
 """The recorder of the emulated ATmega328P: spans, latencies and stack of programs whose times follow from the data
-sheet (12.4, 7) and the instruction set manual; and that whoever is recorded does the same as before."""
+sheet (12.4, 7) and the instruction set manual; and that a recorded machine does the same as before."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TIMERS = """
 
 
 def recorded(source: str, cycles: int, *functions: str, **watch: int) -> tuple[Machine, Any]:
-    """A machine that has run for so many cycles, and what was recorded of it."""
+    """A machine that has run for some cycles, and what was recorded of it."""
     machine = Machine(source)
     entries = [entry_of(assemble(source), name) for name in functions]
     machine.avr.record(Watch(functions=entries, **watch))

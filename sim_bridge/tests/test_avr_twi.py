@@ -91,7 +91,7 @@ def sda_at(log: list[Edge], cycle: int) -> int:
 def acknowledging(program: str, cycles: int, bits: dict[int, str]) -> Bus:
     """A bus on which a device sends bits: for each byte (by number) the nine of them, "1" and "." let go.
 
-    The program's timing does not depend on the bits: a dry run tells when SCL falls.
+    The program's timing does not depend on the bits: a dry run shows when SCL falls.
     """
     dry = falls(Bus(program, cycles).run())
     bus = Bus(program, cycles)
@@ -154,7 +154,7 @@ def test_master_transmitter() -> None:
 
 def test_master_receiver_and_repeated_start() -> None:
     program = "setup 20, 0\n start\n send 0x3C\n start\n send 0x3D\n take 1\n take 0\n stop\n sbi PINB, 5"
-    # the repeated START costs a fall of its own: its nine bits stand one fall later
+    # the repeated START costs one fall: its nine bits come one fall later
     dry = falls(Bus(program, 6000).run())
     assert len(dry) == 1 + 9 + 1 + 27
     bus = Bus(program, 6000)

@@ -62,7 +62,7 @@ ROBOTS = {"native": "shieldbot", "avr": "shieldbot", "direct": "arsim"}
 @pytest.fixture
 def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Tells of each run whether the robot stands still once its driver has let go of it."""
-    told: list[bool] = []
+    stopped: list[bool] = []
 
     def board(url: str, request: BoardRequest) -> BoardSession:
         session = open_board(url, request)
@@ -73,7 +73,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
             session.transport.read(1.0, 1.0)  # wheels that nothing drives have stopped by then
             truth = session.truth()
             assert truth is not None and truth.left_speed is not None
-            told.append(bool(abs(truth.left_speed[-1]) < 1e-3 < abs(truth.left_speed).max()))
+            stopped.append(bool(abs(truth.left_speed[-1]) < 1e-3 < abs(truth.left_speed).max()))
             close()
 
         session.close = look_and_close  # type: ignore[method-assign]
@@ -88,7 +88,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         close = session.close
 
         def look_and_close() -> None:
-            told.append(calls.count("step") > 10 and calls[-1] == "stop")
+            stopped.append(calls.count("step") > 10 and calls[-1] == "stop")
             close()
 
         session.close = look_and_close  # type: ignore[method-assign]
@@ -98,7 +98,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path)
     monkeypatch.setattr(runner, "open_board", board)
     monkeypatch.setattr(runner, "open_vehicle", vehicle)
-    return told
+    return stopped
 
 
 def spy(session: DirectSession, name: str, calls: list[str]) -> None:

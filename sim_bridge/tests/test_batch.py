@@ -36,7 +36,7 @@ def model() -> VehicleModel:
 
 
 def driven(worlds: list[int], threads: int = 1, chunk: int = 50) -> dict[int, int]:
-    """Hash of each of those worlds after 300 steps under signals of its own."""
+    """Hash of each of those worlds after 300 steps under its own signals."""
     batch = Batch(model(), load_arena("arsim"), STARTS[worlds], np.array(worlds) + 5, threads=threads)
     signals = np.array([[0.5 + 0.03 * k, 0.7 - 0.05 * k] for k in worlds])
     for _ in range(300 // chunk):
@@ -134,7 +134,7 @@ def test_a_brain_by_its_address_is_asked_in_every_step() -> None:
 
 
 def test_a_world_that_ends_leaves_its_neighbours_as_they_are_alone() -> None:
-    """At collisions at different times, and where a brain fails; whoever goes on does as it does by itself."""
+    """At collisions at different times, and where a brain fails; the worlds that go on do as they do alone."""
     fragile = arsim(odometer_sigma=1e-3, ends_at_collision=True)
     signals = np.array([[0.5 + 0.03 * k, 0.7 - 0.05 * k] for k in range(12)])
     batch = Batch(fragile, load_arena("arsim"), STARTS, np.arange(12))

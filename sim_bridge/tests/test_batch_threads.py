@@ -117,7 +117,7 @@ def test_ctrl_c_ends_a_long_call_and_the_batch_goes_on(threads: int, way: str) -
     done = batch.steps
     assert done.min() > 0
     assert np.array_equal(batch.steps, done), "nothing runs on"
-    for index in (0, 7):  # each is a world that was asked for so many steps
+    for index in (0, 7):  # each is a world that was asked for this many steps
         other = Batch(batch.model, batch.arenas[index], np.zeros((1, 3)), [index])
         if way == "step":
             other.step(signals[:1], int(done[index]))

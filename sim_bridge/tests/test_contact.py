@@ -1,4 +1,4 @@
-"""One body against what stands in an arena: sliding, turning, corners, no way through, no energy."""
+"""One body against the shapes of an arena: sliding, turning, corners, no way through, no energy."""
 
 from __future__ import annotations
 

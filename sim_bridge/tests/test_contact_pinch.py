@@ -1,6 +1,6 @@
 """Robots between something that moves and something that does not: walls hold, movers wait; shapely measures.
 
-After each step the distance of every body's core (outline.h) from all edges, discs, movers and other bodies is taken,
+After each step the distance of every body's core (outline.h) from edges, discs, movers and other bodies is measured,
 and the way of its middle since the step before may cross no edge.
 """
 
@@ -252,7 +252,7 @@ def shuttle(speed: float) -> Arena:
 
 
 def reach_of(vehicle: Vehicle, speed: float, late: float) -> float:
-    """Distance of the robot's circle from the block, which is where a triangle wave of its own clock says."""
+    """Distance of the robot's circle from the block, which is where a triangle wave of its clock says."""
     period = 1.5 / speed + 0.0007
     phase = ((vehicle.time - late) / period) % 2
     x = -1 + 1.5 * (phase if phase <= 1 else 2 - phase)

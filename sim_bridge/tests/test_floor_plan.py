@@ -1,4 +1,4 @@
-"""What the simulator tells of an arena for pictures, and the rays that a view of a vehicle draws."""
+"""What pictures get of an arena, and the rays that a view of a vehicle draws."""
 
 from __future__ import annotations
 
@@ -73,9 +73,9 @@ def test_a_run_tells_of_its_own_time() -> None:
     vehicle = open_vehicle("direct", BoardRequest(robot=load_robot("arsim"), arena="showcase"))
     for _ in range(100):
         vehicle.step(0.1, 0.1)
-    told = vehicle.truth()
-    assert told is not None and told.plan.moving[0].time[-1] == pytest.approx(1.0)
-    assert told.plan.moving[0].pose(1.0)[0] == pytest.approx(1.0 + 0.6 / 4)
+    truth = vehicle.truth()
+    assert truth is not None and truth.plan.moving[0].time[-1] == pytest.approx(1.0)
+    assert truth.plan.moving[0].pose(1.0)[0] == pytest.approx(1.0 + 0.6 / 4)
 
 
 def lengths(view: View) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Moving shapes that waited for a robot are told where they really were: after runs, in logs and in a view."""
+"""Moving shapes that waited for a robot are drawn where they really were: after runs, in logs and in a view."""
 
 from __future__ import annotations
 
@@ -78,18 +78,18 @@ def run(sim: Sim, seconds: float) -> Iterator[tuple[float, tuple[float, float, f
 def check(truth: Truth | None, arena: Arena, seen: list[tuple[float, tuple[float, float, float]]]) -> Moving:
     """The plan has the shape where the world had it, and by its path alone it would be elsewhere."""
     assert truth is not None
-    (told,) = truth.plan.moving
+    (shape,) = truth.plan.moving
     seen = [(time, pose) for time, pose in seen if time <= truth.time[-1]]
-    assert max(apart(told.pose(time), pose) for time, pose in seen) < 1e-6
+    assert max(apart(shape.pose(time), pose) for time, pose in seen) < 1e-6
     (path,) = floor_plan(arena, float(truth.time[0]), float(truth.time[-1])).moving
     assert max(apart(path.pose(time), pose) for time, pose in seen) > 0.3
-    return told
+    return shape
 
 
-def deepest(told: Moving, columns: Any, radius: float) -> float:
+def deepest(shape: Moving, columns: Any, radius: float) -> float:
     """How far a robot's circle is in the shape at most, m; negative: it never touches."""
     rows = zip(*(columns[name].tolist() for name in ("time", "x", "y")), strict=True)
-    return max(radius - float(shapely.distance(shape_of(told.at(t)), shapely.Point(x, y))) for t, x, y in rows)
+    return max(radius - float(shapely.distance(shape_of(shape.at(t)), shapely.Point(x, y))) for t, x, y in rows)
 
 
 def test_a_robot_without_a_board_is_pinched_and_leaves() -> None:
@@ -101,8 +101,8 @@ def test_a_robot_without_a_board_is_pinched_and_leaves() -> None:
     assert 0.5 < late.waited[-1] < PINCHED_S
     pinched.signals(1.0, 1.0)
     seen += run(sim, FREE_S)
-    told = check(truth_of(pinched), arena, seen)
-    assert abs(deepest(told, pinched.truth(), robot.body.radius_m)) < 2e-6, "it was touched, never entered"
+    shape = check(truth_of(pinched), arena, seen)
+    assert abs(deepest(shape, pinched.truth(), robot.body.radius_m)) < 2e-6, "it was touched, never entered"
     (late,) = sim.lateness()
     assert len(late.time) < 100, "rows only where something changes"
 
@@ -121,7 +121,7 @@ def test_a_robot_with_a_board_is_pinched_and_taken_away(disc: bool) -> None:
 
 
 def test_saved_and_restored_in_between() -> None:
-    """Restored while it waits, the world tells the same and goes on with the same bits."""
+    """Restored while it waits, the world gives the same path and goes on with the same bits."""
 
     def build() -> Sim:
         sim = Sim(press())
@@ -179,8 +179,8 @@ def test_view_and_recorder_have_the_vehicles_own() -> None:
             where = shape_of(Solid(kind="obstacle", points=np.array(square(0, 0, SIDE))).placed(*pose_of(mover)))
             assert shapely.hausdorff_distance(drawn, where) < 1e-9
     assert vehicle.movers[0].waited > 0.5
-    (told,) = log.floor_plan().moving
-    assert abs(deepest(told, log, radius)) < 2e-6, "it was touched, never entered"
+    (shape,) = log.floor_plan().moving
+    assert abs(deepest(shape, log, radius)) < 2e-6, "it was touched, never entered"
     path = floor_plan(vehicle.arena, 0.0, vehicle.time).moving[0]
     assert deepest(path, log, radius) > 0.05
     vehicle.place((0.7, 0.0, 0.0))
@@ -216,11 +216,11 @@ def test_poses_are_those_of_the_path_by_its_own_clock(
         rows += [(time + goes, late), (time + goes + waits, late + waits)]
     clock = Lateness(time=np.array([t for t, _ in rows]), waited=np.array([late for _, late in rows]))
     arena = Arena(ArenaDescription(name="any", moving=[moving]))
-    (told,) = floor_plan(arena, begin, begin + seconds, [clock]).moving
+    (shape,) = floor_plan(arena, begin, begin + seconds, [clock]).moving
     asked = np.linspace(begin, begin + seconds, 101)
     own = asked - np.interp(asked, clock.time, clock.waited)
     phase = own % (2 * times[-1])
     folded = own if repeat == "once" else np.where(phase > times[-1], 2 * times[-1] - phase, phase)
-    for found, column in ((told.x, 1), (told.y, 2)):
+    for found, column in ((shape.x, 1), (shape.y, 2)):
         values = np.interp(folded, times, [point[column] for point in way])
-        assert np.allclose(np.interp(asked, told.time, found), values, atol=1e-8 / times[1:].min())
+        assert np.allclose(np.interp(asked, shape.time, found), values, atol=1e-8 / times[1:].min())

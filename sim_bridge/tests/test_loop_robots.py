@@ -26,7 +26,7 @@ def drive(robot: Scripted, seconds: float, left: float, right: float) -> None:
 
 
 def run_in_order(order: tuple[int, ...], noise: bool = True) -> tuple[int, list[Any]]:
-    """Three robots that cross each other's way, added in that order; the state's hash and what each board was told."""
+    """Three robots that cross each other's way, added in that order; the state's hash and what each board received."""
     sim = sim_of(seed=5, noise=noise)
     poses = {0: (0.0, 0.0, 0.0), 3: (0.5, 0.02, math.pi), 7: (0.2, 0.5, -1.2)}
     robots = {number: add_scripted(sim, pose=poses[number], number=number) for number in order}

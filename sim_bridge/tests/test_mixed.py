@@ -1,6 +1,6 @@
 """Robots without boards in one world, among themselves and beside robots with boards: they sense and bump each other.
 
-Truth: the same vehicle in a world of its own (sim_bridge.vehicle), closed forms, and equality of runs bit for bit.
+Truth: the same vehicle alone in a world (sim_bridge.vehicle), closed forms, and equality of runs bit for bit.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ def stand(robot: Robot) -> None:
 
 
 def path(result: RunResult) -> bytes:
-    """Of the true path and of all that the brain was told and did."""
+    """Of the true path and of all that the brain sensed and did."""
     assert result.error is None and result.truth is not None
     columns = (result.truth.x, result.truth.y, result.truth.heading, result.truth.contact)
-    told = repr((result.record.readings, result.record.steps, result.bytes_from_board)).encode()
-    return b"".join(column.tobytes() for column in columns) + told
+    sensed = repr((result.record.readings, result.record.steps, result.bytes_from_board)).encode()
+    return b"".join(column.tobytes() for column in columns) + sensed
 
 
-# ---- the same vehicle as in a world of its own -----------------------------------------------------------------------
+# ---- the same vehicle as alone in a world --------------------------------------------------------------------------
 
 
 def test_alone_in_a_shared_world_it_is_the_vehicle_of_its_own_world() -> None:

@@ -57,7 +57,7 @@ def test_e01_full_model_against_an_integrator() -> None:
 
     motor = dc_motor(gear=1.0)
     current = ffi.new("double *", 3.0)
-    speed, dt = 2.0, 2e-6  # it turns already; standstill has a law of its own
+    speed, dt = 2.0, 2e-6  # it turns already; standstill has its own law
     times = np.array([0.0005, 0.002, 0.01])
     truth = solve_ivp(rates, (0, 0.02), [3.0, 2.0], method="LSODA", rtol=1e-10, atol=1e-12, t_eval=times)
     assert truth.success

@@ -123,13 +123,13 @@ def test_memory_outlives_a_reset_but_not_the_loss_of_supply(cause: ResetCause) -
 # ---- supply ----
 
 METER = """
-static void tell(void) {
+static void report(void) {
   const uint16_t result = hal_analog_result();
   const uint8_t bytes[2] = {(uint8_t)result, (uint8_t)(result >> 8)};
   say(bytes, 2);
 }
-static void start(void) { tell(); hal_analog_select(HAL_ANALOG_BANDGAP); hal_analog_convert(); }
-static void slot(void) { tell(); hal_analog_convert(); tell(); }
+static void start(void) { report(); hal_analog_select(HAL_ANALOG_BANDGAP); hal_analog_convert(); }
+static void slot(void) { report(); hal_analog_convert(); report(); }
 """
 
 

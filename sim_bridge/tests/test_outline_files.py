@@ -135,7 +135,7 @@ def test_a_model_takes_an_outline_or_says_why_not(bad: Any) -> None:
         VehicleModel(ARSIM_BODY | {"outline_m": bad})
 
 
-def test_a_narrow_outline_is_refused_and_an_array_taken() -> None:
+def test_a_narrow_outline_is_refused_and_an_array_accepted() -> None:
     with pytest.raises(RobotError, match=r"narrower than 0\.4 mm"):
         VehicleModel(ARSIM_BODY | {"outline_m": [(-1, -1e-4), (1, -1e-4), (1, 1e-4), (-1, 1e-4)]})
     model = VehicleModel(ARSIM_BODY | {"outline_m": np.array(BOX)}, ends_at_collision=False)

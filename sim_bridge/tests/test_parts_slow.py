@@ -141,7 +141,7 @@ def test_near_things_look_far() -> None:
     assert lib.script_board_volts(near.script, 2) < 0.5 * lib.script_board_volts(far.script, 2)
 
 
-def test_a_new_value_every_38_ms_whoever_asks_and_7_6_ms_late() -> None:
+def test_a_new_value_every_38_ms_at_any_time_of_asking_and_7_6_ms_late() -> None:
     """The robot is put nearer at 50 ms: the measurement at 76.6 ms is the first that knows, out at 84.2 ms."""
     robot = sharp_before(0.8)
     robot.run(0.05)

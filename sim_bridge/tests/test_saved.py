@@ -188,7 +188,7 @@ def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: 
 
 
 def drive(session: with_board.SimSession) -> None:
-    """Straight on for half a second, over a link of its own."""
+    """Straight on for half a second, over its own link."""
     link = Link(session.transport)
     link.open()
     link.arm()

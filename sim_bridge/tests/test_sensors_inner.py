@@ -165,14 +165,14 @@ def test_bad_tables_are_refused() -> None:
 
 def test_sample_and_hold_keeps_its_own_grid() -> None:
     hold = ffi.new("sample_hold *", {"period": 0.04})
-    taken = []
+    due = []
     for step in range(100):
         time = step * 0.01
         if lib.sample_hold_due(hold, time):
             lib.sample_hold_take(hold, time, step)
-            taken.append(step)
+            due.append(step)
         assert time - hold.taken <= 0.04
-    assert taken == list(range(0, 100, 4))
+    assert due == list(range(0, 100, 4))
 
 
 def test_a_unit_keeps_its_bias_and_units_differ() -> None:

@@ -361,7 +361,7 @@ def test_vehicle_reads_ideal_values(without: tuple[str, ...], name: str, ideal: 
 
 
 def test_odometer_and_sampling_of_a_vehicle() -> None:
-    """The odometer's pose is the true one; the compass tells at every step."""
+    """The odometer's pose is the true one; the compass reads at every step."""
     devices = {
         "odometer": msgspec.structs.replace(ARSIM.device["odometer"], sigma_step_m=0.001),
         "compass": msgspec.structs.replace(ARSIM.device["compass"], period_s=0.5),

@@ -106,7 +106,7 @@ def test_nothing_is_lost_in_the_figures(figures: Run) -> None:
 
 
 def test_an_overload_fills_the_line_and_masks_the_noise_without_a_late_tick() -> None:
-    """50,000 bytes/s come; noise is told from the tick on in which it began."""
+    """50,000 bytes/s come; noise is reported from the tick on in which it began."""
     image, ticks = avr_image("shieldbot-quad"), 50
     found = run(image, robot_of(image), "overload", ticks / 100, 1)
     assert found.sent > ticks / 100 * 50_000 * 0.95  # the first tick is a phase
@@ -135,20 +135,20 @@ def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
         events = {
             heard.message.number: heard.message for heard in line.heard[since:] if isinstance(heard.message, Event)
         }
-        told = line.wait(Counters, after)
+        counters = line.wait(Counters, after)
     kinds = [events[number].kind for number in sorted(events)]
     all_kinds = set(EventKind) - {EventKind.FALLBACK}  # no brain is on
     assert set(kinds[4 : 4 + len(all_kinds)]) == all_kinds, kinds
-    assert told.deferred > 3 * len(all_kinds)
+    assert counters.deferred > 3 * len(all_kinds)
     assert MASKED in seen, "noise of both wheels in one tick"
 
 
 def test_a_search_finds_no_less_than_its_first_run_and_is_repeatable() -> None:
     robot = robot_of(IMAGE)
-    told: list[float] = []
-    found = search(IMAGE, robot, "figures", seconds=0.05, runs=3, seed=3, progress=told.append)
+    shown: list[float] = []
+    found = search(IMAGE, robot, "figures", seconds=0.05, runs=3, seed=3, progress=shown.append)
     first = measure(IMAGE, robot, "figures", 0.05, 3)
-    assert told == [1 / 3, 2 / 3, 1.0]
+    assert shown == [1 / 3, 2 / 3, 1.0]
     assert all(found.row(name).largest >= spans.largest for name, spans in first.tasks.items())
     again = search(IMAGE, robot, "figures", seconds=0.05, runs=3, seed=3)
     assert as_json(found) == as_json(again)

@@ -22,7 +22,7 @@ from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
 from sim_bridge.timing.losses import losses
 
 CYCLES_PER_US = 16
-SAME_WIDTH = 16  # cycles by which a pulse may differ from what it is taken for
+SAME_WIDTH = 16  # cycles by which a pulse may differ from the set-point's
 
 
 def measure_jitter(
@@ -104,7 +104,7 @@ def echo_lengths(run: Run) -> Distribution:
 
 
 def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:
-    """Each echo with the first telemetry that tells of it: the one whose age begins anew."""
+    """Each echo with the first telemetry that shows it: the one whose age begins anew."""
     telemetry = run.line.telemetry
     for before, heard in pairwise(telemetry):
         if heard.message.ping_age < before.message.ping_age or before.message.ping_age == 255 != heard.message.ping_age:
@@ -142,7 +142,7 @@ def reactions(run: Run) -> list[Distribution]:
 
 
 def observations(run: Run) -> list[Distribution]:
-    """From an event at a pin to the end of the telemetry that first tells of it."""
+    """From an event at a pin to the end of the telemetry that first shows it."""
     telemetry = run.line.telemetry
     found = []
     for side, bit in (("left", 1), ("right", 2)):
@@ -167,5 +167,5 @@ def observations(run: Run) -> list[Distribution]:
 
 
 def lost(run: Run) -> Losses:
-    """What got lost in a run. Lets time pass until the board tells."""
+    """What got lost in a run. Lets time pass until the board reports it."""
     return losses(run.line, run.encoders, run.load.name)

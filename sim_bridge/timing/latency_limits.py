@@ -50,7 +50,7 @@ def setpoint_to_pulse(slot: int) -> Limits:
 
 # Sampled at the start of each slot, pressed at the second sample in a row (whisker.c), reported in slot 0. Earliest:
 # pressed just before the sample of slot 3, which may itself be late by almost a slot. The latest: just after that
-# sample; slots 0 and 1 sample it, and the next slot 0 tells.
+# sample; slots 0 and 1 sample it, and the next slot 0 reports it.
 WHISKER = Limits(TOLD_EARLIEST, SLOT_CYCLES + TICK_CYCLES + TOLD_LATEST)
 
 # Counted, or captured, at once; reported in the next slot 0 whose task has not yet run.

@@ -17,7 +17,7 @@ MASKED = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MAS
 
 
 def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]], load: str) -> Losses:
-    """Since power-on, of a board that nothing acts on any more. Lets time pass until the board tells.
+    """Since power-on, of a board that nothing acts on any more. Lets time pass until the board reports it.
 
     `wheels`: the encoder lines of the left and the right wheel; one whose line is noisy may be left empty: its edges
     are masked, and not counted as lost.

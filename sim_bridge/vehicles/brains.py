@@ -1,4 +1,4 @@
-"""Brains in Python that drive the worlds of a batch: in each world one of its own, and a robot as in `boebot.run`."""
+"""Brains in Python that drive the worlds of a batch: one in each world, with a robot as in `boebot.run`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Brains:
             self._direct.append(direct)
 
     def step(self, ticks: list[int], readings: list[list[float]], runs: list[bool]) -> list[tuple[float, float]]:
-        """One step of the brain of each world that `runs`, after so many ticks and with these readings there. Returns
+        """One step of the brain of each world that `runs`, after that many ticks and with these readings there. Returns
         the motor signals.
 
         Raises:

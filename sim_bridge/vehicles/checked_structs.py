@@ -34,7 +34,7 @@ class Range:
         return (value > self.low if self.above else value >= self.low) and value <= self.high
 
     def text(self, whole: bool = False) -> str:
-        """As it stands in a message."""
+        """As it is shown in a message."""
         if self.choices:
             return " or ".join(f"{choice:g}" for choice in self.choices)
         kind = "a whole number" if whole else "a number"

@@ -70,7 +70,7 @@ static int run_row(vehicles *self, const size_t row[], vehicle_brain *brain, siz
   return status;
 }
 
-/* Worlds that run are taken into rows; the last few go alone. */
+/* Worlds that run are put into rows; the last few go alone. */
 static int run_all(vehicles *self, size_t first, size_t count, vehicle_brain *brain, size_t steps) {
   int status = VEHICLE_OK;
   size_t row[ROW];

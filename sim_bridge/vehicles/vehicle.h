@@ -71,7 +71,7 @@ void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *fl
 const body_state *vehicles_body(const vehicles *self, size_t i);
 uint64_t vehicles_steps_done(const vehicles *self, size_t i);
 
-/* The arena's moving shapes as they stand in that world; good until it is placed anew. */
+/* The arena's moving shapes as they are in that world; good until it is placed anew. */
 const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count);
 double vehicles_energy(const vehicles *self, size_t i);
 

@@ -190,10 +190,10 @@ static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
   for (size_t number = 0; number < m->sensors_count; number++) {
     const vehicle_sensor *sensor = &m->sensors[number];
     const double *draws = s.draws[count];
-    const unsigned taken = draws_of(sensor);
-    count += taken;
-    for (size_t k = 0; k < ROW && taken == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
-    if (taken == 0) continue;
+    const unsigned needed = draws_of(sensor);
+    count += needed;
+    for (size_t k = 0; k < ROW && needed == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
+    if (needed == 0) continue;
     if (sensor->kind == infrared_proximity_sensor) read_eyes(&s, sensor, draws);
     if (sensor->kind == compass_sensor) read_compasses(&s, sensor, draws);
     if (sensor->kind == odometer_sensor) read_odometers(&s, sensor, draws);

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 /* python: begin */
-/* Its memory; zero at first. `seed` tells worlds apart. Readings 0 and 1 must be the IR sensors, left and right. */
+/* Its memory; zero at first. `seed` differs between worlds. Readings 0 and 1 must be the IR sensors, left and right. */
 typedef struct {
   uint64_t seed, draws;
   int32_t state; /* 0 start forward, 1 forward, 2 turning */

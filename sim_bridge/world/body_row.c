@@ -1,4 +1,4 @@
-/* body_row.c: body_advance_row of body_step.h: speeds and the way where nothing stands in it for a whole row at once, all else for
+/* body_row.c: body_advance_row of body_step.h: speeds and the way where nothing blocks it for a whole row at once, all else for
  * each body alone. */
 #include <string.h>
 

@@ -3,7 +3,7 @@
  * Each wheel carries half the weight. While the force that rolling without slip needs lies within grip * load at both
  * wheels, (2.16) and (2.17) hold. Beyond that a wheel's rim has its own speed, I_w dw/dt = tau - F r (2.12), and the
  * floor pulls against the slip, F = -grip N s / |s| with s the velocity of the tyre's print over the floor. A step solves
- * both wheels together for the impulses that leave the least energy, which is that law with the slip taken at the step's
+ * both wheels together for the impulses that leave the least energy, which is that law with the slip at the step's
  * end: stable at any step, and it never adds energy. With `slip` off the wheels always roll, and only the speed across
  * the heading is held by friction.
  */

@@ -7,7 +7,7 @@
 
 #define PULSE_MINIMUM_US 500.0
 #define PULSE_MAXIMUM_US 2500.0
-#define HOLD_S 0.050 /* without a pulse for so long: the controller rests */
+#define HOLD_S 0.050 /* without a pulse for this long: the controller rests */
 
 void motor_position_default(motor_position_parameters *out) {
   *out = (motor_position_parameters){

@@ -4,8 +4,8 @@
  * polygon shrunk by its rounding, and the body is everything within the rounding of its core. So the straight sides are
  * where the polygon says, its outward corners are rounded, and a contact always has a direction. A corner's tip lies
  * outside of that by r (1 / sin(a/2) - 1), r the rounding and a the corner's angle: the sharpest corner decides the
- * rounding, so that this is at most 0.1 mm. Section 3.2.5 of the notes: a detailed robot has a simplified collision
- * geometry of its own.
+ * rounding, so that this is at most 0.1 mm. Section 3.2.5 of the notes: a detailed robot has its own
+ * simplified collision geometry.
  */
 #ifndef WORLD_OUTLINE_H
 #define WORLD_OUTLINE_H

@@ -52,6 +52,6 @@ double servo_motor_torque(const servo_motor_parameters *p, servo_motor *self, do
 
 #define SERVO_MOTOR_NEUTRAL_US 1500.0
 #define SERVO_MOTOR_SPAN_US 200.0
-#define SERVO_MOTOR_HOLD_S 0.050 /* without a pulse for so long: it lets go */
+#define SERVO_MOTOR_HOLD_S 0.050 /* without a pulse for this long: it lets go */
 
 #endif

@@ -5,7 +5,7 @@
  * robot and what it senses is its owner's: a vehicle with motors and sensors by their models, or the parts that join a
  * board to its pins.
  *
- * A robot that is alone does not stand in the scene: nobody could sense it.
+ * A robot that is alone is not in the scene: nobody could sense it.
  */
 #ifndef WORLD_WORLD_H
 #define WORLD_WORLD_H

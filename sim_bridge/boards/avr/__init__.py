@@ -62,7 +62,7 @@ def _extension() -> Any:
 
 class AvrBoard:
     """An emulated Arduino Uno. `pointer` is its `board *` as an integer, valid until `close` or the end of this
-    object: whoever uses the pointer keeps this object.
+    object: the user of the pointer keeps this object.
     """
 
     def __init__(self, elf: bytes, path: Path) -> None:

@@ -1,5 +1,5 @@
 /* avr_arithmetic.h: results and flags of arithmetic instructions, after the AVR instruction set manual. The flags are
- * those of avr_t: each in a byte of its own, 0 or 1.
+ * those of avr_t: each in its own byte, 0 or 1.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */

@@ -49,13 +49,13 @@ static bool load_segment(avr_board *b, const uint8_t *bytes, uint32_t address, u
 /* What a segment says of the program: where its code ends, or its variables, if they leave memory for a stack. */
 static void heed_segment(avr_board *b, const uint8_t *segment) {
   uint32_t place = word(segment + 8), address = word(segment + 12), length = word(segment + 16);
-  uint32_t taken = word(segment + 20), flags = word(segment + 24);
+  uint32_t size = word(segment + 20), flags = word(segment + 24);
   if ((flags & SEGMENT_EXECUTABLE) && address < AVR_BOARD_FLASH_SIZE && address + length > b->code_end) {
     b->code_end = address + length;
   }
   uint32_t begin = place - DATA_BASE;
-  if (begin < BOARD_DATA_SIZE && taken < BOARD_DATA_SIZE - begin && begin + taken > b->lowest_stack) {
-    b->lowest_stack = (uint16_t)(begin + taken);
+  if (begin < BOARD_DATA_SIZE && size < BOARD_DATA_SIZE - begin && begin + size > b->lowest_stack) {
+    b->lowest_stack = (uint16_t)(begin + size);
   }
 }
 

@@ -380,7 +380,7 @@ board_state run_until(avr_board *b, uint64_t until);
 bool core_stopped(avr_board *b);           /* because it sleeps, or not; false: it cannot go on */
 uint64_t next_of_simavr(const avr_t *avr); /* when the next of simavr's own timers is due, or NEVER */
 void restart(avr_board *b);                /* for the causes in `reset_wanted` */
-void hear_core(avr_board *b);              /* what simavr's core tells, from each of its resets on */
+void hear_core(avr_board *b);              /* connects to simavr's core; after each of its resets */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
 void raise_flag(avr_board *b, uint8_t vector);
 void clear_flag(avr_board *b, uint8_t vector);

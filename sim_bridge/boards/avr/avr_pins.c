@@ -80,7 +80,7 @@ static uint64_t first_due(const change_queue *q) { return q->first < q->end ? q-
 
 /* ---- ports ---- */
 
-/* Hands edges to whoever looks at edges: pin-change, capture and external interrupts. */
+/* Hands edges to what reacts to edges: pin-change, capture and external interrupts. */
 static void see_edges(avr_board *b, uint8_t port, uint8_t moved, uint64_t cycle) {
   uint8_t watched = b->avr->data[REG_PCMSK0 + port];
   if (port == PORT_B) watched |= 1u << CAPTURE_BIT;

@@ -170,7 +170,7 @@ static bool enter_interrupt(avr_board *b) {
   return true;
 }
 
-/* simavr tells of RETI; the instruction after it runs even if I was set before. */
+/* simavr reports RETI; the instruction after it runs even if I was set before. */
 static void on_reti(struct avr_irq_t *irq, uint32_t value, void *param) {
   avr_board *b = param;
   (void)irq;

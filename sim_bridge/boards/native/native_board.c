@@ -31,7 +31,7 @@ typedef struct {
   uint32_t baud;      /* of the outside's side of the line */
   uint64_t line_free; /* cycle at which the last byte to the board has arrived */
   native_byte_queue outgoing;
-  uint64_t bytes_out; /* taken by receive() */
+  uint64_t bytes_out; /* returned by receive() */
   uint64_t edges_out, resets;
 
   board_analog_source *analog_source;
@@ -303,19 +303,19 @@ static void board_send(board *face, uint64_t at, const uint8_t *bytes, size_t co
 static size_t board_receive(board *face, uint8_t *bytes, uint64_t *cycles, size_t capacity) {
   native_board *self = of_board(face);
   native_byte_queue *queue = &self->outgoing;
-  size_t taken = 0;
-  while (taken < capacity && queue->count > 0 && queue->bytes[queue->first].cycle <= self->machine.now) {
+  size_t count = 0;
+  while (count < capacity && queue->count > 0 && queue->bytes[queue->first].cycle <= self->machine.now) {
     read_by_outside(self, &queue->bytes[queue->first]);
-    bytes[taken] = queue->bytes[queue->first].byte;
+    bytes[count] = queue->bytes[queue->first].byte;
     if (cycles != NULL) {
-      cycles[taken] = queue->bytes[queue->first].cycle;
+      cycles[count] = queue->bytes[queue->first].cycle;
     }
-    taken++;
+    count++;
     queue->count--;
     queue->first = queue->count == 0 ? 0 : queue->first + 1;
   }
-  self->bytes_out += taken;
-  return taken;
+  self->bytes_out += count;
+  return count;
 }
 
 static void board_line_rate(board *face, uint32_t baud) {
@@ -351,7 +351,7 @@ static void board_hold(board *face, bool held) {
 static void board_counters_now(const board *face, board_counters *out) {
   const native_board *self = of_const_board(face);
   const native_byte_queue *queue = &self->outgoing;
-  uint64_t waiting = 0; /* bytes that have left and were not taken yet */
+  uint64_t waiting = 0; /* bytes that have left and were not read yet */
   while (waiting < queue->count && queue->bytes[queue->first + waiting].cycle <= self->machine.now) {
     waiting++;
   }

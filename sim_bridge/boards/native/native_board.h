@@ -1,6 +1,6 @@
 /* native_board.h: an emulated board that runs the firmware's own C, compiled for the PC (firmware/src/hal/native).
  *
- * Each board loads a copy of the firmware library of its own, so that boards share no state, and a reset is the
+ * Each board loads its own copy of the firmware library, so that boards share no state, and a reset is the
  * unloading of that copy and the loading of a fresh one. Much faster than the AVR board; it has the same events at the
  * same cycles but for what the AVR's own instructions take: here the firmware's work takes no time. */
 #ifndef NATIVE_BOARD_H

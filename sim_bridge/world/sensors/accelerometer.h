@@ -1,4 +1,4 @@
-/* accelerometer.h: a proof mass on a spring (Fig. 1.10 of the notes); its deflection z tells the acceleration, a = k z / m.
+/* accelerometer.h: a proof mass on a spring (Fig. 1.10 of the notes); its deflection z gives the acceleration, a = k z / m.
  *
  * m z'' + c z' + k z = m a, stepped implicitly, which is stable for every step: a stiff sensor simply follows.
  */

@@ -16,7 +16,7 @@ typedef struct {
   double range;       /* m, at 38 kHz, for a white surface */
   double range_sigma; /* relative spread of the range from burst to burst, (3.1); 0: none */
   double
-      false_hit; /* probability per burst that light from elsewhere (fluorescent lamps) is taken for an echo; 0: never */
+      false_hit; /* probability per burst that light from elsewhere (fluorescent lamps) looks like an echo; 0: never */
   double
       direct; /* m: from how far the LED of another pair is seen by the receiver at 38 kHz; 0: never (no cross-talk) */
 } infrared_pair_parameters;
