@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from boebot.brain.leaky import LeakyIntegrator
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import (
+    Draw,
+    Floats,
+    Measured,
+    Outcome,
+    Progress,
+    about,
+    exactly,
+    experiment,
+    with_progress,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 STEP = 0.01  # s
 SIZE, SPREAD, SPEED = 10.0, 2.5, 1.0  # side of the square, width of the attractant, speed of a run
 
 
-def utility_of(stimulus: NDArray[np.float64], a: float, b: float, step: float) -> NDArray[np.float64]:
+def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
     """U = X - V, dV/dt + a V = b X  (4.1), with V(0) = (b/a) X(0) and X held over each step."""
     memory = LeakyIntegrator(a, b, b / a * float(stimulus[0]))
     values = []
@@ -96,9 +107,9 @@ def sign(seed: int, progress: Progress) -> Outcome:
 class Swarm:
     """Bacteria after some time."""
 
-    begun: NDArray[np.float64]
+    begun: Floats
     """positions at the beginning, shape (n, 2)"""
-    ended: NDArray[np.float64]
+    ended: Floats
     """and at the end"""
     running: float
     """share of steps that were runs"""
@@ -133,7 +144,7 @@ def swarm(
         drift: speed of the attractant's middle, along x.
     """
 
-    def attractant(at: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def attractant(at: Floats, time: float) -> Floats:
         if uniform:
             return np.full(len(at), 0.5)
         return np.asarray(np.exp(-((at - (drift * time, 0.0)) ** 2).sum(axis=1) / (2 * SPREAD**2)))
@@ -155,24 +166,29 @@ def swarm(
     return Swarm(begun, at, runs / (count * round(seconds / STEP)), (drift * seconds, 0.0))
 
 
-def _positions(group: Swarm) -> dict[str, Any]:
-    return {
-        "x0": group.begun[:, 0],
-        "y0": group.begun[:, 1],
-        "x": group.ended[:, 0],
-        "y": group.ended[:, 1],
-    }
+def positions(group: Swarm) -> dict[str, Floats]:
+    """Columns of the data."""
+    return {"x0": group.begun[:, 0], "y0": group.begun[:, 1], "x": group.ended[:, 0], "y": group.ended[:, 1]}
 
 
-def _draw_swarm(group: Swarm, title: str) -> object:
+def begin_and_end(figure: Figure, group: Swarm, title: str = "") -> Iterator[tuple[Axes, Floats]]:
+    """Axes for the beginning and for the end, and the bacteria's positions then."""
+    for axes, at, name in zip(figure.subplots(1, 2), (group.begun, group.ended), ("begin", "after 10 s"), strict=True):
+        axes.set(title=title + name, xlabel="x", ylabel="y", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
+        yield axes, at
+
+
+def draw_circle(axes: Axes, radius: float, middle: tuple[float, float] = (0.0, 0.0), **look: Any) -> None:
+    """A circle of 100 points."""
+    turn = np.linspace(0, 2 * np.pi, 100)
+    axes.plot(middle[0] + radius * np.cos(turn), middle[1] + radius * np.sin(turn), **look)
+
+
+def _draw_swarm(group: Swarm, title: str) -> Draw:
     def draw(figure: Figure) -> None:
-        for axes, at, name in zip(
-            figure.subplots(1, 2), (group.begun, group.ended), ("begin", "after 10 s"), strict=True
-        ):
+        for axes, at in begin_and_end(figure, group, f"{title}, "):
             axes.plot(*at.T, ".", markersize=4)
-            turn = np.linspace(0, 2 * np.pi, 100)
-            axes.plot(SPREAD * np.cos(turn), SPREAD * np.sin(turn), "--", color="0.6")
-            axes.set(title=f"{title}, {name}", xlabel="x", ylabel="y", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
+            draw_circle(axes, SPREAD, linestyle="--", color="0.6")
 
     return draw
 
@@ -184,20 +200,16 @@ def _draw_swarm(group: Swarm, title: str) -> object:
     caption="100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.",
 )
 def accumulation(seed: int, progress: Progress) -> Outcome:
-    groups = []
-    for number in range(10):
+    groups, controls = [], []
+    for number in with_progress(range(10), progress):
         groups.append(swarm(np.random.default_rng([seed, number])))
-        progress(number / 20)
-    controls = []
-    for number in range(10):
         controls.append(swarm(np.random.default_rng([seed, 100 + number]), uniform=True))
-        progress(0.5 + number / 20)
     measured = [
         Measured("mean distance against the beginning", float(np.mean([one.ratio for one in groups])), most=0.3),
         Measured("share within the width at the end", float(np.mean([one.share for one in groups])), least=0.85),
         about("the same ratio in uniform attractant", float(np.mean([one.ratio for one in controls])), 1.0, 0.05),
     ]
-    return Outcome(measured, _positions(groups[0]), _draw_swarm(groups[0], "attractant"))  # type: ignore[arg-type]
+    return Outcome(measured, positions(groups[0]), _draw_swarm(groups[0], "attractant"))
 
 
 @experiment(
@@ -212,4 +224,4 @@ def trap(seed: int, progress: Progress) -> Outcome:
         Measured("share of steps that were runs", group.running, most=0.01),
         about("mean distance against the beginning", group.ratio, 1.0, 0.05),
     ]
-    return Outcome(measured, _positions(group), _draw_swarm(group, "no jitter"))  # type: ignore[arg-type]
+    return Outcome(measured, positions(group), _draw_swarm(group, "no jitter"))

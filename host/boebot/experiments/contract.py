@@ -7,7 +7,7 @@ and the brain's own commands and chance. The walk follows what Python's garbage 
 so that nothing is too private for it, and knows by name the few kinds of objects that may be met.
 
 What nobody can guarantee in Python: a brain that imports the simulator itself, walks the interpreter's frames or lists
-all objects of the process finds the world. It then does so in so many words, and would find nothing on a robot.
+all objects of the process finds the world. Its source then shows it, and it finds nothing on a robot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import boebot
-from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,8 +115,8 @@ class Met(NamedTuple):
 
 
 def walk(start: object) -> list[Met]:
-    """All that an object leads to, to the first foreign one on each way; modules and classes do not count, which
-    whoever may import has anyway."""
+    """All that an object leads to, to the first foreign one on each way; modules and classes do not count: any brain
+    can import them."""
     seen: dict[int, object] = {}  # kept, so that no other object gets its id
     met = []
     waiting: list[tuple[str, object]] = [("robot", start)]
@@ -193,7 +193,7 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         exactly("imports of the simulator or of what knows the truth", guilty, 0),
     ]
     counts: dict[str, dict[str, int]] = {}
-    for number, (robot, on) in enumerate(RUNS):
+    for robot, on in with_progress(RUNS, progress):
         walker = Walker(0.5)
         boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
         counts[robot] = _by_module(walker.met)
@@ -208,7 +208,6 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
                 0,
             ),
         ]
-        progress((number + 1) / len(RUNS))
     modules = sorted(set().union(*counts.values()))
 
     def draw(figure: Figure) -> None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,18 +128,17 @@ class Evolved:
 def evolve(
     seed: int, progress: Progress = lambda share: None, generations: int = GENERATIONS, seconds: float = SECONDS
 ) -> Evolved:
-    """All restarts, each with chance of its own."""
+    """All restarts, each with its own generator."""
     sources = [np.random.default_rng([seed, number]) for number in range(RESTARTS)]
     genes = np.stack([source.normal(0.0, SPREAD, (POPULATION, 4)) for source in sources])
     genes[..., 3] = math.log(0.3) + genes[..., 3] / 4
     genes[..., 3] = np.clip(genes[..., 3], math.log(0.1), math.log(3.0))
     best = []
-    for generation in range(generations):
+    for _ in with_progress(range(generations), progress):
         fitness = live(genes.reshape(-1, 4), seconds=seconds).work.reshape(RESTARTS, POPULATION)
         best.append(fitness.max(axis=1))
         winner = genes.reshape(-1, 4)[fitness.argmax()]
         genes = np.stack([offspring(*each) for each in zip(genes, fitness, sources, strict=True)])
-        progress(generation / generations)
     return Evolved(np.array(best), winner)
 
 

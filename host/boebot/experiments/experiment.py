@@ -1,12 +1,12 @@
-"""What an experiment is: a run of its own, what it measured against what was expected, a figure, and its data."""
+"""What an experiment is: a function of a seed that gives measured against expected figures, a picture, and data."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 """Called now and then with the share that is done, 0 to 1."""
 Draw = Callable[["Figure"], None]
+Thing = TypeVar("Thing")
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,10 @@ class Outcome:
         return columns
 
 
+Run = Callable[[int, Progress], Outcome]
+"""Runs an experiment with a seed."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
     """One experiment, to be run by `boebot experiment NAME`."""
@@ -113,14 +118,13 @@ class Experiment:
     """where in the notes"""
     caption: str
     """of its figure"""
-    robot: str
+    robot: str = "none"
     """the robot that it runs on, and its board where it has one, such as "shieldbot (native)"; or "none" """
-    criterion: str
-    """where what is expected comes from; "" where the notes or their restored figures say it"""
-    slow: bool
+    criterion: str = ""
+    """where the expected values come from; "" where the notes or their restored figures say it"""
+    slow: bool = False
     """takes more than some two seconds"""
-    run: Callable[[int, Progress], Outcome]
-    """with a seed"""
+    run: Run
 
     @property
     def section(self) -> str:
@@ -132,31 +136,20 @@ class Experiment:
 EXPERIMENTS: dict[str, Experiment] = {}
 
 
-def experiment(
-    name: str,
-    *,
-    title: str,
-    source: str,
-    caption: str,
-    robot: str = "none",
-    criterion: str = "",
-    slow: bool = False,
-) -> Callable[[Callable[[int, Progress], Outcome]], Callable[[int, Progress], Outcome]]:
-    """Marks a function of a seed and a progress function as an experiment; see `Experiment` for what is to be said."""
+def experiment(name: str, **description: Any) -> Callable[[Run], Run]:
+    """Marks a function as an experiment; `description` holds the other fields of `Experiment`."""
 
-    def register(run: Callable[[int, Progress], Outcome]) -> Callable[[int, Progress], Outcome]:
+    def register(run: Run) -> Run:
         if name in EXPERIMENTS:
             raise ValueError(f"there are two experiments {name}")
-        EXPERIMENTS[name] = Experiment(
-            name=name,
-            title=title,
-            source=source,
-            caption=caption,
-            robot=robot,
-            criterion=criterion,
-            slow=slow,
-            run=run,
-        )
+        EXPERIMENTS[name] = Experiment(name=name, run=run, **description)
         return run
 
     return register
+
+
+def with_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thing]:
+    """Each thing in turn; `progress` is called after each."""
+    for number, thing in enumerate(things, 1):
+        yield thing
+        progress(number / len(things))

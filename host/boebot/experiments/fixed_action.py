@@ -62,7 +62,7 @@ class Escape:
     """motor signals asked for, a row a step of the brain while the pattern lasts"""
 
     def span(self, values: Any) -> Floats:
-        """What the robot told, at the ticks from release to end and two more steps, in which it shows at the wheels."""
+        """The robot's readings at the ticks from release to end and two more steps, in which it shows at the wheels."""
         time = self.result.series.time
         return np.asarray(values)[(time >= self.released - 1e-9) & (time < self.ended + 2 * PERIOD - 1e-9)]
 

@@ -17,7 +17,7 @@ from boebot.behaviors import Homing, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.cognition import Odometry, PathIntegration
 from boebot.devices.compass import TESLA_PER_COUNT
-from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, experiment, with_progress
 from boebot.experiments.trials import PER_SEED, true_pose
 from boebot.experiments.variants import varied
 
@@ -119,13 +119,12 @@ def ant(compass: float, way: float) -> RobotDescription:
     slow=True,
 )
 def cataglyphis(seed: int, progress: Progress) -> Outcome:
-    noisy, exact = [], []
-    for number in range(4):
-        noisy.append(journey(ant(0.05, 0.02), 200.0, SECONDS, seed + PER_SEED * number))
-        progress((number + 1) / 6)
-    for number in range(2):
-        exact.append(journey(ant(0.0, 0.0), 200.0, SECONDS, seed + PER_SEED * number))
-        progress((number + 5) / 6)
+    noise = [(0.05, 0.02, number) for number in range(4)] + [(0.0, 0.0, number) for number in range(2)]
+    journeys = [
+        journey(ant(compass, way), 200.0, SECONDS, seed + PER_SEED * number)
+        for compass, way, number in with_progress(noise, progress)
+    ]
+    noisy, exact = journeys[:4], journeys[4:]
     measured = [
         Measured("home vector's error, mean of 4", float(np.mean([one.error for one in noisy])), "m", most=0.4),
         Measured("the same without noise, the greater of 2", max(one.error for one in exact), "m", most=0.05),
@@ -149,11 +148,8 @@ def cataglyphis(seed: int, progress: Progress) -> Outcome:
     slow=True,
 )
 def cataglyphis_shieldbot(seed: int, progress: Progress) -> Outcome:
-    found = []
-    for number in range(2):
-        its_seed = seed + PER_SEED * number
-        found.append(journey(calibrated(its_seed), 20.0, 210.0, its_seed))
-        progress((number + 1) / 2)
+    seeds = with_progress((seed, seed + PER_SEED), progress)
+    found = [journey(calibrated(trial_seed), 20.0, 210.0, trial_seed) for trial_seed in seeds]
     measured = [
         Measured("search begins from the nest, the farther of 2", max(one.distance for one in found), "m", most=0.21),
         Measured("the search passes the nest within", max(one.nearest for one in found), "m", most=0.1),

@@ -16,10 +16,10 @@ import numpy as np
 
 from boebot.cognition import Odometry
 from boebot.devices.encoder import SingleEncoder as Encoder
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
-from boebot.experiments.trials import PER_SEED, end_of, start_of
+from boebot.experiments.trials import trial_seeds
 from boebot.experiments.variants import varied
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def ghost(trial: Straight) -> tuple[float, float, float]:
 
 
 def ghost_path(trial: Straight) -> NDArray[np.float64]:
-    """The ghost's way (m), shape (n, 2): by odometry of what the robot told, with that wheel factor."""
+    """The ghost's way (m), shape (n, 2): by odometry from the robot's readings, with that wheel factor."""
     estimate = trial.result.odometry
     if trial.result.layout is not None:  # the odometer's own: it has the factor
         return np.column_stack((estimate.x, estimate.y))
@@ -60,7 +60,7 @@ def ghost_path(trial: Straight) -> NDArray[np.float64]:
 
 def error(trial: Straight) -> float:
     """Distance of the ghost from the robot at the end (m)."""
-    return math.dist(ghost(trial)[:2], end_of(trial)[:2])
+    return math.dist(ghost(trial)[:2], trial.end[:2])
 
 
 def _draw(trials: Sequence[Straight]) -> Draw:
@@ -83,8 +83,8 @@ def _draw(trials: Sequence[Straight]) -> Draw:
                 *ghost_path(trial).T, color=style.ESTIMATE, lw=1.4, ls=(0, (4, 2)), zorder=7,
                 label="" if number else "ghost: where it believes to be",
             )  # fmt: skip
-        draw_robot(axes, first.result.robot, start_of(first), style.START)
-        draw_robot(axes, first.result.robot, end_of(first), style.END)
+        draw_robot(axes, first.result.robot, first.start, style.START)
+        draw_robot(axes, first.result.robot, first.end, style.END)
         x, y, heading = ghost(first)
         place = Affine2D().rotate(heading).translate(x, y) + axes.transData
         body = first.result.robot.body
@@ -103,8 +103,8 @@ def _draw(trials: Sequence[Straight]) -> Draw:
 
 
 def arc_error(believed: float, track_width: float) -> float:
-    """Distance of ghost and robot (m) when the ghost is `believed` metres from the start and the robot went "
-    "straight."""
+    """Distance of ghost and robot (m) when the ghost is `believed` metres from the start and the robot went
+    straight."""
     curvature = (1 - FACTOR) / ((1 + FACTOR) / 2 * track_width)
     arc = 2 / abs(curvature) * math.asin(abs(curvature) * believed / 2)
     bearing = curvature * arc / 2
@@ -114,7 +114,7 @@ def arc_error(believed: float, track_width: float) -> float:
 
 def judge_notes(trial: Straight) -> list[Measured]:
     """What is asked, and the closed form."""
-    told = trial.result.odometry
+    odometer = trial.result.odometry
     expected = arc_error(math.hypot(*ghost(trial)[:2]), trial.result.robot.body.track_width_m)
     return [
         Measured("error of the estimate at the end", error(trial), "m", least=0.01),
@@ -122,7 +122,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
         Measured("believed d at the stop command", trial.believed, "m", 0.980, 0.982),
         about(
             "what the brain believes off what the odometer tells",
-            math.dist(ghost(trial), (told.x[-1], told.y[-1], told.heading[-1])), 0, 1e-3, "m",
+            math.dist(ghost(trial), (odometer.x[-1], odometer.y[-1], odometer.heading[-1])), 0, 1e-3, "m",
         ),
     ]  # fmt: skip
 
@@ -142,22 +142,17 @@ def notes_ghost(seed: int, progress: Progress) -> Outcome:
 
 
 # ---- shieldbots ------------------------------------------------------------------------------------------------------
-# The brain's odometry has the factor, and holds its heading: the ghost goes straight, R = 1.02 L, and the robot on an
-# arc of curvature (R - L) / 0.105 m over its way (R + L) / 2: 0.189 / m. At 0.98 m of the ghost it has gone 0.970 m and
-# is 8.9 cm to the left and 1.5 cm back: 9.0 cm. Each wheel's first edge comes anywhere within 3.25 mm, a heading error
-# of 0.41 · 3.25 mm / 0.105 m = 0.013 rad (1 σ) over a metre: 1.2 cm; a missed edge or a flicker, 0.6 of them in a run,
-# is two edges, 0.062 rad, over half a metre: 3 cm, 2.4 cm (1 σ). Together 2.7 cm, of the mean of five 1.2 cm.
 
 
 def judge_shieldbots(trials: Sequence[Straight]) -> list[Measured]:
-    """By the derivation above."""
+    """By the derivation in the criterion."""
     errors = [error(trial) for trial in trials]
     return [
         exactly("runs that stop", sum(trial.behavior.arrived for trial in trials), len(trials)),
         Measured("smallest error of the estimate at the end", min(errors), "m", least=0.01),
         about("mean error", float(np.mean(errors)), 0.090, 0.036, "m"),
         Measured("runs in which the robot ends to the left of its ghost", float(sum(
-            end_of(trial)[1] > ghost(trial)[1] for trial in trials)), least=len(trials)),
+            trial.end[1] > ghost(trial)[1] for trial in trials)), least=len(trials)),
     ]  # fmt: skip
 
 
@@ -175,15 +170,15 @@ def judge_shieldbots(trials: Sequence[Straight]) -> list[Measured]:
     "centred.",
 )
 def shieldbot_ghosts(seed: int, progress: Progress) -> Outcome:
+    seeds = trial_seeds(seed, RUNS)
     trials = []
-    for number in range(RUNS):
+    for trial_seed in with_progress(seeds, progress):
         brain = runner(period=0.05, least=LEAST, hold=HOLD, factors=(FACTOR, 1.0))
-        trials.append(drive(brain, "shieldbot", 14.0, PER_SEED * seed + number, "native"))
-        progress((number + 1) / RUNS)
+        trials.append(drive(brain, "shieldbot", 14.0, trial_seed, "native"))
     data = {
-        "seed": [PER_SEED * seed + number for number in range(RUNS)],
-        "x_m": [end_of(trial)[0] for trial in trials],
-        "y_m": [end_of(trial)[1] for trial in trials],
+        "seed": list(seeds),
+        "x_m": [trial.end[0] for trial in trials],
+        "y_m": [trial.end[1] for trial in trials],
         "believed_x_m": [ghost(trial)[0] for trial in trials],
         "believed_y_m": [ghost(trial)[1] for trial in trials],
         "error_m": [error(trial) for trial in trials],

@@ -22,7 +22,7 @@ import boebot
 from boebot.behaviors import Avoid
 from boebot.brain import Brain, MotorBehavior, Utility
 from boebot.cognition import near, wrapped
-from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.variants import narrow_arsim
 from boebot.record.readings_series import ReadingsSeries
@@ -159,10 +159,9 @@ def paradigms(seed: int, progress: Progress) -> Outcome:
     runs: dict[str, list[Crossing]] = {"behavior-based": [], **{f"serial, {p:g} s": [] for p in PLANNINGS}}
     brains: list[tuple[str, Callable[[], object]]] = [("behavior-based", behavior_based)]
     brains += [(f"serial, {planning:g} s", partial(Serial, planning)) for planning in PLANNINGS]
-    for number, start in enumerate(STARTS):
+    for start in with_progress(STARTS, progress):
         for name, brain in brains:
             runs[name].append(cross(brain(), start, seed))
-        progress(number / len(STARTS))
     parallel, quick, serial = runs["behavior-based"], runs["serial, 0.05 s"], runs["serial, 0.5 s"]
     hits = [sum(len(one.touched) for one in runs[f"serial, {planning:g} s"]) for planning in PLANNINGS]
     measured = [

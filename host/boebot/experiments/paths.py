@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.experiments.experiment import Floats
-from boebot.experiments.trials import Trial, start_of
+from boebot.experiments.trials import Trial
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,4 +43,4 @@ def draw_paths(axes: Axes, trials: Sequence[Trial]) -> None:
         axes.plot(*path.T, color=style.colour(number), lw=1.1, alpha=0.85, zorder=6)
         if trial.has_collided:
             axes.plot(*path[-1], "x", color=style.CONTACT, ms=7, mew=1.8, zorder=13)
-    draw_robot(axes, trials[0].result.robot, start_of(trials[0]), style.START)
+    draw_robot(axes, trials[0].result.robot, trials[0].start, style.START)

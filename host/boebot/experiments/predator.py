@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boebot.experiments.chemotaxis import SIZE, SPEED, Swarm, swarm
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, experiment
+from boebot.experiments.chemotaxis import SIZE, SPEED, Swarm, begin_and_end, draw_circle, positions, swarm
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, experiment, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,11 +35,10 @@ def density_ratio(group: Swarm) -> float:
     caption="Bacteria before and after 10 s, lured by a predator 200 times slower; circle: what is near to it.",
 )
 def lure(seed: int, progress: Progress) -> Outcome:
-    groups = []
-    for number in range(5):
-        draw = np.random.default_rng([seed, 200 + number])
-        groups.append(swarm(draw, count=COUNT, seconds=SECONDS, drift=SPEED / SLOWER))
-        progress((number + 1) / 6)
+    groups = [
+        swarm(np.random.default_rng([seed, 200 + number]), count=COUNT, seconds=SECONDS, drift=SPEED / SLOWER)
+        for number in with_progress(range(5), progress)
+    ]
     control = swarm(np.random.default_rng([seed, 300]), count=10 * COUNT, seconds=SECONDS, uniform=True)
     measured = [
         Measured("density around the predator, times uniform", min(map(density_ratio, groups)), least=3.0),
@@ -48,26 +47,11 @@ def lure(seed: int, progress: Progress) -> Outcome:
     ]
     one = groups[0]
 
-    def draw_figure(figure: Figure) -> None:
-        turn = np.linspace(0, 2 * np.pi, 100)
-        for axes, at, source, name in zip(
-            figure.subplots(1, 2),
-            (one.begun, one.ended),
-            ((0.0, 0.0), one.source),
-            ("begin", "after 10 s"),
-            strict=True,
-        ):
+    def draw(figure: Figure) -> None:
+        for (axes, at), source in zip(begin_and_end(figure, one), ((0.0, 0.0), one.source), strict=True):
             axes.plot(*at.T, ".", color="#0072b2", markersize=3, label="prey")
             axes.plot(*source, "s", color="#d55e00", markersize=6, label="predator", zorder=4)
-            axes.plot(
-                source[0] + REACH * np.cos(turn),
-                source[1] + REACH * np.sin(turn),
-                color="#d55e00",
-                linewidth=1.5,
-                zorder=4,
-            )
-            axes.set(title=name, xlabel="x", ylabel="y", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
+            draw_circle(axes, REACH, source, color="#d55e00", linewidth=1.5, zorder=4)
         axes.legend(loc="upper right", fontsize=9)
 
-    data = {"x0": one.begun[:, 0], "y0": one.begun[:, 1], "x": one.ended[:, 0], "y": one.ended[:, 1]}
-    return Outcome(measured, data, draw_figure)
+    return Outcome(measured, positions(one), draw)

@@ -29,7 +29,7 @@ Watch = Callable[[Mapping[str, float]], None]
 """Called now and then with the share that is done, 0 to 1, of each experiment that is running."""
 
 LOOK_S = 0.1  # how often shares are looked at
-BOARDS = ("avr", "native", "direct", "arsim")  # from slow to fast, as they stand in `Experiment.robot`
+BOARDS = ("avr", "native", "direct", "arsim")  # from slow to fast, as named in `Experiment.robot`
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def run(
         for verdict in verdicts:
             waiting = [one for one in waiting if one.name != verdict.name]
             yield verdict
-    for one in waiting:  # a process died, and with it the others: each now gets one of its own
+    for one in waiting:  # a process died, and with it the others: each now gets its own
         alone = list(_in_processes([one], seed, 1, watch, files))
         yield alone[0] if alone else Verdict(one.name, error="its process has died")
 
@@ -137,7 +137,7 @@ def _collect(
             try:
                 verdict = future.result()
             except (BrokenProcessPool, CancelledError):
-                continue  # whoever asked for it sees that it is missing
+                continue  # the caller sees that it is missing
             except Exception as error:  # what came of it could not be handed over
                 verdict = Verdict(experiments[futures[future]].name, error=_place(error))
             yield verdict

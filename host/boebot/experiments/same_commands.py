@@ -19,7 +19,7 @@ import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.record.compare import Difference, command_difference, replayed, telemetry_difference
 
 if TYPE_CHECKING:
@@ -70,11 +70,8 @@ def same_commands(seed: int, progress: Progress) -> Outcome:
     measured: list[Measured] = []
     data: dict[str, object] = {}
     drawn: list[tuple[str, list[RunResult], list[Difference | None]]] = []
-    for number, (name, brain) in enumerate(BRAINS.items()):
-        runs = []
-        for on in ("native", "avr"):
-            runs.append(boebot.run(brain(), robot="shieldbot", on=on, seconds=SECONDS, seed=seed))
-            progress((2 * number + len(runs)) / 4)
+    for name, brain in with_progress(list(BRAINS.items()), progress):
+        runs = [boebot.run(brain(), robot="shieldbot", on=on, seconds=SECONDS, seed=seed) for on in ("native", "avr")]
         a, b = runs
         seen, looked_at = telemetry_difference(a, b), telemetry_difference(a, b, LOOKED_AT)
         commanded = command_difference(a, b)

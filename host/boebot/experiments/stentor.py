@@ -216,8 +216,8 @@ def dose(seed: int, progress: Progress) -> Outcome:
 def dose_response(seed: int, progress: Progress) -> Outcome:
     doses = np.linspace(0.2, 4.0, 39)
     highest, stopping, detaching = np.zeros(len(doses), dtype=int), np.full(len(doses), np.nan), np.zeros(len(doses))
-    for index, strength in enumerate(doses):
-        found = exact(float(strength))
+    for index, strength in enumerate(doses.tolist()):
+        found = exact(strength)
         highest[index] = max(which for which, _ in found.starts)
         if len(found.starts) > 1:
             stopping[index] = found.starts[1][1]

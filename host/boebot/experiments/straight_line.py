@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment
-from boebot.experiments.trials import PER_SEED, Trial, try_once
+from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot.experiments.trials import Trial, trial_seeds, try_once
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -152,17 +152,8 @@ def notes_run(seed: int, progress: Progress) -> Outcome:
     return Outcome(judge_notes(trial), columns(trial), draw_runs([trial]))
 
 
-# The shieldbot. Its servos run at v(s) = 0.178 m/s tanh(k s), k = 200 / 78.5 = 2.55, and stand still within 9 us =
-# 0.045 of their centre: s_min = 0.06 as in E23. They are centred, as is done before a robot's first run: one that is
-# not creeps on at the signal 0. They differ by 2.9 % (1 σ), so it holds its heading, k = 0.5, yet by
-# little at the beginning, where another signal hardly changes the speed.
-#   time     (5.1) down to s_min takes ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k) = 8.5 s, the last 0.047 m at
-#            v(0.06) = 0.027 m/s 1.7 s, the lag 0.1 s: 10.3 s. The mean of two servos differs by 2.1 %, three of those
-#            are 0.65 s; headings off by up to 0.4 rad make the way 5 % longer, 0.5 s: together 1.2 s
-#   d̂        stop at the first step beyond 0.98 m; a step of 1.4 mm has at most one edge of each wheel: 3.3 mm more
-#   d        an edge, 3.3 mm, to both sides; edges missed and flickers, 0.0005 of 300 edges of two wheels, are 0.3 of
-#            each kind in a run, and each is 2 edges of one wheel, 3.3 mm: up to three of a kind (four in one run of
-#            4000) are 9.8 mm to both sides; while it comes to rest, in the frame and the lag, 75 ms, 2 mm more
+# Time by (5.1) down to s_min: ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k), k = 200 / 78.5; the rest of the
+# derivation is the criterion.
 LEAST, HOLD = 0.06, 0.5
 RUN_S = 14.0
 _BY_SERVO = (
@@ -175,7 +166,7 @@ _BY_SERVO = (
 
 
 def judge_shieldbot(runs: Sequence[Straight]) -> list[Measured]:
-    """By the derivation above; each bound holds for every run."""
+    """By the derivation in the criterion; each bound holds for every run."""
     believed, rest, times = ([getattr(one, name) for one in runs] for name in ("believed", "rest", "stop_time"))
     return [
         exactly("runs that stop", sum(one.behavior.arrived for one in runs), len(runs)),
@@ -191,13 +182,13 @@ def judge_shieldbot(runs: Sequence[Straight]) -> list[Measured]:
 
 
 def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
-    runs = []
-    for number in range(count):
-        brain = runner(period=0.05, least=LEAST, hold=HOLD)
-        runs.append(drive(brain, "shieldbot", RUN_S, PER_SEED * seed + number, on))
-        progress((number + 1) / count)
+    seeds = trial_seeds(seed, count)
+    runs = [
+        drive(runner(period=0.05, least=LEAST, hold=HOLD), "shieldbot", RUN_S, trial_seed, on)
+        for trial_seed in with_progress(seeds, progress)
+    ]
     data = {
-        "seed": [PER_SEED * seed + number for number in range(count)],
+        "seed": list(seeds),
         "stop_time_s": [one.stop_time for one in runs],
         "believed_m": [one.believed for one in runs],
         "rest_m": [one.rest for one in runs],

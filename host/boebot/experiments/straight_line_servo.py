@@ -15,9 +15,9 @@ import msgspec
 from boebot.behaviors import StraightRun
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.equipment import Equipment
-from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment
+from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.experiments.straight_line import Straight, drive, runner
-from boebot.experiments.trials import PER_SEED
+from boebot.experiments.trials import trial_seeds
 from boebot.experiments.variants import varied
 from boebot.link import messages
 from boebot.robot import Observation, Robot
@@ -89,7 +89,7 @@ def on_servo_model(least: float) -> ServoRun:
 
 
 def _telemetry(tick: int, edges: int, signal: float) -> messages.Telemetry:
-    """What a board would tell."""
+    """What a board would send."""
     nothing = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
     pulses = [round((1500 + mount * SPAN_US * signal) / PULSE_COUNT_US) for mount in (1, -1)]
     return nothing._replace(
@@ -153,17 +153,10 @@ def servo_model(seed: int, progress: Progress) -> Outcome:
 
 
 # ---- through the circle ----------------------------------------------------------------------------------------------
-# The shieldbot with a wheel of 208 mm and 16 edges to a turn: q = 13.0 mm. What it believes is the mean of both wheels,
-# in steps of q / 2 or q, and the truth is up to q to either side: the first edges come anywhere within q. Its dead band
-# is 9 us = 0.045.
-#   with s_min      believed d at the stop 0.980 to 0.980 + q; at rest up to q less or more, and 2 mm of coming to rest
-#   (75
-#                   ms of frame and lag at v(0.06) = 0.178 m/s tanh(0.06 · 200 / 78.5) = 0.027 m/s): 0.967 to 1.008 m
-#   without         stalls when 0.9 (1 - d̂) < 0.045: d̂ from 0.950 to 0.950 + q; at rest 0.937 to 0.978 m
 
 
 def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
-    """By the derivation above."""
+    """By the derivation in the criterion."""
     asked = without.result.record.steps[-1][2]
     return [
         exactly("with s_min: stops (1: yes)", with_least.behavior.arrived, 1),
@@ -191,11 +184,10 @@ def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
 )
 def servo_shieldbot(seed: int, progress: Progress) -> Outcome:
     robot = coarse(load_robot("shieldbot").body.wheel_radius_m)
-    runs = []
-    for number, least in enumerate((LEAST, 0.0)):
-        brain = runner(period=0.05, least=least)
-        runs.append(drive(brain, robot, 20.0, PER_SEED * seed + number, "native", "encoder_errors"))
-        progress((number + 1) / 2)
+    runs = [
+        drive(runner(period=0.05, least=least), robot, 20.0, trial_seed, "native", "encoder_errors")
+        for least, trial_seed in zip((LEAST, 0.0), with_progress(trial_seeds(seed, 2), progress), strict=True)
+    ]
     rows: list[Series] = [
         (name, list(run.time), list(run.distances), list(run.result.series.signals[0]))
         for name, run in zip(("s_min = 0.06", "without s_min"), runs, strict=True)

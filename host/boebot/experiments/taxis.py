@@ -18,9 +18,9 @@ from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment
+from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment, with_progress
 from boebot.experiments.paths import floor
-from boebot.experiments.trials import PER_SEED, Trial, start_of, try_once
+from boebot.experiments.trials import Trial, trial_seeds, try_once
 from boebot.experiments.variants import arena_file, at_angle, varied
 
 if TYPE_CHECKING:
@@ -53,8 +53,7 @@ def _arsim() -> RobotDescription:
     return varied("arsim", "arsim-lights", light_left=left, light_right=right)
 
 
-# The shieldbot's sensors see ambient light of irradiance 1 everywhere: 667 / s each (decay 1.5 ms), 10 % more or less
-# (1 σ), 1333 / s ± 94 / s together. Up to 2000 / s, 7 σ above, it is dark; the lamp, 20 W at 2 m, adds 5 · 667 / s.
+# Ambient light of irradiance 1: 667 / s of each sensor (decay 1.5 ms); the lamp, 20 W at 2 m, adds 5 · 667 / s.
 # The straight way: 1.85 m at 0.682 m/s, and 0.15 s of rise; at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s, and 0.1 s.
 ARSIM = Setting(robot=_arsim(), on=None, seconds=9.0, straight=1.85 / 0.682 + 0.15)
 SHIELDBOT = Setting(
@@ -90,13 +89,12 @@ def trials(setting: Setting, seed: int, progress: Progress, *, flee: bool = Fals
     chance = random.Random(f"taxis {seed}")
     done = []
     with arena_file("lamp", LAMP) as arena:
-        for number in range(starts):
+        for trial_seed in with_progress(trial_seeds(seed, starts), progress):
             bearing, heading = (chance.uniform(-math.pi, math.pi) for _ in range(2))
             pose = (AWAY_M * math.cos(bearing), AWAY_M * math.sin(bearing), heading)
             brain = seeker(setting, flee=flee)
-            terms = {"on": setting.on, "seed": PER_SEED * seed + number, "pose": pose}
+            terms = {"on": setting.on, "seed": trial_seed, "pose": pose}
             done.append(try_once(brain, setting.robot, arena, setting.seconds, **terms))
-            progress((number + 1) / (starts + 1))
     return done
 
 
@@ -135,7 +133,7 @@ def _draw(done: Sequence[Trial], times: Sequence[float], straight: float) -> Dra
             left.plot(*trial.path[:until].T, color=style.END if time < math.inf else style.ESTIMATE, lw=0.8, zorder=6)
             left.plot(*trial.path[0], ".", color=style.START, ms=4, zorder=7)
         left.add_patch(Circle((0, 0), REACHED_M, fill=False, ls="--", ec=style.FAINT, zorder=8))
-        draw_robot(left, done[0].result.robot, start_of(done[0]), style.START)
+        draw_robot(left, done[0].result.robot, done[0].start, style.START)
         reached = [time for time in times if time < math.inf]
         left.set_title(f"{len(reached)} of {len(times)} starts reach the lamp")
         right.hist(reached, bins=24)
@@ -151,9 +149,9 @@ def _draw(done: Sequence[Trial], times: Sequence[float], straight: float) -> Dra
 def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
     done = trials(setting, seed, progress)
     times, straight = [time_to_lamp(trial) for trial in done], straight_time(setting)
-    poses = [start_of(trial) for trial in done]
+    poses = [trial.start for trial in done]
     data = {
-        "seed": [PER_SEED * seed + number for number in range(len(done))],
+        "seed": list(trial_seeds(seed, len(done))),
         "x_m": [x for x, _, _ in poses],
         "y_m": [y for _, y, _ in poses],
         "heading_rad": [heading for _, _, heading in poses],

@@ -12,6 +12,7 @@ from boebot.running.runner import run
 from boebot.timing.realisable import NotRealisableError, Verdict, judge
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 STEP_S = 0.01
@@ -22,7 +23,7 @@ _COLOURS = {"sense": "#e69f00", "process": "#009e73"}
 
 
 def robot_with(count: int) -> RobotDescription:
-    """The notes' robot with so many IR sensors, read one after another."""
+    """The notes' robot with `count` IR sensors, read one after another."""
     robot = load_robot("arsim")
     sensor = msgspec.structs.replace(robot.device["infrared_left"], reading_s=READING_S)
     others = {name: device for name, device in robot.device.items() if not name.startswith("infrared")}
@@ -75,10 +76,7 @@ def timing_rule(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, data, draw)
 
 
-def _diagram(axes: object, verdict: Verdict) -> None:
-    from matplotlib.axes import Axes
-
-    assert isinstance(axes, Axes)
+def _diagram(axes: Axes, verdict: Verdict) -> None:
     for place, event in enumerate(verdict.events):
         axes.barh(place, event.seconds * 1000, 0.7, left=event.begin * 1000, color=_COLOURS[event.kind])
     axes.axvline(verdict.period_s * 1000, color="#2e3440")

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from boebot.record.result import RunResult
 
 PER_SEED = 1000
-"""Trials of one experiment have the seeds from PER_SEED times the experiment's on."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +49,23 @@ class Trial:
         return np.column_stack((pose.x, pose.y))
 
     @property
+    def start(self) -> tuple[float, float, float]:
+        """Where the robot began: m, m, rad."""
+        return self._pose(0)
+
+    @property
+    def end(self) -> tuple[float, float, float]:
+        """Where it ended: m, m, rad."""
+        return self._pose(-1)
+
+    def _pose(self, index: int) -> tuple[float, float, float]:
+        pose = self.result.true_pose
+        assert pose is not None, "experiments run in the simulator"
+        return float(pose.x[index]), float(pose.y[index]), float(pose.heading[index])
+
+    @property
     def plan(self) -> FloorPlan:
-        """What stands in its arena."""
+        """Walls and obstacles of its arena."""
         assert self.result.truth is not None
         return self.result.truth.plan
 
@@ -85,6 +99,11 @@ class Trial:
         return np.asarray(active[np.clip(np.searchsorted(at, self.time, side="right") - 1, 0, len(at) - 1)])
 
 
+def trial_seeds(seed: int, count: int) -> range:
+    """Seeds of the trials of an experiment with that seed."""
+    return range(PER_SEED * seed, PER_SEED * seed + count)
+
+
 def try_once(brain: Brain, robot: str | RobotDescription, arena: str | Path, seconds: float, **terms: Any) -> Trial:
     """One run; `terms` as of `boebot.run`.
 
@@ -98,19 +117,3 @@ def true_pose(result: RunResult, times: Sequence[float] | Floats) -> Pose:
     """Where the robot really was at those times (s of the run)."""
     assert result.truth is not None
     return truth_at(result.truth, np.asarray(times, dtype=np.float64) + result.clock_offset)
-
-
-def start_of(trial: Trial) -> tuple[float, float, float]:
-    """Where the robot began: m, m, rad."""
-    return _pose(trial, 0)
-
-
-def end_of(trial: Trial) -> tuple[float, float, float]:
-    """And where it ended."""
-    return _pose(trial, -1)
-
-
-def _pose(trial: Trial, index: int) -> tuple[float, float, float]:
-    pose = trial.result.true_pose
-    assert pose is not None
-    return float(pose.x[index]), float(pose.y[index]), float(pose.heading[index])

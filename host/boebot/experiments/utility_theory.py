@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,16 +21,20 @@ def expected_gain(wealth: float, price: float) -> float:
     return sum(2.0**-k * (math.log(wealth - price + 2.0**k) - math.log(wealth)) for k in range(1, TERMS))
 
 
-def fair_price(wealth: float) -> float:
-    """The price r at which P_s is 0, by bisection: P_s falls with r."""
-    low, high = 0.0, wealth
-    for _ in range(60):
+def bisected(is_below: Callable[[float], bool], low: float, high: float) -> float:
+    """Where `is_below` changes from true to false, between `low` and `high`."""
+    for _ in range(100):
         middle = (low + high) / 2
-        if expected_gain(wealth, middle) > 0:
+        if is_below(middle):
             low = middle
         else:
             high = middle
     return (low + high) / 2
+
+
+def fair_price(wealth: float) -> float:
+    """The price r at which P_s is 0, by bisection: P_s falls with r."""
+    return bisected(lambda price: expected_gain(wealth, price) > 0, 0.0, wealth)
 
 
 @experiment(
@@ -122,28 +127,20 @@ def money(seed: int, progress: Progress) -> Outcome:
 def certainty_equivalent(p: float, better: float, worse: float) -> float:
     """The amount for sure that is worth as much as the lottery, by bisection of u."""
     aim = p * money_utility(better) + (1 - p) * money_utility(worse)
-    low, high = worse, better
-    for _ in range(100):
-        middle = (low + high) / 2
-        if money_utility(middle) < aim:
-            low = middle
-        else:
-            high = middle
-    return (low + high) / 2
+    return bisected(lambda amount: money_utility(amount) < aim, worse, better)
 
 
-def elicited(answer: object, depth: int) -> tuple[list[float], list[float]]:
+def elicited(answer: Callable[[float, float], float], depth: int) -> tuple[list[float], list[float]]:
     """A utility function through the answers of somebody who is asked for certainty equivalents of even chances.
 
     Args:
         answer: function of (better, worse): the amount for sure that is as good as an even chance of both.
         depth: how often each interval is halved.
     """
-    assert callable(answer)
     amounts, utilities = [0.0, 100.0], [0.0, 1.0]
     for _ in range(depth):
         for index in range(len(amounts) - 1, 0, -1):
-            amounts.insert(index, float(answer(amounts[index], amounts[index - 1])))
+            amounts.insert(index, answer(amounts[index], amounts[index - 1]))
             utilities.insert(index, (utilities[index] + utilities[index - 1]) / 2)
     return amounts, utilities
 

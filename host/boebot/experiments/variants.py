@@ -1,7 +1,7 @@
 """Variants for one experiment: bundled robots with some devices or lengths changed, and arenas written down for it.
 
-Not an experiment itself. Robots keep to docs/reference/notes.md but for what is said; arenas have the keys of
-docs/reference/arenas.md.
+Not an experiment itself. Robots follow docs/reference/notes.md except where a variant says otherwise; arenas have the
+keys of docs/reference/arenas.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def varied(
 
     Args:
         body: keys of its body to be changed.
-        devices: devices of its own with keys to be changed, or whole devices in their place or beside them.
+        devices: keys to change of its devices, or whole devices to replace or add.
     """
     described = load_robot(robot)
     changed = {

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +15,9 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import near
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.equipment import Equipment
-from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.paths import draw_paths, floor
-from boebot.experiments.trials import PER_SEED, Trial, end_of, start_of, try_once
+from boebot.experiments.trials import Trial, trial_seeds, try_once
 from boebot.experiments.variants import arena_file, narrow_arsim, scaled_arsim_arena
 from boebot.link import messages
 from boebot.robot import Observation, Robot
@@ -120,12 +118,9 @@ class Setting:
     runs: int = 12
 
 
-# The shieldbot in ARSim's arena. All lengths as its radius: 0.07 m / 0.20 m = 0.35. Its servo's wheel runs at
-# 0.178 m/s tanh(200 s / 78.5): 0.152 m/s at s = 0.5, so that 1 s of the notes' robot, 0.682 m/s, takes
-# 0.35 · 0.682 / 0.152 = 1.57 s: runs of 47 s, and turns begin with 0.01 / 1.57 = 0.0064. On the spot, at s = 0.7, it
-# turns with 2 · 0.168 / 0.105 = 3.19 rad/s instead of 4.447: turns of the same angle end with 0.03 · 3.19 / 4.447.
 NOTES = Setting(robot="arsim")
 NARROW = Setting(robot=narrow_arsim())
+# scaled as `_SCALED` says
 SHIELDBOT = Setting(
     robot="shieldbot", on="native", scale=0.35, turn=0.0064, stop_turn=0.0215, period=0.05, seconds=47.0
 )
@@ -156,21 +151,13 @@ def _wander(setting: Setting) -> Wander:
 
 
 def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[Trial]:
-    """The setting's runs, each with a brain and a seed of its own."""
-    done = []
-    with (
-        nullcontext("arsim")
-        if setting.scale == 1
-        else arena_file("arsim-small", scaled_arsim_arena(setting.scale)) as arena
-    ):
-        for number in range(setting.runs):
-            done.append(_run(make(setting), setting, arena, PER_SEED * seed + number))
-            progress((number + 1) / setting.runs)
-    return done
-
-
-def _run(brain: Brain, setting: Setting, arena: str | Path, seed: int) -> Trial:
-    return try_once(brain, setting.robot, arena, setting.seconds, on=setting.on, seed=seed)
+    """The setting's runs, each with its own brain and seed."""
+    with arena_file("arsim-small", scaled_arsim_arena(setting.scale)) as small:
+        arena = "arsim" if setting.scale == 1 else small
+        return [
+            try_once(make(setting), setting.robot, arena, setting.seconds, on=setting.on, seed=trial_seed)
+            for trial_seed in with_progress(trial_seeds(seed, setting.runs), progress)
+        ]
 
 
 def judge_alone(done: list[Trial]) -> list[Measured]:
@@ -189,7 +176,7 @@ def judge_avoiding(done: list[Trial]) -> list[Measured]:
 
 def _data(done: list[Trial], seed: int) -> dict[str, object]:
     return {
-        "seed": [PER_SEED * seed + number for number in range(len(done))],
+        "seed": list(trial_seeds(seed, len(done))),
         "first_contact_s": [trial.first_contact for trial in done],
         "way_m": [trial.way for trial in done],
         "times_avoided": [trial.times_on("avoid") for trial in done],
@@ -242,7 +229,7 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
     for name, active, colour in (("wander", ~avoids, style.END), ("avoid", avoids, style.ESTIMATE)):
         shown = np.where(active[:, None], trial.path, np.nan)
         axes.plot(*shown.T, color=colour, lw=2.6 if name == "avoid" else 1.4, label=name, zorder=7)
-    for pose, colour in ((start_of(trial), style.START), (end_of(trial), style.END)):
+    for pose, colour in ((trial.start, style.START), (trial.end, style.END)):
         draw_robot(axes, trial.result.robot, pose, colour, plan=trial.result.truth.plan if trial.result.truth else None)
     axes.legend(fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.13))
     axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
@@ -299,10 +286,7 @@ def avoiding(seed: int, progress: Progress) -> Outcome:
     return _avoiding(NARROW, seed, progress)
 
 
-# Between seeing and turning the shieldbot needs up to 50 ms (IR schedule) + 50 ms (brain) + 50 ms (lag of the utility)
-# + 75 ms (servo frame and lag), in which it drives 0.225 s · 0.152 m/s = 3.4 cm; turning on the spot its round body
-# goes nowhere. What lies ahead within the body's width, |y| < 0.07 m, is in an IR beam (0.25 to 0.65 rad from (0.05,
-# 0.04), 0.20 m) or the Ping's (±0.35 rad, nearness 0.10 at 0.36 m) when the body's front is still 9 cm or more away.
+# IR beams: 0.25 to 0.65 rad from (0.05, 0.04) m, 0.20 m long; Ping: ±0.35 rad, nearness 0.10 at 0.36 m.
 _SEEN = (
     "From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) + 75 ms (servo), 3.4 cm at "
     "0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least 9 cm to go; a round body "
