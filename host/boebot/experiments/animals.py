@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +129,7 @@ def isocline(seed: int, progress: Progress) -> Outcome:
         exactly("one that only drinks dies (1: yes)", single.dead, 1),
         Measured("and does so after", float(single.times[-1]), "s", most=STARTS[0][1] / USE + STEP),
     ]
-    return Outcome(measured, _data(lives), _draw(lives, single))
+    return Outcome(measured, _data(lives), lambda figure: _draw(figure, lives, single))
 
 
 def time_to_isocline(start: tuple[float, float], cues: tuple[float, float]) -> float:
@@ -151,23 +151,20 @@ def _data(lives: list[Life]) -> dict[str, Floats]:
     }
 
 
-def _draw(lives: list[Life], single: Life) -> Draw:
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        turn = np.linspace(0, np.pi / 2, 100)
-        boundary = 1 - math.sqrt(LETHAL) * np.cos(turn), 1 - math.sqrt(LETHAL) * np.sin(turn)
-        axes.fill_between(*boundary, 0, color="0.75", label="lethal")
-        axes.plot(*boundary, color="black", label="lethal boundary")
-        ratio = CUES[0] / CUES[1]
-        water = np.linspace(max(0.0, 1 - 1 / ratio), 1, 2)
-        axes.plot(water, 1 - ratio * (1 - water), "--", color="black", label="motivational isocline")
-        for number, one in enumerate(lives, 1):
-            axes.plot(*one.levels.T, color=f"C{number - 1}", label=f"animal {number}")
-            axes.plot(*one.levels[0], "o", color=f"C{number - 1}")
-        axes.plot(*single.levels.T, color="red", linestyle="-.", label="only drinks")
-        axes.plot(*single.levels[-1], "x", color="red")
-        axes.set(xlabel="water availability (1: all it can hold)", ylabel="nutrient level (1: all it can hold)")
-        axes.set(xlim=(0, 1.02), ylim=(0, 1.02), aspect="equal")
-        axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize="small")
-
-    return draw
+def _draw(figure: Figure, lives: list[Life], single: Life) -> None:
+    axes = figure.subplots()
+    turn = np.linspace(0, np.pi / 2, 100)
+    boundary = 1 - math.sqrt(LETHAL) * np.cos(turn), 1 - math.sqrt(LETHAL) * np.sin(turn)
+    axes.fill_between(*boundary, 0, color="0.75", label="lethal")
+    axes.plot(*boundary, color="black", label="lethal boundary")
+    ratio = CUES[0] / CUES[1]
+    water = np.linspace(max(0.0, 1 - 1 / ratio), 1, 2)
+    axes.plot(water, 1 - ratio * (1 - water), "--", color="black", label="motivational isocline")
+    for number, one in enumerate(lives, 1):
+        axes.plot(*one.levels.T, color=f"C{number - 1}", label=f"animal {number}")
+        axes.plot(*one.levels[0], "o", color=f"C{number - 1}")
+    axes.plot(*single.levels.T, color="red", linestyle="-.", label="only drinks")
+    axes.plot(*single.levels[-1], "x", color="red")
+    axes.set(xlabel="water availability (1: all it can hold)", ylabel="nutrient level (1: all it can hold)")
+    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), aspect="equal")
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize="small")

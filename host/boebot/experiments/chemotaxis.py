@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boebot.brain.leaky import LeakyIntegrator
-from boebot.experiments.experiment import (
-    Draw,
-    Floats,
-    Measured,
-    Outcome,
-    Progress,
-    about,
-    exactly,
-    experiment,
-    with_progress,
-)
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -184,13 +174,10 @@ def draw_circle(axes: Axes, radius: float, middle: tuple[float, float] = (0.0, 0
     axes.plot(middle[0] + radius * np.cos(turn), middle[1] + radius * np.sin(turn), **look)
 
 
-def _draw_swarm(group: Swarm, title: str) -> Draw:
-    def draw(figure: Figure) -> None:
-        for axes, at in begin_and_end(figure, group, f"{title}, "):
-            axes.plot(*at.T, ".", markersize=4)
-            draw_circle(axes, SPREAD, linestyle="--", color="0.6")
-
-    return draw
+def _draw_swarm(figure: Figure, group: Swarm, title: str) -> None:
+    for axes, at in begin_and_end(figure, group, f"{title}, "):
+        axes.plot(*at.T, ".", markersize=4)
+        draw_circle(axes, SPREAD, linestyle="--", color="0.6")
 
 
 @experiment(
@@ -209,7 +196,7 @@ def accumulation(seed: int, progress: Progress) -> Outcome:
         Measured("share within the width at the end", float(np.mean([one.share for one in groups])), least=0.85),
         about("the same ratio in uniform attractant", float(np.mean([one.ratio for one in controls])), 1.0, 0.05),
     ]
-    return Outcome(measured, positions(groups[0]), _draw_swarm(groups[0], "attractant"))
+    return Outcome(measured, positions(groups[0]), lambda figure: _draw_swarm(figure, groups[0], "attractant"))
 
 
 @experiment(
@@ -224,4 +211,4 @@ def trap(seed: int, progress: Progress) -> Outcome:
         Measured("share of steps that were runs", group.running, most=0.01),
         about("mean distance against the beginning", group.ratio, 1.0, 0.05),
     ]
-    return Outcome(measured, positions(group), _draw_swarm(group, "no jitter"))
+    return Outcome(measured, positions(group), lambda figure: _draw_swarm(figure, group, "no jitter"))

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 """Called now and then with the share that is done, 0 to 1."""
-Draw = Callable[["Figure"], None]
 Thing = TypeVar("Thing")
 
 
@@ -82,7 +81,7 @@ class Outcome:
     measured: Sequence[Measured]
     data: Mapping[str, Any]
     """columns of the CSV file, units in their names; all of the same length"""
-    draw: Draw
+    draw: Callable[[Figure], None]
     """draws the figure that the notes' caption describes"""
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 
 from boebot.cognition import Odometry
 from boebot.devices.encoder import SingleEncoder as Encoder
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot.experiments.trials import trial_seeds
@@ -63,37 +63,33 @@ def error(trial: Straight) -> float:
     return math.dist(ghost(trial)[:2], trial.end[:2])
 
 
-def _draw(trials: Sequence[Straight]) -> Draw:
+def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
     """Ways of robots and ghosts from above, with robot and ghost where the first ones end."""
+    from matplotlib.transforms import Affine2D
 
-    def draw(figure: Figure) -> None:
-        from matplotlib.transforms import Affine2D
+    from boebot.view import style
+    from boebot.view.robot_drawing import body_patch, draw_robot
 
-        from boebot.view import style
-        from boebot.view.robot_drawing import body_patch, draw_robot
-
-        axes = figure.subplots()
-        first = trials[0]
-        reach = first.result.robot.body.radius_m
-        ends = np.array([(x - reach, y - reach) for x, y in ((0, 0), (1, 0))])
-        floor(axes, first.plan, *(trial.path for trial in trials), *map(ghost_path, trials), ends, ends + 2 * reach)
-        for number, trial in enumerate(trials):
-            axes.plot(*trial.path.T, color=style.END, lw=1.4, zorder=7, label="" if number else "robot")
-            axes.plot(
-                *ghost_path(trial).T, color=style.ESTIMATE, lw=1.4, ls=(0, (4, 2)), zorder=7,
-                label="" if number else "ghost: where it believes to be",
-            )  # fmt: skip
-        draw_robot(axes, first.result.robot, first.start, style.START)
-        draw_robot(axes, first.result.robot, first.end, style.END)
-        x, y, heading = ghost(first)
-        place = Affine2D().rotate(heading).translate(x, y) + axes.transData
-        body = first.result.robot.body
-        look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.4, "ls": (0, (3, 2)), "zorder": 14}
-        axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=place, **look))
-        axes.plot((0, body.front_m), (0, 0), color=style.ESTIMATE, lw=1.4, transform=place, zorder=14)
-        axes.legend(fontsize="small", ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-
-    return draw
+    axes = figure.subplots()
+    first = trials[0]
+    reach = first.result.robot.body.radius_m
+    ends = np.array([(x - reach, y - reach) for x, y in ((0, 0), (1, 0))])
+    floor(axes, first.plan, *(trial.path for trial in trials), *map(ghost_path, trials), ends, ends + 2 * reach)
+    for number, trial in enumerate(trials):
+        axes.plot(*trial.path.T, color=style.END, lw=1.4, zorder=7, label="" if number else "robot")
+        axes.plot(
+            *ghost_path(trial).T, color=style.ESTIMATE, lw=1.4, ls=(0, (4, 2)), zorder=7,
+            label="" if number else "ghost: where it believes to be",
+        )  # fmt: skip
+    draw_robot(axes, first.result.robot, first.start, style.START)
+    draw_robot(axes, first.result.robot, first.end, style.END)
+    x, y, heading = ghost(first)
+    place = Affine2D().rotate(heading).translate(x, y) + axes.transData
+    body = first.result.robot.body
+    look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.4, "ls": (0, (3, 2)), "zorder": 14}
+    axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=place, **look))
+    axes.plot((0, body.front_m), (0, 0), color=style.ESTIMATE, lw=1.4, transform=place, zorder=14)
+    axes.legend(fontsize="small", ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
 # ---- the notes' robot ------------------------------------------------------------------------------------------------
@@ -138,7 +134,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
 def notes_ghost(seed: int, progress: Progress) -> Outcome:
     robot = varied("arsim", "arsim-1.02", odometer={"factor_left": FACTOR})
     trial = drive(runner(period=0.01), robot, 6.0, seed)
-    return Outcome(judge_notes(trial), columns(trial), _draw([trial]))
+    return Outcome(judge_notes(trial), columns(trial), lambda figure: _draw(figure, [trial]))
 
 
 # ---- shieldbots ------------------------------------------------------------------------------------------------------
@@ -183,4 +179,4 @@ def shieldbot_ghosts(seed: int, progress: Progress) -> Outcome:
         "believed_y_m": [ghost(trial)[1] for trial in trials],
         "error_m": [error(trial) for trial in trials],
     }
-    return Outcome(judge_shieldbots(trials), data, _draw(trials))
+    return Outcome(judge_shieldbots(trials), data, lambda figure: _draw(figure, trials))

@@ -22,7 +22,7 @@ import boebot
 from boebot.behaviors import Avoid
 from boebot.brain import Brain, MotorBehavior, Utility
 from boebot.cognition import near, wrapped
-from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.variants import narrow_arsim
 from boebot.record.readings_series import ReadingsSeries
@@ -156,14 +156,15 @@ def _reaction(result: RunResult) -> float:
     slow=True,
 )
 def paradigms(seed: int, progress: Progress) -> Outcome:
-    runs: dict[str, list[Crossing]] = {"behavior-based": [], **{f"serial, {p:g} s": [] for p in PLANNINGS}}
-    brains: list[tuple[str, Callable[[], object]]] = [("behavior-based", behavior_based)]
-    brains += [(f"serial, {planning:g} s", partial(Serial, planning)) for planning in PLANNINGS]
+    brains: dict[str, Callable[[], object]] = {"parallel": behavior_based}
+    brains |= {f"serial_{planning:g}s".replace(".", "_"): partial(Serial, planning) for planning in PLANNINGS}
+    runs: dict[str, list[Crossing]] = {name: [] for name in brains}
     for start in with_progress(STARTS, progress):
-        for name, brain in brains:
+        for name, brain in brains.items():
             runs[name].append(cross(brain(), start, seed))
-    parallel, quick, serial = runs["behavior-based"], runs["serial, 0.05 s"], runs["serial, 0.5 s"]
-    hits = [sum(len(one.touched) for one in runs[f"serial, {planning:g} s"]) for planning in PLANNINGS]
+    parallel, quick, *_, serial = runs.values()
+    hits = [sum(len(one.touched) for one in crossings) for crossings in runs.values()][1:]
+    soonest, latest = PLANNING - PERIOD, 2 * PLANNING + PERIOD
     measured = [
         exactly("behavior-based: collisions", sum(len(one.touched) for one in parallel), 0),
         exactly("behavior-based: crossings that get there", sum(one.arrival > 0 for one in parallel), len(STARTS)),
@@ -173,30 +174,17 @@ def paradigms(seed: int, progress: Progress) -> Outcome:
         Measured(
             "plans for 0.5 s: crossings that get there", sum(one.arrival > 0 for one in serial), most=len(STARTS) - 1
         ),
-        Measured(
-            "plans for 0.5 s: quickest reaction", _worst(serial, min), "s", PLANNING - PERIOD, 2 * PLANNING + PERIOD
-        ),
-        Measured(
-            "plans for 0.5 s: slowest reaction", _worst(serial, max), "s", PLANNING - PERIOD, 2 * PLANNING + PERIOD
-        ),
+        Measured("plans for 0.5 s: quickest reaction", _worst(serial, min), "s", soonest, latest),
+        Measured("plans for 0.5 s: slowest reaction", _worst(serial, max), "s", soonest, latest),
         Measured("plans for 0.05 s: share of these collisions", hits[0] / max(hits[-1], 1), most=0.5),
         exactly("plans for 0.05 s: crossings that get there", sum(one.arrival > 0 for one in quick), len(STARTS)),
     ]
-    data: dict[str, Any] = {
-        "start_x_m": [x for x, _ in STARTS],
-        "start_y_m": [y for _, y in STARTS],
-    }
+    data: dict[str, Any] = {"start_x_m": [x for x, _ in STARTS], "start_y_m": [y for _, y in STARTS]}
     for name, crossings in runs.items():
-        key = (
-            name.replace("behavior-based", "parallel")
-            .replace("serial, ", "serial_")
-            .replace(" s", "s")
-            .replace(".", "_")
-        )
-        data[f"{key}_arrival_s"] = [one.arrival for one in crossings]
-        data[f"{key}_reaction_s"] = [one.reaction for one in crossings]
-        data[f"{key}_collisions"] = [float(len(one.touched)) for one in crossings]
-    return Outcome(measured, data, _draw(serial, parallel, hits))
+        data[f"{name}_arrival_s"] = [one.arrival for one in crossings]
+        data[f"{name}_reaction_s"] = [one.reaction for one in crossings]
+        data[f"{name}_collisions"] = [float(len(one.touched)) for one in crossings]
+    return Outcome(measured, data, lambda figure: _draw(figure, serial, parallel, hits))
 
 
 def _worst(crossings: list[Crossing], of: Callable[[list[float]], float]) -> float:
@@ -204,22 +192,19 @@ def _worst(crossings: list[Crossing], of: Callable[[list[float]], float]) -> flo
     return of(known) if known else math.nan
 
 
-def _draw(serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> Draw:
-    def draw(figure: Figure) -> None:
-        left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1))
-        for axes, name, crossings in ((left, "plans for 0.5 s", serial), (middle, "behavior-based", parallel)):
-            floor(axes, crossings[0].plan)
-            for one in crossings:
-                axes.plot(one.x, one.y, linewidth=0.8)
-                axes.plot(one.x[one.touched], one.y[one.touched], "x", color="red", markersize=5)
-            axes.plot(*GOAL, "*", color="black")
-            axes.set(title=name)
-            axes.locator_params(nbins=5)
-        right.plot(PLANNINGS, hits, "o-", label="serial")
-        right.axhline(sum(len(one.touched) for one in parallel), linestyle="--", color="C1", label="behavior-based")
-        right.set(xlabel="time for a plan (s)", ylabel=f"collisions in {len(serial)} crossings")
-        right.set_box_aspect(1.0)
-        right.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0))
-        middle.set(ylabel="")
-
-    return draw
+def _draw(figure: Figure, serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> None:
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1))
+    for axes, name, crossings in ((left, "plans for 0.5 s", serial), (middle, "behavior-based", parallel)):
+        floor(axes, crossings[0].plan)
+        for one in crossings:
+            axes.plot(one.x, one.y, linewidth=0.8)
+            axes.plot(one.x[one.touched], one.y[one.touched], "x", color="red", markersize=5)
+        axes.plot(*GOAL, "*", color="black")
+        axes.set(title=name)
+        axes.locator_params(nbins=5)
+    right.plot(PLANNINGS, hits, "o-", label="serial")
+    right.axhline(sum(len(one.touched) for one in parallel), linestyle="--", color="C1", label="behavior-based")
+    right.set(xlabel="time for a plan (s)", ylabel=f"collisions in {len(serial)} crossings")
+    right.set_box_aspect(1.0)
+    right.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    middle.set(ylabel="")

@@ -19,7 +19,7 @@ import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.record.compare import Difference, command_difference, replayed, telemetry_difference
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def disagreements(run: RunResult, brain: object) -> int:
 )
 def same_commands(seed: int, progress: Progress) -> Outcome:
     measured: list[Measured] = []
-    data: dict[str, object] = {}
+    data: dict[str, list[float]] = {}
     drawn: list[tuple[str, list[RunResult], list[Difference | None]]] = []
     for name, brain in with_progress(list(BRAINS.items()), progress):
         runs = [boebot.run(brain(), robot="shieldbot", on=on, seconds=SECONDS, seed=seed) for on in ("native", "avr")]
@@ -95,8 +95,10 @@ def same_commands(seed: int, progress: Progress) -> Outcome:
             data |= {f"{name}_{run.board}_left": [left for *_, left, _ in run.record.steps][:steps]}
             data |= {f"{name}_{run.board}_right": [right for *_, right in run.record.steps][:steps]}
         drawn.append((name, runs, [seen, looked_at, commanded]))
-    shortest = min(len(column) for column in data.values())  # type: ignore[arg-type]
-    return Outcome(measured, {key: column[:shortest] for key, column in data.items()}, _draw(drawn))  # type: ignore[index]
+    shortest = min(len(column) for column in data.values())
+    return Outcome(
+        measured, {key: column[:shortest] for key, column in data.items()}, lambda figure: _draw(figure, drawn)
+    )
 
 
 def _which(difference: Difference | None) -> str:
@@ -117,25 +119,20 @@ def _counts_apart(runs: list[RunResult]) -> int:
     return int(np.abs(counts[0][:, :ticks] - counts[1][:, :ticks]).max())
 
 
-def _draw(drawn: list[tuple[str, list[RunResult], list[Difference | None]]]) -> Draw:
-    def draw(figure: Figure) -> None:
-        rows = figure.subplots(2 * len(drawn), sharex=True)
-        for index, (name, runs, differences) in enumerate(drawn):
-            for side in (0, 1):
-                axes = rows[2 * index + side]
-                for run, style in zip(runs, ("-", "--"), strict=True):
-                    times = [run.record.times[step[0]] for step in run.record.steps]
-                    axes.step(
-                        times, [step[2 + side] for step in run.record.steps], style, where="post", label=run.board
-                    )
-                axes.set(ylabel=f"{name},\n{('left', 'right')[side]}", ylim=(-1.05, 1.05))
-                for difference, color in zip(differences, ("0.8", "C2", "red"), strict=True):
-                    if difference is not None:
-                        axes.axvline(difference.tick * runs[0].tick, color=color, linestyle=":")
-        rows[0].set_title(
-            "first difference: grey telemetry, green infrared or whiskers, red commands", loc="left", fontsize=9
-        )
-        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=2, fontsize="x-small")
-        rows[-1].set(xlabel="time (s)")
-
-    return draw
+def _draw(figure: Figure, drawn: list[tuple[str, list[RunResult], list[Difference | None]]]) -> None:
+    rows = figure.subplots(2 * len(drawn), sharex=True)
+    for index, (name, runs, differences) in enumerate(drawn):
+        for side in (0, 1):
+            axes = rows[2 * index + side]
+            for run, style in zip(runs, ("-", "--"), strict=True):
+                times = [run.record.times[step[0]] for step in run.record.steps]
+                axes.step(times, [step[2 + side] for step in run.record.steps], style, where="post", label=run.board)
+            axes.set(ylabel=f"{name},\n{('left', 'right')[side]}", ylim=(-1.05, 1.05))
+            for difference, color in zip(differences, ("0.8", "C2", "red"), strict=True):
+                if difference is not None:
+                    axes.axvline(difference.tick * runs[0].tick, color=color, linestyle=":")
+    rows[0].set_title(
+        "first difference: grey telemetry, green infrared or whiskers, red commands", loc="left", fontsize=9
+    )
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=2, fontsize="x-small")
+    rows[-1].set(xlabel="time (s)")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.experiments.experiment import Draw, Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,25 +126,22 @@ def undisturbed(seconds: float) -> float:
     return float(FEED / u.max())
 
 
-def _draw(found: Response) -> Draw:
-    def draw(figure: Figure) -> None:
-        axes = figure.subplot_mosaic([["u", "x"], ["active", "x"]], height_ratios=(4, 1))
-        for index, (name, line) in enumerate(zip(NAMES, LINES, strict=True)):
-            marker = "+" if name is NAMES[-1] else None
-            every = max(1, len(found.times) // 30)
-            axes["u"].plot(found.times, found.utilities[:, index], line, marker=marker, markevery=every, label=name)
-        axes["u"].set(ylabel="utility U", xlim=(0, SECONDS), ylim=(0, 0.7), xticklabels=())
-        axes["u"].legend(fontsize="x-small", loc="lower right")
-        axes["x"].plot(found.times, found.stimulus, color="C5")
-        axes["x"].set(xlabel="time (s)", ylabel="noxious substance X", xlim=(0, SECONDS), ylim=(0, 0.7))
-        ends = [time for _, time in found.starts[1:]] + [SECONDS]
-        for (which, time), end in zip(found.starts, ends, strict=True):
-            axes["active"].hlines(which, time, end, color=f"C{which - 1}", linewidth=4)
-        names = [f"B{number}" for number in range(1, 6)]
-        axes["active"].set(xlabel="time (s)", ylabel="active", yticks=range(1, 6), yticklabels=names)
-        axes["active"].set(xlim=(0, SECONDS), ylim=(0.4, 5.6))
-
-    return draw
+def _draw(figure: Figure, found: Response) -> None:
+    axes = figure.subplot_mosaic([["u", "x"], ["active", "x"]], height_ratios=(4, 1))
+    for index, (name, line) in enumerate(zip(NAMES, LINES, strict=True)):
+        marker = "+" if name is NAMES[-1] else None
+        every = max(1, len(found.times) // 30)
+        axes["u"].plot(found.times, found.utilities[:, index], line, marker=marker, markevery=every, label=name)
+    axes["u"].set(ylabel="utility U", xlim=(0, SECONDS), ylim=(0, 0.7), xticklabels=())
+    axes["u"].legend(fontsize="x-small", loc="lower right")
+    axes["x"].plot(found.times, found.stimulus, color="C5")
+    axes["x"].set(xlabel="time (s)", ylabel="noxious substance X", xlim=(0, SECONDS), ylim=(0, 0.7))
+    ends = [time for _, time in found.starts[1:]] + [SECONDS]
+    for (which, time), end in zip(found.starts, ends, strict=True):
+        axes["active"].hlines(which, time, end, color=f"C{which - 1}", linewidth=4)
+    names = [f"B{number}" for number in range(1, 6)]
+    axes["active"].set(xlabel="time (s)", ylabel="active", yticks=range(1, 6), yticklabels=names)
+    axes["active"].set(xlim=(0, SECONDS), ylim=(0.4, 5.6))
 
 
 def _data(found: Response) -> dict[str, Any]:
@@ -178,7 +175,7 @@ def sequence(seed: int, progress: Progress) -> Outcome:
         about("exact: last start of B1", limit.starts[7][1] if len(limit.starts) > 7 else np.nan, 3.6794, 1e-4, "s"),
         about("exact: last start of B5", limit.starts[-1][1], 3.6976, 1e-4, "s"),
     ]
-    return Outcome(measured, _data(found), _draw(found))
+    return Outcome(measured, _data(found), lambda figure: _draw(figure, found))
 
 
 @experiment(
@@ -200,7 +197,7 @@ def dose(seed: int, progress: Progress) -> Outcome:
         Measured("B5 comes later than at full strength by", found.first(5) - full.first(5), "s", least=0.0),
         Measured("Euler, 1 ms: first start of B5", by_euler(1.0).first(5), "s", 2.59, 2.69),
     ]
-    return Outcome(measured, _data(found), _draw(found))
+    return Outcome(measured, _data(found), lambda figure: _draw(figure, found))
 
 
 @experiment(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.trials import Trial, trial_seeds, try_once
 
 if TYPE_CHECKING:
@@ -104,27 +104,23 @@ def columns(trial: Straight) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def draw_runs(runs: Sequence[Straight]) -> Draw:
+def draw_runs(figure: Figure, runs: Sequence[Straight]) -> None:
     """Distance and motor signals against time."""
-
-    def draw(figure: Figure) -> None:
-        upper, lower = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        upper.axhspan(0.98, 1.02, color="C2", alpha=0.15, label="destination, |D - d| < b D")
-        for number, one in enumerate(runs):
-            upper.plot(one.time, one.distances, color="C0", lw=1.2, label="" if number else "true distance d")
-            if not math.isnan(one.stop_time):
-                upper.plot(
-                    one.stop_time, one.believed, "o", color="C1", ms=4, label="" if number else "stop, d as believed"
-                )
-            series = one.result.series
-            for side, signal, colour in (("left", series.signals[0], "C0"), ("right", series.signals[1], "C3")):
-                lower.plot(one.time, signal, color=colour, lw=0.8, alpha=0.7, label="" if number else side)
-        upper.set(ylabel="distance (m)", ylim=(0, 1.08))
-        lower.set(xlabel="time (s)", ylabel="motor signal")
-        upper.legend(fontsize="small", loc="lower right")
-        lower.legend(fontsize="small", loc="upper right")
-
-    return draw
+    upper, lower = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+    upper.axhspan(0.98, 1.02, color="C2", alpha=0.15, label="destination, |D - d| < b D")
+    for number, one in enumerate(runs):
+        upper.plot(one.time, one.distances, color="C0", lw=1.2, label="" if number else "true distance d")
+        if not math.isnan(one.stop_time):
+            upper.plot(
+                one.stop_time, one.believed, "o", color="C1", ms=4, label="" if number else "stop, d as believed"
+            )
+        series = one.result.series
+        for side, signal, colour in (("left", series.signals[0], "C0"), ("right", series.signals[1], "C3")):
+            lower.plot(one.time, signal, color=colour, lw=0.8, alpha=0.7, label="" if number else side)
+    upper.set(ylabel="distance (m)", ylim=(0, 1.08))
+    lower.set(xlabel="time (s)", ylabel="motor signal")
+    upper.legend(fontsize="small", loc="lower right")
+    lower.legend(fontsize="small", loc="upper right")
 
 
 # ---- E22 -------------------------------------------------------------------------------------------------------------
@@ -149,7 +145,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
 )
 def notes_run(seed: int, progress: Progress) -> Outcome:
     trial = drive(runner(period=0.01), "arsim", 6.0, seed)
-    return Outcome(judge_notes(trial), columns(trial), draw_runs([trial]))
+    return Outcome(judge_notes(trial), columns(trial), lambda figure: draw_runs(figure, [trial]))
 
 
 # Time by (5.1) down to s_min: ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k), k = 200 / 78.5; the rest of the
@@ -194,7 +190,7 @@ def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
         "rest_m": [one.rest for one in runs],
         "rest_y_m": [float(one.path[-1, 1]) for one in runs],
     }
-    return Outcome(judge_shieldbot(runs), data, draw_runs(runs))
+    return Outcome(judge_shieldbot(runs), data, lambda figure: draw_runs(figure, runs))
 
 
 @experiment(

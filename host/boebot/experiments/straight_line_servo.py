@@ -108,16 +108,30 @@ def judge_model(with_least: ServoRun, without: ServoRun) -> list[Measured]:
     ]
 
 
-Series = tuple[str, "Sequence[float]", "Sequence[float]", "Sequence[float]"]
-"""name; time (s); distance (m); motor signal"""
+Columns = tuple["Sequence[float]", "Sequence[float]", "Sequence[float]"]
+"""time (s); distance (m); motor signal"""
 
 
-def _draw(figure: Figure, rows: list[Series], dead_band: float) -> None:
+def _outcome(measured: list[Measured], dead_band: float, with_least: Columns, without: Columns) -> Outcome:
+    """The data end where the shorter run ends."""
+    count = min(len(with_least[0]), len(without[0]))
+    data = {
+        "time_s": with_least[0][:count],
+        "distance_m": with_least[1][:count],
+        "signal": with_least[2][:count],
+        "distance_without_m": without[1][:count],
+        "signal_without": without[2][:count],
+    }
+    rows = {"s_min = 0.06": with_least, "without s_min": without}
+    return Outcome(measured, data, lambda figure: _draw(figure, rows, dead_band))
+
+
+def _draw(figure: Figure, rows: dict[str, Columns], dead_band: float) -> None:
     """Distance and motor signal of the runs against time."""
     upper, lower = figure.subplots(2, sharex=True)
     upper.axhspan(0.98, 1.02, color="C2", alpha=0.15, label="destination, |D - d| < b D")
     lower.axhspan(0, dead_band, color="0.85", label="dead band")
-    for (name, times, distances, signals), colour in zip(rows, ("C0", "C1"), strict=True):
+    for (name, (times, distances, signals)), colour in zip(rows.items(), ("C0", "C1"), strict=True):
         upper.plot(times, distances, color=colour, label=name)
         lower.plot(times, signals, color=colour, lw=1)
     upper.set(ylabel="true distance (m)", ylim=(0.8, 1.03))
@@ -138,18 +152,8 @@ def servo_model(seed: int, progress: Progress) -> Outcome:
     with_least = on_servo_model(LEAST)
     progress(0.5)
     without = on_servo_model(0.0)
-    rows: list[Series] = [
-        (name, run.times, run.distances, run.signals)
-        for name, run in (("s_min = 0.06", with_least), ("without s_min", without))
-    ]
-    data = {
-        "time_s": with_least.times,
-        "distance_m": with_least.distances,
-        "signal": with_least.signals,
-        "distance_without_m": without.distances,
-        "signal_without": without.signals,
-    }
-    return Outcome(judge_model(with_least, without), data, lambda figure: _draw(figure, rows, DEAD_BAND))
+    columns = [(run.times, run.distances, run.signals) for run in (with_least, without)]
+    return _outcome(judge_model(with_least, without), DEAD_BAND, *columns)
 
 
 # ---- through the circle ----------------------------------------------------------------------------------------------
@@ -188,16 +192,5 @@ def servo_shieldbot(seed: int, progress: Progress) -> Outcome:
         drive(runner(period=0.05, least=least), robot, 20.0, trial_seed, "native", "encoder_errors")
         for least, trial_seed in zip((LEAST, 0.0), with_progress(trial_seeds(seed, 2), progress), strict=True)
     ]
-    rows: list[Series] = [
-        (name, list(run.time), list(run.distances), list(run.result.series.signals[0]))
-        for name, run in zip(("s_min = 0.06", "without s_min"), runs, strict=True)
-    ]
-    count = min(len(run.time) for run in runs)
-    data = {
-        "time_s": runs[0].time[:count],
-        "distance_m": runs[0].distances[:count],
-        "signal": runs[0].result.series.signals[0][:count],
-        "distance_without_m": runs[1].distances[:count],
-        "signal_without": runs[1].result.series.signals[0][:count],
-    }
-    return Outcome(judge_shieldbot(*runs), data, lambda figure: _draw(figure, rows, 0.045))
+    columns = [(list(run.time), list(run.distances), list(run.result.series.signals[0])) for run in runs]
+    return _outcome(judge_shieldbot(*runs), 0.045, *columns)

@@ -18,7 +18,7 @@ from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
-from boebot.experiments.experiment import Draw, Measured, Outcome, Progress, about, experiment, with_progress
+from boebot.experiments.experiment import Measured, Outcome, Progress, about, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import Trial, trial_seeds, try_once
 from boebot.experiments.variants import arena_file, at_angle, varied
@@ -117,33 +117,29 @@ def judge(setting: Setting, times: Sequence[float], straight: float) -> list[Mea
     ]
 
 
-def _draw(done: Sequence[Trial], times: Sequence[float], straight: float) -> Draw:
+def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straight: float) -> None:
     """Ways up to the lamp, and the times that they took."""
+    from matplotlib.patches import Circle
 
-    def draw(figure: Figure) -> None:
-        from matplotlib.patches import Circle
+    from boebot.view import style
+    from boebot.view.robot_drawing import draw_robot
 
-        from boebot.view import style
-        from boebot.view.robot_drawing import draw_robot
-
-        left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-        floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
-        for trial, time in zip(done, times, strict=True):
-            until = int(np.searchsorted(trial.time, time)) + 1
-            left.plot(*trial.path[:until].T, color=style.END if time < math.inf else style.ESTIMATE, lw=0.8, zorder=6)
-            left.plot(*trial.path[0], ".", color=style.START, ms=4, zorder=7)
-        left.add_patch(Circle((0, 0), REACHED_M, fill=False, ls="--", ec=style.FAINT, zorder=8))
-        draw_robot(left, done[0].result.robot, done[0].start, style.START)
-        reached = [time for time in times if time < math.inf]
-        left.set_title(f"{len(reached)} of {len(times)} starts reach the lamp")
-        right.hist(reached, bins=24)
-        right.axvline(straight, color="0.3", ls="--", lw=1, label=f"straight {straight:.1f} s")
-        if reached:
-            right.axvline(float(np.median(times)), color="C1", lw=1.5, label=f"median {np.median(times):.1f} s")
-        right.set(xlabel="time to the lamp (s)", ylabel="starts", xlim=(0, None))
-        right.legend(fontsize="small")
-
-    return draw
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
+    for trial, time in zip(done, times, strict=True):
+        until = int(np.searchsorted(trial.time, time)) + 1
+        left.plot(*trial.path[:until].T, color=style.END if time < math.inf else style.ESTIMATE, lw=0.8, zorder=6)
+        left.plot(*trial.path[0], ".", color=style.START, ms=4, zorder=7)
+    left.add_patch(Circle((0, 0), REACHED_M, fill=False, ls="--", ec=style.FAINT, zorder=8))
+    draw_robot(left, done[0].result.robot, done[0].start, style.START)
+    reached = [time for time in times if time < math.inf]
+    left.set_title(f"{len(reached)} of {len(times)} starts reach the lamp")
+    right.hist(reached, bins=24)
+    right.axvline(straight, color="0.3", ls="--", lw=1, label=f"straight {straight:.1f} s")
+    if reached:
+        right.axvline(float(np.median(times)), color="C1", lw=1.5, label=f"median {np.median(times):.1f} s")
+    right.set(xlabel="time to the lamp (s)", ylabel="starts", xlim=(0, None))
+    right.legend(fontsize="small")
 
 
 def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
@@ -157,7 +153,7 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
         "heading_rad": [heading for _, _, heading in poses],
         "time_s": times,
     }
-    return Outcome(judge(setting, times, straight), data, _draw(done, times, straight))
+    return Outcome(judge(setting, times, straight), data, lambda figure: _draw(figure, done, times, straight))
 
 
 @experiment(

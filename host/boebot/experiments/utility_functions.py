@@ -8,7 +8,6 @@ All by the kit's own utilities, and E64 by a whole brain on a robot.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -205,10 +204,6 @@ class Note(CognitiveProcess):
 RISE, FALL = 1.0, 4.0  # s
 
 
-def _of_time(name: str, value: Callable[[float], float]) -> StateVariable:
-    return StateVariable(name, lambda robot: value(robot.time))
-
-
 @experiment(
     "E64",
     title="One motor behavior, and every cognitive process above zero",
@@ -221,7 +216,7 @@ def activation(seed: int, progress: Progress) -> Outcome:
     motor = [Hold(name=f"m{i}", signal=i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5})) for i in range(3)]
     delayed = Note(name="delayed", utility=Utility(b=-0.5, w={"z": 1.5}, tau=TAU))
     notes = [delayed, Note(name="always"), Note(name="never", utility=Utility(b=-0.2))]
-    z = _of_time("z", lambda time: float(RISE - 1e-9 <= time < FALL - 1e-9))
+    z = StateVariable("z", lambda robot: float(RISE - 1e-9 <= robot.time < FALL - 1e-9))
     brain = Brain([*motor, *notes], [z], period=0.01)
     result = boebot.run(brain, robot="arsim", arena="empty", seconds=6, seed=seed)
     times = np.array([step.time for step in brain.steps])
@@ -229,46 +224,31 @@ def activation(seed: int, progress: Progress) -> Outcome:
     best = utilities[:, :3].argmax(axis=1)
     driving = np.array([round(left * 10) for _, _, left, _ in result.record.steps])
     stepped = np.stack([np.isin(times, note.times) for note in notes], axis=1)
+    disagree = int((stepped != (utilities[:, 3:] > 0)).sum())
+    first, last = (delayed.times[0], delayed.times[-1]) if delayed.times else (math.nan, math.nan)
     low, high = math.tanh(-0.5), math.tanh(1.0)
     on, off = 0.3 * math.log((high - low) / high), 0.3 * math.log((high - low) / -low)
     measured = [
         exactly("steps in which another motor behavior than the best drives", int((driving != best).sum()), 0),
         # m2 at z = 0, m0 at z = 1; halfway tanh is concave: (tanh 0.1 + tanh 0.2) / 2 of m1 > tanh(0.3) / 2 of m0
         exactly("motor behaviors that have been active", len(set(driving.tolist())), 3),
-        exactly(
-            "steps and processes with u > 0 but idle, or not but active",
-            int((stepped != (utilities[:, 3:] > 0)).sum()),
-            0,
-        ),
-        about("delay of switching on", delayed.times[0] - RISE if delayed.times else math.nan, on, 0.01, "s"),
-        about(
-            "delay of switching off",
-            delayed.times[-1] + brain.PERIOD - FALL if delayed.times else math.nan,
-            off,
-            0.01,
-            "s",
-        ),
+        exactly("steps and processes with u > 0 but idle, or not but active", disagree, 0),
+        about("delay of switching on", first - RISE, on, 0.01, "s"),
+        about("delay of switching off", last + brain.PERIOD - FALL, off, 0.01, "s"),
     ]
 
     def draw(figure: Figure) -> None:
-        for axes, kind, first, at in zip(
-            figure.subplots(2, sharex=True),
-            ("motor", "cognitive"),
-            (0, 3),
-            (best[:, None] == np.arange(3), stepped),
-            strict=True,
-        ):
-            for index in range(3):
-                values = utilities[:, first + index]
-                name = brain.processes[first + index].name
-                axes.plot(times, values, linewidth=0.8, color=f"C{first + index}")
-                axes.plot(
-                    times, np.where(at[:, index], values, np.nan), linewidth=3, color=f"C{first + index}", label=name
-                )
+        upper, lower = figure.subplots(2, sharex=True)
+        active = np.concatenate((best[:, None] == np.arange(3), stepped), axis=1)
+        for index, process in enumerate(brain.processes):
+            axes, values, color = (upper if index < 3 else lower), utilities[:, index], f"C{index}"
+            axes.plot(times, values, linewidth=0.8, color=color)
+            axes.plot(times, np.where(active[:, index], values, np.nan), linewidth=3, color=color, label=process.name)
+        for axes, kind in ((upper, "motor"), (lower, "cognitive")):
             axes.axhline(0, color="0.6", linewidth=0.8)
             axes.set(ylabel=f"utility, {kind}")
             axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
-        axes.set(xlabel="time (s)")
+        lower.set(xlabel="time (s)")
 
     names = [process.name for process in brain.processes]
     return Outcome(measured, {"time_s": times} | {f"u_{name}": utilities[:, i] for i, name in enumerate(names)}, draw)
