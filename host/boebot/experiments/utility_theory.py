@@ -23,7 +23,7 @@ def expected_gain(wealth: float, price: float) -> float:
 
 def bisected(is_below: Callable[[float], bool], low: float, high: float) -> float:
     """Where `is_below` changes from true to false, between `low` and `high`."""
-    for _ in range(100):
+    for _ in range(60):
         middle = (low + high) / 2
         if is_below(middle):
             low = middle
