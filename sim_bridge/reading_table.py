@@ -25,7 +25,7 @@ COLUMNS: Final = ("distance_m", "angle_rad", "reading")
 
 
 class ReadingTable:
-    """What a sensor was seen to read, by distance (m) and angle of incidence (rad, 0: straight at the surface).
+    """Readings of a real sensor, by distance (m) and angle of incidence (rad, 0: straight at the surface).
 
     Attributes:
         distances: of the bins, increasing.

@@ -1,7 +1,9 @@
-"""A log of a vehicle's run: one row a step, columns as numpy arrays. What ARSim calls motion results."""
+"""The record of a vehicle that is stepped by hand: one row a step, columns as numpy arrays. What ARSim calls motion
+results. (`boebot.run` records its runs itself; both write `boebot.record.record.Record`.)"""
 
 from __future__ import annotations
 
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan, plan_of_poses, poses_of
 from boebot.errors import RobotError
+from boebot.record.record import Record
 from sim_bridge.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
@@ -16,28 +19,28 @@ TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "distance", "touchin
 
 
 class Recorder:
-    """Rows of truth and readings. Given to `Vehicle.run` as `stage` it takes one after each step.
+    """Rows of truth and readings. Given to `Vehicle.run` as `stage` it appends one after each step.
 
     Attributes:
+        record: the rows, streams "vehicle" and "movers".
         names: of the columns: `TRUTH`, then a column for each reading, such as "compass", "odometer[0]".
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         """Empty."""
         self.vehicle = vehicle
+        self.record = Record()
         self.names = list(TRUTH)
         for name, where in vehicle.model.names.items():
             count = where.stop - where.start
             self.names += [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]
-        self._rows: list[tuple[float, ...]] = []
-        self._movers: list[Floats] = []
 
     def append(self) -> None:
         """A row of how things are now. Lengths in m, times in s, angles in rad."""
         v, body = self.vehicle, self.vehicle.body
         truth = (v.time, body.x, body.y, body.heading, body.speed, body.turn_rate, body.distance, body.touching)
-        self._rows.append((*truth, *v.readings))
-        self._movers.append(poses_of(v.movers))
+        self.record.append("vehicle", v.time, array("d", (*truth, *v.readings)).tobytes())
+        self.record.append("movers", v.time, poses_of(v.movers).tobytes())
 
     def __call__(self, stage: str, vehicle: Vehicle) -> None:
         """A row at the end of each step: as ARSim, with the readings that the step's brain got."""
@@ -45,7 +48,7 @@ class Recorder:
             self.append()
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self.record.rows("vehicle"))
 
     def __getitem__(self, name: str) -> Floats:
         """A column, shape (rows,); one of a sensor with several readings by "odometer[0]"."""
@@ -54,7 +57,10 @@ class Recorder:
     @property
     def table(self) -> Floats:
         """All, shape (rows, columns)."""
-        return np.array(self._rows, dtype=np.float64).reshape(-1, len(self.names))
+        return self._stream("vehicle").reshape(-1, len(self.names))
+
+    def _stream(self, name: str) -> Floats:
+        return np.frombuffer(b"".join(data for _, data in self.record.rows(name)), dtype=np.float64).copy()
 
     def floor_plan(self) -> FloorPlan:
         """The arena with its moving shapes where they really were, at the rows' times, for pictures of the run.
@@ -64,11 +70,13 @@ class Recorder:
         Raises:
             RobotError: there is no row.
         """
-        if not self._rows:
+        if not len(self):
             raise RobotError("recorder: it has no row; expected append() after some steps before a floor plan is made")
         time = self["time"]
         newest = 1 + max(np.flatnonzero(np.diff(time) < 0), default=-1)
-        return plan_of_poses(self.vehicle.arena, time[newest:], np.array(self._movers[newest:]).transpose(1, 2, 0))
+        shapes = len(self.vehicle.arena.description.moving)
+        movers = self._stream("movers").reshape(len(self), shapes, 4)[newest:]
+        return plan_of_poses(self.vehicle.arena, time[newest:], movers.transpose(1, 2, 0))
 
     def save(self, path: str | Path) -> None:
         """Writes a CSV file with the columns' names in its first line."""

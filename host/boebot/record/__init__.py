@@ -1,1 +1,1 @@
-"""What a run leaves: what was put aside while it went on, the same as arrays, its figures, the comparison of two."""
+"""What a run leaves: its record, the same as arrays, figures, and the comparison of two runs."""

@@ -1,5 +1,5 @@
 """What a brain of processes did in a run: the state variables, utilities and active processes of each of its steps, and
-why it switched (section 8.2 of the notes). Taken when a run has ended; it changes no more.
+why it switched (section 8.2 of the notes). Made when a run has ended; it changes no more.
 """
 
 from __future__ import annotations

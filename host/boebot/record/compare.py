@@ -68,7 +68,7 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
     """What a fresh brain commands, step by step, on the telemetry of a run: without board, link and world.
 
     Raises:
-        BoebotError: a run without a board, or of a board with slow devices, whose messages have no step of their own.
+        BoebotError: a run without a board, or of a board with slow devices, whose messages belong to no step.
     """
     if result.record.rows(DevicesTelemetry.NAME):
         raise BoebotError(f"robot {result.robot.name!r} has slow devices; only telemetry can be replayed")

@@ -9,6 +9,7 @@ NAME of a message   that of the newest tick     the payload of a message of slow
 event               the board's, since reset    kind, value, whether it was before the session
 readings            the run's, of the step      of a robot without a board: tick, status, motor signals, ages, readings
 command             that of the observation     kind (index of KINDS), left, right: what the brain asked for in one step
+vehicle, movers     the run's, of the step      of a vehicle stepped by hand (sim_bridge.recorder)
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Record:
         self._decoded: dict[str, list[Any]] = {}
 
     def __repr__(self) -> str:
-        names = ("telemetry", "readings", "event", "command")
+        names = ("telemetry", "readings", "event", "command", "vehicle")
         return "<Record: " + ", ".join(f"{len(self.rows(name))} {name}" for name in names if self.rows(name)) + ">"
 
     # ---- writing -----------------------------------------------------------------------------------------------------

@@ -115,14 +115,14 @@ class RunResult:
 
     @cached_property
     def series(self) -> Series:
-        """Everything the robot told, as arrays, one entry per control tick received."""
+        """Telemetry or readings as arrays, one entry per control tick received."""
         if self.layout is not None:
             return ReadingsSeries(self.record, self.robot, self.tick, self.layout)
         return self.telemetry
 
     @cached_property
     def telemetry(self) -> TelemetrySeries:
-        """Everything the board told, with what only a board tells; empty without one."""
+        """The board's telemetry, with what only boards send; empty without a board."""
         return TelemetrySeries(self.record, self.robot, self.tick)
 
     @cached_property
@@ -135,14 +135,10 @@ class RunResult:
     @cached_property
     def odometry(self) -> Pose:
         """The pose estimate from encoders and commands at each of those ticks, calibrated once at the start."""
-        start = (0.0, 0.0, 0.0)
-        if self.true_pose is not None:
-            start = (
-                float(self.true_pose.x[0]),
-                float(self.true_pose.y[0]),
-                float(self.true_pose.heading[0]),
-            )
-        return self.series.odometry(start)
+        pose = self.true_pose
+        if pose is None:
+            return self.series.odometry()
+        return self.series.odometry((float(pose.x[0]), float(pose.y[0]), float(pose.heading[0])))
 
     @property
     def bytes_from_board(self) -> bytes:
@@ -189,14 +185,14 @@ class RunResult:
     @cached_property
     def dead_man_stops(self) -> int:
         """Times the motors stopped because no fresh set-point came."""
-        told = sum(event.kind == EventKind.DEAD_MAN for event in self.record.events)
-        return max(self.series.rising(Status.DEAD_MAN), told)  # telemetry is not heard while a session is lost
+        events = sum(event.kind == EventKind.DEAD_MAN for event in self.record.events)
+        return max(self.series.rising(Status.DEAD_MAN), events)  # telemetry is not heard while a session is lost
 
     @cached_property
     def fallback_takeovers(self) -> int:
         """Times the board's own brain took over because the host was silent."""
-        told = sum(event.kind == EventKind.FALLBACK and event.value == 1 for event in self.record.events)
-        return max(self.series.rising(Status.FALLBACK), told)
+        events = sum(event.kind == EventKind.FALLBACK and event.value == 1 for event in self.record.events)
+        return max(self.series.rising(Status.FALLBACK), events)
 
     @property
     def has_odometry(self) -> bool:
@@ -239,18 +235,11 @@ class RunResult:
         known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
         return float(known.max()) if len(known) else None
 
-    def _behavior_figures(self) -> dict[str, float | int | str | None]:
-        """Of a brain of processes: switches between motor behaviors, and the share of time of each."""
-        record = self.brain_record
-        if record is None:
-            return {"behavior_switches": None}
-        shares = {f"{name}_share": round(share, 4) for name, share in record.shares(self.run_time).items()}
-        return {"behavior_switches": len(record.behavior_switches), **shares}
-
     def table(self) -> dict[str, float | int | str | None]:
         """The run's figures by name, units in the names; None: not known, or nothing that this robot has."""
         on_board = self.layout is None
-        slow_age = self.slow_reading_age
+        slow_age, identity, brain = self.slow_reading_age, self.identity, self.brain_record
+        shares = {} if brain is None else brain.shares(self.run_time)
         return {
             "brain": self.brain,
             "robot": self.robot.name,
@@ -270,7 +259,8 @@ class RunResult:
             "long_steps": self.long_steps,
             "longest_step_ms": round(self.longest_step * 1000, 3),
             "unrealisable": self.unrealisable,
-            **self._behavior_figures(),
+            "behavior_switches": None if brain is None else len(brain.behavior_switches),
+            **{f"{name}_share": round(share, 4) for name, share in shares.items()},
             "ticks": self.ticks,
             "slow_readings": None if slow_age is None else len(self.record.rows(DevicesTelemetry.NAME)),
             "slow_reading_age_ms": None if slow_age is None else round(slow_age * 1000, 3),
@@ -283,11 +273,9 @@ class RunResult:
             "sessions_lost": self.sessions_lost if on_board else None,
             "hung_at": hangs.places(self.watchdog_resets),
             "real_time_factor": round(self.real_time_factor, 2),
-            "firmware": None if self.identity is None else text(self.identity.firmware_version),
-            "compiler": None if self.identity is None else text(self.identity.compiler),
-            "image_hash": None
-            if self.identity is None or self.identity.image_size == 0
-            else f"{self.identity.image_hash:08x}",
+            "firmware": None if identity is None else text(identity.firmware_version),
+            "compiler": None if identity is None else text(identity.compiler),
+            "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
             "ended": "complete" if self.error is None else _why(self.error),
         }
 

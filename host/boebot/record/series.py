@@ -39,7 +39,7 @@ class Pose:
 
 
 class Series(Run, ABC):
-    """What the robot told, and what was asked of it.
+    """What the robot sent, and what was asked of it.
 
     Attributes:
         raw: what was recorded at each tick: a board's telemetry, or a vehicle's readings; has the column "tick".
@@ -75,7 +75,7 @@ class Series(Run, ABC):
 
     @abstractmethod
     def _own_columns(self) -> list[Column]:
-        """What run.csv says besides the devices."""
+        """Columns of run.csv besides those of the devices."""
 
     @cached_property
     def _places(self) -> dict[str, Place]:
@@ -106,7 +106,7 @@ class Series(Run, ABC):
         return np.full(len(self), np.nan) if column is None else np.asarray(column.values, dtype=np.float64)
 
     def columns(self) -> dict[str, tuple[NDArray[Any], int | None]]:
-        """What the devices said, for run.csv: heading (unit in its name) -> (values, digits; None: whole numbers)."""
+        """The devices' columns for run.csv: heading (unit in its name) -> (values, digits; None: whole numbers)."""
         found = {}
         for device in self._places:
             for column in self.device_columns(device).values():
@@ -114,7 +114,7 @@ class Series(Run, ABC):
         return found | {_heading("", column): (column.values, column.digits) for column in self._own_columns()}
 
     def readouts(self) -> list[Readout]:
-        """What the devices said that pages show as a number."""
+        """The devices' readings that pages show as a number."""
         found = [
             self._robot.device[device].readout(place, self, self.device_columns(device))
             for device, place in self._places.items()
