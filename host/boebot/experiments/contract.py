@@ -15,6 +15,7 @@ from __future__ import annotations
 import ast
 import functools
 import gc
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
@@ -192,11 +193,11 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         Measured("modules that brains are made of", len(found), least=len(ROOMS)),
         exactly("imports of the simulator or of what knows the truth", guilty, 0),
     ]
-    counts: dict[str, dict[str, int]] = {}
+    counts: dict[str, Counter[str]] = {}
     for robot, on in with_progress(RUNS, progress):
         walker = Walker(0.5)
         boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
-        counts[robot] = _by_module(walker.met)
+        counts[robot] = Counter(one.kind.rpartition(".")[0] for one in walker.met)
         devices = {one.kind for one in walker.met if is_within(one.kind, ("boebot.devices", "boebot.devices.readings"))}
         measured += [
             # kinds: of objects themselves there are some more where the interpreter has run other things before
@@ -214,20 +215,11 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         axes = figure.subplots()
         places = np.arange(len(modules))
         for number, (robot, of_module) in enumerate(counts.items()):
-            axes.barh(places + 0.4 * number, [of_module.get(module, 0) for module in modules], 0.4, label=robot)
+            axes.barh(places + 0.4 * number, [of_module[module] for module in modules], 0.4, label=robot)
         axes.set_xscale("log")
         axes.set(xlabel="objects", yticks=places + 0.2, yticklabels=modules)
         axes.tick_params(axis="y", labelsize="small")
         axes.legend()
 
-    data = {"module": modules} | {robot: [of.get(module, 0) for module in modules] for robot, of in counts.items()}
+    data = {"module": modules} | {robot: [of[module] for module in modules] for robot, of in counts.items()}
     return Outcome(measured, data, draw)
-
-
-def _by_module(met: list[Met]) -> dict[str, int]:
-    """How many, by the module of their class."""
-    found: dict[str, int] = {}
-    for one in met:
-        module = one.kind.rpartition(".")[0]
-        found[module] = found.get(module, 0) + 1
-    return found

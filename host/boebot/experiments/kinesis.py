@@ -32,19 +32,19 @@ PERIOD = 0.05  # s
 MOTOR = RegulatedMotor(gain_n_s=10.0, torque_maximum_n_m=10.0)
 
 
-def humidity(x: float, y: float) -> float:
-    """H at a place (m): half of the floor is humid, in squares like those of a chessboard, without end and border."""
-    return float((math.floor(x / FIELD) + math.floor(y / FIELD)) % 2)
+def humidity(x: Floats | float, y: Floats | float) -> Floats:
+    """H at places (m): half of the floor is humid, in squares like those of a chessboard, without end and border."""
+    return np.asarray((np.floor(x / FIELD) + np.floor(y / FIELD)) % 2)
 
 
 def feel(robot: Robot) -> float:
     """H where the robot is: it has no hygrometer, but an exact odometer and a map."""
-    return humidity(robot.odometer.x, robot.odometer.y)
+    return float(humidity(robot.odometer.x, robot.odometer.y))
 
 
 def humid_share(x: Floats, y: Floats) -> float:
     """Share of places that are humid."""
-    return float(np.mean((np.floor(x / FIELD) + np.floor(y / FIELD)) % 2))
+    return float(humidity(x, y).mean())
 
 
 @experiment(
@@ -72,7 +72,7 @@ def wood_louse(seed: int, progress: Progress) -> Outcome:
     time, x, y = result.truth.time, result.truth.x, result.truth.y
     measured = [about("humid share of the time", humid_share(x, y), 0.83, 0.02)]
     shown = slice(0, 60_000, 20)
-    wet = (np.floor(x / FIELD) + np.floor(y / FIELD)) % 2
+    wet = humidity(x, y)
     share = np.cumsum(wet) / np.arange(1, len(wet) + 1)
     along = slice(0, None, 500)
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.cognition import Odometry
-from boebot.devices.encoder import SingleEncoder as Encoder
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
@@ -44,16 +43,9 @@ def ghost_path(trial: Straight) -> NDArray[np.float64]:
     estimate = trial.result.odometry
     if trial.result.layout is not None:  # the odometer's own: it has the factor
         return np.column_stack((estimate.x, estimate.y))
-    robot = trial.result.robot
-    wheel = robot.device["encoder_left"]
-    assert isinstance(wheel, Encoder)
-    edge = 2 * math.pi * robot.body.wheel_radius_m / wheel.edges_per_turn
-    counts = trial.result.series.raw
-    left, right = (
-        factor * edge * np.diff(counts[f"encoder_{side}"].astype(float), prepend=float(counts[f"encoder_{side}"][0]))
-        for side, factor in (("left", FACTOR), ("right", 1.0))
-    )
-    turn = (right - left) / robot.body.track_width_m
+    left, right = trial.result.telemetry.wheel_travel
+    left = FACTOR * left
+    turn = (right - left) / trial.result.robot.body.track_width_m
     middle, step = np.cumsum(turn) - turn / 2, (left + right) / 2
     return np.column_stack((np.cumsum(step * np.cos(middle)), np.cumsum(step * np.sin(middle))))
 

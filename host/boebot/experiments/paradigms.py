@@ -187,9 +187,8 @@ def paradigms(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, data, lambda figure: _draw(figure, serial, parallel, hits))
 
 
-def _worst(crossings: list[Crossing], of: Callable[[list[float]], float]) -> float:
-    known = [one.reaction for one in crossings if one.reaction == one.reaction]
-    return of(known) if known else math.nan
+def _worst(crossings: list[Crossing], of: Callable[..., float]) -> float:
+    return of((one.reaction for one in crossings if not math.isnan(one.reaction)), default=math.nan)
 
 
 def _draw(figure: Figure, serial: list[Crossing], parallel: list[Crossing], hits: list[int]) -> None:

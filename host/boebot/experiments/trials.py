@@ -44,9 +44,7 @@ class Trial:
     @cached_property
     def path(self) -> Floats:
         """The true way of the robot's middle (m), shape (n, 2)."""
-        pose = self.result.true_pose
-        assert pose is not None, "experiments run in the simulator"
-        return np.column_stack((pose.x, pose.y))
+        return np.column_stack((self._true_pose.x, self._true_pose.y))
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -59,9 +57,13 @@ class Trial:
         return self._pose(-1)
 
     def _pose(self, index: int) -> tuple[float, float, float]:
-        pose = self.result.true_pose
-        assert pose is not None, "experiments run in the simulator"
+        pose = self._true_pose
         return float(pose.x[index]), float(pose.y[index]), float(pose.heading[index])
+
+    @property
+    def _true_pose(self) -> Pose:
+        assert self.result.true_pose is not None, "experiments run in the simulator"
+        return self.result.true_pose
 
     @property
     def plan(self) -> FloorPlan:

@@ -135,11 +135,8 @@ def wanderer(setting: Setting) -> Brain:
 
 
 def avoider(setting: Setting) -> Brain:
-    """Wandering and avoiding: tanh(10 near - 0.5) exceeds tanh(0.5) where near exceeds 0.10.
-
-    A threshold of 0.3 was met by luck: with it 1 to 3 of 12 runs collide at most seeds, whatever the
-    utility's lag (boebot.behaviors.avoid says why).
-    """
+    """Wandering and avoiding: tanh(10 near - 0.5) exceeds tanh(0.5) where near exceeds 0.10 (boebot.behaviors.avoid
+    says why)."""
     avoid = Avoid(utility=Utility(b=-0.5, w={"near": 10.0}, tau=0.05))
     return Brain([_wander(setting), avoid], [near()], period=setting.period)
 
@@ -230,7 +227,7 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
         shown = np.where(active[:, None], trial.path, np.nan)
         axes.plot(*shown.T, color=colour, lw=2.6 if name == "avoid" else 1.4, label=name, zorder=7)
     for pose, colour in ((trial.start, style.START), (trial.end, style.END)):
-        draw_robot(axes, trial.result.robot, pose, colour, plan=trial.result.truth.plan if trial.result.truth else None)
+        draw_robot(axes, trial.result.robot, pose, colour, plan=trial.plan)
     axes.legend(fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.13))
     axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
 
