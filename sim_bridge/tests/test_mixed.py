@@ -49,7 +49,7 @@ def path(result: RunResult) -> bytes:
     """Of the true path and of all that the brain sensed and did."""
     assert result.error is None and result.truth is not None
     columns = (result.truth.x, result.truth.y, result.truth.heading, result.truth.contact)
-    sensed = repr((result.record.readings, result.record.steps, result.bytes_from_board)).encode()
+    sensed = repr((result.record.rows("readings"), result.record.steps, result.bytes_from_board)).encode()
     return b"".join(column.tobytes() for column in columns) + sensed
 
 

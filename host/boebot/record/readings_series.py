@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,14 +23,8 @@ class ReadingsSeries(Series):
 
     def __init__(self, record: Record, robot: RobotDescription, tick_s: float, layout: Layout) -> None:
         super().__init__(record, robot, tick_s, layout)
-        self._samples = samples = [sample for sample, _, _ in record.readings]
-        width = max((where.stop for where in layout.values()), default=0)
-        self.raw = np.array(
-            [(sample.tick, sample.status, sample.values) for sample in samples],
-            dtype=[("tick", "<u4"), ("status", "<u2"), ("values", "<f8", (width,))],
-        )
+        self.raw = record.readings(max((where.stop for where in layout.values()), default=0))
         self.status = self.raw["status"]
-        self._signals = np.array([signals for _, *signals in record.readings], dtype=np.float64).reshape(-1, 2)
 
     def values(self, device: str) -> Floats:
         """All readings of a device of the description, shape (ticks, readings of the device)."""
@@ -39,7 +32,7 @@ class ReadingsSeries(Series):
 
     def ages(self, device: str) -> Floats:
         """Their ages (s)."""
-        return self._ages[:, self._layout[device].start]
+        return np.asarray(self.raw["ages"][:, self._layout[device].start], dtype=np.float64)
 
     def held(self, kind: type) -> Held:
         """A robot without a board sends no messages."""
@@ -48,11 +41,7 @@ class ReadingsSeries(Series):
     @property
     def signals(self) -> tuple[Floats, Floats]:
         """See `Series`."""
-        return self._signals[:, 0], self._signals[:, 1]
-
-    @cached_property
-    def _ages(self) -> Floats:
-        return np.array([sample.ages for sample in self._samples], dtype=np.float64).reshape(len(self), -1)
+        return self.raw["left"], self.raw["right"]
 
     def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
         """See `Series`: the odometer's own estimate, laid off from `start`; without one it stays there."""

@@ -20,6 +20,9 @@ from collections.abc import Callable, Sequence
 from struct import Struct
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from boebot.devices.readings import Readings
 from boebot.link.events import BoardEvent
 
@@ -114,10 +117,11 @@ class Record:
         """(host time of the tick in s, its error bound in s) of each telemetry."""
         return self._each("stamps", self.rows("telemetry"), lambda row: _STAMP.unpack(row[1][-_STAMP.size :]))
 
-    @property
-    def readings(self) -> list[tuple[Readings, float, float]]:
-        """Readings of a robot without a board, and the motor signals in force, left and right."""
-        return self._each("readings", self.rows("readings"), _readings)
+    def readings(self, count: int) -> NDArray[np.void]:
+        """Steps of a robot without a board that has `count` readings, with the motor signals in force."""
+        numbers = [("left", "<f8"), ("right", "<f8"), ("ages", "<f8", (count,)), ("values", "<f8", (count,))]
+        columns = np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers])
+        return np.frombuffer(b"".join(data for _, data in self.rows("readings")), dtype=columns)
 
     @property
     def events(self) -> list[BoardEvent]:
@@ -146,13 +150,6 @@ class Record:
         if found is None or len(found) != len(rows):
             found = self._decoded[name] = [decode(row) for row in rows]
         return found
-
-
-def _readings(row: Row) -> tuple[Readings, float, float]:
-    tick, status, left, right = _READINGS.unpack_from(row[1])
-    count = (len(row[1]) - _READINGS.size) // 16
-    numbers = Struct(f"<{2 * count}d").unpack_from(row[1], _READINGS.size)
-    return Readings(tick, status, numbers[:count], numbers[count:]), left, right
 
 
 def _event(row: Row) -> BoardEvent:
