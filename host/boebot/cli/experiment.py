@@ -93,11 +93,9 @@ def _list(experiments: Sequence[Experiment], as_json: bool) -> None:
         fields = ("name", "title", "robot", "section", "source", "slow")
         output.print_json({"experiments": [{key: getattr(one, key) for key in fields} for one in experiments]})
         return
-    from rich import box
-    from rich.table import Table
-
-    rows = Table("name", "", "title", "robot", "section", box=box.SIMPLE_HEAD, pad_edge=False)
-    rows.columns[0].no_wrap = rows.columns[1].no_wrap = True
+    rows = output.empty_table()
+    for title in ("name", "", "title", "robot", "section"):
+        rows.add_column(title, no_wrap=title in ("name", ""))
     for one in experiments:
         rows.add_row(one.name, "slow" if one.slow else "", one.title, one.robot, one.section)
     output.console().print(rows)
@@ -149,8 +147,6 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
 
 def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> None:
     """A table for each."""
-    from rich import box
-    from rich.table import Table
     from rich.text import Text
 
     console = output.console()
@@ -164,7 +160,7 @@ def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> No
         if verdict.error:
             console.print(Text(verdict.error))
         else:
-            rows = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+            rows = output.empty_table()
             for title in ("figure", "measured", "expected", "unit", ""):
                 rows.add_column(title, justify="right" if title == "measured" else "left", overflow="fold")
             for figure in verdict.measured:

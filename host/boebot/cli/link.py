@@ -118,13 +118,11 @@ def _show_table(watched: Link, seconds: float, once: bool) -> None:
 
 
 def _table(seen: dict[str, Any]) -> Any:
-    from rich import box
     from rich.columns import Columns
     from rich.console import Group
-    from rich.table import Table
 
     state = output.table({name: value for name, value in seen.items() if name not in _TABLES})
-    counted = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    counted = output.empty_table()
     counted.add_column("counted", style="dim")
     counted.add_column("host", justify="right")
     counted.add_column("board", justify="right")
@@ -137,10 +135,7 @@ def _table(seen: dict[str, Any]) -> Any:
 
 def _tasks(longest_us: Mapping[str, float | None]) -> Any:
     """The longest time of each task, if the board takes any."""
-    from rich import box
-    from rich.table import Table
-
-    tasks = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    tasks = output.empty_table()
     tasks.add_column("task", style="dim")
     tasks.add_column("longest, us", justify="right")
     for name, took_us in longest_us.items():

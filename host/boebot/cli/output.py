@@ -24,6 +24,7 @@ from boebot.running.driver import Progress
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
+    from rich.table import Table
 
 BAR_AFTER_S = 2.0
 STEP_S = 5.0  # a step of a brain that takes longer is spoken of
@@ -73,17 +74,22 @@ def print_json(values: Mapping[str, Any], indent: int | None = 1) -> None:
     line(json.dumps(values, indent=indent))
 
 
+def empty_table(**options: Any) -> Table:
+    """A table without columns, as all of them look; `options` of `rich.table.Table`."""
+    from rich import box
+    from rich.table import Table
+
+    return Table(box=box.SIMPLE_HEAD, pad_edge=False, **options)
+
+
 def print_table(values: Mapping[str, Any]) -> None:
     """Names, values and units as a table on standard output; unknown values are left out."""
     console().print(table(values))
 
 
-def table(values: Mapping[str, Any]) -> Any:
-    """The same as a `rich.table.Table`."""
-    from rich import box
-    from rich.table import Table
-
-    rows = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
+def table(values: Mapping[str, Any]) -> Table:
+    """The same, not yet printed."""
+    rows = empty_table(show_header=False)
     rows.add_column(style="dim")
     rows.add_column(justify="right", overflow="fold")
     rows.add_column(style="dim")
@@ -95,14 +101,11 @@ def table(values: Mapping[str, Any]) -> Any:
 def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table with a header; the second column holds numbers, the last one sentences. Where the terminal is too narrow
     for those beside the rest, each stands below its row."""
-    from rich import box
-    from rich.table import Table
-
     screen = console()
     widths = [max(len(row[index]) for row in (header, *rows)) for index in range(len(header) - 1)]
     beside = screen.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
     if beside:
-        printed = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        printed = empty_table()
         for index, title in enumerate(header):
             printed.add_column(title, justify="right" if index == 1 else "left", no_wrap=index < len(widths))
         for row in rows:

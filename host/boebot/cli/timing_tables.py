@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -183,6 +182,6 @@ def _limits(one: Distribution) -> str:
 
 
 def _table(title: str) -> Table:
-    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    shown = output.empty_table(padding=(0, 1, 0, 0))
     shown.add_column(title)
     return shown

@@ -35,7 +35,7 @@ struct reader {
   pthread_mutex_t lock; /* for all that follows */
   pthread_cond_t filled, emptied;
   bool stopping, ended;
-  uint32_t head, tail; /* free-running counts of bytes read and taken */
+  uint32_t head, tail; /* free-running counts of bytes read and handed out */
   uint32_t chunk_head, chunk_tail;
   chunk chunks[RING_CHUNKS];
   uint8_t bytes[RING_BYTES];
@@ -163,7 +163,7 @@ static uint32_t copy_chunk(reader *self, uint8_t *bytes, uint32_t at) {
 
 int reader_take(reader *self, double wait_s, uint8_t *bytes, uint32_t room, double *times, uint32_t *ends,
                 int chunk_room) {
-  int taken = 0;
+  int chunks = 0;
   uint32_t at = 0;
   if (!is_ours(self)) {
     return -1;
@@ -176,19 +176,19 @@ int reader_take(reader *self, double wait_s, uint8_t *bytes, uint32_t room, doub
       error = pthread_cond_timedwait(&self->filled, &self->lock, &until);
     }
   }
-  while (taken < chunk_room && self->chunk_tail != self->chunk_head) {
+  while (chunks < chunk_room && self->chunk_tail != self->chunk_head) {
     const chunk *next = &self->chunks[self->chunk_tail % RING_CHUNKS];
     if (next->end - self->tail > room - at) {
       break;
     }
-    times[taken] = next->time;
+    times[chunks] = next->time;
     at += copy_chunk(self, bytes, at);
-    ends[taken++] = at;
+    ends[chunks++] = at;
   }
-  const bool gone = taken == 0 && self->ended;
+  const bool gone = chunks == 0 && self->ended;
   pthread_cond_signal(&self->emptied);
   pthread_mutex_unlock(&self->lock);
-  return gone ? -1 : taken;
+  return gone ? -1 : chunks;
 }
 
 void reader_forget(reader *self) {
@@ -220,7 +220,7 @@ void reader_stop(reader *self) {
 }
 
 void reader_free(reader *self) {
-  if (!is_ours(self)) { /* the thread may have held the lock at the fork: it can be neither taken nor destroyed */
+  if (!is_ours(self)) { /* the thread may have held the lock at the fork: it can be neither locked nor destroyed */
     close(self->wake[0]);
     close(self->wake[1]);
     free(self);

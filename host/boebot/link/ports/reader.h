@@ -17,13 +17,13 @@ typedef struct reader reader;
 /* Starts the thread. The descriptor stays the caller's, and open until reader_stop. NULL: no memory, no pipe or no thread. */
 reader *reader_start(int descriptor);
 
-/* Waits at most wait_s seconds for the first chunk, then takes whole chunks as long as they fit into `room` bytes and
- * `chunk_room` entries: times[i] is the receipt of chunk i (s, CLOCK_MONOTONIC), ends[i] its end in `bytes`. Returns how
- * many; 0: nothing in time; -1: the other side has gone, and everything was taken. room >= READER_CHUNK */
+/* Waits at most wait_s seconds for the first chunk, then copies whole chunks while they fit into `room` bytes and
+ * `chunk_room` entries: times[i] is the receipt of chunk i (s, CLOCK_MONOTONIC), ends[i] its end in `bytes`. Returns their
+ * number; 0: nothing in time; -1: the other side has gone, and nothing is left. room >= READER_CHUNK */
 int reader_take(reader *self, double wait_s, uint8_t *bytes, uint32_t room, double *times, uint32_t *ends,
                 int chunk_room);
 
-/* Forgets what was read and not yet taken. */
+/* Forgets the bytes that were read and not yet handed out. */
 void reader_forget(reader *self);
 
 /* Ends the thread. May be called twice. */
