@@ -145,18 +145,11 @@ class VehicleSession(Protocol):
         """Frees the world."""
 
 
-class VehicleFactory(Protocol):
-    """What an entry point of the group `boebot.vehicles` loads to."""
-
-    def __call__(self, request: BoardRequest) -> VehicleSession:
-        """Opens a robot without a board; raises a BoebotError with one sentence if it cannot."""
-
-
-class BoardFactory(Protocol):
-    """What an entry point of the group `boebot.boards` loads to."""
-
-    def __call__(self, request: BoardRequest) -> BoardSession:
-        """Opens a board; raises a BoebotError with one sentence if it cannot."""
+BoardFactory = Callable[[BoardRequest], BoardSession]
+"""What an entry point of the group `boebot.boards` loads to: opens a board; raises a BoebotError with one sentence if
+it cannot."""
+VehicleFactory = Callable[[BoardRequest], VehicleSession]
+"""The same of the group `boebot.vehicles`: opens a robot without a board."""
 
 
 @runtime_checkable
