@@ -9,7 +9,7 @@ from boebot.experiments import Experiment, Outcome
 ONE = "E57"
 
 
-def few(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
+def few_files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
     """All files of `ONE`; of others, which would only take longer, the data."""
     from boebot.view import experiment_files  # here: `fatal` shall not wait for it
 

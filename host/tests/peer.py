@@ -149,7 +149,7 @@ class Peer:
         self._saving_until: float | None = None
         self._save_answer: int | None = None
         self.counts = dict.fromkeys(messages.Counters._fields, 0)
-        self._own = 0
+        self._next_task = 0
         self._new_nonce()
         self._event: messages.Event | None = None
         self._events: deque[tuple[int, int, int]] = deque()
@@ -427,7 +427,7 @@ class Peer:
             self._end_session()
         self._end_saving()
         self._move_and_feel()
-        self._send_on_its_own()
+        self._send_periodic()
         self.ticks = (self.ticks + 1) & 0xFFFFFFFF
 
     def _watch_supply(self) -> None:
@@ -447,7 +447,7 @@ class Peer:
                 self._answer(self._save_answer, AnswerStatus.OK)
                 self._save_answer = None
 
-    def _send_on_its_own(self) -> None:
+    def _send_periodic(self) -> None:
         period = max(self.telemetry_period, self.parameter("telemetry_period"))
         if self.ticks % (max(HELLO_SESSION_TICKS, 4 * period) if self.session else HELLO_TICKS) == 0:
             self._hello()
@@ -464,16 +464,16 @@ class Peer:
         if self._is_on(SLOW_DEVICES) and self.ticks % self.parameter("devices_period") == 0:
             self._send(self._devices_telemetry())
         if self.ticks % (OWN_TICKS * self.telemetry_period) == 0:
-            self._send_of_itself()
+            self._send_task_time()
 
-    def _send_of_itself(self) -> None:
-        if self._own < len(messages.Task):
-            if self._own not in self.silent_tasks:
-                self._send(messages.TaskTime(self._own, self.task_times[self._own]))
+    def _send_task_time(self) -> None:
+        if self._next_task < len(messages.Task):
+            if self._next_task not in self.silent_tasks:
+                self._send(messages.TaskTime(self._next_task, self.task_times[self._next_task]))
         else:
             self.counts["good"], self.counts["bad"] = self.decoder.good, self.decoder.bad
             self._send(messages.Counters(*(value & 0xFFFF for value in self.counts.values())))
-        self._own = (self._own + 1) % (len(messages.Task) + 1)
+        self._next_task = (self._next_task + 1) % (len(messages.Task) + 1)
 
     def _telemetry(self) -> messages.Telemetry:
         ahead = self._ahead()

@@ -35,7 +35,7 @@ def variable(name: str, of_time: Callable[[float], float | None]) -> StateVariab
     return StateVariable(name, lambda robot: of_time(robot.time))
 
 
-def half(robot: Robot) -> float | None:
+def half_read(robot: Robot) -> float | None:
     return 0.5
 
 
@@ -135,7 +135,7 @@ def test_brain_whose_parts_do_not_fit_is_refused_in_one_sentence(make: Callable[
         (lambda: Phototaxis(signal=2), "phototaxis: signal is 2; expected a motor signal"),
         (lambda: Phototaxis(gain="much"), "phototaxis: gain is 'much'; expected a number"),  # type: ignore[arg-type]
         (lambda: Klinotaxis(seconds=-1), "klinotaxis: seconds is -1; expected more than 0"),
-        (lambda: RunAndTumble(stimulus=half, a=0), "run_and_tumble: a is 0; expected more than 0"),
+        (lambda: RunAndTumble(stimulus=half_read, a=0), "run_and_tumble: a is 0; expected more than 0"),
         (lambda: StuckDetector(window=-1), "stuck_detector: window is -1; expected more than 0"),
         (lambda: Drift(distance=0), "drift: distance is 0; expected more than 0"),
         (lambda: LightSense(scale=0), "light_sense: scale is 0; expected more than 0"),

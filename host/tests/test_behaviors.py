@@ -123,7 +123,7 @@ def test_reflex_intensity_is_the_solution_of_its_equations(warm_up: float, fatig
     reflex = ReflexIntensity(warm_up, fatigue, weight)
     ours = [reflex.advance(1.0 if step < 60 else 0.0, 0.05) for step in range(100)]
 
-    def theirs(stimulus: float, start: tuple[float, float], seconds: float, times: object) -> np.ndarray:
+    def by_solver(stimulus: float, start: tuple[float, float], seconds: float, times: object) -> np.ndarray:
         found = solve_ivp(
             lambda t, y: ((stimulus - y[0]) / warm_up, (y[0] - y[1]) / fatigue),
             (0, seconds),
@@ -134,8 +134,8 @@ def test_reflex_intensity_is_the_solution_of_its_equations(warm_up: float, fatig
         )
         return np.asarray(found.y)
 
-    during = theirs(1.0, (0.0, 0.0), 3.0, np.arange(1, 61) * 0.05)
-    after = theirs(0.0, (during[0, -1], during[1, -1]), 2.0, np.arange(1, 41) * 0.05)
+    during = by_solver(1.0, (0.0, 0.0), 3.0, np.arange(1, 61) * 0.05)
+    after = by_solver(0.0, (during[0, -1], during[1, -1]), 2.0, np.arange(1, 41) * 0.05)
     w, f = np.hstack([during, after])
     assert ours == pytest.approx(np.maximum(0, w - weight * f), abs=1e-6)
 

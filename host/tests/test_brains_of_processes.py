@@ -1,5 +1,5 @@
-"""Brains of processes as they are given to a run: in a Python file, in a TOML file, bundled, as an object; and what is
-said of those that are wrong.
+"""Brains of processes as they are given to a run: in a Python file, in a TOML file, bundled, as an object; and the
+errors of those that are wrong.
 
 The runs are on robots without and with a board of this process (boebot.run, native).
 """
@@ -310,7 +310,7 @@ except boebot.BoebotError as error:
 BAD_LINE = SCRIPT.splitlines().index("        robot.drive(0.1, 7)") + 1
 
 
-def said(file: str) -> list[str]:
+def expected_lines(file: str) -> list[str]:
     return [
         "step 20 0.4",
         "brain 20 -0.4",
@@ -321,7 +321,7 @@ def said(file: str) -> list[str]:
 
 def test_brains_of_a_notebook_have_no_file(capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(SCRIPT, "<cell 3>", "exec"), {"__name__": "__main__"})
-    assert capsys.readouterr().out.splitlines() == said("<cell 3>")
+    assert capsys.readouterr().out.splitlines() == expected_lines("<cell 3>")
 
 
 @pytest.mark.parametrize("way", ["script", "stdin"])
@@ -332,7 +332,7 @@ def test_brains_of_a_script_and_of_a_prompt(tmp_path: Path, way: str) -> None:
         [sys.executable, *command], cwd=tmp_path, input=typed, capture_output=True, text=True, check=False
     )
     assert done.stderr == ""
-    assert done.stdout.splitlines() == said(str(path) if way == "script" else "<stdin>")
+    assert done.stdout.splitlines() == expected_lines(str(path) if way == "script" else "<stdin>")
 
 
 def test_new_brain_of_several_behaviors_backs_off_from_what_it_touches(

@@ -57,7 +57,7 @@ class Case:
     with_: Callable[[], list[CognitiveProcess]] = list
 
 
-def half(robot: Robot) -> float | None:
+def half_read(robot: Robot) -> float | None:
     return 0.5
 
 
@@ -74,7 +74,7 @@ CASES = {
     "follow line": Case(FollowLine),
     "follow wall": Case(FollowWall),
     "homing": Case(lambda: Homing(found=landmark), lambda: [Odometry(), PathIntegration()]),
-    "kinesis": Case(lambda: Kinesis(stimulus=half, spread=20.0)),
+    "kinesis": Case(lambda: Kinesis(stimulus=half_read, spread=20.0)),
     "klinotaxis": Case(Klinotaxis),
     "phototaxis": Case(lambda: Phototaxis(signal=1.0, gain=1.0)),
     "run and tumble": Case(lambda: RunAndTumble(stimulus=lambda robot: robot.light_left.brightness)),

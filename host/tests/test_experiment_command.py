@@ -54,7 +54,7 @@ def invented(name: str, value: float = 1.0, error: Exception | None = None, crit
 
 
 @pytest.fixture
-def four(monkeypatch: pytest.MonkeyPatch) -> dict[str, Experiment]:
+def four_experiments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Experiment]:
     """Experiments of this test alone: one that is met, one that is missed, two that fail."""
     known = {
         "X1": invented("X1", criterion="Of our own."),
@@ -172,7 +172,7 @@ def test_wrong_usage_is_said_before_anything_runs(
 
 
 def test_folder_that_cannot_be_written_is_said_before_the_run(
-    four: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    four_experiments: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
     code, out, err = boebot(capsys, "experiment", "Y", "--out", str(tmp_path / "file"))
@@ -180,7 +180,7 @@ def test_folder_that_cannot_be_written_is_said_before_the_run(
 
 
 def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
-    four: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    four_experiments: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     code, out, err = boebot(capsys, "experiment", "--all", "--jobs", "1", "--out", str(tmp_path))
     assert code == 1
@@ -190,11 +190,11 @@ def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
     assert "the board has gone" in out
     assert re.search(r"ZeroDivisionError: by nothing \(test_experiment_command.py, line \d+\)", out)
     assert {path.name for path in tmp_path.glob("*.png")} == {"X1.png", "X2.png"}
-    check_page(tmp_path / "index.html", list(four.values()))
+    check_page(tmp_path / "index.html", list(four_experiments.values()))
 
 
 def test_pattern_means_all_that_it_matches(
-    four: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    four_experiments: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     code, out, _ = boebot(capsys, "experiment", "x2*", "X1", "x1", "--jobs", "1", "--json", "--out", str(tmp_path))
     printed = json.loads(out)
@@ -247,7 +247,7 @@ def check_page(path: Path, shown: list[Experiment]) -> None:
 def test_same_seed_gives_the_same_files_whatever_the_number_of_processes() -> None:
     chosen = [all_experiments()[name] for name in QUICK]
     one, two = (
-        {verdict.name: verdict for verdict in running.run(chosen, 3, jobs, lambda _: None, made_files.few)}
+        {verdict.name: verdict for verdict in running.run(chosen, 3, jobs, lambda _: None, made_files.few_files)}
         for jobs in (1, 2)
     )
     assert set(one) == set(QUICK) and one == two

@@ -27,7 +27,9 @@ ROUND_S = 0.04 * (len(messages.Task) + 1)
 """In which the time of each task and the counters come once, one of them with every fourth telemetry."""
 
 
-def joined(peer: Peer | None = None, channel: Channel | None = None, **options: object) -> tuple[Link, Peer, InProcess]:
+def open_link(
+    peer: Peer | None = None, channel: Channel | None = None, **options: object
+) -> tuple[Link, Peer, InProcess]:
     """A link with an open session, its board, and the channel between them."""
     peer = peer or Peer()
     session = InProcess(peer, channel)
@@ -223,7 +225,7 @@ def test_board_without_control_ticks_is_refused() -> None:
 
 
 def test_board_of_another_kind_in_mid_session_is_refused() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     peer.schema_hash = 0xDEADBEEF
     peer.reset()
     with pytest.raises(ProtocolError, match="schema deadbeef"):
@@ -269,7 +271,7 @@ def test_what_does_not_answer_is_distinguished(
 
 
 def test_session_of_another_host_is_waited_for() -> None:
-    first, peer, session = joined()
+    first, peer, session = open_link()
     second = Link(session)
     second.open()
     assert 1.0 < session.now() < 1.3, "after the board's patience with the first"
@@ -297,7 +299,7 @@ def test_board_that_another_host_keeps_is_busy() -> None:
 
 
 def test_host_that_was_replaced_gives_way() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     peer._open(messages.Open(messages.PROTOCOL_VERSION, peer.nonce, 12345))
     with pytest.raises(TakenOverError, match="another program has taken the board at peer"):
         listen(link, 0.5)
@@ -305,7 +307,7 @@ def test_host_that_was_replaced_gives_way() -> None:
 
 
 def test_close_ends_the_session_at_once() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     link.arm()
     link.close()
     session.read(0.01, 0.01)
@@ -319,7 +321,7 @@ def test_close_ends_the_session_at_once() -> None:
 
 @pytest.mark.parametrize("at_ms", [0, 3, 7, 50, 333])
 def test_reset_at_any_moment_and_the_traffic_resumes(at_ms: int) -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     listen(link, 0.5 + at_ms / 1000)
     reset_s = session.now()
     peer.reset()
@@ -332,7 +334,7 @@ def test_reset_at_any_moment_and_the_traffic_resumes(at_ms: int) -> None:
 
 
 def test_reset_during_a_request_is_said() -> None:
-    link, peer, _session = joined()
+    link, peer, _session = open_link()
     request = link.submit(messages.SetParameter, 7, 9, what="set parameter infrared_period")
     peer.reset()
     listen(link, 0.1)
@@ -342,7 +344,7 @@ def test_reset_during_a_request_is_said() -> None:
 
 
 def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     link.arm()
     session.read(3.0, 3.0)
     assert peer.session == 0 and peer.latch == Latch.SESSION_ENDED
@@ -353,7 +355,7 @@ def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
 
 @pytest.mark.parametrize("time_out_ms", [200, 1000, 1500])
 def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
-    link, _peer, _session = joined()
+    link, _peer, _session = open_link()
     link.parameters.set("session_time_out", time_out_ms)
     before = len([kind for kind in sent_kinds(link) if kind == "clock_probe"])
     listen(link, 6 + 20 * time_out_ms / 1000)
@@ -367,7 +369,7 @@ def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
 def test_late_hello_of_the_time_before_does_no_harm() -> None:
     peer = Peer()
     trace: list[tuple[float, str, bytes]] = []
-    link, peer, session = joined(peer, Channel(trace=trace))
+    link, peer, session = open_link(peer, Channel(trace=trace))
     hellos = [frame for _, way, frame in trace if way == "host" and frame[2] == messages.Hello.ID]
     session._schedule(session.now() + 0.03, "host", hellos[0])
     listen(link, 0.5)
@@ -375,7 +377,7 @@ def test_late_hello_of_the_time_before_does_no_harm() -> None:
 
 
 def test_frames_of_an_earlier_session_are_refused() -> None:
-    link, peer, _session = joined()
+    link, peer, _session = open_link()
     link.arm()
     link.send_signal(1.0, 1.0, 2000, peer.ticks)
     old = [frame for _, frame in sent(link) if frame[2] not in (messages.Open.ID,)]
@@ -401,7 +403,7 @@ def test_frames_of_an_earlier_session_would_count_without_the_seed(monkeypatch: 
         seed = property(lambda self: SEED, lambda self, _: Decoder.seed.fset(self, SEED))  # type: ignore[attr-defined]
 
     monkeypatch.setattr(module, "Decoder", Seedless)
-    link, peer, _session = joined(Peer(protections=without(seed=False)))
+    link, peer, _session = open_link(Peer(protections=without(seed=False)))
     link.arm()
     old = [frame for _, frame in sent(link) if frame[2] == messages.Arm.ID]
     peer.reset()
@@ -415,7 +417,7 @@ def test_frames_of_an_earlier_session_would_count_without_the_seed(monkeypatch: 
 
 
 def test_request_is_repeated_until_it_is_answered_and_carried_out_once() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     whole = session.channel.carry
     losses = [True, False, True, True, False]
 
@@ -431,7 +433,7 @@ def test_request_is_repeated_until_it_is_answered_and_carried_out_once() -> None
 
 
 def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_answered() -> None:
-    link, peer, session = joined(times=LinkTimes(request_limit_s=0.5))
+    link, peer, session = open_link(times=LinkTimes(request_limit_s=0.5))
     whole = session.channel.carry
     session.channel.carry = lambda way, frame, at_s: (  # type: ignore[method-assign]
         [] if frame[2] == messages.SetParameter.ID else whole(way, frame, at_s)
@@ -449,7 +451,7 @@ def test_request_that_is_never_answered_ends_in_one_sentence_and_the_next_is_ans
 
 def test_slow_line_is_not_flooded_with_retries() -> None:
     """A round trip of 40 ms, as by Bluetooth: once it is known, answers are waited for."""
-    link, _, _ = joined(channel=Channel(to_board=uniform(0.019, 0.020), to_host=uniform(0.019, 0.020)))
+    link, _, _ = open_link(channel=Channel(to_board=uniform(0.019, 0.020), to_host=uniform(0.019, 0.020)))
     listen(link, 1.0)
     before = link.counters().retransmitted
     for _ in range(10):
@@ -459,27 +461,27 @@ def test_slow_line_is_not_flooded_with_retries() -> None:
 
 @pytest.mark.parametrize("value", [1, 251, -5, float("nan"), float("inf")])
 def test_parameter_out_of_range_is_refused_before_it_is_sent(value: float) -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     with pytest.raises(BoebotError, match=r"infrared_period cannot be .* ticks; expected 2 to 250"):
         link.parameters.set("infrared_period", value)
     assert peer.carried_out == []
 
 
 def test_unknown_parameter_is_named() -> None:
-    link, _, _ = joined()
+    link, _, _ = open_link()
     with pytest.raises(BoebotError, match="no parameter 'speed'; expected one of devices"):
         link.parameters.get("speed")
 
 
 def test_parameter_travels_in_its_unit() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     assert link.parameters.set("servo_left_centre", 1499.5) == 1499.5
     assert peer.parameter("servo_left_centre") == 23992
     assert link.parameters.get("servo_left_centre") == 1499.5
 
 
 def test_parameters_are_saved_and_reset() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     link.parameters.set("ping_period", 9)
     begun = session.now()
     link.parameters.save()
@@ -493,7 +495,7 @@ def test_parameters_are_saved_and_reset() -> None:
 
 
 def test_board_that_is_busy_writing_is_asked_again() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     saving = link.submit(messages.SaveParameters, what="save", limit_s=5.0)
     listen(link, 0.005)
     request = link.submit(messages.GetParameter, 7, what="send it")
@@ -510,7 +512,7 @@ def test_board_that_is_busy_writing_is_asked_again() -> None:
     ("status", "reason"), [(messages.AnswerStatus.OUT_OF_RANGE, "out of range"), (99, "unknown 99")]
 )
 def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     peer._set = lambda message, saving: (status, 0)  # type: ignore[method-assign]
     with pytest.raises(BoardError, match=f"refuses parameter devices: {reason}"):
         link.parameters.set("devices", 3)
@@ -520,7 +522,7 @@ def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) ->
 
 
 def test_armed_board_obeys_until_it_is_stopped() -> None:
-    link, peer, _session = joined()
+    link, peer, _session = open_link()
     ticks = listen(link, 0.02)
     link.send_signal(0.5, 0.5, 250, ticks[-1])
     listen(link, 0.02)
@@ -535,7 +537,7 @@ def test_armed_board_obeys_until_it_is_stopped() -> None:
 
 
 def test_stop_is_sent_again_until_it_is_confirmed() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     link.arm()
     whole = session.channel.carry
     losses = [True, True, False, True]
@@ -552,7 +554,7 @@ def test_stop_is_sent_again_until_it_is_confirmed() -> None:
 
 
 def test_stop_goes_before_a_request_under_way() -> None:
-    link, peer, session = joined()
+    link, peer, session = open_link()
     session.channel.stalled = True
     link.submit(messages.GetParameter, 7, what="send it")
     listen(link, 0.1)
@@ -563,13 +565,13 @@ def test_stop_goes_before_a_request_under_way() -> None:
 
 
 def test_stop_that_nobody_confirms_is_said() -> None:
-    link, _, session = joined()
+    link, _, session = open_link()
     session.channel.stalled = True
     assert not link.stop_and_confirm(0.3)
 
 
 def test_arm_does_not_undo_a_stop_that_it_does_not_know_of() -> None:
-    link, peer, _session = joined()
+    link, peer, _session = open_link()
     listen(link, 0.05)
     peer._latch(Latch.STOP_COMMAND)
     with pytest.raises(LatchedAgainError):
@@ -581,7 +583,7 @@ def test_arm_does_not_undo_a_stop_that_it_does_not_know_of() -> None:
 
 
 def test_arm_would_undo_it_without_the_count_of_latches() -> None:
-    link, peer, _ = joined(Peer(protections=without(latches=False)))
+    link, peer, _ = open_link(Peer(protections=without(latches=False)))
     listen(link, 0.05)
     peer._latch(Latch.STOP_COMMAND)
     link.arm()
@@ -589,7 +591,7 @@ def test_arm_would_undo_it_without_the_count_of_latches() -> None:
 
 
 def test_arm_is_refused_while_the_supply_is_low() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     listen(link, 0.05)
     peer.supply_mv = 3900
     listen(link, 0.05)
@@ -601,7 +603,7 @@ def test_arm_is_refused_while_the_supply_is_low() -> None:
 
 
 def test_events_come_once_and_in_order_over_a_bad_line() -> None:
-    link, peer, _session = joined(
+    link, peer, _session = open_link(
         channel=Channel(loss=0.3, duplication=0.3, seed=7), times=LinkTimes(request_limit_s=9)
     )
     sent_values: list[int] = []
@@ -624,7 +626,7 @@ def test_events_come_once_and_in_order_over_a_bad_line() -> None:
 
 
 def test_set_points_name_their_tick() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     link.send_signal(0.5, -1.0, 250, 0x12345)
     link.send_speed(0.1, -0.05, 250, 0x12346)
     link.send_coast(100, 0x12347)
@@ -642,7 +644,7 @@ def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
     """The line stalls with motion commands queued and lets them all go at once; without the age they would count."""
     channel = Channel()
     peer = Peer(protections=without(age=protected))
-    link, peer, _session = joined(peer, channel)
+    link, peer, _session = open_link(peer, channel)
     link.parameters.set("session_time_out", 1500)
     link.arm()
     channel.stalled = True
@@ -661,7 +663,7 @@ def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
 
 
 def test_telemetry_that_comes_during_a_request_is_kept() -> None:
-    link, _, session = joined()
+    link, _, session = open_link()
     session.channel.stalled = True
     request = link.submit(messages.GetParameter, 7, what="send it")
     while not request.done and session.now() < 0.2:
@@ -673,7 +675,7 @@ def test_telemetry_that_comes_during_a_request_is_kept() -> None:
 def test_late_telemetry_is_counted() -> None:
     """Later than three periods of 10 ms after its tick; the line itself takes 0.9 ms."""
     channel = Channel()
-    link, _, _ = joined(channel=channel)
+    link, _, _ = open_link(channel=channel)
     listen(link, 2.0)
     channel.to_host = lambda _: 0.025
     listen(link, 0.5)
@@ -692,7 +694,7 @@ def test_telemetry_thinner_than_its_parameter_is_reported(line_ticks: int, param
     peer = Peer()
     peer.telemetry_period = line_ticks  # as its line allows
     peer.parameters[messages.PARAMETERS["telemetry_period"].id] = parameter
-    link, _, _ = joined(peer)
+    link, _, _ = open_link(peer)
     notice = (
         f"the board at peer sends telemetry every {10 * line_ticks} ms, not every {10 * parameter} ms as its parameter "
         "telemetry_period says: its line is slow"
@@ -707,7 +709,7 @@ def test_both_ends_count_by_the_same_names() -> None:
 
 def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
     """The host sleeps in mid-drive: dead-man, end of the session. Both come with their times, once, and are earlier."""
-    link, peer, session = joined()
+    link, peer, session = open_link()
     link.arm()
     listen(link, 0.1)
     link.events.fetch()
@@ -734,7 +736,7 @@ def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
 
 
 def test_overruns_are_those_that_the_transport_knows_of() -> None:
-    link, _, session = joined()
+    link, _, session = open_link()
     assert link.counters().overrun == 0
     session.overruns = 7  # type: ignore[attr-defined]
     assert link.counters().overrun == 7
@@ -745,7 +747,7 @@ def test_ticks_roll_over(first_tick: int) -> None:
     peer = Peer()
     peer.first_tick = first_tick
     peer.reset()
-    link, peer, _ = joined(peer)
+    link, peer, _ = open_link(peer)
     link.arm()
     for _ in range(100):
         listen(link, 0.01)
@@ -755,7 +757,7 @@ def test_ticks_roll_over(first_tick: int) -> None:
 
 
 def test_board_counters_are_unwrapped() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     peer.counts["late"] = 65500
     listen(link, ROUND_S)
     peer.counts["late"] = 65536 + 20
@@ -770,7 +772,7 @@ def test_board_counters_are_unwrapped() -> None:
 
 
 def test_longest_times_of_tasks_are_those_of_this_session() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     assert set(link.task_times.cycles.values()) == {None}
     names = [task.name.lower() for task in messages.Task]
     peer.task_times = [100 + number for number in range(len(names))]
@@ -784,7 +786,7 @@ def test_longest_times_of_tasks_are_those_of_this_session() -> None:
 
 
 def test_longest_times_lost_on_the_line_come_again() -> None:
-    link, peer, _ = joined(channel=Channel(loss=0.2))
+    link, peer, _ = open_link(channel=Channel(loss=0.2))
     peer.task_times = [7] * len(messages.Task)
     assert set(task_times.measure(link, 0.0).values()) == {7}
     assert link.counters().lost > 10
@@ -794,14 +796,14 @@ def test_longest_times_lost_on_the_line_come_again() -> None:
 def test_measuring_the_tasks_lasts_as_long_as_asked_and_a_round(period: int) -> None:
     peer = Peer()
     peer.telemetry_period = period
-    link, peer, _ = joined(peer)
+    link, peer, _ = open_link(peer)
     begun, round_s = link.transport.now(), ROUND_S * period
     task_times.measure(link, 1.0)
     assert 1.0 + round_s <= link.transport.now() - begun < 1.0 + round_s + 0.1
 
 
 def test_a_board_that_leaves_out_a_task_is_named_with_it() -> None:
-    link, peer, _ = joined()
+    link, peer, _ = open_link()
     peer.silent_tasks = {messages.Task.TURRET, messages.Task.DEVICES}
     begun = link.transport.now()
     with pytest.raises(BoardError, match=f"tasks turret, devices within {0.5 + 4 * ROUND_S:.1f} s"):
@@ -810,7 +812,7 @@ def test_a_board_that_leaves_out_a_task_is_named_with_it() -> None:
 
 
 def test_a_task_that_this_kit_does_not_know_is_left_out() -> None:
-    link, _, _ = joined()
+    link, _, _ = open_link()
     link._handlers[messages.TaskTime.ID](messages.TaskTime(len(messages.Task), 9).pack(), 0.0)
     assert set(link.task_times.cycles.values()) == {None}
 
@@ -818,6 +820,6 @@ def test_a_task_that_this_kit_does_not_know_is_left_out() -> None:
 def test_same_run_twice_is_the_same_to_the_last_byte() -> None:
     traces: list[list[tuple[float, str, bytes]]] = [[], []]
     for trace in traces:
-        link, _, _ = joined(channel=Channel(trace=trace))
+        link, _, _ = open_link(channel=Channel(trace=trace))
         listen(link, 2.0)
     assert traces[0] == traces[1] and len(traces[0]) > 200

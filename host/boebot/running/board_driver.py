@@ -380,7 +380,7 @@ class BoardDriver:
         return max(passed_s, self._last_s + self.tick_s) if self._last_s >= 0.0 else 0.0
 
     def end(self) -> None:
-        """Tells the board to stop, waits until it says so, and leaves it to others; one that has gone stops by its
+        """Stops the board, waits until it confirms, and leaves it to others; one that has gone stops by its
         dead-man."""
         self._put_devices_aside()
         with contextlib.suppress(BoebotError, KeyboardInterrupt):

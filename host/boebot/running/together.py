@@ -218,7 +218,7 @@ class _Run:
             self._progress(min(robot.time_s for robot in self._robots))
 
     def _stop_all(self, error: BaseException | None) -> None:
-        """Tells every robot that still runs to end, and lets time pass until all of them have stopped."""
+        """Ends every robot that still runs, and lets time pass until all of them have stopped."""
         why = "Ctrl-C" if isinstance(error, KeyboardInterrupt) else str(error)
         stop = StoppedError(f"the run has ended: {why}")
         for robot in self._robots:
