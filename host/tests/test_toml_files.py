@@ -16,7 +16,7 @@ from boebot.description import toml_files
 from boebot.description.robots import load_robot
 from boebot.description.toml_limits import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
 from boebot.description.toml_lines import line_of
-from boebot.errors import RobotError
+from boebot.errors import ArenaError, RobotError
 
 LAYOUT = '''# a comment with [brackets] and "quotes"
 title = "a ] string } with # signs"   # line 2
@@ -214,3 +214,14 @@ def test_a_robot_that_extends_another_names_the_right_file_and_line(tmp_path: Pa
         load_robot(tmp_path / "robot.toml")
     with pytest.raises(RobotError, match=r"other\.toml:5: body\.radius_m: expected float, got str"):
         load_robot(tmp_path / "other.toml")
+
+
+def test_reading_a_large_file_is_announced_and_its_errors_have_their_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "large.toml"
+    row = "[[obstacle]]\ncorners_m = [[0.25, 0.5], [1.5, 0.5], [1.5, 1.5]]\n"
+    file.write_text(row * 40_000 + "wrong = \n", encoding="utf-8")
+    with pytest.raises(ArenaError, match=r"large\.toml is no valid TOML: Invalid value \(at line 80001"):
+        toml_files.read(file, ArenaError)
+    assert capsys.readouterr().err == "reading large.toml, 2.5 MB ...\n"

@@ -18,15 +18,14 @@ from typing import Any, NamedTuple, TypeVar
 import msgspec
 
 from boebot import resources
-from boebot.description import toml_limits, toml_numbers
+from boebot.description import toml_limits
 from boebot.description.toml_limits import SIZE_MAXIMUM
 from boebot.description.toml_lines import line_of
 from boebot.errors import BoebotError, printable
 
 _T = TypeVar("_T")
 
-LARGE = 50_000  # from here on it is worth while to read rows of points by themselves ...
-SLOW = 2_000_000  # ... and from here on it takes seconds, and somebody waits
+SLOW = 2_000_000  # bytes that take about a second: a notice says why nothing happens
 
 
 class Table(dict[str, Any]):
@@ -83,7 +82,7 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         text = path.read_text(encoding="utf-8-sig")  # some editors begin with a byte order mark
         if fault := toml_limits.fault_of_text(text):
             raise error(f"{path.name}{fault}")
-        table = Table(toml_numbers.loads(text) if size > LARGE else tomllib.loads(text))
+        table = Table(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
         raise error(f"{path.name} cannot be read: {cause}") from None
     except RecursionError:
