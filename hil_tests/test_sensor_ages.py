@@ -104,7 +104,7 @@ def is_of(value: float, pair: tuple[float, float], on: bool) -> bool:
 
 
 def volts(reported: int) -> float:
-    """Of a ratio in 1/1024 of the supply, whichever of the two that is."""
+    """Of a ratio in 1/1024 of the supply, at the one or the other of its two values."""
     return reported / 1024 * SUPPLY_V[0]
 
 

@@ -1,4 +1,4 @@
-"""Worst-case timing of machine code for the ATmega328P: of any image, whichever compiler built it.
+"""Worst-case timing of machine code for the ATmega328P: of any image, built by any compiler.
 
 Four rooms, each of which knows only those before it:
 

@@ -1,4 +1,4 @@
-// Runs the script of a replay page without a browser: elements and canvases are stand-ins that keep what they are told.
+// Runs the script of a replay page without a browser: elements and canvases only keep what they are given.
 // node replay_page.js PAGE TIME... prints one JSON object per time: texts by id, readings, fills and shapes drawn.
 "use strict";
 const fs = require("fs"), vm = require("vm");

@@ -50,7 +50,7 @@ class _Share:
     passes: dict[Hashable, int] = field(default_factory=dict)  # by loop
 
     def add(self, other: _Share, times: int) -> None:
-        """Another call's, so many times."""
+        """Another call's, a number of times."""
         self.cycles += times * other.cycles
         self.runs += times * other.runs
         for loop, passes in other.passes.items():

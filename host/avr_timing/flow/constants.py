@@ -276,7 +276,7 @@ def _parts(
     instruction: Instruction, state: State, registers: dict[int, int], flags: dict[str, bool]
 ) -> tuple[dict[int, Part], tuple[Part, int] | None]:
     """The parts of unknown words behind an instruction, and the carry that one has left. What a comparison or a
-    difference of two parts tells goes to `registers` and `flags`."""
+    difference of two parts says goes to `registers` and `flags`."""
     name, operands, old = instruction.mnemonic, instruction.operands, state.parts
     changed = written(instruction)
     new = {r: part for r, part in old.items() if r not in changed} if changed else old.copy()

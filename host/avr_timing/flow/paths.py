@@ -5,7 +5,7 @@ longest way from the header out of each of its exits; around it, it is one node 
 says how often a marked node runs per entry of the loop. With n such runs, and every pass marked, a walk leaves
 - through an exit that it reaches without the mark (the test of `while`) after n passes,
 - through one that it reaches over the mark (`break`, the test of `do ... while`) after n - 1.
-Where copies of the mark stand in one pass, m of them on every way, the passes are n / m and (n - 1) / m.
+Where one pass has copies of the mark, m of them on every way, the passes are n / m and (n - 1) / m.
 The sum is the optimum of the integer program of Y. Li, S. Malik, "Performance Analysis of Embedded Software Using
 Implicit Path Enumeration" (1995) with the same bounds.
 """
@@ -34,7 +34,7 @@ class Way(Generic[N]):
 
 @dataclass(frozen=True, slots=True)
 class Repeat(Generic[N]):
-    """A piece of a walk, so many times."""
+    """A piece of a walk, repeated."""
 
     walk: Walk[N]
     times: int
@@ -53,7 +53,7 @@ class Walk(Generic[N]):
         return Walk(self.cycles + way.cycles, self, way)
 
     def repeat(self, walk: Walk[N], times: int) -> Walk[N]:
-        """Another walk behind this one, so many times."""
+        """Another walk behind this one, repeated."""
         return Walk(self.cycles + times * walk.cycles, self, Repeat(walk, times)) if times else self
 
     def ways(self, times: int = 1) -> Iterator[tuple[Way[N], int]]:
@@ -188,7 +188,7 @@ class _Search(Generic[N]):
         whole = {name for name in marks if marks[name].cycles is not None or regions[name].back[0] is None}
         if len(marks) > 1 and (len(loop.latches) > 1 or not whole):
             # Loops of the source that share a header: at most n runs of the one before each of the m of the other, and
-            # behind the last, whichever is the inner one.
+            # behind the last, the inner and the outer one alike.
             runs = 1
             for mark in marks.values():
                 if mark.passes is None:
@@ -227,7 +227,7 @@ class _Search(Generic[N]):
 
 
 def _out(region: _Region[N], mark: Mark, where: str, least: int) -> dict[Way[N], Walk[N]]:
-    """The longest walk through each exit of a loop under one bound, with so many marks at least in each pass."""
+    """The longest walk through each exit of a loop under one bound, with at least `marks` marks in each pass."""
     free_pass, full = region.back
     result: dict[Way[N], Walk[N]] = {}
     if mark.cycles is not None and (mark.passes is None or free_pass is not None):

@@ -75,7 +75,7 @@ def read_image(path: Path) -> Image:
 
 @lru_cache(maxsize=4)
 def _read(path: Path, data: bytes) -> Image:
-    """Once, whoever asks again for the same bytes."""
+    """Read once for the same bytes."""
     try:
         return _image(path, ELFFile(BytesIO(data)))
     except DAMAGE as error:

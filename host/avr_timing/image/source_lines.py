@@ -2,7 +2,7 @@
 
 avr-gcc before version 8 writes DWARF with `-gdwarf-4`; its `-g` means stabs, whose addresses the linker's relaxation
 (`--relax`) leaves as they were. They are wrong then, and are not read. clang's addresses have two bytes, of which its
-DWARF 5 tells.
+DWARF 5 has.
 """
 
 from __future__ import annotations

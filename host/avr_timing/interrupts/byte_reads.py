@@ -1,12 +1,12 @@
-"""Where an interrupt takes received bytes, and how long it may run until it has taken so many.
+"""Where an interrupt reads received bytes, and how long it may run until it has read a number of them.
 
-A byte that waits is taken by whoever reads the UART's data register: the receive interrupt, or one that keeps it
+A byte that waits is read by the code that reads the UART's data register: the receive interrupt, or one that keeps it
 waiting and looks after the line meanwhile. Where it does shows in its machine code: a load of UDR0. While a byte waits,
 a test of RXC (bit 7 of a register just loaded from UCSR0A, or its sign) goes one way only, so the other one is left
 out: the bit is set when unread data exist in the receive buffer (data sheet, 20.11). Who finds a byte takes it before
 he looks again or returns, as long as the receive ring is not full; that it is not is for others to show (budget.py).
 
-Of an interrupt's run, from its acceptance (entry: 4 cycles) to the end of its RETI, these times are told, in cycles,
+Of an interrupt's run, from its acceptance (entry: 4 cycles) to the end of its RETI, these times are found, in cycles,
 for bytes that wait all the time: with at most n bytes taken the longest whole run (`run`); from acceptance to the end
 of the load that takes byte n + 1 (`until`); and of a run that has just found none, or taken the last, likewise the
 longest rest (`rest`, `next`). None: there is no such run. `charged` is for sums over many runs.
@@ -68,19 +68,19 @@ class ByteReads:
         return self._contains(self.start[0])
 
     def run(self, most: int) -> int | None:
-        """The longest whole run in which at most so many bytes are taken."""
+        """The longest whole run in which at most that many bytes are read."""
         return self._once("run", most)
 
     def until(self, taken: int) -> int | None:
-        """The longest time from acceptance until one byte more than so many is taken."""
+        """The longest time from acceptance until one byte more than that is read."""
         return self._once("until", taken)
 
     def rest(self, most: int) -> int | None:
-        """The longest rest of a run behind a look that found none, with at most so many taken in it."""
+        """The longest rest of a run behind a look that found none, with at most that many read in it."""
         return self._once("rest", most)
 
     def next(self, taken: int) -> int | None:
-        """The longest time from a look that found none until one byte more than so many is taken, in the same run."""
+        """The longest time from a look that found none until one byte more than that is read, in the same run."""
         return self._once("next", taken)
 
     @property
@@ -101,7 +101,7 @@ class ByteReads:
         return True
 
     def charged(self, each: int) -> int:
-        """The longest run less so many cycles for each byte that it takes: what it costs where bytes are charged apart.
+        """The longest run less `each` cycles a byte that it reads: what it costs where bytes are charged apart.
 
         All of it, where it takes bytes in a loop.
         """
@@ -135,7 +135,7 @@ class ByteReads:
         until: bool = False,
         waiting: bool = False,
     ) -> int | None:
-        """The longest way on which at most so many bytes are taken, ended with a number in `exits`, or (`until`) by the
+        """The longest way on which at most `most` bytes are read, ended with a number in `exits`, or (`until`) by the
         load of one more; `waiting`: bytes wait all the time."""
         ways: dict[_Node, list[Way[_Node]]] = {}
         first: _Node = (0, False, start)
@@ -254,7 +254,7 @@ def behind_test(block: Block, address: int) -> int | None:
     """The block behind a test of bit 7 of a register of the UART, if that is set; None: the block ends with none.
 
     A test is a skip on the bit of a register that holds it, or a branch on its sign, which `tst` (`and` of a register
-    with itself) or a comparison with zero told.
+    with itself) or a comparison with zero has shown.
     """
     last, before = block.instructions[-1], list(block.instructions[:-1])
     ways = {edge.to for edge in block.edges}

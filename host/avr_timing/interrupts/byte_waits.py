@@ -42,7 +42,7 @@ class Other:
     span: int
 
     def runs(self, window: int, begun: bool = False) -> int:
-        """Most runs that begin in a window of so many cycles; `begun`: behind one that has begun before it.
+        """Most runs that begin in a window of that many cycles; `begun`: behind one that has begun before it.
 
         The request of the first may have waited already, of the others it came within.
         """
@@ -50,7 +50,7 @@ class Other:
         return min(self._requests(window + before) - begun, self._requests(window) + 1)
 
     def first(self, most: int) -> int | None:
-        """The longest rest of a run that has begun, with at most so many bytes taken: all of it, or behind a look."""
+        """The longest rest of a run that has begun, with at most that many bytes read: all of it, or behind a look."""
         found = [each for each in (self.taken.run(most), self.taken.rest(most)) if each is not None]
         return max(found, default=None)
 
@@ -149,7 +149,7 @@ def _shared(line: Line, q: int, runs: Mapping[int, int], first: Sequence[int]) -
 
 
 def _after(times: list[int], taken: ByteReads, number: int) -> list[int]:
-    """By bytes taken, the longest time with so many runs more of one interrupt."""
+    """By bytes read, the longest time with more runs of one interrupt."""
     idle = taken.run(0)
     if idle is not None:  # a run that takes none costs no byte
         times = [each + number * idle for each in times]

@@ -74,7 +74,7 @@ class Begin:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call, or a jump into another function (`to` None), of so many cycles; `to` is what comes behind it."""
+    """A call, or a jump into another function (`to` None), and its cycles; `to` is what comes behind it."""
 
     callee: int
     cycles: int

@@ -14,7 +14,7 @@ where N_i(L) is the most requests of i in L + 1 cycles; after A. Burns, A. Welli
 Languages", 11.8 (blocking by what cannot be preempted). C_i runs from acceptance (entry: 4 cycles) to the end of RETI;
 of an interrupt that lets others in, to where it does so.
 
-Each has one flag (data sheet, 11): those of its own kind do not pile up. But the last moment at which none of higher
+Each has one flag (data sheet, 11): requests of one kind do not pile up. But the last moment at which none of higher
 priority was waiting may be the one at which the request before this one was accepted: then B is its own time. That
 was at most L after the request before; so it need not be heeded where no two of its requests come within L and the time
 that passes, by the same formula, from that acceptance on.
@@ -115,7 +115,7 @@ class Latencies:
         return self.taken[vector]
 
     def _behind(self, begun: int, higher: Sequence[int]) -> int:
-        """The wait where one that takes so long has just begun."""
+        """The wait where one that takes this long has just begun."""
         wait, longer = -1, begun
         while longer > wait:
             if longer >= HORIZON:

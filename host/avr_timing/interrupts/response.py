@@ -70,7 +70,7 @@ class Source:
             raise ValueError(f"{self.name}: no source of interrupts: {self}")
 
     def requests(self, window: int, start: int | None = None) -> int:
-        """The most that can come in a window of so many cycles, which begins `start` cycles after slot 0; None: at any
+        """The most that can come in a window of `length` cycles, which begins `start` cycles after slot 0; None: at any
         time."""
         if window <= 0:
             return 0
@@ -217,7 +217,7 @@ def misses(schedule: Schedule, slots: Sequence[int]) -> list[int]:
 
 
 def longest_gap(schedule: Schedule, sources: Sequence[Source], before: int, after: int) -> int | None:
-    """The longest time for which the main loop does nothing but slots, with so many cycles of other work before them,
+    """The longest time for which the main loop does nothing but slots, with some cycles of other work before them,
     during which the first one begins, and after them; None: overload."""
     if load(sources) + schedule.mean_load >= 1:
         return None

@@ -88,7 +88,7 @@ class Steps:
         self._recurrence = _Recurrence(self._ways, self.longest)
 
     def most(self, steps: int, jumps: int = 0) -> int:
-        """The longest time of so many steps, cycles; `jumps`: how often the way may break off and begin elsewhere."""
+        """The longest time of that many steps, cycles; `jumps`: how often the way may break off and begin elsewhere."""
         if not self._known.is_regular:
             return steps * self.longest
         if steps > KEPT:
@@ -217,7 +217,7 @@ class Steps:
         return tuple(self._places[place] for place in places if place in self._places)
 
     def _irregular(self) -> list[int]:
-        """Longest stretches, where steps are not told apart."""
+        """Longest stretches, where steps do not differ."""
         if self._known.is_regular:
             return []
         main = self.blocked.of("main").cycles

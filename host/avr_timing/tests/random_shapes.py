@@ -27,7 +27,7 @@ class Shape:
         return self.nodes - 1
 
     def way(self, source: int, target: int) -> None:
-        """A new way with cycles of its own."""
+        """A new way with its own cycles."""
         self.ways.append((source, target, self.chance.randint(1, 30)))
 
     def graph(self) -> Graph[int]:

@@ -147,7 +147,7 @@ def test_how_often_one_of_higher_priority_comes_must_be_said(tmp_path: Path) -> 
 
 @dataclass
 class Machine:
-    """Runs the few instructions of the programs below, one after another; requests come when they are told to."""
+    """Runs the few instructions of the programs below, one after another; requests come at given times."""
 
     program: Program
     requests: dict[int, list[int]]  # by vector, cycles in rising order

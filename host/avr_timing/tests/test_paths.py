@@ -125,7 +125,7 @@ def test_loops_that_share_their_header_are_bounded_together() -> None:
 
 
 def farthest(ways: list[tuple[int, int, int]], marked: set[int], most: int, node: int = 0) -> int:
-    """By trying all walks from a node to the end with so many runs of marked nodes; below 0: there is none."""
+    """By trying all walks from a node to the end with that many runs of marked nodes; below 0: there is none."""
     left = most - (node in marked)
     if node == END or left < 0:
         return 0 if node == END else -10_000

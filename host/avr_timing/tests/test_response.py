@@ -150,8 +150,8 @@ def test_no_simulation_exceeds_the_bound_and_the_worst_meets_it(
         reached = [max(pair) for pair in zip(reached, worst, strict=True)]
     busy = [cycles > 0 for cycles in works]
     assert all(one <= most for one, most in zip(reached, bound.slots, strict=True))
-    if all(busy) and max(bound.slots) <= 20:  # each slot then begins a busy period of its own
-        assert tuple(reached) == bound.slots, "there is a run in which it takes just so long"
+    if all(busy) and max(bound.slots) <= 20:  # each slot then begins another busy period
+        assert tuple(reached) == bound.slots, "there is a run in which it takes exactly this long"
 
 
 def test_a_late_slot_delays_the_next() -> None:

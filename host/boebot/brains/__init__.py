@@ -229,7 +229,7 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
 
 
 def _made(module: ModuleType, where: str, path: Path | None) -> LoadedBrain | None:
-    """Of the module's `brain = Brain([...])`, or of its own class Brain."""
+    """Of the module's `brain = Brain([...])`, or of its class Brain."""
     brain, kind = getattr(module, "brain", None), getattr(module, "Brain", None)
     if isinstance(brain, Brain):
         if callable(getattr(module, "step", None)):

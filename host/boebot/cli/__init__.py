@@ -26,7 +26,7 @@ def main() -> NoReturn:
     """Runs the command; every error that people can make ends as one sentence."""
     code: object
     try:
-        for number in SIGNALS:  # motors are stopped and the record is written, whichever of them comes
+        for number in SIGNALS:  # motors are stopped and the record is written at each of them
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
                 signal.signal(number, _interrupt)
         sys.unraisablehook = _ask_again

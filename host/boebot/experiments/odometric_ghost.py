@@ -109,7 +109,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
         about("the same against its closed form", error(trial) - expected, 0, 1e-3, "m"),
         Measured("believed d at the stop command", trial.believed, "m", 0.980, 0.982),
         about(
-            "what the brain believes off what the odometer tells",
+            "what the brain believes off what the odometer measures",
             math.dist(ghost(trial), (odometer.x[-1], odometer.y[-1], odometer.heading[-1])), 0, 1e-3, "m",
         ),
     ]  # fmt: skip

@@ -197,7 +197,7 @@ def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
     "E22-shieldbot",
     title="A metre straight ahead by odometry: ten shieldbots",
     source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
-    caption="Distance and motor signals of ten shieldbots, each with servos of its own, on their way to a destination "
+    caption="Distance and motor signals of ten shieldbots, each with its own servos, on their way to a destination "
     "1 m ahead.",
     robot="shieldbot (native)",
     criterion=f"{_BY_SERVO}.",

@@ -36,7 +36,7 @@ from boebot.timing.table import Table
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START
 FLASH_BYTES = 0x8000
-FOR_EVER = 1 << 20  # cycles, 65 ms: what waits so long has no bound
+FOR_EVER = 1 << 20  # cycles, 65 ms: what waits this long has no bound
 STAMP_ROLLS_OVER = 1 << 16  # cycles after which the stamp of an edge says nothing any more
 
 
@@ -147,7 +147,7 @@ class Report:
 
     @property
     def edge_age(self) -> int | None:
-        """Cycles from an edge to the moment at which the time is told of it. None: there is overload, where the board
+        """Cycles from an edge to the moment at which its time is reported. None: there is overload, where the board
         notices if that is too late, or no encoder.
 
         Each slot begins with that, and so does each round of the main loop: it waits for no frame.

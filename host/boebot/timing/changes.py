@@ -48,7 +48,7 @@ def most_waiting(
     slots = max(map(schedule.work, range(len(schedule.slots))))
 
     def peak(work: int, left: int) -> int | None:
-        """With so much work before the next poll looks, and so many changes that wait already."""
+        """With some work before the next poll looks, and changes that wait already."""
         most = freed = 0
         while True:
             until = response(work + (freed + 1) * found.change, interrupts)

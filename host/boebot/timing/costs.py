@@ -44,7 +44,7 @@ SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the 
 
 
 class Given(WorstCase):
-    """Bounds in which certain functions take so many cycles, whatever they do: the rest is accounted for elsewhere."""
+    """Bounds in which certain functions take given cycles, whatever they do: the rest is accounted for elsewhere."""
 
     def __init__(self, program: Program, cycles: Mapping[int, int]) -> None:
         super().__init__(program)
@@ -71,7 +71,7 @@ class Costs:
     frame: int  # to work off one frame
     edges: int  # to look for pin changes
     change: int  # more, to work off one
-    changes_due: int  # so many changes the main loop works off between slots; fewer wait
+    changes_due: int  # changes from which on the main loop works them off between slots; fewer wait
     found_by: Latencies | None = field(default=None, compare=False, repr=False)
 
     def under(self, firmware: Firmware, load: Load) -> Costs:
@@ -120,7 +120,7 @@ class Costs:
         return found
 
     def between(self, firmware: Firmware, load: Load) -> list[Source]:
-        """What the main loop does besides when no slot waits: it looks for changes when so many are due."""
+        """What the main loop does besides when no slot waits: it looks for changes when enough are due."""
         return [
             replace(one, name="looks for changes")
             for one in self._changes(firmware, load, -(-(self.loop + self.edges) // self.changes_due))
@@ -252,7 +252,7 @@ def _edges(firmware: Firmware) -> tuple[int, int]:
 
 
 def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:
-    """One pass of the main loop at most, and the scheduler in it around a slot's tasks, with so many cycles to look for
+    """One pass of the main loop at most, and the scheduler in it around a slot's tasks, with some cycles to look for
     edges: of the scheduler its longest way, of the loop around it every block once.
 
     The scheduler's only loop drops ticks when it has fallen behind. Where it has not, it is not passed.
@@ -260,7 +260,7 @@ def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:
     program, scheduler = firmware.program, firmware.entry_of(SCHEDULER)
     if scheduler is None:
         raise TimingError(
-            f"{program.path} has no function {SCHEDULER}; expected the scheduler as a function of its own, not in line"
+            f"{program.path} has no function {SCHEDULER}; expected the scheduler as a function, not in line"
         )
     names = (*(f"{row.name}_task" for row in firmware.table.tasks), *AROUND_TASK)
     elsewhere = dict.fromkeys(firmware.entries_of(names), 0)

@@ -35,7 +35,7 @@ _LEGEND = {
     "interrupt": "interrupt",
     "line": "bytes on the line",
     "process": "brain",
-    "sense": "reading, in hardware of its own",
+    "sense": "reading, in separate hardware",
 }
 _BETWEEN = "#d9dee5"  # the scheduler, before a slot's tasks and between them
 _HEIGHT = 0.66  # of a box, in lanes

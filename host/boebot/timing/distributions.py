@@ -1,4 +1,4 @@
-"""Jitter and latency as distributions: what was measured, whoever measured it, and what it may be."""
+"""Jitter and latency as distributions: what was measured, in the emulator or by a board, and what it may be."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Losses:
     edges: int  # of encoders, that the counts lack
     ticks: int  # without telemetry
     late_ticks: int  # whose work went on when the next tick had begun
-    masked: int  # telemetries that tell of a masked encoder line
+    masked: int  # telemetries with a masked encoder line
     resets: int
 
     @property

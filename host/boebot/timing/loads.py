@@ -37,7 +37,7 @@ _REQUEST = messages.SetParameter.LENGTH + FRAME_OVERHEAD
 class Stream:
     """Requests at least `interval` cycles apart, and for each (n, period) of `bursts` at most n in each period.
 
-    Interval 0: the table's own. So many as `close` more may come at once, early by so many intervals.
+    Interval 0: the table's own. `close` more may come at once, early by that many intervals.
     """
 
     interval: int = 0
@@ -47,7 +47,7 @@ class Stream:
     spells: tuple[Spell, ...] = ()  # of a servo frame, in which alone they come
 
     def source(self, row: InterruptRow, cycles: int) -> Source:
-        """As what asks for an interrupt of so many cycles."""
+        """As what asks for an interrupt of that many cycles."""
         interval = self.interval or row.interval
         period = 2 * TICK if self.spells else 1
         early = self.close * interval
@@ -76,7 +76,7 @@ class Load:
     may_be_late: frozenset[int] = field(default_factory=frozenset)
 
     def sources(self, row: InterruptRow, cycles: int) -> list[Source]:
-        """What asks for an interrupt that takes so many cycles."""
+        """What asks for an interrupt that takes that many cycles."""
         if row.vector in self.off:
             return []
         return [one.source(row, cycles) for one in self.streams.get(row.vector, (Stream(),))]

@@ -1,4 +1,4 @@
-"""What was measured of a running image: spans of tasks and interrupts, whoever measured them."""
+"""What was measured of a running image: spans of tasks and interrupts."""
 
 from __future__ import annotations
 

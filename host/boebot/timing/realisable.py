@@ -4,7 +4,7 @@ All that happens within one time step has to fit, in hardware, into that step:
 
     sum of t_read + t_process + sum of t_command < dt
 
-Events that follow one another add up. What a unit of its own does meanwhile (a timer, the capture input, the converter:
+Events that follow one another add up. What separate hardware does meanwhile (a timer, the capture input, the converter:
 all devices of a board) runs beside them and does not count, but a reading has to fit into the sensor's own period.
 """
 
@@ -53,7 +53,7 @@ class Event:
 
     @property
     def beside(self) -> bool:
-        """It runs beside the rest, in hardware of its own."""
+        """It runs beside the rest, in separate hardware."""
         return self.every > 0
 
     @property

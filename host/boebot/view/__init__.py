@@ -85,7 +85,7 @@ def save(result: RunResult, folder: Path) -> list[Path]:
 
 
 def save_together(result: TogetherResult, folder: Path) -> list[Path]:
-    """Writes picture and page of all robots into `folder`, and the files of each into a folder of its own; returns
+    """Writes picture and page of all robots into `folder`, and the files of each into its own folder; returns
     their paths.
 
     Raises: as `save`.

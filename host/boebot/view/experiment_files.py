@@ -49,7 +49,7 @@ def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, byte
 
 
 def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) -> list[bytes]:
-    """The figure in those forms, "png" or "svg", with so many dots per inch."""
+    """The figure in those forms, "png" or "svg", with that many dots per inch."""
     found = []
     with mpl.rc_context({**style.PLOTS, "svg.hashsalt": experiment.name}):
         figure = Figure(figsize=(style.WIDTH_IN, HEIGHT_IN), layout="constrained")

@@ -140,7 +140,7 @@ def _mind(record: BrainRecord) -> dict[str, Any] | None:
     thin = slice(None, None, max(1, math.ceil(len(record.steps) / STEPS_AT_MOST)))
     time, chosen = record.time[thin], [switch for switch in record.switches if switch.on in record.behaviors]
     last = np.searchsorted([switch.time for switch in chosen], time, side="right") - 1
-    kept = np.unique(last)  # switches that no kept step tells of are left out
+    kept = np.unique(last)  # switches between kept steps are left out
     return {
         "behaviors": [
             {"name": name, "colour": style.behavior(index), "utility": _array(record.utility_of(name)[thin])}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MARGIN = 0.03  # of the greater side
 OPEN_M = 0.3  # to see around a path in an open field, at least
-OPEN_ARENA_M = 1.0  # around what stands in an open field
+OPEN_ARENA_M = 1.0  # around the robots in an open field
 OPEN_SHARE = 0.15  # of the path's extent, to see around it
 SLIMMEST = 0.4  # shorter side by longer side of what is shown of an open field
 

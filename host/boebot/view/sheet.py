@@ -87,7 +87,7 @@ class Sheet:
         )
 
     def _write(self, tall: float, lines: Sequence[str], legend: Sequence[Artist], columns: int) -> None:
-        """Title, caption and legend on a sheet so many inches tall."""
+        """Title, caption and legend on a sheet of this height, inches."""
         left = 0.18 / style.WIDTH_IN
         shown = textwrap.shorten(self.title, TITLE_COLUMNS, placeholder="…")
         self._figure.text(left, 1 - 0.32 / tall, shown, fontsize=15, weight="bold", color=style.INK, va="center")

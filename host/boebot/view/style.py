@@ -1,7 +1,7 @@
 """Colours and widths that all pictures share.
 
-Hues are those of Okabe and Ito, which the colour-blind tell apart; what matters also differs in form or lightness, so
-that it survives a grey printer.
+Hues are those of Okabe and Ito, which the colour-blind can distinguish; what matters also differs in form or lightness,
+so that it survives a grey printer.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def write_summary(result: RunResult, path: Path) -> Path:
 
 
 def write_wire(result: RunResult, folder: Path) -> list[Path]:
-    """to_board.bin and to_host.bin; wire.csv tells when which of their bytes were sent or read (transport's clock)."""
+    """to_board.bin and to_host.bin; wire.csv says when which of their bytes were sent or read (transport's clock)."""
     rows: list[tuple[float, str, int, int]] = []
     for name, chunks in ((name, result.record.rows(name)) for name in ("to_board", "to_host")):
         (folder / f"{name}.bin").write_bytes(b"".join(data for _, data in chunks))
@@ -109,7 +109,7 @@ def write_wire(result: RunResult, folder: Path) -> list[Path]:
 
 
 def _cells(values: Any, digits: int | None = None) -> list[str]:
-    """Array to text: numbers with so many digits, flags as 0 and 1, not-a-number as nothing."""
+    """Array to text: numbers with that many digits, flags as 0 and 1, not-a-number as nothing."""
     if digits is None:
         return [str(int(value)) for value in values.tolist()]
     form = f"%.{digits}f"

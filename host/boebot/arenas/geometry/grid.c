@@ -9,7 +9,7 @@
 #define CELLS_PER_ITEM 4.0   /* of the box around everything */
 #define CELL_MINIMUM 1e-4    /* m */
 #define CONTENT_PER_ITEM 16u /* cells that an item may touch on average ... */
-#define CONTENT_FREE 65536u  /* ... beyond so many altogether */
+#define CONTENT_FREE 65536u  /* ... beyond this many altogether */
 
 void grid_item_box(const grid_items *items, uint32_t item, double box[4]) {
   if (item < items->edge_count) {
@@ -122,7 +122,7 @@ static void lay_out(grid *g, const double box[4], double cell) {
   g->y1 = g->y0 + g->rows * cell;
 }
 
-/* Side of the cells: so many per item; a long thin box has fewer. */
+/* Side of the cells: a number of cells per item; a long thin box has fewer. */
 static double cell_side(const double box[4], size_t count) {
   const double width = box[2] - box[0];
   const double height = box[3] - box[1];

@@ -1,5 +1,5 @@
 /* hash.h: hashes of numbers, the same on every machine: of values in a row, never of memory, which has padding and an order
- * of bytes. They tell things apart that were not made to look alike. */
+ * of bytes. They differ for things that were not made to look alike. */
 #ifndef GEOMETRY_HASH_H
 #define GEOMETRY_HASH_H
 

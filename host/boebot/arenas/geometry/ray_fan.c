@@ -51,7 +51,7 @@ static inline void turn(const fan_question *q, size_t first, group *out) {
   }
 }
 
-/* ray_edge for four rays. `thinnest` stays above 0 unless one of them goes along the edge, where no division can tell. */
+/* ray_edge for four rays. `thinnest` stays above 0 unless one of them goes along the edge, where a division by zero says nothing. */
 NUMBERS_INLINE void ask_edge(const arena_edge *e, double x, double y, const group *rays, double nearest[GROUP],
                              double thinnest[GROUP]) {
   const double wx = x - e->ax;

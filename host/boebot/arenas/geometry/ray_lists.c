@@ -7,7 +7,7 @@
 #define CELL_LEAST 0.05            /* m */
 #define SIDE_MAXIMUM 100           /* cells: more of them would not stay in the processor's cache */
 #define BORDER 1.0                 /* m around everything where rays may start */
-#define GATHER_ENOUGH 256u         /* items that a cell looks at, if there are so many */
+#define GATHER_ENOUGH 256u         /* items that a cell looks at, if there are that many */
 #define PATIENCE 128u              /* fans from a cell before it gets lists: by then they cost less than they save */
 #define MEMORY_LARGEST (64u << 20) /* bytes */
 #define COVERED (1.0 / RAY_LISTS_PER_TURN + 0.611) /* of ray_turn by a list; a rad is one unit or less */

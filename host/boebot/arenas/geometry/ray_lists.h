@@ -33,7 +33,7 @@ typedef struct {
   int columns, rows;
   ray_list_cell **cells; /* columns * rows, NULL: not made yet */
   uint16_t *visits;
-  unsigned patience; /* a cell's lists are made after so many fans from there */
+  unsigned patience; /* a cell's lists are made after this many fans from there */
   size_t memory;     /* bytes in lists */
   const grid *grid;
   grid_items items;
