@@ -86,9 +86,7 @@ def live(genes: Floats, *, traced: bool = False, seconds: float = SECONDS) -> Li
         if traced:
             rows.append((energy, u, place, work.copy(), (charges & on & alive).astype(float)))
     names = ("energy", "utility", "place", "work", "charging")
-    trace = (
-        {name: np.array(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)} if rows else {}
-    )
+    trace = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True)) if rows else {}
     times: Floats = np.arange(1, len(rows) + 1, dtype=np.float64) * STEP
     return Lives(work, alive, switches, times, trace)
 
@@ -156,12 +154,11 @@ def evolution(seed: int, progress: Progress) -> Outcome:
     evolved = evolve(seed, progress)
     known = live(np.array([NEVER, ALWAYS, THRESHOLD, BY_HAND]))
     best = live(evolved.genes[None], traced=True)
+    worse = int((np.diff(evolved.best, axis=0) < -1e-9).sum())
     measured = [
         Measured("performance of the best of three restarts", float(best.work[0]), "s", least=190.0),
         exactly("the best is alive at the end (1: yes)", float(best.alive[0]), 1),
-        exactly(
-            "generations in which a restart's best got worse", int((np.diff(evolved.best, axis=0) < -1e-9).sum()), 0
-        ),
+        exactly("generations in which a restart's best got worse", worse, 0),
         about("never charging: performance", known.work[0], 50.0, 0.1, "s"),
         exactly("never charging: alive at the end", float(known.alive[0]), 0),
         about("always charging: performance", known.work[1], 0.0, 0.1, "s"),

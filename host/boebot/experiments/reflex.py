@@ -69,7 +69,7 @@ TURN = 2 * math.pi  # rad/s of turning away at full intensity
 
 @dataclass(frozen=True)
 class Larva:
-    """What became of it, step by step."""
+    """Its path and intensity, step by step."""
 
     times: Floats
     place: Floats

@@ -36,7 +36,7 @@ def runner(*, period: float, least: float = 0.0, hold: float = 0.0, factors: tup
 
 @dataclass(frozen=True)
 class Straight(Trial):
-    """One run, and what became of it."""
+    """One run, and its figures."""
 
     @property
     def behavior(self) -> StraightRun:

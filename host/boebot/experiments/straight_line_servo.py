@@ -47,7 +47,7 @@ def coarse(wheel_radius_m: float) -> RobotDescription:
 
 @dataclass
 class ServoRun:
-    """A run on the servo model, and what became of it."""
+    """A run on the servo model."""
 
     behavior: StraightRun
     times: list[float] = field(default_factory=list)
