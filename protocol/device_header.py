@@ -15,13 +15,13 @@ HEAD = """/* devices.h: the devices of this image, from protocol/messages.toml a
 """
 
 
-def devices_header(spec: schema.Schema, note: str) -> str:
+def devices_header(spec: schema.Schema) -> str:
     """The header's text."""
     bits = spec.flags["devices"].bits
     spoken = [message for message in spec.message if message.devices]
     others = [message for message in spoken if message.name != "telemetry"]
     names = sorted({name for message in spoken for name in message.devices} | set(bits))
-    lines = [HEAD.format(note=note)]
+    lines = [HEAD.format(note=schema.MADE_NOTE)]
     lines += [f'#include "{name}.h"' for name in names]
     lines += [
         '#include "clock.h"',

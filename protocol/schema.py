@@ -34,6 +34,19 @@ INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
 }
 
 
+MADE_NOTE = "Made by protocol/generate.py; do not edit."
+
+
+def number(value: float) -> str:
+    """A number as short as it can be written."""
+    return str(int(value)) if float(value).is_integer() else repr(float(value))
+
+
+def unit_per_count(scale: float, unit: str) -> str:
+    """What one count stands for: "0.0625 us", "ms", or nothing."""
+    return " ".join(part for part in ("" if scale == 1.0 else number(scale), unit) if part)
+
+
 @dataclass(frozen=True)
 class Field:
     """One field of a message."""
@@ -47,6 +60,12 @@ class Field:
     flags: str = ""
     enum: str = ""
     doc: str = ""
+
+    @property
+    def comment(self) -> str:
+        """Unit, scale and explanation in one phrase."""
+        parts = (unit_per_count(self.scale, self.unit), self.flags or self.enum, self.doc)
+        return "; ".join(part for part in parts if part)
 
     @property
     def text_length(self) -> int:

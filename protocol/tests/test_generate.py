@@ -22,7 +22,7 @@ PROTOCOL = Path(__file__).resolve().parents[1]
 ROOT = PROTOCOL.parent
 sys.path.insert(0, str(PROTOCOL))
 
-import generate  # noqa: E402
+import pin_headers  # noqa: E402
 import reference_frame  # noqa: E402
 import robot_files  # noqa: E402
 import schema  # noqa: E402
@@ -110,8 +110,8 @@ def test_the_generator_and_the_library_read_robots_alike(name: str) -> None:
         assert ours.has(device) == library.device[device].on
     spec = schema.load()
     values = parameters_of(library)
-    assert generate.devices_default(spec, ours) == values.pop("devices")
-    counted = {p.name: generate.default_counts(p, ours) for p in spec.parameter if p.default_from}
+    assert pin_headers.devices_default(spec, ours) == values.pop("devices")
+    counted = {p.name: pin_headers.default_counts(p, ours) for p in spec.parameter if p.default_from}
     scales = {p.name: p.scale for p in spec.parameter}
     assert {key: counted[key] for key in values if key in counted} == {
         key: round(value / scales[key]) for key, value in values.items() if key in counted
