@@ -73,21 +73,24 @@ AS_BUILT = Draw(0, noise=False)
 
 def body_parameters(body: robots.Body, draw: Draw = AS_BUILT, outline: Any = ffi.NULL) -> Any:
     """The body in C. `outline`: its collision outline in C, which must outlive what is made of it; NULL: a circle."""
-    return ffi.new(
-        "body_parameters *",
-        {
-            "mass": body.mass_kg,
-            "inertia": body.inertia_kg_m2,
-            "radius": body.radius_m,
-            "half_track": body.track_width_m / 2,
-            "wheel_radius": body.wheel_radius_m,
-            "wheel_mass": body.wheel_mass_kg,
-            "wheel_inertia": body.wheel_inertia_kg_m2,
-            "linear_damping": body.linear_damping_n_s_m,
-            "angular_damping": body.angular_damping_n_m_s,
-            "outline": outline,
-            "grip": draw.own("TYRE_GRIP", body.tyre_grip),
-            "spin_inertia": SPIN_INERTIA_KG_M2,
-            "slip": int(draw.own("TYRE_SLIP", body.tyre_slip)),
-        },
-    )
+    tyres = {
+        "grip": draw.own("TYRE_GRIP", body.tyre_grip),
+        "spin_inertia": SPIN_INERTIA_KG_M2,
+        "slip": int(draw.own("TYRE_SLIP", body.tyre_slip)),
+    }
+    return ffi.new("body_parameters *", body_numbers(body) | {"outline": outline} | tyres)
+
+
+def body_numbers(body: robots.Body) -> dict[str, float]:
+    """Masses, lengths and damping of the body, by their names in C (SI units)."""
+    return {
+        "mass": body.mass_kg,
+        "inertia": body.inertia_kg_m2,
+        "radius": body.radius_m,
+        "half_track": body.track_width_m / 2,
+        "wheel_radius": body.wheel_radius_m,
+        "wheel_mass": body.wheel_mass_kg,
+        "wheel_inertia": body.wheel_inertia_kg_m2,
+        "linear_damping": body.linear_damping_n_s_m,
+        "angular_damping": body.angular_damping_n_m_s,
+    }

@@ -71,18 +71,7 @@ def _file(robot: Any) -> str | Path:
 
 
 def _body(body: robots.Body) -> dict[str, Any]:
-    return {
-        "mass": body.mass_kg,
-        "inertia": body.inertia_kg_m2,
-        "radius": body.radius_m,
-        "half_track": body.track_width_m / 2,
-        "wheel_radius": body.wheel_radius_m,
-        "wheel_mass": body.wheel_mass_kg,
-        "wheel_inertia": body.wheel_inertia_kg_m2,
-        "linear_damping": body.linear_damping_n_s_m,
-        "angular_damping": body.angular_damping_n_m_s,
-        "grip": imperfections.TYRE_GRIP,
-    }
+    return imperfections.body_numbers(body) | {"grip": imperfections.TYRE_GRIP}
 
 
 def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
