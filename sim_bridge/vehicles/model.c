@@ -128,8 +128,13 @@ int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *
   }
   uint32_t number = 0;
   for (size_t i = 0; i < self->sensors_count; i++) number += self->sensors[i].kind == kind;
-  self->sensors[self->sensors_count++] = (vehicle_sensor){
-      .kind = kind, .device = kind->noise * 64u + number, .first = self->readings, .period = period, .made = made};
+  self->sensors[self->sensors_count++] = (vehicle_sensor){.kind = kind,
+                                                          .device = kind->noise * 64u + number,
+                                                          .first = self->readings,
+                                                          .numbers = self->numbers,
+                                                          .period = period,
+                                                          .made = made};
+  self->numbers += kind->numbers;
   if (kind->reach != NULL) self->reach = fmax(self->reach, kind->reach(made));
   self->readings += readings;
   return (int)(self->readings - readings);

@@ -71,6 +71,7 @@ typedef struct {
   const sensor_kind *kind;
   uint32_t device; /* key of its noise */
   size_t first;    /* of its readings */
+  size_t numbers;  /* that the sensors before it keep */
   double period;
   void *made; /* by its kind */
 } vehicle_sensor;
@@ -87,6 +88,7 @@ struct vehicle_model {
   energy_parameters energy;
   int noise, ends_at_collision;
   size_t sensors_count, readings;
+  size_t numbers; /* that all sensors keep */
   vehicle_sensor sensors[VEHICLE_SENSORS];
 };
 

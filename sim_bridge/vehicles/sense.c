@@ -6,6 +6,14 @@
 
 /* ---- memory ------------------------------------------------------------------------------------------------------- */
 
+void vehicle_sensors_give_numbers(vehicles *self) {
+  const vehicle_model *m = self->model;
+  for (size_t k = 0; k < self->slots_count; k++) {
+    const size_t world = k / m->sensors_count, sensor = k % m->sensors_count;
+    self->slots[k].memory.numbers = &self->numbers[world * m->numbers + m->sensors[sensor].numbers];
+  }
+}
+
 int vehicle_sensors_find_room(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   sensor_slot *slots = &self->slots[i * m->sensors_count];
@@ -59,8 +67,9 @@ void vehicle_sensors_start(vehicles *self, size_t i) {
     sensor_slot *slot = &self->slots[i * m->sensors_count + k];
     *slot = (sensor_slot){.key = noise_key(w->state.seed, w->state.id, sensor->device),
                           .hold = {.period = sensor->period},
-                          .memory = {.work = slot->memory.work},
+                          .memory = slot->memory,
                           .free_work = slot->free_work};
+    memset(slot->memory.numbers, 0, sensor->kind->numbers * sizeof(double));
     if (sensor->kind->start != NULL) sensor->kind->start(sensor->made, &slot->memory, &s);
   }
 }

@@ -10,6 +10,9 @@ void vehicle_sense(vehicles *self, size_t i);
 /* The same for one sensor, if it is due; `from`: where the body is. */
 void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from);
 
+/* Each sensor's place for the numbers that it keeps. */
+void vehicle_sensors_give_numbers(vehicles *self);
+
 /* Room to work in for the sensors of world `i` that need it; 0 without memory. */
 int vehicle_sensors_find_room(vehicles *self, size_t i);
 void vehicle_sensors_free_room(vehicles *self); /* of all worlds; the model may be gone already */

@@ -138,6 +138,7 @@ struct vehicles {
   vehicle *worlds;
   size_t slots_count;
   sensor_slot *slots; /* as many for each world as the model has sensors */
+  double *numbers;    /* that the sensors keep, world by world */
   double *readings;
   unsigned char *brains;
 };

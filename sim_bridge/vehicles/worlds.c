@@ -20,11 +20,16 @@ vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_si
   self->worlds = calloc(count + 1, sizeof *self->worlds);
   self->slots_count = count * model->sensors_count;
   self->slots = calloc(self->slots_count + 1, sizeof *self->slots);
+  self->numbers = calloc(count * model->numbers + 1, sizeof *self->numbers);
   self->readings = calloc(count * model->readings + 1, sizeof *self->readings);
   self->brains = calloc(count + 1, block + 1);
-  if (self->worlds != NULL && self->slots != NULL && self->readings != NULL && self->brains != NULL) return self;
-  vehicles_destroy(self);
-  return NULL;
+  if (self->worlds == NULL || self->slots == NULL || self->numbers == NULL || self->readings == NULL ||
+      self->brains == NULL) {
+    vehicles_destroy(self);
+    return NULL;
+  }
+  vehicle_sensors_give_numbers(self);
+  return self;
 }
 
 /* Frees what belongs to one world. */
@@ -39,6 +44,7 @@ void vehicles_destroy(vehicles *self) {
   if (self->slots != NULL) vehicle_sensors_free_room(self);
   free(self->worlds);
   free(self->slots);
+  free(self->numbers);
   free(self->readings);
   free(self->brains);
   free(self);
@@ -153,6 +159,7 @@ void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;
-  const size_t each = sizeof(vehicle) + m->sensors_count * sizeof(sensor_slot) + m->readings * sizeof(double);
+  const size_t each =
+      sizeof(vehicle) + m->sensors_count * sizeof(sensor_slot) + (m->numbers + m->readings) * sizeof(double);
   return sizeof *self + self->count * (each + self->state_size);
 }

@@ -13,8 +13,6 @@
 #include "../body.h"
 #include "beam.h"
 
-#define SENSOR_NUMBERS 8
-
 /* What a sensor may use of its robot, after a step of the world. */
 typedef struct {
   viewpoint from;
@@ -29,14 +27,14 @@ typedef struct {
 
 /* What a sensor keeps in one world. */
 typedef struct {
-  double numbers[SENSOR_NUMBERS]; /* a struct of doubles */
-  void *work;                     /* room to work in, without meaning from one reading to the next; NULL: needs none */
+  double *numbers; /* a struct of doubles */
+  void *work;      /* room to work in, without meaning from one reading to the next; NULL: needs none */
 } sensor_memory;
 
 typedef struct sensor_kind {
   uint32_t noise; /* part of the key of its draws, different for each kind, less than 2^26 */
   size_t size;    /* bytes of a made sensor */
-  size_t numbers; /* that it keeps, at most SENSOR_NUMBERS */
+  size_t numbers; /* that it keeps */
 
   /* Makes it; returns how many readings it gives, or 0: its parameters are not as its header says. */
   size_t (*make)(void *self, const void *parameters);
