@@ -8,6 +8,8 @@
 #include "generated/parameters.h"
 #include "native_bench.h"
 
+#ifdef PIN_LINE_LEFT
+
 namespace {
 
 constexpr std::array<uint8_t, 3> PINS = {PIN_LINE_LEFT, PIN_LINE_MIDDLE, PIN_LINE_RIGHT};
@@ -152,3 +154,5 @@ TEST_CASE("switched off: pulled up, no message; on again: readings") {
   CHECK(bench.count(MSG_LINE_TELEMETRY_ID) > before);
   CHECK(std::abs(bench.line().line_middle - 321) <= 2);
 }
+
+#endif
