@@ -1,7 +1,7 @@
 /* frame_fuzzer.c: any bytes into the frame decoder, guided by coverage (libFuzzer), under the address and
  * undefined-behaviour sanitizers. The assertions say what must hold whatever the bytes:
  *
- *   what is accepted is, encoded again, byte for byte what came;
+ *   an accepted message, encoded again, gives the same bytes;
  *   its length is that of its id, and nothing is collected beyond the longest frame;
  *   each piece between delimiters is counted once, as good, as bad or as unknown;
  *   a good frame behind two delimiters is accepted, whatever came before.

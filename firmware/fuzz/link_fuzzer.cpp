@@ -27,18 +27,18 @@ struct kind {
 #define ROW(id, length, hash) {(id), (length)},
 constexpr kind KINDS[] = {MESSAGE_LIST(ROW)};
 
-/* The rest of the input, taken byte by byte; zeros behind its end. */
+/* The rest of the input, byte by byte; zeros behind its end. */
 class input {
  public:
   input(const uint8_t *data, size_t size) : data_(data), end_(data + size) {}
   bool is_empty() const { return data_ == end_; }
   uint8_t byte() { return is_empty() ? uint8_t{0} : *data_++; }
   std::vector<uint8_t> bytes(size_t count) {
-    std::vector<uint8_t> taken(count);
-    for (uint8_t &one : taken) {
+    std::vector<uint8_t> some(count);
+    for (uint8_t &one : some) {
       one = byte();
     }
-    return taken;
+    return some;
   }
 
  private:

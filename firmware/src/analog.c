@@ -24,11 +24,11 @@
 
 static uint16_t results[ANALOG_INPUTS];
 static uint8_t ages[ANALOG_INPUTS]; /* ticks */
-static uint8_t input;               /* to which the converter is joined */
+static uint8_t input;               /* that the converter measures */
 static uint8_t last_device;         /* the input before the bandgap */
 static bool converting;
-static bool tick_begins;   /* and the ages are still to grow by it */
-static uint16_t joined_at; /* hal_time() */
+static bool tick_begins;     /* and the ages are still to grow by it */
+static uint16_t selected_at; /* hal_time() */
 
 static uint16_t now(void) {
   uint16_t time = 0;
@@ -36,13 +36,13 @@ static uint16_t now(void) {
   return time;
 }
 
-static void join(uint8_t to) {
-  input = to;
+static void select_input(uint8_t next) {
+  input = next;
   converting = false;
-  joined_at = now();
-  hal_analog_select(to == ANALOG_BATTERY    ? BATTERY_CHANNEL
-                    : to == ANALOG_INFRARED ? INFRARED_CHANNEL
-                                            : HAL_ANALOG_BANDGAP);
+  selected_at = now();
+  hal_analog_select(next == ANALOG_BATTERY    ? BATTERY_CHANNEL
+                    : next == ANALOG_INFRARED ? INFRARED_CHANNEL
+                                              : HAL_ANALOG_BANDGAP);
 }
 
 static bool is_on(uint8_t device) {
@@ -85,7 +85,7 @@ void analog_start(void) {
   }
   last_device = ANALOG_INFRARED;
   tick_begins = false;
-  join(ANALOG_BANDGAP);
+  select_input(ANALOG_BANDGAP);
 }
 
 static void grow_older(uint8_t device) {
@@ -98,7 +98,7 @@ static void grow_older(uint8_t device) {
   }
 }
 
-/* Takes what the converter has, or does all else: so no slot has both, however long the converter has been kept waiting. */
+/* Reads the converter's result, or does all else: no slot does both, which keeps the task short. */
 void analog_task(void) {
   if (clock_tick_begins()) {
     tick_begins = true;
@@ -106,7 +106,7 @@ void analog_task(void) {
   if (converting && !hal_analog_busy()) {
     results[input] = hal_analog_result();
     ages[input] = 0;
-    join(next_input());
+    select_input(next_input());
     return;
   }
   if (tick_begins) {
@@ -114,7 +114,7 @@ void analog_task(void) {
     grow_older(ANALOG_BATTERY);
     grow_older(ANALOG_INFRARED);
   }
-  if (!converting && (uint16_t)(now() - joined_at) >= SETTLE_CYCLES) {
+  if (!converting && (uint16_t)(now() - selected_at) >= SETTLE_CYCLES) {
     converting = true;
     hal_analog_convert();
   }

@@ -1,7 +1,7 @@
 /* analog.h: the one owner of the analog converter (data sheet of the ATmega328P, 24): it measures the chip's bandgap for
  * the supply (supply.h), and in turn the battery's divider and the analog infra-red sensor, as far as they are on. In every
- * slot it makes one step: join the converter to an input, in a later slot convert, in a later slot take the result. So an
- * input has a slot to settle, and nothing waits. */
+ * slot it makes one step: select an input, in a later slot convert, in a later slot read the result. So an input has a slot
+ * to settle, and nothing waits. */
 #ifndef ANALOG_H
 #define ANALOG_H
 
@@ -14,7 +14,7 @@ extern "C" {
 
 enum { ANALOG_BANDGAP, ANALOG_BATTERY, ANALOG_INFRARED, ANALOG_INPUTS };
 
-/* Its pin is measured, or pulled up. */
+/* Its pin becomes an input to be measured, or is pulled up. */
 void analog_connect(uint8_t input, bool connected);
 
 void analog_start(void);
@@ -25,7 +25,7 @@ uint16_t analog_read(uint8_t input);
 /* Its age in ticks; 255: none yet, or older, or switched off. */
 uint8_t analog_age(uint8_t input);
 
-/* The bandgap's last result, given once: 0 until there is another. */
+/* The bandgap's last result; 0 when it was read before. */
 uint16_t analog_take_bandgap(void);
 
 #ifdef __cplusplus

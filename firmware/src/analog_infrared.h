@@ -12,7 +12,7 @@ extern "C" {
 
 void analog_infrared_start(void);
 
-/* What it says in devices_telemetry; false: nothing, it is off. */
+/* Fills in its fields of devices_telemetry; false: it is off. */
 bool analog_infrared_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus

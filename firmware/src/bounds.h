@@ -1,6 +1,6 @@
-/* bounds.h: how often a loop runs at most, for the loops of which the analysis of the image cannot see it in the code.
+/* bounds.h: the most passes of a loop, for the loops in whose code the analysis of the image cannot see it.
  *
- *   LOOP_BOUND(passes);     in a loop's body: the body runs at most so often each time that the loop is entered
+ *   LOOP_BOUND(passes);     in a loop's body: the most passes each time that the loop is entered
  *   LOOP_CYCLES(cycles);    in the body of a loop that waits for a time: it takes at most these cycles, and then the pass
  *                           that is under way; interrupts come on top
  *

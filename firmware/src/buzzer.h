@@ -29,7 +29,7 @@ bool buzzer_tone(uint16_t frequency, uint8_t ticks, uint8_t token);
 /* Ends a tone. */
 void buzzer_silence(void);
 
-/* What it says in devices_telemetry; false: nothing, it is off. */
+/* Fills in its fields of devices_telemetry; false: it is off. */
 bool buzzer_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus

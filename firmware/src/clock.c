@@ -13,6 +13,7 @@ static volatile uint32_t slot_us; /* time on the board's clock at which clock_sl
 
 static uint32_t tick;
 static uint32_t tick_us; /* time on the board's clock at which it begins, or has begun */
+
 void clock_start(uint32_t first_tick) {
   clock_slot = 0xFF; /* the first slot is still to begin */
   clock_next_slot = 0;

@@ -31,9 +31,9 @@ typedef struct {
 
 typedef struct {
   uint8_t state;
-  bool is_set;    /* the device has its settings */
-  uint8_t wait;   /* ticks until the next transfer */
-  uint8_t pulses; /* of the clock, twice: low and high again */
+  bool is_set;   /* the device has its settings */
+  uint8_t wait;  /* ticks until the next transfer */
+  uint8_t edges; /* of the clock's pulses that free the bus, down and up again */
   compass_reading reading;
 } compass_state;
 
@@ -94,7 +94,7 @@ static void finish(void) {
       two_wire_stop();
       own.reading.status = COMPASS_STATUS_BUS_STUCK;
       own.is_set = false;
-      own.pulses = 0;
+      own.edges = 0;
       own.state = FREEING;
       return;
   }
@@ -103,8 +103,8 @@ static void finish(void) {
 
 /* One edge of the clock a tick, low or let go, until the data line is free after a pulse, or after all of them. */
 static void free_bus(void) {
-  if (own.pulses % 2u == 0) {
-    if (own.pulses == 2u * CLOCK_PULSES || (own.pulses != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
+  if (own.edges % 2u == 0) {
+    if (own.edges == 2u * CLOCK_PULSES || (own.edges != 0 && HAL_PIN_READ(COMPASS_SDA) != 0)) {
       two_wire_start();
       own.state = WAITING;
       return;
@@ -114,7 +114,7 @@ static void free_bus(void) {
   } else {
     HAL_PIN_PULL_UP(COMPASS_SCL);
   }
-  own.pulses++;
+  own.edges++;
 }
 
 static void switch_off(void) {

@@ -46,7 +46,7 @@ void encoder_lift_masks(void);
 /* Edges since reset, at the start of this tick. */
 int32_t encoder_count(uint8_t side);
 
-/* What it says in telemetry: the readings at the start of this tick. */
+/* Fills in its fields of telemetry: the readings at the start of this tick. */
 void encoder_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus

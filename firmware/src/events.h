@@ -28,7 +28,7 @@ const event *events_first(void);
 /* It has been collected. */
 void events_drop_first(void);
 
-/* Forgets touches of the whiskers: to a host that comes later they are nothing. Stops of the motors stay. */
+/* Forgets touches of the whiskers: they are of no use to a host that comes later. Stops of the motors stay. */
 void events_forget_touches(void);
 
 /* Events that found no room in the queue and waited, or were merged, since the start, modulo 65536. */

@@ -13,7 +13,7 @@ extern "C" {
 /* Begins to wait for the host. */
 void fallback_start(void);
 
-/* The host has spoken: the motors are its own again, and get no pulses until it says so. */
+/* The host has spoken: the motors follow it again, and get no pulses before its next set-point. */
 void fallback_host_spoke(void);
 
 #ifdef __cplusplus

@@ -11,8 +11,8 @@ extern "C" {
 /* Brings up board, devices and link, says hello, and starts the slots. */
 void firmware_start(void);
 
-/* Does what is due: a slot's tasks; if no slot waits, the changes of pins and one received frame. So a frame delays a slot
- * once at most, and waits while slots do. */
+/* Does the work that is due: a slot's tasks; if no slot waits, the changes of pins and one received frame. So at most one
+ * frame delays a slot, and frames wait while slots do. */
 void firmware_poll(void);
 
 /* Not 0: there is something for firmware_poll() to do. */

@@ -24,13 +24,13 @@ uint8_t infrared_read(void);
 /* Its age in ticks; 255: none yet, or older. */
 uint8_t infrared_age(void);
 
-/* What it says in devices_telemetry; false: nothing, it is off. */
+/* Fills in its fields of devices_telemetry; false: it is off. */
 bool infrared_report_devices_telemetry(msg_devices_telemetry *message);
 
 /* In an interrupt: a side's slot begins. */
 void infrared_begin(uint8_t side);
 
-/* What it says in telemetry. */
+/* Fills in its fields of telemetry. */
 void infrared_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus

@@ -134,7 +134,7 @@ static uint16_t decay_time(uint8_t side, uint8_t level) {
 }
 #endif
 
-/* Whether the left edge is among the changes that are still to be worked off: the pin is low. */
+/* Whether the left edge still waits in the ring of changes: the pin is low, and no fall was seen. */
 static bool must_wait(void) {
 #ifdef PIN_LIGHT_LEFT
   return LEFT_BIT != 0 && !has_fallen[LEFT] && HAL_PIN_READ(LIGHT_LEFT) == 0;
@@ -170,7 +170,7 @@ void light_task(void) {
     readings[LEFT] = readings[RIGHT] = 0;
     age = AGE_NEVER;
   } else if (slot == CHARGE) {
-    if (state == DECAYING && !is_too_early()) { /* had to wait; no longer, the line may be one that never was high */
+    if (state == DECAYING && !is_too_early()) { /* it had to wait; not longer: the line may never have been high */
       collect();
     }
     charge();

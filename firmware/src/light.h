@@ -29,7 +29,7 @@ void light_on_pin_change(uint8_t bits, uint32_t time);
 /* These pins are noise: their edge is awaited no more. */
 void light_mask(uint8_t pins);
 
-/* What it says in devices_telemetry; false: nothing, it is off. */
+/* Fills in its fields of devices_telemetry; false: it is off. */
 bool light_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus

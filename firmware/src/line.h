@@ -15,7 +15,7 @@ extern "C" {
 
 void line_start(void);
 
-/* What it says in line_telemetry; false: nothing, it is off. */
+/* Fills in its fields of line_telemetry; false: it is off. */
 bool line_report_line_telemetry(msg_line_telemetry *message);
 
 #ifdef __cplusplus

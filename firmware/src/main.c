@@ -1,4 +1,4 @@
-/* main.c: start, then do what is due and sleep until an interrupt has more. */
+/* main.c: start; then do the work that is due, and sleep until an interrupt brings more. */
 #include "firmware.h"
 #include "hal/hal.h"
 

@@ -32,8 +32,8 @@ uint8_t parameters_set(uint8_t parameter, int32_t value);
 /* Whether a device (DEVICES_... bit) is switched on. */
 bool parameters_device_on(uint16_t device);
 
-/* Whether it may also drive its pins: not before a host has opened a session, as what is wired to the board may be something
- * else; or the board's own brain may begin by itself. */
+/* Whether it may also drive its pins: only after a host has opened a session, as other devices may be wired to the board,
+ * or where the board's own brain may begin by itself. */
 bool parameters_device_in_use(uint16_t device);
 void parameters_host_has_come(void);
 

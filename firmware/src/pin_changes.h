@@ -22,7 +22,7 @@ uint8_t pin_changes_due(void);
 /* Works off what waits, and listens to the pins that encoders and light sensor want now. Whenever it is due. */
 void pin_changes_poll(void) __attribute__((noinline));
 
-/* The same at the begin of every slot's work: stamps of 16 bits roll over after 4 ms. In a tick's first slot masked pins are
+/* The same at the beginning of every slot's work: stamps of 16 bits roll over after 4 ms. In a tick's first slot masked pins are
  * listened to again from here on. */
 void pin_changes_begin_slot(void);
 

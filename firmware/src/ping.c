@@ -23,7 +23,13 @@
 #define ECHO_MAX 18300u /* us; without an echo its pulse lasts 18.5 ms */
 
 /* Shared with the capture's interrupt, which only stamps; the stamps are settled when the state is ENDED or CUT. */
-enum { IDLE, RISING, FALLING, ENDED, CUT }; /* what is awaited; CUT: the pulse had ended before that was awaited */
+enum {
+  IDLE,
+  RISING,
+  FALLING,
+  ENDED,
+  CUT
+}; /* the edge that is awaited; CUT: the pulse ended before its end was awaited */
 static volatile uint8_t state;
 static volatile uint16_t triggered, rise, fall;  /* hal_time() */
 static volatile uint8_t trigger_slot, rise_slot; /* clock_slot then */

@@ -22,7 +22,7 @@ extern "C" {
 
 void ping_start(void);
 
-/* What it says in telemetry. */
+/* Fills in its fields of telemetry. */
 void ping_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-/* First of all at start. */
+/* At start, before all others. */
 void reset_start(void);
 
 /* RESET_CAUSE_... of generated/values.h. That of a watchdog reset is RESET_CAUSE_WATCHDOG or, where a task ran,

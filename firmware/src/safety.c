@@ -35,7 +35,7 @@ typedef struct {
 
 static safety_state own;
 
-/* Whatever stops the motors also releases the turret and silences the buzzer. */
+/* Each stop of the motors also releases the turret and silences the buzzer. */
 static void stop_all(void) {
   own.state = 0;
   motion_off();
@@ -78,7 +78,7 @@ safety_verdict safety_accept(uint16_t time_to_live, uint16_t answers_tick, uint8
     return SAFETY_LATE;
   }
   const uint32_t start = clock_tick_time() - ticks * (uint32_t)CLOCK_TICK_US;
-  /* Vast before a tick that has not begun although its tasks are awaited. */
+  /* Huge, hence late, for a tick that has not begun yet: its start lies ahead. */
   const uint32_t age = clock_time() - start;
   const uint32_t life = (time_to_live != 0 ? time_to_live : parameters_u16(PARAMETER_TIME_TO_LIVE)) * 1000ul;
   if (age >= life || has_newer(answers_tick, sequence) ||

@@ -90,8 +90,8 @@ static void begin_tick(void) {
   overrun_row = !overran ? 0u : overrun_row < OVERLOAD_TICKS ? (uint8_t)(overrun_row + 1u) : OVERLOAD_TICKS;
 }
 
-/* Runs what is due in a slot. The watchdog is kicked here and nowhere else, and only when all of it has returned, and not
- * in a board that has fallen behind for good: tasks of dropped ticks have not run. */
+/* Runs the tasks that are due in a slot. The watchdog is kicked here and nowhere else: only when all of them have returned,
+ * and not when the board has fallen behind for good, because the tasks of dropped ticks have not run. */
 static void run_tasks(uint8_t slot) {
 #define TASK(name, period, phase, budget)    \
   if (slot % (uint8_t)(period) == (phase)) { \

@@ -37,7 +37,7 @@ uint16_t servo_pulse(uint8_t servo);
 void servo_frame(void);
 void servo_begin(uint8_t servo, uint16_t start);
 
-/* What it says in telemetry. */
+/* Fills in its fields of telemetry. */
 void servo_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus

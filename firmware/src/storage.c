@@ -290,7 +290,7 @@ static void give_up(void) {
   }
 }
 
-/* Every other slot: goes on with what is under way; writes the boot counter when this start has run for 10 s. */
+/* Every other slot: goes on with the record under way; writes the boot counter when this start has run for 10 s. */
 void storage_task(void) {
   if (own.run_slots < RUN_SLOTS) {
     own.run_slots = (uint16_t)(own.run_slots + SLOTS_PER_CALL);

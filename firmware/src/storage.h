@@ -23,8 +23,8 @@ extern "C" {
 /* Reads the boot counter. At start, before interrupts. */
 void storage_start(void);
 
-/* Puts what is saved in force, if there is a whole copy of this image's parameters within their ranges. At start, after
- * parameters_start(). */
+/* Puts the saved parameters in force, if there is a whole copy of this image's parameters and all are within their ranges.
+ * At start, after parameters_start(). */
 void storage_load_parameters(void);
 
 /* Whether the parameters in force at start were those that were saved. */

@@ -17,7 +17,8 @@ void supply_start(void);
 /* mV; 0: not yet measured. */
 uint16_t supply_voltage(void);
 
-/* What it says in telemetry, and in devices_telemetry, for the sake of the others there: false. */
+/* Fills in its field of telemetry, and that of devices_telemetry; there false: its field alone is no reason to send the
+ * message. */
 void supply_report_telemetry(msg_telemetry *message);
 bool supply_report_devices_telemetry(msg_devices_telemetry *message);
 

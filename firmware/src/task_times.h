@@ -1,6 +1,6 @@
-/* task_times.h: the board times its own tasks: which one runs, and how long each took at most.
+/* task_times.h: the board times its own tasks: which one runs, and the longest time that each took.
  *
- * Taken with Timer1, in cycles, from a task's call to its return: interrupts that came on top are in it. */
+ * Measured with Timer1, in cycles, from a task's call to its return, with the interrupts that came in between. */
 #ifndef TASK_TIMES_H
 #define TASK_TIMES_H
 

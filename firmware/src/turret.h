@@ -2,7 +2,7 @@
  *
  *   pulse = turret_centre + turret_gain * angle       clamped to 600..2400 us
  *
- * It holds the last angle until it is released: by its own message, and by whatever stops the motors (safety.h). */
+ * It holds the last angle until it is released: by its own message, and by each stop of the motors (safety.h). */
 #ifndef TURRET_H
 #define TURRET_H
 
@@ -23,7 +23,7 @@ void turret_hold(int16_t angle);
 /* No pulses from the next servo frame on. */
 void turret_release(void);
 
-/* What it says in devices_telemetry; false: nothing, it is off. */
+/* Fills in its fields of devices_telemetry; false: it is off. */
 bool turret_report_devices_telemetry(msg_devices_telemetry *message);
 
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
 /* two_wire.h: the master of the two-wire bus (I2C; data sheet of the ATmega328P, 22, and its status codes): one transfer at a
  * time, carried on by the bus's interrupt. A transfer writes some bytes to a device and then reads some after a repeated
- * start. Whoever began it asks for its end and gives it up when it takes too long. */
+ * start. The driver that began it asks whether it has ended, and gives it up when it takes too long. */
 #ifndef TWO_WIRE_H
 #define TWO_WIRE_H
 

@@ -24,10 +24,11 @@ typedef struct {
 bool whisker_debounce(whisker_state *state, bool touching);
 
 void whisker_start(void);
+
 /* WHISKERS_... bits. */
 uint8_t whisker_read(void);
 
-/* What it says in telemetry. */
+/* Fills in its fields of telemetry. */
 void whisker_report_telemetry(msg_telemetry *message);
 
 #ifdef __cplusplus

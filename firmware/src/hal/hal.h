@@ -39,15 +39,15 @@ extern "C" {
 /* Starts time and slots: the first slot begins at HAL_SLOT_CYCLES. Interrupts are on from here. */
 void hal_start_timers(void);
 
-/* Why the chip says that it started, RESET_CAUSE_...; unknown behind a bootloader that took the cause. Of several the one
- * that loses most: power, brown-out, watchdog, external. */
+/* Why the chip says that it started, RESET_CAUSE_...; unknown behind a bootloader that has cleared the cause. Of several
+ * causes the one that loses most: power, brown-out, watchdog, external. */
 uint8_t hal_reset_cause(void);
 
 /* Memory of HAL_NOINIT_SIZE bytes that a reset leaves alone and power-on fills with anything. */
 #define HAL_NOINIT_SIZE 32u
 void *hal_noinit(void);
 
-/* A hash of the memory above the variables: what RAM held when the power came, if it just came. */
+/* A hash of the memory above the variables, whose content is by chance after power-on. */
 uint32_t hal_memory_noise(void);
 
 /* The chip resets itself unless kicked every 120 ms: then reset_on_watchdog() runs, and 16 ms later comes the reset. */
@@ -87,10 +87,10 @@ void hal_watch_port_d(uint8_t bits);
 /* Opens the line at that rate (96 ... 10000, in 100 bit/s; as near as the clock allows), 8N1. Once, before the timers. */
 void hal_start_serial(uint16_t baud);
 
-/* Not 0: the main loop should look. So it is after a zero byte (the end of a frame), while half of the ring waits, and when
+/* Not 0: the main loop should read bytes: after a zero byte (the end of a frame), while half of the ring waits, and when
  * reception has stopped. */
 uint8_t hal_serial_due(void);
-void hal_serial_clear_due(void); /* zero bytes that were received until now are seen to */
+void hal_serial_clear_due(void); /* forgets the zero bytes that were received until now */
 void hal_serial_set_due(void);   /* due until cleared */
 
 /* Takes the oldest byte that waits; false if none does. */
@@ -127,8 +127,8 @@ void hal_tone_stop(void);
 void hal_ping_raise(void);
 void hal_ping_release(void);
 
-/* The analog converter: joins it to channel 0..5 (A0..A5) or to the chip's bandgap, converts (104 us, the first time 200);
- * the last complete result is voltage * 1024 / supply, rounded down, at most 1023. Nothing is joined while it is busy. */
+/* The analog converter: selects channel 0..5 (A0..A5) or the chip's bandgap, converts (104 us, the first time 200); the last
+ * complete result is voltage * 1024 / supply, rounded down, at most 1023. No channel is selected while it is busy. */
 #define HAL_ANALOG_BANDGAP 14u
 void hal_analog_select(uint8_t channel);
 void hal_analog_convert(void);

@@ -1,6 +1,7 @@
 /* interrupts.h: who owns which interrupt. The board calls these functions, with interrupts off; each is short, stamps and
  * stores, and lets no other interrupt in. hal/avr/interrupts.c has the vectors, hal/native/chip.c calls them from its
- * queue of events. What is not here (receive, send, IR carrier, tone) is the board's own. */
+ * queue of events. The interrupts that are not here (receive, send, IR
+ * carrier, tone) belong to the board. */
 #ifndef HAL_INTERRUPTS_H
 #define HAL_INTERRUPTS_H
 

@@ -23,8 +23,8 @@ void counter_messages_start(void) {
   task_time.task = 0;
 }
 
-/* In every tick: looks whether received bytes were lost; in a session sends one task's longest time or the counters
- * now and then. */
+/* In every tick: counts whether received bytes were lost; in a session sends one task's longest time or the counters every
+ * 4 ticks, on slow lines less often. */
 void counters_task(void) {
   counters_end_tick();
   if (due_in != 0) {

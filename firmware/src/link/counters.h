@@ -1,4 +1,4 @@
-/* counters.h: what this end of the link has counted. */
+/* counters.h: the counters of the board's end of the link. */
 #ifndef LINK_COUNTERS_H
 #define LINK_COUNTERS_H
 

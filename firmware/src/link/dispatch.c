@@ -18,7 +18,8 @@
 #include "safety.h"
 #include "turret.h"
 
-/* Whether a set-point may be put in force; counts the late ones. What is late was not wrong to ask. */
+/* Whether a set-point may be put in force; counts the late ones. A late one is not refused: it was valid
+ * when it was sent. */
 static bool may_move(uint16_t time_to_live, uint16_t answers_tick, uint8_t sequence, bool *refused) {
   const safety_verdict verdict = safety_accept(time_to_live, answers_tick, sequence);
   if (verdict == SAFETY_LATE) {

@@ -57,11 +57,11 @@ typedef struct {
   uint16_t resynchronised; /* times that a good frame followed bad ones, modulo 65536 */
   bool synchronised;       /* a delimiter was seen; what precedes the first is the tail of a frame joined late */
   bool lost;               /* the last frame was refused */
-  bool begins;             /* an empty piece came before what is collected: a frame begins here */
+  bool begins;             /* an empty piece came before the bytes collected: a frame begins here */
   uint8_t used;            /* bytes of the piece before, and its delimiter */
   uint8_t whole;           /* bytes of the frame that it began by its id; 0: it began none that is known */
   uint8_t count;           /* bytes collected; above FRAME_INSIDE_MAX: too long to be a frame */
-  uint8_t bytes[FRAME_INSIDE_MAX + 1u]; /* the last place is for what is too long */
+  uint8_t bytes[FRAME_INSIDE_MAX + 1u]; /* the last place shows that a piece is too long */
 } frame_decoder;
 
 void frame_decoder_start(frame_decoder *decoder, uint32_t seed);

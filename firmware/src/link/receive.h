@@ -1,4 +1,4 @@
-/* receive.h: what comes over the serial line: bytes into frames. */
+/* receive.h: bytes from the serial line into frames. */
 #ifndef LINK_RECEIVE_H
 #define LINK_RECEIVE_H
 

@@ -100,12 +100,13 @@ void session_heard(void) {
   fallback_host_spoke();
 }
 
-/* In every tick: says hello now and then, ends the session when the host was silent for too long. */
+/* In every tick: says hello when it is due, ends the session when the host was silent for too long. */
 void session_task(void) {
   silence = (uint16_t)(silence + TICK_MS); /* rolls over only without a session */
   if (session_is_open() && silence > parameters_u16(PARAMETER_SESSION_TIME_OUT)) {
     safety_host_lost();
-    begin(FRAME_NO_SESSION); /* hello in the next tick: both together would be the longest run by half */
+    begin(
+        FRAME_NO_SESSION); /* hello in the next tick: both together would make this task's longest run half as long again */
   } else if (identify && send_has_room(MSG_IDENTITY_LENGTH)) {
     identify = false;
     identity_send();

@@ -1,5 +1,5 @@
-/* session.h: what one start of the board and one opening by a host have in common (protocol/PROTOCOL.md, "Session"). Its
- * seed (session_seed.h) separates its frames from those of all others. */
+/* session.h: the session, from its opening by a host until it is closed, the host is silent, or the board starts again
+ * (protocol/PROTOCOL.md, "Session"). Its seed (session_seed.h) separates its frames from those of all others. */
 #ifndef LINK_SESSION_H
 #define LINK_SESSION_H
 

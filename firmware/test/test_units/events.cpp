@@ -86,7 +86,7 @@ TEST_CASE("touches that merge have the latest state and all that closed since") 
   CHECK(collect().back() == happened{WHISKERS, 0x0300});
 }
 
-TEST_CASE("what is collected makes room: the next of its kind is one more") {
+TEST_CASE("a collected event makes room: the next of its kind is one more") {
   native_bench bench;
   raise_all(bench, {{LATCH, 1}, {LATCH, 2}, {LATCH, 3}, {LATCH, 4}, {WHISKERS, 5}});
   events_drop_first(); /* the touch is the fourth now */

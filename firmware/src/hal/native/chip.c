@@ -62,7 +62,7 @@ static void settle(uint8_t pin) {
   }
 }
 
-/* Tells the outside what the firmware now does to a pin. */
+/* Reports to the outside what the firmware now does to a pin. */
 static void show(uint8_t pin) {
   const uint8_t state = is_output[pin] ? (level_high[pin] ? NATIVE_HIGH : NATIVE_LOW)
                                        : (level_high[pin] ? NATIVE_PULLED_UP : NATIVE_RELEASED);

@@ -29,7 +29,7 @@ void native_two_wire_reset(void) {
   native_next[EVENT_TWO_WIRE] = NATIVE_NEVER;
 }
 
-/* What is under way has ended. */
+/* The action under way has ended. */
 static void rest(void) {
   doing = NOTHING;
   native_next[EVENT_TWO_WIRE] = NATIVE_NEVER;
@@ -135,7 +135,7 @@ static uint8_t sent_status(void) {
   return answered ? HAL_TWO_WIRE_ADDRESS_TAKEN : HAL_TWO_WIRE_ADDRESS_REFUSED;
 }
 
-/* Puts bit `bit` of what is under way on the data line; the clock is low. */
+/* Puts bit `bit` of the byte or its acknowledgement on the data line; the clock is low. */
 static void put_bit(uint8_t bit) {
   if (bit == BITS - 1u) {
     data_line(doing == RECEIVE && acknowledge);
