@@ -18,7 +18,7 @@ GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.tom
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
 ARENA_SCHEMA := host/boebot/arenas/bundled/schema.json
-IMAGES := $(patsubst %,build/images/%.elf,$(shell sed -n 's/^custom_pin_map = //p' platformio.ini))
+IMAGES := $(patsubst %,build/images/%.elf,$(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,))
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis

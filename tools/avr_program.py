@@ -15,10 +15,8 @@ PLATFORM_FLAGS += ["-Wl,--gc-sections", "-Wl,--relax"]
 
 _PROJECT = configparser.ConfigParser(interpolation=None)
 _PROJECT.read(ROOT / "platformio.ini", encoding="utf-8")
-# The name of each image -> its section of platformio.ini.
-IMAGES = dict(
-    sorted((_PROJECT[name]["custom_pin_map"], name) for name in _PROJECT if "custom_pin_map" in _PROJECT[name])
-)
+# The names of the images: those of their pin maps and of their environments in platformio.ini.
+IMAGES = _PROJECT["platformio"]["default_envs"].split(", ")
 
 
 def flags(image: str = "shieldbot") -> list[str]:
@@ -32,7 +30,7 @@ def flags(image: str = "shieldbot") -> list[str]:
             text = before + option(*reference.split(".")) + after
         return text
 
-    return [*PLATFORM_FLAGS, *shlex.split(option(IMAGES[image], "build_flags")), "-std=gnu11"]
+    return [*PLATFORM_FLAGS, *shlex.split(option(f"env:{image}", "build_flags")), "-std=gnu11"]
 
 
 def build(

@@ -5,7 +5,7 @@ set -eu
 cd "$(dirname "$0")/.."
 mkdir -p build/cppcheck
 
-tools/pio check -e uno -e native --fail-on-defect low --fail-on-defect medium --fail-on-defect high
+tools/pio check -e shieldbot -e native --fail-on-defect low --fail-on-defect medium --fail-on-defect high
 cppcheck --quiet --error-exitcode=1 --inline-suppr --std=c11 --enable=warning,performance,portability \
   --suppress=missingIncludeSystem --cppcheck-build-dir=build/cppcheck -j "$(nproc)" \
   --platform=unix64 -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src \

@@ -1,4 +1,4 @@
-"""PlatformIO, after the build: copies the image to build/images/<pin map>.elf and .hex, for everybody."""
+"""PlatformIO, after the build: copies the image to build/images/<pin map>.elf and .hex."""
 
 from SCons.Script import Copy, Default, Import
 
@@ -7,5 +7,5 @@ env = globals()["env"]
 
 for suffix in (".elf", ".hex"):
     built = "$BUILD_DIR/${PROGNAME}" + suffix
-    copied = f"$PROJECT_DIR/build/images/{env.GetProjectOption('custom_pin_map')}{suffix}"
+    copied = "$PROJECT_DIR/build/images/${PIOENV}" + suffix
     Default(env.Command(copied, built, env.VerboseAction(Copy("$TARGET", "$SOURCE"), "Copying $TARGET")))
