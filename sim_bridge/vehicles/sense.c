@@ -9,8 +9,8 @@
 void vehicle_sensors_give_numbers(vehicles *self) {
   const vehicle_model *m = self->model;
   for (size_t k = 0; k < self->slots_count; k++) {
-    const size_t world = k / m->sensors_count, sensor = k % m->sensors_count;
-    self->slots[k].memory.numbers = &self->numbers[world * m->numbers + m->sensors[sensor].numbers];
+    const size_t i = k / m->sensors_count, sensor = k % m->sensors_count;
+    self->slots[k].memory.numbers = &self->numbers[i * m->numbers + m->sensors[sensor].numbers];
   }
 }
 
