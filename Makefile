@@ -78,6 +78,7 @@ soak: experiments
 	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.other_emulators
 	@$(PYTHON_VENV) -m pytest -q -m soak
+	@PYTHONMALLOC=malloc tools/test_sanitized.sh
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000
