@@ -69,7 +69,7 @@ def watched(path: Path) -> Watched:
         entries=tuple(found.values()),
         names=tuple(found),
         vectors=vectors,
-        first=next((row.name for row in table.tasks if row.period == 1), None),
+        first=next((row.name for row in table.tasks if row.period == 1 and row.name in found), None),
     )
 
 

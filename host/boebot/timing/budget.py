@@ -140,7 +140,7 @@ class Report:
         rows = {row.name: row for row in self.rows if row.kind == "task"}
         tick = max(range(self.schedule.ticks), key=self.schedule.tick_work)
         slots = self.schedule.slots[tick * self.schedule.slots_per_tick :][: self.schedule.slots_per_tick]
-        found = [rows[piece.name] for slot in slots for piece in slot if piece.name in rows]
+        found = [rows[piece.name] for slot in slots for piece in slot if piece.name in rows and rows[piece.name].bound]
         if any(row.ratio is None for row in found):
             return None
         return sum(row.bound for row in found) / sum(row.emulator or 0 for row in found)
