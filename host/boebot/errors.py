@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterable
+from difflib import get_close_matches
 
+LONGEST_NAME = 100  # that is compared with known ones; no name of the kit's is longer
 _CONTROL = {"Cc", "Cf", "Cs", "Co", "Zl", "Zp"}  # Unicode's categories: control, format, surrogate, private, separators
 
 
@@ -16,6 +19,18 @@ def printable(text: str) -> str:
         char.encode("unicode_escape").decode() if unicodedata.category(char) in _CONTROL and char != "\n" else char
         for char in text
     )
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown name: the known one most like it, whatever the order of its words; or
+    nothing."""
+    by_words = {_words(other): other for other in known}
+    near = get_close_matches(_words(name), by_words, n=1, cutoff=0.7) if len(name) <= LONGEST_NAME else []
+    return f"; did you mean {by_words[near[0]]!r}?" if near else ""
+
+
+def _words(name: str) -> str:
+    return "_".join(sorted(name.lower().split("_")))
 
 
 class BoebotError(Exception):

@@ -96,7 +96,7 @@ class Observation(_Fields, Attributes):
         def __getattr__(self, name):
             reader = self.equipment.readers.get(name)
             if reader is None:
-                raise self.equipment.no_device(name)
+                raise self.equipment.no_device(name, [*dir(type(self)), *self.equipment.readers])
             return reader(self.sample, self.slow)
 
 
@@ -161,7 +161,7 @@ class Robot(Attributes):
             seen = self.observation
             reader = seen.equipment.readers.get(name)
             if reader is None:
-                raise seen.equipment.no_device(name)
+                raise seen.equipment.no_device(name, [*dir(type(self)), *seen.equipment.readers])
             return reader(seen.sample, seen.slow)
 
     def has(self, name: str) -> bool:

@@ -67,10 +67,10 @@ def four_experiments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Experiment]:
 
 
 def test_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = boebot(capsys, "experiment", "list")
+    code, out, err = boebot(capsys, "list", "experiments")
     assert (code, err) == (0, "")
     assert {line.split()[0] for line in out.splitlines() if line.strip()} >= set(all_experiments())
-    _, out, _ = boebot(capsys, "experiment", "LIST", "--json")
+    _, out, _ = boebot(capsys, "list", "experiments", "--json")
     listed = {one["name"]: one for one in json.loads(out)["experiments"]}
     assert list(listed) == list(all_experiments())
     assert listed["E29"]["robot"] == "none" and listed["E29"]["section"] == "4.4.2"
@@ -154,10 +154,10 @@ def test_figure_is_said_so_that_its_verdict_can_be_seen(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ((), "give one of NAME, list and --all"),
-        (("E29", "--all"), "give one of NAME, list and --all"),
+        ((), "give either NAME or --all"),
+        (("E29", "--all"), "give either NAME or --all"),
         (("E299",), "there is no experiment 'E299'; did you mean E29"),
-        (("qqqqqq",), "there is no experiment 'qqqqqq'; `boebot experiment list` names all"),
+        (("qqqqqq",), "there is no experiment 'qqqqqq'; `boebot list experiments` names all"),
         (("E29", "Z*"), "there is no experiment 'Z*'"),
         (("E29", "--seed", "-1"), "--seed"),
         (("--all", "--jobs", "0"), "--jobs"),

@@ -21,7 +21,9 @@ PER_S = 0.01  # the notes' step, which their probabilities are meant for
 
 @dataclass(kw_only=True)
 class Wander(MotorBehavior):
-    """The notes' parameters; where a robot is a fifth as fast, `turn_probability` 0.002 gives the same paths.
+    """Drives straight, and turns on the spot now and then, by chance.
+
+    The parameters are the notes'; where a robot is a fifth as fast, `turn_probability` 0.002 gives the same paths.
 
     Attributes:
         left: it turns, or turned last, to the left.

@@ -33,7 +33,7 @@ from typing import Any
 from boebot import arguments
 from boebot.brain import Brain, Process, StateVariable, composition
 from boebot.cognition import Odometry
-from boebot.errors import BrainError
+from boebot.errors import BrainError, did_you_mean
 from boebot.robot import Robot
 
 FOLDER = Path(__file__).resolve().parent
@@ -69,10 +69,11 @@ class LoadedBrain:
 
 def bundled() -> list[str]:
     """Names of the bundled brains."""
-    return sorted(_bundled_files())
+    return sorted(bundled_files())
 
 
-def _bundled_files() -> dict[str, Path]:
+def bundled_files() -> dict[str, Path]:
+    """Name -> file of each bundled brain."""
     return {path.stem: path for path in FOLDER.iterdir() if path.suffix in (PYTHON, TOML) and path.stem[0] != "_"}
 
 
@@ -167,11 +168,11 @@ def _find(source: str | Path) -> Path:
         if path.is_file():
             return path.resolve()
         raise BrainError(f"there is no brain file {path}")
-    files = _bundled_files()
+    files = bundled_files()
     if str(source) in files:
         return files[str(source)]
     meant = next((f"{path}{suffix}" for suffix in (PYTHON, TOML) if Path(f"{path}{suffix}").is_file()), None)
-    hint = f"; did you mean {meant}?" if meant else ""
+    hint = f"; did you mean {meant}?" if meant else did_you_mean(str(source), files)
     raise BrainError(
         f"there is no brain {str(source)!r}; expected a bundled one ({', '.join(bundled())}) or a Python or TOML "
         f"file{hint}"

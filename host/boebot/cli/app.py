@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import experiment, info, link, new, options, output, parameters, run, serve, teleop, timing
+from boebot.cli import experiment, info, link, names, new, options, output, parameters, run, serve, teleop, timing
 from boebot.link import messages, mismatch
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ app = typer.Typer(
 )
 app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
+app.command("list")(names.list_names)
 app.command("info")(info.info)
 app.command("teleop", cls=options.Command)(teleop.teleop)
 app.command("link")(link.link)

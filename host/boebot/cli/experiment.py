@@ -19,11 +19,10 @@ if TYPE_CHECKING:
     from boebot.experiments import Experiment
     from boebot.experiments.running import Verdict
 
-LIST = "list"
 FOLDER = Path("experiments")
 _HELP = """Run experiments of the notes: figures, measured against expected.
 
-  boebot experiment list          all of them
+  boebot list experiments         what there is
 
   boebot experiment E29 E59       two of them
 
@@ -38,9 +37,7 @@ a page of all of them. The exit code is 1 when one is outside its criterion."""
 def experiment(
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="NAME", help="Of an experiment, or a pattern with * and ?; or list.", show_default=False
-        ),
+        typer.Argument(metavar="NAME", help="Of an experiment, or a pattern with * and ?.", show_default=False),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Run all of them.")] = False,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of all that is left to chance.")] = 1,
@@ -56,11 +53,8 @@ def experiment(
     from boebot.experiments import all_experiments
 
     known = all_experiments()
-    if names is not None and [name.lower() for name in names] == [LIST] and not every:
-        _list(list(known.values()), json)
-        return
     if every == bool(names):
-        raise _usage(f"give one of NAME, {LIST} and --all")
+        raise _usage("give either NAME or --all")
     chosen = list(known.values()) if every else _chosen(names or [], known)
     _run(chosen, seed, out, jobs or os.cpu_count() or 1, json)
 
@@ -82,23 +76,10 @@ def _chosen(wanted: Sequence[str], known: Mapping[str, Experiment]) -> list[Expe
         if not found:
             lower = {name.lower(): name for name in known}
             near = [lower[name] for name in get_close_matches(text.lower(), lower, n=3, cutoff=0.5)]
-            hint = f"did you mean {' or '.join(near)}?" if near else "`boebot experiment list` names all"
+            hint = f"did you mean {' or '.join(near)}?" if near else "`boebot list experiments` names all"
             raise _usage(f"there is no experiment {text!r}; {hint}")
         names |= found
     return [known[name] for name in known if name in names]
-
-
-def _list(experiments: Sequence[Experiment], as_json: bool) -> None:
-    if as_json:
-        fields = ("name", "title", "robot", "section", "source", "slow")
-        output.print_json({"experiments": [{key: getattr(one, key) for key in fields} for one in experiments]})
-        return
-    rows = output.empty_table()
-    for title in ("name", "", "title", "robot", "section"):
-        rows.add_column(title, no_wrap=title in ("name", ""))
-    for one in experiments:
-        rows.add_row(one.name, "slow" if one.slow else "", one.title, one.robot, one.section)
-    output.console().print(rows)
 
 
 def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_json: bool) -> None:

@@ -21,7 +21,7 @@ from boebot import resources
 from boebot.description import toml_limits
 from boebot.description.toml_limits import SIZE_MAXIMUM
 from boebot.description.toml_lines import line_of
-from boebot.errors import BoebotError, printable
+from boebot.errors import BoebotError, did_you_mean, printable
 
 _T = TypeVar("_T")
 
@@ -67,7 +67,10 @@ def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
         raise error(f"there is no {thing} file {path}")
     known = bundled_names(kind)
     if str(name) not in known:
-        raise error(f"there is no {thing} {str(name)!r}; expected one of {', '.join(known)}, or a .toml file")
+        raise error(
+            f"there is no {thing} {str(name)!r}; expected one of {', '.join(known)}, or a .toml file"
+            + did_you_mean(str(name), known)
+        )
     return resources.folder(kind) / f"{name}.toml"
 
 
@@ -191,7 +194,9 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
             return fault
     choices = _choices(kind)
     if choices and value not in choices:
-        return Fault(key, f"{key} is {reprlib.repr(value)}; expected one of {', '.join(map(str, choices))}")
+        known = [str(choice) for choice in choices]
+        hint = did_you_mean(str(value), known)
+        return Fault(key, f"{key} is {reprlib.repr(value)}; expected one of {', '.join(known)}{hint}")
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as cause:
@@ -221,7 +226,8 @@ def _struct_fault(value: dict[str, Any], kind: Any, key: str) -> Fault | None:
     fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
     for name in value:
         if name not in fields:
-            return Fault(_below(key, name), f"{at}there is no key {name!r} here; expected {', '.join(fields)}")
+            hint = did_you_mean(name, fields)
+            return Fault(_below(key, name), f"{at}there is no key {name!r} here; expected {', '.join(fields)}{hint}")
     for name, field in fields.items():
         if name not in value:
             if field.required:

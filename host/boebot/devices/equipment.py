@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
 from boebot.devices.readings import Layout
-from boebot.errors import BrainError
+from boebot.errors import BrainError, did_you_mean
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
@@ -92,16 +92,18 @@ class Equipment:
             if need in self.readers:
                 continue
             if need not in groups() and need not in usual_names():
-                known = ", ".join(dict.fromkeys((*groups(), *usual_names(), *self.readers)))
-                raise BrainError(f"a brain cannot need {need!r}; {_hint(need, f'expected one of {known}')}")
+                known = list(dict.fromkeys((*groups(), *usual_names(), *self.readers)))
+                hint = _hint(need, f"expected one of {', '.join(known)}{did_you_mean(need, known)}")
+                raise BrainError(f"a brain cannot need {need!r}; {hint}")
             lacking += [name for name in groups().get(need, (need,)) if name not in self.readers]
         return lacking
 
-    def no_device(self, name: str) -> NoDeviceError:
-        """The error of a brain that reads `name`, which the robot does not have."""
+    def no_device(self, name: str, known: Iterable[str]) -> NoDeviceError:
+        """The error of a brain that reads `name`, which the robot does not have; `known`: all names it has."""
         if name in usual_names():
             return NoDeviceError(f"robot {self.robot_name!r} has no {name}")
-        hint = _hint(name, f"its devices are {', '.join(self.readers) or 'none'}")
+        there = [other for other in known if other[0] != "_"]
+        hint = _hint(name, f"its devices are {', '.join(self.readers) or 'none'}{did_you_mean(name, there)}")
         return NoDeviceError(f"robot {self.robot_name!r} has no attribute {name!r}; {hint}")
 
 

@@ -111,7 +111,7 @@ class Experiment:
     """One experiment, to be run by `boebot experiment NAME`."""
 
     name: str
-    """as in `boebot experiment list`, such as "E22\""""
+    """as in `boebot list experiments`, such as "E22\""""
     title: str
     source: str
     """where in the notes"""

@@ -1,0 +1,98 @@
+"""`boebot list WHAT`: what is bundled, each with a line: robots, arenas, brains, behaviors, experiments."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from boebot import behaviors
+from boebot.arenas import arena_names, load_arena
+from boebot.brain.process import MotorBehavior
+from boebot.brains import bundled_files
+from boebot.cli import options, output
+from boebot.description.robots import load_robot, robot_names
+from boebot.errors import did_you_mean
+
+Row = dict[str, Any]
+KINDS = ("robots", "arenas", "brains", "behaviors", "experiments")
+
+
+def list_names(
+    what: Annotated[
+        str | None, typer.Argument(metavar="WHAT", help=f"One of {', '.join(KINDS)}; without it all of them.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """List what is bundled, by the names that other commands and Python understand."""
+    if what is not None and what not in KINDS:
+        raise typer.BadParameter(
+            f"there is no list of {what!r}; expected {', '.join(KINDS)}{did_you_mean(what, KINDS)}"
+        )
+    found = {name: rows() for name, rows in _ROWS.items() if what in (None, name)}
+    if json:
+        output.print_json(found)
+        return
+    for name, rows in found.items():
+        if len(found) > 1:
+            output.line(name)
+        _print(rows)
+
+
+def _print(rows: Sequence[Row]) -> None:
+    table = output.empty_table()
+    titles = [title for title in rows[0] if title != "source"]  # of an experiment; it is long
+    for title in titles:
+        table.add_column("" if title == "slow" else title, no_wrap=title == "name")
+    for row in rows:
+        cells = (row[title] for title in titles)
+        table.add_row(*(("slow" if cell else "") if isinstance(cell, bool) else str(cell) for cell in cells))
+    output.console().print(table)
+
+
+def _robots() -> list[Row]:
+    found = (load_robot(name) for name in robot_names())
+    return [{"name": one.name, "title": one.title, "on": "a board" if one.has_board else "direct"} for one in found]
+
+
+def _arenas() -> list[Row]:
+    found = (load_arena(name).description for name in arena_names())
+    return [{"name": one.name, "title": one.title} for one in found]
+
+
+def _brains() -> list[Row]:
+    return [{"name": name, "title": _first_line(path)} for name, path in sorted(bundled_files().items())]
+
+
+def _first_line(path: Path) -> str:
+    """What a brain's file says of itself: of a TOML file its first comment."""
+    text = path.read_text(encoding="utf-8")
+    said = (ast.get_docstring(ast.parse(text)) or "") if path.suffix == ".py" else text.removeprefix("# ")
+    return said.partition("\n")[0]
+
+
+def _behaviors() -> list[Row]:
+    kinds = (getattr(behaviors, name) for name in behaviors.__all__)
+    found = [kind for kind in kinds if issubclass(kind, MotorBehavior)]
+    return [{"name": kind.__name__, "title": (inspect.getdoc(kind) or "").partition("\n")[0]} for kind in found]
+
+
+def _experiments() -> list[Row]:
+    # here, as it takes a while: no other list should wait for it
+    from boebot.experiments import all_experiments
+
+    fields = ("name", "slow", "title", "robot", "section", "source")
+    return [{field: getattr(one, field) for field in fields} for one in all_experiments().values()]
+
+
+_ROWS: dict[str, Callable[[], list[Row]]] = {
+    "robots": _robots,
+    "arenas": _arenas,
+    "brains": _brains,
+    "behaviors": _behaviors,
+    "experiments": _experiments,
+}
