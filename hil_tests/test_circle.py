@@ -48,7 +48,7 @@ def test_same_seed_same_bytes(board_url: str) -> None:
 def test_odometry_follows_the_truth(board_url: str) -> None:
     """Encoder counts through the whole circle: a straight metre is a metre within 3 %."""
     result = boebot.run(lambda robot: robot.drive(0.5, 0.5), on=board_url, arena="empty", seconds=8)
-    assert result.truth is not None
+    assert result.truth is not None and result.odometry is not None
     true = np.hypot(result.truth.x[-1] - result.truth.x[0], result.truth.y[-1] - result.truth.y[0])
     estimate = np.hypot(result.odometry.x[-1], result.odometry.y[-1])
     assert true > 0.5

@@ -59,7 +59,7 @@ def test_it_wanders_through_the_room_and_touches_nothing(board_url: str) -> None
         switch_on(rig)
         begun = rig.robot.body().distance
         be_silent(rig, 60.0)
-        assert rig.robot.contacts == 0
+        assert rig.robot.true_contacts == 0
         assert rig.robot.body().distance - begun > 0.5 * 60 * SPEED_M_S, "half of the time, at least, it drives ahead"
         assert rig.pulses(LEFT)[-1, 0] > rig.board.cycle - 2 * FRAME_CYCLES, "and does so to the end"
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from types import TracebackType
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from boebot import arguments
 from boebot.arenas import Arena
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
+from boebot.former_names import FormerNames
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import VehicleModel
 from sim_bridge.vehicles import worlds
@@ -37,12 +38,14 @@ PORTION_SHORT_S: Final = 0.02  # such portions are doubled ...
 PORTION_LONG_S: Final = 0.1  # ... and such halved
 
 
-class Batch:
+class Batch(FormerNames):
     """N worlds of one model. With several threads, `close` it or use it by `with`; what was read stays.
 
     Attributes:
         readings: shape (N, M), a view that changes with each step; `model.names` says which column is what.
     """
+
+    FORMER: ClassVar = {"poses": "true_poses"}
 
     def __init__(
         self,
@@ -256,7 +259,7 @@ class Batch:
     # ---- what can be read --------------------------------------------------------------------------------------------
 
     @property
-    def poses(self) -> Floats:
+    def true_poses(self) -> Floats:
         """Truth: shape (N, 3), x (m), y (m), heading (rad)."""
         poses = np.empty((self.count, 3))
         lib.vehicles_poses(self.handle, 0, self.count, ffi.from_buffer("double[]", poses))

@@ -11,11 +11,21 @@ from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan, plan_of_poses, poses_of
 from boebot.errors import RobotError
+from boebot.former_names import refusal
 from boebot.record.record import Record
 from sim_bridge.vehicle import Vehicle
 
 Floats = NDArray[np.float64]
-TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "distance", "touching")
+TRUTH = {
+    "time": "s", "true_x": "m", "true_y": "m", "true_heading": "rad", "true_speed": "m_s", "true_turn_rate": "rad_s",
+    "true_distance": "m", "true_contact": "",
+}  # fmt: skip
+"""Columns of what only a simulator knows, and their units."""
+
+FORMER = {
+    "x": "true_x", "y": "true_y", "heading": "true_heading", "speed": "true_speed", "turn_rate": "true_turn_rate",
+    "distance": "true_distance", "touching": "true_contact",
+}  # fmt: skip
 
 
 class Recorder:
@@ -51,7 +61,13 @@ class Recorder:
         return len(self.record.rows("vehicle"))
 
     def __getitem__(self, name: str) -> Floats:
-        """A column, shape (rows,); one of a sensor with several readings by "odometer[0]"."""
+        """A column, shape (rows,); one of a sensor with several readings by "odometer[0]".
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        if name not in self.names:
+            raise KeyError(refusal(name, FORMER) or f"no column {name!r}; expected {', '.join(self.names)}")
         return self.table[:, self.names.index(name)]
 
     @property
@@ -79,5 +95,6 @@ class Recorder:
         return plan_of_poses(self.vehicle.arena, time[newest:], movers.transpose(1, 2, 0))
 
     def save(self, path: str | Path) -> None:
-        """Writes a CSV file with the columns' names in its first line."""
-        np.savetxt(path, self.table, fmt="%.9g", delimiter=",", header=",".join(self.names), comments="")
+        """Writes a CSV file with the columns' names in its first line, those of the truth with their units."""
+        heading = ",".join(f"{name}_{TRUTH[name]}" if TRUTH.get(name) else name for name in self.names)
+        np.savetxt(path, self.table, fmt="%.9g", delimiter=",", header=heading, comments="")

@@ -7,7 +7,7 @@ import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from boebot.arenas.floor_plan import Lateness
 from boebot.arguments import point, shown, whole
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
+from boebot.former_names import FormerNames
 from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
@@ -445,8 +446,10 @@ class _Patience:
             print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)
 
 
-class SimRobot:
+class SimRobot(FormerNames):
     """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
+
+    FORMER: ClassVar = {"contacts": "true_contacts"}
 
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
@@ -575,7 +578,7 @@ class SimRobot:
         return int(lib.sim_last_byte(self._handle, self.number))
 
     @property
-    def contacts(self) -> int:
+    def true_contacts(self) -> int:
         """Touches begun so far; apart by 0.1 s at least."""
         return int(lib.sim_contacts(self._handle, self.number))
 

@@ -9,11 +9,12 @@ rad, SI units; motor signals in [-1, 1], left and right.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
+from boebot.former_names import FormerNames
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicles import worlds
 from sim_bridge.vehicles.model import VehicleModel as VehicleModel
@@ -36,13 +37,15 @@ SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
 TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
 
 
-class Vehicle:
+class Vehicle(FormerNames):
     """One vehicle in one world. Its readings are there from the start; `step` takes motor signals to the next ones.
 
     Attributes:
         readings: all readings, a view that changes with each step; `model.names` says where what is.
-        pose: where it truly is; not for brains.
+        true_pose: where it truly is; not for brains.
     """
+
+    FORMER: ClassVar = {"pose": "true_pose"}
 
     def __init__(
         self,
@@ -107,8 +110,8 @@ class Vehicle:
         return float(lib.vehicles_steps_done(self.handle, 0) * self.model.dt)
 
     @property
-    def pose(self) -> tuple[float, float, float]:
-        """x (m), y (m), heading (rad)."""
+    def true_pose(self) -> tuple[float, float, float]:
+        """Truth: x (m), y (m), heading (rad)."""
         return self._body.x, self._body.y, self._body.heading
 
     @property

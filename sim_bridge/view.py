@@ -41,7 +41,7 @@ class View:
         self._axes = self.figure.subplots()
         plan = floor_plan(vehicle.arena, 0.0, 0.0)
         draw_arena(self._axes, replace(plan, moving=()))
-        x, y, _ = vehicle.pose
+        x, y, _ = vehicle.true_pose
         frame(self._axes, *plan_bounds(plan, [(x, y)]))
         self._solids = moving_solids(vehicle.arena)
         self._moving = [self._add_moving(solid.kind == "disc") for solid in self._solids]
@@ -67,7 +67,7 @@ class View:
 
     def update(self) -> None:
         """Takes the vehicle, and what moves beside it, as they are now."""
-        x, y, heading = self.vehicle.pose
+        x, y, heading = self.vehicle.true_pose
         self._trail.append((x, y))
         self._put(self._body, x, y, heading)
         tip = x + self._front * math.cos(heading), y + self._front * math.sin(heading)
@@ -106,7 +106,7 @@ class View:
 
     def _each_ray(self) -> Iterator[tuple[float, float, float, float, float]]:
         """Of each sensor that looks: where a ray begins, its direction, reach and height."""
-        x, y, heading = self.vehicle.pose
+        x, y, heading = self.vehicle.true_pose
         for look, reach in self.vehicle.model.looks.values():
             x0 = x + look["x"] * math.cos(heading) - look["y"] * math.sin(heading)  # (3.9)
             y0 = y + look["x"] * math.sin(heading) + look["y"] * math.cos(heading)

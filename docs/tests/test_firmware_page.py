@@ -110,7 +110,7 @@ def test_the_analysis_takes_the_budget_of_what_it_cannot_bound(changed: PageFirm
 
 def test_wander_drives_it_and_hears_of_each_tick(changed: PageFirmware) -> None:
     run = answer(changed, "run")
-    assert run["distance_m"] > 0.5 and run["ticks"] >= 1000
+    assert run["true_distance_m"] > 0.5 and run["ticks"] >= 1000
     assert run["lost_frames"] == run["overruns"] == run["resets"] == run["dead_man_stops"] == 0
 
 

@@ -39,7 +39,16 @@ def peer(monkeypatch: pytest.MonkeyPatch) -> Peer:
 def test_run_prints_a_table(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, "run", "wander", "--seconds", "3")
     assert (code, err) == (0, "")
-    for name in ("distance", "contacts", "ticks", "lost frames", "overruns", "dead man stops", "real time factor"):
+    for name in (
+        "true distance",
+        "odometry distance",
+        "true contacts",
+        "ticks",
+        "lost frames",
+        "overruns",
+        "dead man stops",
+        "real time factor",
+    ):
         assert name in out
 
 
@@ -153,8 +162,8 @@ def test_options_given_several_times_go_to_one_robot_each(capsys: pytest.Capture
     code, out, _ = boebot(capsys, "run", *arguments, *poses)
     first, second = json.loads(out)["robots"]
     assert code == 0
-    assert (first["brain"], first["robot"]) == ("wander", "shieldbot") and first["distance_m"] > 0.1
-    assert (second["brain"], second["robot"]) == ("still", "shieldbot-quad") and second["distance_m"] < 0.001
+    assert (first["brain"], first["robot"]) == ("wander", "shieldbot") and first["true_distance_m"] > 0.1
+    assert (second["brain"], second["robot"]) == ("still", "shieldbot-quad") and second["true_distance_m"] < 0.001
 
 
 @pytest.mark.parametrize("robots", ["1", "2"])
@@ -193,7 +202,7 @@ def test_new_brain_runs_and_is_never_overwritten(
     monkeypatch.chdir(tmp_path)
     assert boebot(capsys, "new", "first")[0] == 0
     code, out, _ = boebot(capsys, "run", "first.py", "--seconds", "20", "--json")
-    assert code == 0 and json.loads(out)["distance_m"] > 0.5
+    assert code == 0 and json.loads(out)["true_distance_m"] > 0.5
     (tmp_path / "first.py").write_text("# precious\n")
     code, _, err = boebot(capsys, "new", "first")
     assert code == 1 and "first.py exists already" in err

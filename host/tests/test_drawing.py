@@ -195,7 +195,7 @@ def test_picture_names_only_what_the_robot_has(
     monkeypatch.setattr(Figure, "legend", lambda self, handles, **_: named.extend(h.get_label() for h in handles))
     monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
     picture.write(result, tmp_path / "run.png")
-    assert ("odometric estimate" in named) == estimate
+    assert ("path by odometry" in named) == estimate
     assert "whisker touch" not in named, "none happened"
     assert any("0 whisker touches" in text for text in texts)
     assert any("odometry off" in text for text in texts) == estimate
@@ -218,8 +218,11 @@ def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypa
     result.robot = msgspec.structs.replace(whole, device=fewer)
     result.truth = None
     table = result.table()
-    assert [table[name] for name in ("distance_m", "contacts", "whisker_touches", "odometry_error_m")] == [None] * 4
-    assert not scene.view(result).path_is_seen and "way unknown" in result.summary()
+    assert [
+        table[name]
+        for name in ("true_distance_m", "odometry_distance_m", "true_contacts", "whisker_touches", "odometry_error_m")
+    ] == [None] * 5
+    assert not scene.view(result).path_is_seen and "distance unknown" in result.summary()
 
 
 def test_pictures_show_the_sensors_that_are_on() -> None:
@@ -267,11 +270,13 @@ def test_the_body_is_drawn_as_what_meets_things(
 
 def test_the_ghost_is_drawn_as_the_body(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run_of("shieldbot", monkeypatch)
+    odometry = result.odometry
+    assert odometry is not None
     axes = Figure().subplots()
-    picture._draw_ghost(axes, shaped(result.robot, OUTLINES["box"]).body, result.odometry)
+    picture._draw_ghost(axes, shaped(result.robot, OUTLINES["box"]).body, odometry)
     (ghost,) = axes.patches
     corners = (ghost.get_transform() - axes.transData).transform(ghost.get_path().vertices)
-    end = tuple(float(row[-1]) for row in (result.odometry.x, result.odometry.y, result.odometry.heading))
+    end = odometry.at(-1)
     turned = shapely.affinity.rotate(shapely.Polygon(OUTLINES["box"]), end[2], origin=(0, 0), use_radians=True)
     expected = shapely.affinity.translate(turned, *end[:2])
     assert shapely.hausdorff_distance(shapely.Polygon(corners), expected) < 1e-9
@@ -295,7 +300,8 @@ def test_the_way_out_is_the_nearest_edge_ahead(star: list[tuple[float, float]]) 
 def test_repr_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run_of("shieldbot", monkeypatch)
     assert repr(result) == (
-        f"<RunResult: <lambda> on shieldbot (native) in square, 2.0 s, {result.distance:.2f} m, 0 contacts, seed 1, "
+        f"<RunResult: <lambda> on shieldbot (native) in square, 2.0 s, true distance {result.true_distance:.2f} m, "
+        "0 true contacts, 0 whisker touches, seed 1, "
         "complete>"
     )
     assert len(repr(result.record)) < 200 and "201 telemetry" in repr(result.record)
@@ -306,12 +312,12 @@ def test_notebooks_get_a_table_without_markup_of_others(monkeypatch: pytest.Monk
     result.brain = "<b>bold</b>"
     shown = result._repr_html_()
     assert "<b>" not in shown and "&lt;b&gt;" in shown
-    assert "<tr><th>distance</th>" in shown and "<td>m</td>" in shown
+    assert "<tr><th>true distance</th>" in shown and "<td>m</td>" in shown
 
 
 def test_slow_readings_are_counted_with_their_greatest_age(monkeypatch: pytest.MonkeyPatch) -> None:
     table = run_of("shieldbot-basic", monkeypatch).table()
     assert table["slow_readings"] == pytest.approx(100, abs=3), "one in two ticks for 2 s"
-    assert table["slow_reading_age_ms"] is not None and 20 <= float(table["slow_reading_age_ms"]) <= 70
+    assert table["slow_reading_age_s"] is not None and 0.020 <= float(table["slow_reading_age_s"]) <= 0.070
     assert run_of("shieldbot", monkeypatch).table()["slow_readings"] is None
     assert math.isclose(float(table["run_time_s"] or 0), 2.0)

@@ -52,7 +52,7 @@ def folder(result: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_table_counts_what_happened(result: RunResult) -> None:
     table = result.table()
-    assert table["contacts"] == 1 and table["whisker_touches"] == 2
+    assert table["true_contacts"] == 1 and table["whisker_touches"] == 2
     assert table["ticks"] == 3001 and table["steps"] == 600
     assert table["ended"] == "complete"
     assert table["image_hash"] is None, "a board without flash has no image"
@@ -67,7 +67,7 @@ def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
     assert int(middle["tick"]) == result.series.raw["tick"][1500]
     assert float(middle["true_x_m"]) == pytest.approx(result.true_pose.x[1500], abs=1e-4)  # type: ignore[union-attr]
     assert {row["command"] for row in rows} == {"signal"}
-    assert sum(int(row["contact"]) for row in rows) > 10
+    assert sum(int(row["true_contact"]) for row in rows) > 10
     assert all(set(row) == set(rows[0]) and None not in row.values() for row in rows)
 
 
@@ -92,7 +92,7 @@ def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> No
 
 def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
     beside: dict[str, object] = {"counters": {}, "watchdog_resets": []}
-    assert json.loads((folder / "summary.json").read_text()) == {"format": 2} | result.table() | beside
+    assert json.loads((folder / "summary.json").read_text()) == {"format": 3} | result.table() | beside
 
 
 def test_picture_shows_something(folder: Path) -> None:
@@ -105,7 +105,7 @@ def test_picture_counts_in_words_that_agree(result: RunResult, tmp_path: Path, m
     texts: list[str] = []
     monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
     picture.write(result, tmp_path / "run.png")
-    assert "   ·   1 contact   ·   2 whisker touches" in texts[1]
+    assert "   ·   1 true contact   ·   2 whisker touches" in texts[1]
 
 
 class Loads(HTMLParser):
@@ -150,7 +150,7 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
     assert np.array_equal(flags & replay.LEFT_WHISKER != 0, result.series.flag("whisker_left"))
-    assert len(data["contacts"]) == 1 and data["known"]
+    assert len(data["true_contacts"]) == 1 and data["known"]
 
 
 def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:

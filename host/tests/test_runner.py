@@ -259,6 +259,7 @@ def test_reset_in_mid_run_is_counted_and_the_run_goes_on(session: InProcess) -> 
     assert len(peer.parameters) == counts[0], "the parameters were set again"
     assert (np.diff(times) > 0).all() and times[-1] < 2.0, "the run's clock goes on"
     assert session.now() == pytest.approx(2.0 + result.clock_offset, abs=0.05)
+    assert result.odometry is not None
     assert abs(result.odometry.x[-1] - result.odometry.x[0]) < 0.4, "counts that begin afresh are no motion"
 
 
@@ -299,7 +300,7 @@ def test_takeovers_by_the_boards_own_brain_are_counted(session: InProcess) -> No
 def test_nothing_commanded_means_motors_off(session: InProcess) -> None:
     result = boebot.run(lambda robot: None, seconds=1)
     assert all(isinstance(message, messages.SetpointCoast) for message in session.peer.setpoints)
-    assert result.distance == 0.0
+    assert result.true_distance == 0.0
 
 
 def test_stop_of_a_brain_latches_nothing(session: InProcess) -> None:
@@ -464,10 +465,10 @@ def test_speeds_are_sent_as_speeds(session: InProcess) -> None:
 
 def test_odometry_follows_the_truth(session: InProcess) -> None:
     result = boebot.run(lambda robot: robot.drive(0.4, 0.5), seconds=6)
-    assert result.true_pose is not None and result.odometry_error is not None
-    assert result.distance > 0.3
+    assert result.true_pose is not None and result.odometry is not None and result.odometry_error is not None
+    assert (result.true_distance or 0.0) > 0.3
     assert result.odometry_error < 0.02
-    assert abs(result.odometry.heading[-1] - result.true_pose.heading[-1]) < 0.1
+    assert abs(result.odometry.heading[-1] - (result.true_pose.heading[-1] - result.true_pose.heading[0])) < 0.1
 
 
 def test_progress_is_reported(session: InProcess) -> None:

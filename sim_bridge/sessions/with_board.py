@@ -108,16 +108,17 @@ class SimSession:
         return self.robot.looks()
 
     def counters(self) -> Mapping[str, float]:
-        """Counters of the board, and `contacts`, `distance` (m), `time` (s), `load` (share of cycles executed)."""
+        """Counters of the board, and `time_s`, `load` (share of cycles executed), and what only a simulator knows:
+        `true_contacts`, `true_distance_m`, `true_supply_v`."""
         board = self.board.counters()
         cycle = self.sim.cycle
         return {
             **board,
-            "contacts": float(self.robot.contacts),
-            "distance": float(self.robot.body().distance),
-            "time": cycle / CLOCK_HZ,
+            "true_contacts": float(self.robot.true_contacts),
+            "true_distance_m": float(self.robot.body().distance),
+            "time_s": cycle / CLOCK_HZ,
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
-            "supply_voltage": self.robot.supply_voltage,
+            "true_supply_v": self.robot.supply_voltage,
         }
 
     def watchdog_resets(self) -> list[WatchdogReset]:

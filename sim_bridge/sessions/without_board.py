@@ -58,11 +58,11 @@ class DirectSession:
         return truth_of(self.robot)
 
     def counters(self) -> Mapping[str, float]:
-        """`contacts`, `distance` (m) and `time` (s)."""
+        """`true_contacts`, `true_distance_m` and `time_s`."""
         return {
-            "contacts": float(self.robot.contacts),
-            "distance": float(self.robot.body().distance),
-            "time": self.sim.cycle / CLOCK_HZ,
+            "true_contacts": float(self.robot.true_contacts),
+            "true_distance_m": float(self.robot.body().distance),
+            "time_s": self.sim.cycle / CLOCK_HZ,
         }
 
     def close(self) -> None:

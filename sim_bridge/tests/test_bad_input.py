@@ -57,7 +57,7 @@ def refused(action: Callable[[], Any]) -> bool:
 
 
 def is_sound(vehicle: Vehicle) -> bool:
-    return all(map(math.isfinite, (*vehicle.pose, vehicle.time, vehicle.energy, *vehicle.readings)))
+    return all(map(math.isfinite, (*vehicle.true_pose, vehicle.time, vehicle.energy, *vehicle.readings)))
 
 
 # ---- whatever there is -----------------------------------------------------------------------------------------------
@@ -114,7 +114,7 @@ def test_any_batch_is_worlds_or_a_sentence(poses: Any, seeds: Any, threads: Any,
         return
     with made[0] as batch:
         batch.step(np.full((batch.count, 2), 0.5), 3)
-        assert np.isfinite(batch.readings).all() and np.isfinite(batch.poses).all()
+        assert np.isfinite(batch.readings).all() and np.isfinite(batch.true_poses).all()
 
 
 @given(
@@ -140,7 +140,7 @@ def test_any_signals_and_brains_move_the_batch_or_are_refused(signals: Any, step
         if refused(action):
             assert batch.hashes().tolist() == before
         before = batch.hashes().tolist()
-        assert np.isfinite(batch.readings).all() and np.isfinite(batch.poses).all()
+        assert np.isfinite(batch.readings).all() and np.isfinite(batch.true_poses).all()
 
 
 @given(things | small, things | small, things, things | st.floats(0, 9))

@@ -65,11 +65,11 @@ def test_a_world_of_a_batch_is_a_single_vehicle() -> None:
 def test_arrays_in_and_out() -> None:
     batch = Batch(arsim(noise=False), arena_of(outline=square(0, 0, 30)), STARTS, np.arange(12))
     before = batch.readings.copy()
-    assert batch.readings.shape == (12, 6) and before[:, 2:5] == pytest.approx(batch.poses)
+    assert batch.readings.shape == (12, 6) and before[:, 2:5] == pytest.approx(batch.true_poses)
     readings = batch.step(np.full((12, 2), 0.5), 100)
     assert readings is batch.readings and not np.array_equal(readings, before)
-    assert batch.poses.shape == (12, 3) and batch.flags.tolist() == [0] * 12 and batch.steps.tolist() == [100] * 12
-    travel = np.hypot(*(batch.poses - STARTS)[:, :2].T)
+    assert batch.true_poses.shape == (12, 3) and batch.flags.tolist() == [0] * 12 and batch.steps.tolist() == [100] * 12
+    travel = np.hypot(*(batch.true_poses - STARTS)[:, :2].T)
     assert travel == pytest.approx(np.full(12, travel[0]), rel=1e-9) and batch.bytes_per_world < 4096
     with pytest.raises(ValueError, match="read-only"):
         readings[0, 0] = 1.0
@@ -80,7 +80,7 @@ def test_each_world_has_its_own_arena_and_its_own_end() -> None:
     batch = Batch(arsim(noise=False), [near, far, near], np.zeros((3, 3)), [1, 2, 3])
     batch.step(np.ones((3, 2)), 400)
     assert batch.flags.tolist() == [lib.VEHICLE_COLLIDED, lib.VEHICLE_RUNS, lib.VEHICLE_COLLIDED]
-    assert batch.poses[0, 0] == pytest.approx(0.8) and batch.poses[1, 0] > 4
+    assert batch.true_poses[0, 0] == pytest.approx(0.8) and batch.true_poses[1, 0] > 4
     assert batch.steps[1] == 400 > batch.steps[0] == batch.steps[2]
 
 
@@ -157,7 +157,8 @@ def test_a_world_that_ends_leaves_its_neighbours_as_they_are_alone() -> None:
         one.state(0, "int64_t *")[0] = 3 * k
         one.run(counting, min(31, 40 - 3 * k))
         assert (
-            one.readings[0].tolist() == batch.readings[k].tolist() and one.poses[0].tolist() == batch.poses[k].tolist()
+            one.readings[0].tolist() == batch.readings[k].tolist()
+            and one.true_poses[0].tolist() == batch.true_poses[k].tolist()
         )
 
 

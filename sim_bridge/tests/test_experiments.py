@@ -291,7 +291,7 @@ def test_e16_six_stages_in_order_in_each_step() -> None:
     seen: list[tuple[str, float, float, float]] = []
 
     def note(stage: str, vehicle: Vehicle) -> None:
-        seen.append((stage, vehicle.pose[0], vehicle["odometer"][0], vehicle.time))
+        seen.append((stage, vehicle.true_pose[0], vehicle["odometer"][0], vehicle.time))
 
     vehicle = Vehicle(arsim(noise=False), arena_of(outline=square(0, 0, 20)))
     assert vehicle.run(lambda _: (0.5, 0.5), 30, stage=note) == 30
@@ -319,13 +319,13 @@ def test_e16_a_collision_ends_the_run_within_one_step() -> None:
     vehicle = Vehicle(arsim(noise=False), arena)
     poses = []
     done = vehicle.run(
-        lambda _: (1.0, 1.0), 1000, stage=lambda stage, v: poses.append(v.pose) if stage == "check" else None
+        lambda _: (1.0, 1.0), 1000, stage=lambda stage, v: poses.append(v.true_pose) if stage == "check" else None
     )
     assert vehicle.ended == "collision" and vehicle.collided and done == len(poses) < 1000
     assert poses[-1][0] == pytest.approx(0.8, abs=1e-9) and poses[-2][0] < 0.8 - 1e-6
-    pose = vehicle.pose
+    pose = vehicle.true_pose
     vehicle.step(1.0, 1.0)
-    assert vehicle.pose == pose and vehicle.run(lambda _: (1.0, 1.0), 10) == 0
+    assert vehicle.true_pose == pose and vehicle.run(lambda _: (1.0, 1.0), 10) == 0
 
 
 # ---- E18: the notes' test run --------------------------------------------------------------------------------------
@@ -347,7 +347,7 @@ def test_e18_testrun(heading: float, ends: bool) -> None:
     assert log["time"] == pytest.approx(0.01 * np.arange(1, done + 1), abs=1e-9)
     if ends:
         assert vehicle.ended == "collision" and len(log) == done < 1000
-        assert log["touching"][-1] == 1 and not log["touching"][:-1].any()
+        assert log["true_contact"][-1] == 1 and not log["true_contact"][:-1].any()
     else:
         assert len(log) == done == 1000 and vehicle.time == pytest.approx(10.0, abs=1e-9) and not vehicle.ended
     for side in ("left", "right"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -86,9 +86,12 @@ def check(truth: Truth | None, arena: Arena, seen: list[tuple[float, tuple[float
     return shape
 
 
-def deepest(shape: Moving, columns: Any, radius: float) -> float:
+OF_LOG = ("time", "true_x", "true_y")  # columns of a Recorder
+
+
+def deepest(shape: Moving, columns: Any, radius: float, names: Sequence[str] = ("time", "x", "y")) -> float:
     """How far a robot's circle is in the shape at most, m; negative: it never touches."""
-    rows = zip(*(columns[name].tolist() for name in ("time", "x", "y")), strict=True)
+    rows = zip(*(columns[name].tolist() for name in names), strict=True)
     return max(radius - float(shapely.distance(shape_of(shape.at(t)), shapely.Point(x, y))) for t, x, y in rows)
 
 
@@ -173,16 +176,16 @@ def test_view_and_recorder_have_the_vehicles_own() -> None:
         if step % 50 == 0:
             view.update()
             drawn = shapely.Polygon(view._moving[0].get_xy())  # type: ignore[attr-defined]
-            body = shapely.Point(vehicle.pose[:2]).buffer(radius, 64)
+            body = shapely.Point(vehicle.true_pose[:2]).buffer(radius, 64)
             assert drawn.intersection(body).area < 1e-8
             (mover,) = vehicle.movers
             where = shape_of(Solid(kind="obstacle", points=np.array(square(0, 0, SIDE))).placed(*pose_of(mover)))
             assert shapely.hausdorff_distance(drawn, where) < 1e-9
     assert vehicle.movers[0].waited > 0.5
     (shape,) = log.floor_plan().moving
-    assert abs(deepest(shape, log, radius)) < 2e-6, "it was touched, never entered"
+    assert abs(deepest(shape, log, radius, OF_LOG)) < 2e-6, "it was touched, never entered"
     path = floor_plan(vehicle.arena, 0.0, vehicle.time).moving[0]
-    assert deepest(path, log, radius) > 0.05
+    assert deepest(path, log, radius, OF_LOG) > 0.05
     vehicle.place((0.7, 0.0, 0.0))
     log.append()
     vehicle.step(0.0, 0.0)

@@ -187,7 +187,7 @@ def test_robots_bump_and_neither_enters_the_other() -> None:
     a, b = left.robot.body(), right.robot.body()
     assert b.x - a.x == pytest.approx(0.14, abs=1e-3)  # two radii
     assert a.touching and b.touching
-    assert left.robot.contacts == right.robot.contacts == 1
+    assert left.robot.true_contacts == right.robot.true_contacts == 1
 
 
 def test_a_driving_robot_pushes_one_that_rolls_freely() -> None:

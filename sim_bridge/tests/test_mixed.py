@@ -73,7 +73,7 @@ def test_alone_in_a_shared_world_it_is_the_vehicle_of_its_own_world() -> None:
         for name in ("x", "y", "heading", "speed", "turn_rate", "wheel_left", "wheel_right", "distance", "touching"):
             assert getattr(here, name) == getattr(there, name)
         touched |= bool(there.touching)
-    assert touched and robot.contacts > 0
+    assert touched and robot.true_contacts > 0
 
 
 def test_step_of_a_world_with_boards_changes_little() -> None:
@@ -120,7 +120,7 @@ def test_head_on_neither_enters_the_other() -> None:
     for _ in range(300):
         sim.run(TICK_CYCLES)
         assert right.body().x - left.body().x >= 0.4 - 1e-6
-    assert left.body().touching and right.body().touching and left.contacts == right.contacts == 1
+    assert left.body().touching and right.body().touching and left.true_contacts == right.true_contacts == 1
     assert left.body().x == pytest.approx(1.0 - right.body().x, abs=1e-9), "equal robots meet in the middle"
 
 
@@ -209,7 +209,11 @@ def test_a_run_of_both_kinds_is_told_and_saved(tmp_path: Path) -> None:
     assert [robot.board for robot in result.robots] == ["direct", "native", "direct"]
     assert [robot.seed for robot in result.robots] == [1, 2, 3]
     for robot in result.robots:
-        assert robot.run_time == pytest.approx(4.0, abs=0.02) and robot.distance > 0.05 and robot.true_pose is not None
+        assert (
+            robot.run_time == pytest.approx(4.0, abs=0.02)
+            and (robot.true_distance or 0.0) > 0.05
+            and robot.true_pose is not None
+        )
     assert (tmp_path / "run.png").is_file()
     assert all((tmp_path / f"robot-{number}" / "run.csv").is_file() for number in (1, 2, 3))
 
@@ -235,7 +239,7 @@ def test_command_line_runs_three_without_boards() -> None:
     done = subprocess.run([*command, "--seconds", "3", "--json"], capture_output=True, text=True, check=True)
     robots = json.loads(done.stdout)["robots"]
     assert [robot["robot"] for robot in robots] == ["arsim"] * 3
-    assert all(robot["run_time_s"] == 3.0 and robot["distance_m"] > 0 for robot in robots)
+    assert all(robot["run_time_s"] == 3.0 and robot["true_distance_m"] > 0 for robot in robots)
 
 
 @pytest.mark.unsanitized

@@ -43,7 +43,7 @@ def test_vehicle_is_the_run_of_boebot_run(source: str, seed: int) -> None:
     for step in range(500):
         readings.append((*(vehicle[f"infrared_{side}"] for side in ("left", "right")), *vehicle.readings[2:6:3]))
         vehicle.step(*signals(0.01 * step))
-        rows.append((*vehicle.pose, vehicle.body.rim_left))
+        rows.append((*vehicle.true_pose, vehicle.body.rim_left))
     x, y, heading, left = np.array(rows).T
     truth = result.truth
     assert len(truth.x) == 501 and len(seen) == 500

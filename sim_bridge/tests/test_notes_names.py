@@ -86,7 +86,7 @@ def test_placed_at_a_speed_it_rolls_on() -> None:
     for _ in range(50):
         vehicle.step(1.0, 0.5)
     vehicle.place((1.0, 2.0, 0.5), speed=1.0)
-    assert vehicle.pose == (1.0, 2.0, 0.5) and vehicle.time == 0.0 and list(vehicle["odometer"]) == [1.0, 2.0, 0.5]
+    assert vehicle.true_pose == (1.0, 2.0, 0.5) and vehicle.time == 0.0 and list(vehicle["odometer"]) == [1.0, 2.0, 0.5]
     vehicle.step(0.0, 0.0)
     motor_speed = 2 * 1.0 / 0.1
     torque = -2 * ((0.0333**2 / 0.62 + 0.02) * motor_speed + 0.008)
@@ -123,15 +123,15 @@ def test_recorder_keeps_a_row_a_step(tmp_path: Path) -> None:
     assert log.table.shape == (0, 14)
     done = vehicle.run(lambda _: (0.3, 0.35), 60, stage=log)
     assert len(log) == done == 60 and log["time"] == pytest.approx(0.01 * np.arange(1, 61))
-    assert (log["x"][-1], log["y"][-1], log["heading"][-1]) == vehicle.pose
-    steps = np.hypot(np.diff(log["x"]), np.diff(log["y"]))
-    assert np.diff(log["distance"]) == pytest.approx(steps) and log["odometer[0]"][-1] == pytest.approx(
-        log["x"][-2], abs=1e-3
+    assert (log["true_x"][-1], log["true_y"][-1], log["true_heading"][-1]) == vehicle.true_pose
+    steps = np.hypot(np.diff(log["true_x"]), np.diff(log["true_y"]))
+    assert np.diff(log["true_distance"]) == pytest.approx(steps) and log["odometer[0]"][-1] == pytest.approx(
+        log["true_x"][-2], abs=1e-3
     )
     log.save(tmp_path / "log.csv")
     back = np.genfromtxt(tmp_path / "log.csv", delimiter=",", names=True, deletechars="")
     assert back["infrared_left"] == pytest.approx(log["infrared_left"], rel=1e-8) and len(back) == 60
-    with pytest.raises(ValueError, match="nothing"):
+    with pytest.raises(KeyError, match="no column 'nothing'; expected time, true_x"):
         log["nothing"]
 
 
@@ -145,6 +145,6 @@ def test_view_shows_the_body_where_it_is_and_rays_that_end_at_walls(tmp_path: Pa
     vehicle.run(lambda _: (-0.5, -0.4), 120)
     view.update()
     middle = (view._body.get_transform() - view._axes.transData).transform((0.0, 0.0))
-    assert middle == pytest.approx(vehicle.pose[:2], abs=1e-12)
+    assert middle == pytest.approx(vehicle.true_pose[:2], abs=1e-12)
     later = np.asarray(Image.open(view.save(tmp_path / "after.png")).convert("RGB")).astype(int)
     assert (np.abs(picture - later).sum(axis=2) > 60).sum() > 500, "the body has moved"

@@ -105,7 +105,7 @@ def test_an_outline_from_a_file_meets_a_wall(tmp_path: Path, slip: str) -> None:
         for _ in range(1500):
             vehicle.step(signal, signal)
         assert vehicle.collided
-        assert vehicle.pose[0] == pytest.approx(expected, abs=5e-5)  # a flat front that pushes rocks by 1e-4 rad
+        assert vehicle.true_pose[0] == pytest.approx(expected, abs=5e-5)  # a flat front that pushes rocks by 1e-4 rad
     fast = Vehicle(vehicle_model(robot, noise=False), arena_of(outline=square(0, 0, 99)))
     for _ in range(20):
         fast.step(1.0, 1.0)
@@ -143,7 +143,7 @@ def test_a_narrow_outline_is_refused_and_an_array_accepted() -> None:
     vehicle = Vehicle(model, arena_of(outline=square(0, 0, 2)), pose=(0.0, 0.0, math.pi / 2))
     for _ in range(1000):
         vehicle.step(0.3, 0.3)
-    assert vehicle.pose[1] == pytest.approx(0.9, abs=5e-5)
+    assert vehicle.true_pose[1] == pytest.approx(0.9, abs=5e-5)
 
 
 def test_a_view_draws_the_outline_where_the_vehicle_is() -> None:
@@ -155,8 +155,8 @@ def test_a_view_draws_the_outline_where_the_vehicle_is() -> None:
     for _ in range(100):
         vehicle.step(0.3, 0.5)
     view.update()
-    x, y, heading = vehicle.pose
-    for patch, pose in ((view._body, vehicle.pose), (view._ghost, vehicle["odometer"])):
+    x, y, heading = vehicle.true_pose
+    for patch, pose in ((view._body, vehicle.true_pose), (view._ghost, vehicle["odometer"])):
         corners = (patch.get_transform() - view._axes.transData).transform(patch.get_path().vertices)
         assert shapely.hausdorff_distance(shapely.Polygon(corners), placed(shapely.Polygon(BOX), *pose)) < 1e-9
     front = max(corner for corner, _ in BOX)
@@ -210,8 +210,8 @@ def test_the_example_drives_and_gets_into_nothing(angular: Path, brain: Any, are
     """shapely's core of the polygon, 1 mm within it, stays 1 mm away from every wall."""
     result = boebot.run(brain, robot=angular, arena=arena, on="native", seconds=40, seed=2)
     truth = result.truth
-    assert truth is not None and not result.error and result.distance > 0.5
-    assert brain is not ahead or (result.contacts and truth.contact.sum() > 100)
+    assert truth is not None and not result.error and (result.true_distance or 0.0) > 0.5
+    assert brain is not ahead or (result.true_contacts and truth.contact.sum() > 100)
     core = shapely.Polygon(result.robot.body.outline_m).buffer(-1e-3, join_style="mitre")
     rings = {"outline": shapely.LinearRing, "obstacle": shapely.LinearRing, "wall": shapely.LineString}
     edges = shapely.union_all([rings[solid.kind](solid.points) for solid in truth.plan.solids])

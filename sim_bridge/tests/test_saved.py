@@ -75,7 +75,7 @@ def all_of(sim: Sim) -> str:
     heap = hashlib.sha256(repr((sim.cycle, sim.hash())).encode())
     for robot in sim.robots:
         pins = BoardPins(robot)
-        heap.update(repr((pins.counters(), pins.brown_outs(), robot.contacts, robot.pack_voltage)).encode())
+        heap.update(repr((pins.counters(), pins.brown_outs(), robot.true_contacts, robot.pack_voltage)).encode())
         log = pins.pin_log()
         heap.update(pins.read_eeprom() + log["cycle"].tobytes() + log["pin"].tobytes() + log["level"].tobytes())
         for table in (robot.truth(), robot.looks(), robot.tones()):

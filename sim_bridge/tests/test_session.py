@@ -81,8 +81,8 @@ def test_it_drives_straight_and_records_it(session: SimSession) -> None:
     assert truth.time[-1] == pytest.approx(session.transport.now(), abs=0.02)
     assert not truth.contact.any()
     counters = session.counters()
-    assert counters["distance"] == pytest.approx(np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005)
-    assert counters["contacts"] == 0
+    assert counters["true_distance_m"] == pytest.approx(np.hypot(np.diff(truth.x), np.diff(truth.y)).sum(), abs=0.005)
+    assert counters["true_contacts"] == 0
     assert counters["bytes_in"] > 0 and counters["overruns"] == 0
 
 

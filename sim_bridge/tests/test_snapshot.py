@@ -365,7 +365,7 @@ def test_a_spoilt_state_with_the_right_checksum_is_refused_or_goes_on_in_numbers
     for _ in range(20):
         vehicle.step(0.5, -0.3)
     assert vehicle.ended in ("", "collision", "battery empty", "brain failed")
-    assert all(map(math.isfinite, (*vehicle.pose, vehicle.time, *vehicle.readings)))
+    assert all(map(math.isfinite, (*vehicle.true_pose, vehicle.time, *vehicle.readings)))
 
 
 def test_a_state_of_a_batch_is_one_of_a_vehicle() -> None:

@@ -373,10 +373,10 @@ def test_odometer_and_sampling_of_a_vehicle() -> None:
         vehicle = Vehicle(vehicle_model(robot, without=("compass_noise", *without)), arena_of())
         for _ in range(100):
             vehicle.step(0.5, 0.5)
-        off = math.hypot(vehicle["odometer"][0] - vehicle.pose[0], vehicle["odometer"][1] - vehicle.pose[1])
+        off = math.hypot(vehicle["odometer"][0] - vehicle.true_pose[0], vehicle["odometer"][1] - vehicle.true_pose[1])
         for _ in range(30):
             vehicle.step(0.4, 0.6)
-        return off, abs(vehicle["compass"] - vehicle.pose[2])
+        return off, abs(vehicle["compass"] - vehicle.true_pose[2])
 
     off, late = errors()
     assert off > 1e-3 and late > 1e-2

@@ -99,7 +99,7 @@ def simulated(motor: dict[str, float], dt: float) -> Any:
     for left, right in PHASES:
         for _ in range(round(PHASE_S / dt)):
             vehicle.step(left, right)
-    x, y, heading = vehicle.pose
+    x, y, heading = vehicle.true_pose
     return np.array([*vehicle.currents, vehicle.body.speed, vehicle.body.turn_rate, heading, x, y])
 
 
@@ -161,7 +161,7 @@ def test_without_inductance_full_and_quasi_static_are_one() -> None:
     for step in range(200):
         for vehicle in (a, b):
             vehicle.step(0.5 + 0.4 * math.sin(step / 20), 0.6)
-        assert a.pose == b.pose
+        assert a.true_pose == b.true_pose
 
 
 def test_current_of_a_full_motor_rises_with_its_time_constant_and_that_of_the_other_at_once() -> None:
@@ -210,7 +210,7 @@ def test_saved_state_and_hash_carry_the_current() -> None:
     quiet.step(0.001, 0.001)  # Coulomb friction holds it: nothing but time, signals and current is new
     other = Vehicle(driven(0.01, SLOW | {"inductance_h": 0.06}), load_arena("arsim"), seed=3)
     other.step(0.001, 0.001)
-    assert quiet.pose == other.pose and quiet.hash() not in (before, other.hash())
+    assert quiet.true_pose == other.true_pose and quiet.hash() not in (before, other.hash())
     with pytest.raises(SavedStateError, match="saved by another model"):
         Vehicle(driven(0.01, SLOW, full=False), load_arena("arsim")).restore(state)
 
@@ -266,7 +266,7 @@ def test_limited_regulated_motors_against_an_integrator() -> None:
         vehicle = Vehicle(regulated(gain, dt, most), arena_of())
         for step in range(round(2 / dt)):
             vehicle.step(*((1.0, 0.5) if step * dt < 1 - 1e-9 else (-0.5, 1.0)))
-        x, y, heading = vehicle.pose
+        x, y, heading = vehicle.true_pose
         errors.append(np.abs(np.array([vehicle.body.speed, vehicle.body.turn_rate, heading, x, y]) - truth))
     assert errors[0].max() < 0.02 and errors[2].max() < 0.3 * errors[0].max()
     assert truth[0] == pytest.approx(0.075, abs=0.01), "close to its reference by then"
@@ -303,7 +303,7 @@ def test_a_file_says_full_and_regulated(tmp_path: Path) -> None:
     for vehicle in (by_file, by_hand):
         for _ in range(100):
             vehicle.step(0.5, 0.8)
-    assert by_file.pose == by_hand.pose and by_file.currents == by_hand.currents
+    assert by_file.true_pose == by_hand.true_pose and by_file.currents == by_hand.currents
 
     motor = 'type = "regulated_motor"\ngain_n_s = 2.0'
     file = variant(

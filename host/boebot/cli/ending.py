@@ -11,7 +11,7 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.running import interrupts
 from boebot.view import IncompleteError
 
-HEADER = ("robot", "distance (m)", "contacts", "whisker touches", "late steps", "resets", "brain")
+HEADER = ("robot", "true distance (m)", "true contacts", "whisker touches", "late steps", "resets", "brain")
 
 
 class InterruptedRunError(BoebotError):
@@ -41,7 +41,9 @@ def _rows(result: TogetherResult) -> list[tuple[str, ...]]:
     rows = []
     for number, robot in enumerate(result.robots, 1):
         table = robot.table()
-        figures = (table[name] for name in ("distance_m", "contacts", "whisker_touches", "late_steps", "resets"))
+        figures = (
+            table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches", "late_steps", "resets")
+        )
         ended = "complete" if robot.error is None else "ended early"
         rows.append((f"{number}  {robot.robot.name}", *map(str, figures), f"{robot.brain}, {ended}"))
     return rows

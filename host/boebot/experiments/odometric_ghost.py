@@ -41,6 +41,7 @@ def ghost(trial: Straight) -> tuple[float, float, float]:
 def ghost_path(trial: Straight) -> NDArray[np.float64]:
     """The ghost's way (m), shape (n, 2): by odometry from the robot's readings, with that wheel factor."""
     estimate = trial.result.odometry
+    assert estimate is not None
     if trial.result.layout is not None:  # the odometer's own: it has the factor
         return np.column_stack((estimate.x, estimate.y))
     left, right = trial.result.telemetry.wheel_travel
@@ -103,6 +104,7 @@ def arc_error(believed: float, track_width: float) -> float:
 def judge_notes(trial: Straight) -> list[Measured]:
     """What is asked, and the closed form."""
     odometer = trial.result.odometry
+    assert odometer is not None
     expected = arc_error(math.hypot(*ghost(trial)[:2]), trial.result.robot.body.track_width_m)
     return [
         Measured("error of the estimate at the end", error(trial), "m", least=0.01),

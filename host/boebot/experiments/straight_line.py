@@ -91,14 +91,15 @@ def drive(
 
 def columns(trial: Straight) -> dict[str, NDArray[np.float64]]:
     """A run's data."""
-    series = trial.result.series
+    series, estimate = trial.result.series, trial.result.placed_odometry
+    assert estimate is not None
     return {
         "time_s": trial.time,
-        "x_m": trial.path[:, 0],
-        "y_m": trial.path[:, 1],
-        "distance_m": trial.distances,
-        "believed_x_m": trial.result.odometry.x,
-        "believed_y_m": trial.result.odometry.y,
+        "true_x_m": trial.path[:, 0],
+        "true_y_m": trial.path[:, 1],
+        "true_distance_m": trial.distances,
+        "odometry_x_m": estimate.x,
+        "odometry_y_m": estimate.y,
         "signal_left": series.signals[0],
         "signal_right": series.signals[1],
     }

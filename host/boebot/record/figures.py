@@ -1,4 +1,5 @@
-"""Figures by name as people read them: "distance_m" is "distance", in "m". For tables in terminals and in notebooks."""
+"""Figures by name as people read them: "true_distance_m" is "true distance", in "m". For tables in terminals and in
+notebooks."""
 
 from __future__ import annotations
 
@@ -18,6 +19,11 @@ def rows(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             match = _UNIT.search(name)
             unit = _UNITS.get(match[1], match[1]) if match else ""
             yield _UNIT.sub("", name).replace("_", " "), text(value), unit
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """ "1 contact", "2 contacts"."""
+    return f"{number} {one if number == 1 else many}"
 
 
 def text(value: Any) -> str:

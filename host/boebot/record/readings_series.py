@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,21 +42,13 @@ class ReadingsSeries(Series):
         """See `Series`."""
         return self.raw["left"], self.raw["right"]
 
-    def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
-        """See `Series`: the odometer's own estimate, laid off from `start`; without one it stays there."""
-        x0, y0, heading0 = start
+    def odometry(self) -> Pose:
+        """See `Series`: the odometer's own estimate; without one it stays there."""
         if "odometer" not in self._layout or not len(self):
-            return Pose(*(np.full(len(self), value) for value in start))
+            return Pose(*np.zeros((3, len(self))))
         x, y, heading = self.values("odometer").T
-        turn = heading0 - heading[0]
-        cosine, sine = math.cos(turn), math.sin(turn)
-        dx, dy = x - x[0], y - y[0]
-        turned = heading + turn
-        return Pose(
-            x0 + cosine * dx - sine * dy,
-            y0 + sine * dx + cosine * dy,
-            np.arctan2(np.sin(turned), np.cos(turned)),
-        )
+        start = float(heading[0])
+        return Pose(x - x[0], y - y[0], heading).placed(0.0, 0.0, -start)
 
     def _own_columns(self) -> list[Column]:
         """See `Series`."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
+from boebot.former_names import CONTACTS, DISTANCE, Figures, FormerNames
 from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, EventKind, Identity, Status
 from boebot.record import figures
 from boebot.record.brain_record import BrainRecord
+from boebot.record.figures import counted
 from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record
 from boebot.record.series import Pose, Series, onsets, touch_indices, truth_at
@@ -28,7 +31,7 @@ from boebot.running import hangs
 
 
 @dataclass(kw_only=True, repr=False)
-class RunResult:
+class RunResult(FormerNames):
     """What came of a run. Lengths in metres, times in seconds.
 
     Attributes:
@@ -56,6 +59,8 @@ class RunResult:
         layout: of a robot without a board: where the readings of each of its devices stand.
         brain_record: of a brain of processes: its steps and switches; None: a brain of another kind.
     """
+
+    FORMER: ClassVar = {"distance": DISTANCE, "contacts": CONTACTS}
 
     brain: str
     robot: RobotDescription
@@ -104,12 +109,26 @@ class RunResult:
         parts = [
             f"{self.brain} on {self.robot.name} ({self.board})" + (f" in {where}" if where else ""),
             f"{self.run_time:.1f} s",
-            f"{self.distance:.2f} m" if self.has_path else "way unknown",
-            f"{self.contacts} contact" + ("" if self.contacts == 1 else "s"),
+            *self.way_in_words(),
             f"seed {self.seed}",
             "complete" if self.error is None else f"ended early: {textwrap.shorten(_why(self.error), 120)}",
         ]
         return ", ".join(parts)
+
+    def way_in_words(self) -> list[str]:
+        """How far it went and what it touched, in a few words. The distance is the true one where a simulator knows it,
+        else that by odometry."""
+        if self.true_distance is not None:
+            parts = [f"true distance {self.true_distance:.2f} m"]
+        elif self.odometry_distance is not None:
+            parts = [f"odometry distance {self.odometry_distance:.2f} m"]
+        else:
+            parts = ["distance unknown"]
+        if self.true_contacts is not None:
+            parts.append(counted(self.true_contacts, "true contact", "true contacts"))
+        if self.whisker_touches is not None:
+            parts.append(counted(self.whisker_touches, "whisker touch", "whisker touches"))
+        return parts
 
     # ---- arrays --------------------------------------------------------------------------------------------
 
@@ -133,12 +152,10 @@ class RunResult:
         return truth_at(self.truth, self.series.time + self.clock_offset)
 
     @cached_property
-    def odometry(self) -> Pose:
-        """The pose estimate from encoders and commands at each of those ticks, calibrated once at the start."""
-        pose = self.true_pose
-        if pose is None:
-            return self.series.odometry()
-        return self.series.odometry((float(pose.x[0]), float(pose.y[0]), float(pose.heading[0])))
+    def odometry(self) -> Pose | None:
+        """Where the robot is by encoders or odometer at each of those ticks, as seen from where the run began: there it
+        is at 0, 0 and heads along x. None: it has neither."""
+        return self.series.odometry() if self.has_odometry else None
 
     @property
     def bytes_from_board(self) -> bytes:
@@ -153,23 +170,29 @@ class RunResult:
     # ---- figures -------------------------------------------------------------------------------------------
 
     @cached_property
-    def distance(self) -> float:
-        """Path length of the robot's centre: the true one where somebody knows it, else by odometry (m)."""
-        pose = self.odometry if self.true_pose is None else self.true_pose
-        return float(np.hypot(np.diff(pose.x), np.diff(pose.y)).sum())
+    def true_distance(self) -> float | None:
+        """True path length of the robot's centre (m); None: no simulator knows it."""
+        return None if self.true_pose is None else self.true_pose.length
 
     @cached_property
-    def contacts(self) -> int:
-        """How many times the body came to touch something; on a real robot, a whisker."""
-        if self.truth is not None and len(self.series):
-            begin, end = self.clock_offset, self.clock_offset + float(self.series.time[-1])
-            inside = (self.truth.time >= begin) & (self.truth.time <= end)
-            return len(touch_indices(self.truth.time[inside], self.truth.contact[inside]))
-        return self.whisker_touches
+    def odometry_distance(self) -> float | None:
+        """Path length of the robot's centre by its encoders or odometer (m); None: it has neither."""
+        return None if self.odometry is None else self.odometry.length
 
     @cached_property
-    def whisker_touches(self) -> int:
-        """How many times a whisker was pressed."""
+    def true_contacts(self) -> int | None:
+        """How many times the body came to touch something, 0.1 s apart at least; None: no simulator knows it."""
+        if self.truth is None or not len(self.series):
+            return None
+        begin, end = self.clock_offset, self.clock_offset + float(self.series.time[-1])
+        inside = (self.truth.time >= begin) & (self.truth.time <= end)
+        return len(touch_indices(self.truth.time[inside], self.truth.contact[inside]))
+
+    @cached_property
+    def whisker_touches(self) -> int | None:
+        """How many times a whisker was pressed; None: the robot has none."""
+        if not self.whiskers:
+            return None
         return sum(onsets(self.series.flag(whisker)) for whisker in self.whiskers)
 
     @property
@@ -205,18 +228,20 @@ class RunResult:
         """Names of the robot's whiskers."""
         return [name for name, device in self.robot.device.items() if device.on and device.READING is Whisker]
 
-    @property
-    def has_path(self) -> bool:
-        """Somebody knows where the robot went: the simulator, or the robot by its odometry."""
-        return self.has_odometry or self.true_pose is not None
+    @cached_property
+    def placed_odometry(self) -> Pose | None:
+        """The odometry as it lies in the arena, from the true pose at the start; None: there is no truth, or no
+        odometry."""
+        if self.true_pose is None or self.odometry is None:
+            return None
+        return self.odometry.placed(*self.true_pose.at(0))
 
     @cached_property
     def odometry_error(self) -> float | None:
-        """Distance of the estimate from the true place at the end (m), where somebody knows it and the robot has what
-        an estimate needs."""
-        if self.true_pose is None or not self.has_odometry:
+        """Distance of the estimate from the true place at the end (m); None: there is no truth, or no odometry."""
+        if self.true_pose is None or self.placed_odometry is None:
             return None
-        return float(np.hypot(self.odometry.x[-1] - self.true_pose.x[-1], self.odometry.y[-1] - self.true_pose.y[-1]))
+        return math.dist(self.placed_odometry.at(-1)[:2], self.true_pose.at(-1)[:2])
 
     @property
     def real_time_factor(self) -> float:
@@ -235,49 +260,53 @@ class RunResult:
         known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
         return float(known.max()) if len(known) else None
 
-    def table(self) -> dict[str, float | int | str | None]:
-        """The run's figures by name, units in the names; None: not known, or nothing that this robot has."""
+    def table(self) -> Figures:
+        """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
+        has."""
         on_board = self.layout is None
         slow_age, identity, brain = self.slow_reading_age, self.identity, self.brain_record
         shares = {} if brain is None else brain.shares(self.run_time)
-        return {
-            "brain": self.brain,
-            "robot": self.robot.name,
-            "board": self.board,
-            "arena": (self.truth.plan.name if self.truth is not None else self.arena),
-            "seed": self.seed,
-            "without": ", ".join(self.without) or None,
-            "run_time_s": round(self.run_time, 3),
-            "distance_m": round(self.distance, 3) if self.has_path else None,
-            "contacts": self.contacts if self.truth is not None or self.whiskers else None,
-            "whisker_touches": self.whisker_touches if self.whiskers else None,
-            "odometry": self.odometry_source,
-            "odometry_error_m": None if self.odometry_error is None else round(self.odometry_error, 3),
-            "period_ms": round(self.period * 1000, 3),
-            "steps": self.steps,
-            "late_steps": self.late_steps,
-            "long_steps": self.long_steps,
-            "longest_step_ms": round(self.longest_step * 1000, 3),
-            "unrealisable": self.unrealisable,
-            "behavior_switches": None if brain is None else len(brain.behavior_switches),
-            **{f"{name}_share": round(share, 4) for name, share in shares.items()},
-            "ticks": self.ticks,
-            "slow_readings": None if slow_age is None else len(self.record.rows(DevicesTelemetry.NAME)),
-            "slow_reading_age_ms": None if slow_age is None else round(slow_age * 1000, 3),
-            "lost_frames": self.lost_frames if on_board else None,
-            "bad_frames": self.bad_frames if on_board else None,
-            "overruns": self.overruns if on_board else None,
-            "dead_man_stops": self.dead_man_stops if on_board else None,
-            "fallback_takeovers": self.fallback_takeovers if on_board else None,
-            "resets": self.resets if on_board else None,
-            "sessions_lost": self.sessions_lost if on_board else None,
-            "hung_at": hangs.places(self.watchdog_resets),
-            "real_time_factor": round(self.real_time_factor, 2),
-            "firmware": None if identity is None else text(identity.firmware_version),
-            "compiler": None if identity is None else text(identity.compiler),
-            "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
-            "ended": "complete" if self.error is None else _why(self.error),
-        }
+        return Figures(
+            {
+                "brain": self.brain,
+                "robot": self.robot.name,
+                "board": self.board,
+                "arena": (self.truth.plan.name if self.truth is not None else self.arena),
+                "seed": self.seed,
+                "without": ", ".join(self.without) or None,
+                "run_time_s": round(self.run_time, 3),
+                "true_distance_m": _rounded(self.true_distance, 3),
+                "odometry_distance_m": _rounded(self.odometry_distance, 3),
+                "true_contacts": self.true_contacts,
+                "whisker_touches": self.whisker_touches,
+                "odometry_source": self.odometry_source,
+                "odometry_error_m": _rounded(self.odometry_error, 3),
+                "period_s": round(self.period, 6),
+                "steps": self.steps,
+                "late_steps": self.late_steps,
+                "long_steps": self.long_steps,
+                "longest_step_s": round(self.longest_step, 6),
+                "unrealisable": self.unrealisable,
+                "behavior_switches": None if brain is None else len(brain.behavior_switches),
+                **{f"{name}_share": round(share, 4) for name, share in shares.items()},
+                "ticks": self.ticks,
+                "slow_readings": None if slow_age is None else len(self.record.rows(DevicesTelemetry.NAME)),
+                "slow_reading_age_s": _rounded(slow_age, 6),
+                "lost_frames": self.lost_frames if on_board else None,
+                "bad_frames": self.bad_frames if on_board else None,
+                "overruns": self.overruns if on_board else None,
+                "dead_man_stops": self.dead_man_stops if on_board else None,
+                "fallback_takeovers": self.fallback_takeovers if on_board else None,
+                "resets": self.resets if on_board else None,
+                "sessions_lost": self.sessions_lost if on_board else None,
+                "hung_at": hangs.places(self.watchdog_resets),
+                "real_time_factor": round(self.real_time_factor, 2),
+                "firmware": None if identity is None else text(identity.firmware_version),
+                "compiler": None if identity is None else text(identity.compiler),
+                "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
+                "ended": "complete" if self.error is None else _why(self.error),
+            }
+        )
 
     # ---- files ---------------------------------------------------------------------------------------------
 
@@ -321,6 +350,10 @@ class TogetherResult:
         from boebot.view import save_together
 
         return save_together(self, Path(folder))
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)
 
 
 def _why(error: BaseException) -> str:

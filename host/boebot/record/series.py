@@ -37,6 +37,25 @@ class Pose:
     heading: Floats
     """rad, counter-clockwise from the x axis"""
 
+    def at(self, index: int) -> tuple[float, float, float]:
+        """x (m), y (m), heading (rad) of one of them."""
+        return float(self.x[index]), float(self.y[index]), float(self.heading[index])
+
+    @property
+    def length(self) -> float:
+        """Of the path (m)."""
+        return float(np.hypot(np.diff(self.x), np.diff(self.y)).sum())
+
+    def placed(self, x: float, y: float, heading: float) -> Pose:
+        """The same path moved and turned: what is 0, 0, 0 here comes to that pose (m, m, rad)."""
+        cosine, sine = np.cos(heading), np.sin(heading)
+        turned = self.heading + heading
+        return Pose(
+            x + cosine * self.x - sine * self.y,
+            y + sine * self.x + cosine * self.y,
+            np.arctan2(np.sin(turned), np.cos(turned)),
+        )
+
 
 class Series(Run, ABC):
     """What the robot sent, and what was asked of it.
@@ -70,8 +89,8 @@ class Series(Run, ABC):
         return 0
 
     @abstractmethod
-    def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
-        """The pose estimate at each tick, from `start` (x m, y m, heading rad) at the first."""
+    def odometry(self) -> Pose:
+        """The pose estimate at each tick, as seen from the first: there it is 0, 0, 0."""
 
     @abstractmethod
     def _own_columns(self) -> list[Column]:

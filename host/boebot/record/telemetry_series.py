@@ -86,10 +86,10 @@ class TelemetrySeries(Series):
         supply = np.where(self.raw["supply"] > 0, self.raw["supply"] / 1000, np.nan)
         return [*super().readouts(), Readout("supply", "V", 2, supply, np.zeros(len(self)))]
 
-    def odometry(self, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Pose:
-        """The pose estimate at each tick, from `start` (x m, y m, heading rad) at the first."""
+    def odometry(self) -> Pose:
+        """See `Series`: by the encoders; without them it stays there."""
         left, right = self.wheel_travel
-        estimate = Odometry(self._robot.body.track_width_m, *start)
+        estimate = Odometry(self._robot.body.track_width_m)
         poses = np.empty((3, len(self)))
         for index in range(len(self)):
             if left[index] or right[index]:

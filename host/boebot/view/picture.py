@@ -1,4 +1,4 @@
-"""run.png: the run seen from above. Arena, true path, odometric estimate, contacts, the robot at start and end with
+"""run.png: the run seen from above. Arena, true path, path by odometry, true contacts, the robot at start and end with
 what its sensors look at. What the robot does not have is neither drawn nor named. Of a brain of processes, the path has
 the colour of the active motor behavior, and its utilities stand below."""
 
@@ -12,10 +12,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Affine2D
 
+from boebot.record.figures import counted
 from boebot.view import scene, style, utility_panel
 from boebot.view.arena_drawing import draw_arena, legend_entries
 from boebot.view.robot_drawing import body_patch, draw_robot
-from boebot.view.sheet import Sheet, counted
+from boebot.view.sheet import Sheet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,7 +39,7 @@ def write(result: RunResult, path: Path) -> Path:
     low, high = scene.bounds(view)
     record = result.brain_record if result.brain_record is not None and result.brain_record.steps else None
     rows = utility_panel.legend_rows(record) if record is not None else 0
-    sheet = Sheet(low, high, _title(result, view), _caption(result, view), _legend(result, view), rows)
+    sheet = Sheet(low, high, _title(result, view), _caption(result), _legend(result, view), rows)
     axes = sheet.axes
     draw_arena(axes, view.plan)
     if record is None:
@@ -98,9 +99,15 @@ def draw_marks(axes: Axes, view: scene.View) -> None:
         axes.scatter(
             view.touches[:, 0], view.touches[:, 1], s=30, marker="o", fc=style.FLOOR, ec=style.TOUCH, lw=1.6, zorder=9
         )
-    if len(view.contacts):
+    if len(view.true_contacts):
         axes.scatter(
-            view.contacts[:, 0], view.contacts[:, 1], s=46, marker="x", color=style.CONTACT, lw=1.9, zorder=9.5
+            view.true_contacts[:, 0],
+            view.true_contacts[:, 1],
+            s=46,
+            marker="x",
+            color=style.CONTACT,
+            lw=1.9,
+            zorder=9.5,
         )
 
 
@@ -109,16 +116,8 @@ def _title(result: RunResult, view: scene.View) -> str:
     return f"{result.brain} on {result.robot.name} ({result.board}){where}"
 
 
-def _caption(result: RunResult, view: scene.View) -> list[str]:
-    parts = [f"{result.run_time:.1f} s"]
-    if view.path_is_seen:
-        parts.append(f"{result.distance:.2f} m")
-    else:
-        parts.append("nobody knows where it went: it has nothing to measure its way with")
-    if view.known:
-        parts.append(counted(result.contacts, "contact", "contacts"))
-    if view.has_whiskers:
-        parts.append(counted(result.whisker_touches, "whisker touch", "whisker touches"))
+def _caption(result: RunResult) -> list[str]:
+    parts = [f"{result.run_time:.1f} s", *result.way_in_words()]
     if (error := result.odometry_error) is not None:
         parts.append(f"odometry off by {error:.2f} m at the end")
     parts.append(f"seed {result.seed}")
@@ -137,13 +136,13 @@ def _legend(result: RunResult, view: scene.View) -> list[Artist]:
     if view.path_is_seen:
         entries.append(Line2D([], [], color=style.behavior(0) if composed else "#3b8a8c", lw=2.4, label=said))
     if view.estimate is not None:
-        entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="odometric estimate"))
+        entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="path by odometry"))
     for label, colour in (("start", style.START), ("end", style.END)):
         entries.append(Line2D([], [], ls="", marker="o", mfc=style.BODY, mec=colour, mew=1.8, ms=8, label=label))
     if len(view.touches):
         entries.append(
             Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
         )
-    if len(view.contacts):
-        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="body contact"))
+    if len(view.true_contacts):
+        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="true contact"))
     return entries + legend_entries(view.plan)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from boebot.record.result import RunResult
     from boebot.record.series import Floats, Pose
 
-FORMAT = 5
+FORMAT = 6
 FRAMES_AT_MOST = 20_000
 STEPS_AT_MOST = 6_000  # of a brain of processes
 _PAGE = Path(__file__).with_name("replay_page.html")
@@ -117,7 +117,8 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "begin": result.clock_offset,
         "known": view.known,
         "table": result.table(),
-        "contacts": np.round(view.contacts, 4).tolist(),
+        "way": result.way_in_words(),
+        "true_contacts": np.round(view.true_contacts, 4).tolist(),
         "touches": np.round(view.touches, 4).tolist(),
         "robot": _robot(result.robot),
         "time": _array(series.time[thin]),

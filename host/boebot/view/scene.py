@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.record.series import touch_indices
+from boebot.record.series import Pose, touch_indices
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
     from boebot.devices.drawing import Shape
     from boebot.record.result import RunResult
-    from boebot.record.series import Bools, Floats, Pose
+    from boebot.record.series import Bools, Floats
 
 MARGIN = 0.03  # of the greater side
 OPEN_M = 0.3  # to see around a path in an open field, at least
@@ -30,18 +30,17 @@ class View:
     """A run seen from above; lengths in metres."""
 
     known: bool
-    """The truth is known, and `path` is it; otherwise `path` is the odometric estimate."""
+    """The truth is known, and `path` is it; otherwise `path` is the odometric estimate; without that it is zeros."""
     path: Pose
     estimate: Pose | None
-    """None without the truth, which it is compared with, or without encoders or odometer."""
+    """Laid on the true start; None without the truth, which it is compared with, or without encoders or odometer."""
     plan: FloorPlan
-    contacts: Floats
+    true_contacts: Floats
     """Where the body came to touch something, shape (n, 2)."""
     touches: Floats
     """Where the robot was when a whisker was pressed, shape (n, 2)."""
     turret: Floats
     """Its angle (rad) at each tick; 0 without one, or while it is free."""
-    has_whiskers: bool
     path_is_seen: bool
     """Somebody knows where the robot went: the simulator, or its odometry."""
 
@@ -54,7 +53,8 @@ def view(result: RunResult) -> View:
     """The run as the pictures show it."""
     truth, series = result.truth, result.series
     known = truth is not None and result.true_pose is not None
-    path = result.true_pose if result.true_pose is not None else result.odometry
+    seen = result.true_pose if result.true_pose is not None else result.odometry
+    path = seen if seen is not None else Pose(*np.zeros((3, len(series))))
     contacts = np.empty((0, 2))
     if truth is not None and known:
         inside = truth.time >= result.clock_offset
@@ -65,13 +65,12 @@ def view(result: RunResult) -> View:
     return View(
         known=known,
         path=path,
-        estimate=result.odometry if known and result.has_odometry else None,
+        estimate=result.placed_odometry,
         plan=truth.plan if truth is not None else FloorPlan(),
-        contacts=contacts,
+        true_contacts=contacts,
         touches=touches,
         turret=np.nan_to_num(series.number("turret"), nan=0.0),
-        has_whiskers=bool(result.whiskers),
-        path_is_seen=known or result.has_odometry,
+        path_is_seen=seen is not None,
     )
 
 

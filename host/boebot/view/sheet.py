@@ -116,8 +116,3 @@ def _wrapped(parts: Sequence[str]) -> list[str]:
         else:
             lines.append(part)
     return lines
-
-
-def counted(number: int, one: str, many: str) -> str:
-    """ "1 contact", "2 contacts"."""
-    return f"{number} {one if number == 1 else many}"

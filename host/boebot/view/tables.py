@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
 
-FORMAT = 2  # of a run's files; CHANGELOG.md says what is new in each
+FORMAT = 3  # of a run's files; CHANGELOG.md says what is new in each
 
 
 def columns(result: RunResult) -> dict[str, list[str]]:
@@ -29,10 +29,13 @@ def columns(result: RunResult) -> dict[str, list[str]]:
         "command": list(kinds),
         "command_left": [f"{value:.4f}" for value in left],
         "command_right": [f"{value:.4f}" for value in right],
-        "odometry_x_m": _cells(estimate.x, 5),
-        "odometry_y_m": _cells(estimate.y, 5),
-        "odometry_heading_rad": _cells(estimate.heading, 5),
     }
+    if estimate is not None:
+        table |= {
+            "odometry_x_m": _cells(estimate.x, 5),
+            "odometry_y_m": _cells(estimate.y, 5),
+            "odometry_heading_rad": _cells(estimate.heading, 5),
+        }
     true = result.true_pose
     if true is not None and result.truth is not None:
         moment = np.searchsorted(result.truth.time, series.time + result.clock_offset)
@@ -41,7 +44,7 @@ def columns(result: RunResult) -> dict[str, list[str]]:
             "true_x_m": _cells(true.x, 5),
             "true_y_m": _cells(true.y, 5),
             "true_heading_rad": _cells(true.heading, 5),
-            "contact": _cells(contact),
+            "true_contact": _cells(contact),
         }
     return table
 

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from matplotlib.lines import Line2D
 
+from boebot.record.figures import counted
 from boebot.view import scene, style
 from boebot.view.arena_drawing import draw_arena, legend_entries
 from boebot.view.picture import draw_marks
 from boebot.view.robot_drawing import draw_robot
-from boebot.view.sheet import Sheet, counted
+from boebot.view.sheet import Sheet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,8 +52,8 @@ def _title(result: TogetherResult) -> str:
 def _caption(result: TogetherResult) -> list[str]:
     parts = [
         f"{max(robot.run_time for robot in result.robots):.1f} s",
-        f"{sum(robot.distance for robot in result.robots):.2f} m in all",
-        counted(sum(robot.contacts for robot in result.robots), "contact", "contacts"),
+        f"true distance {sum(robot.true_distance or 0.0 for robot in result.robots):.2f} m in all",
+        counted(sum(robot.true_contacts or 0 for robot in result.robots), "true contact", "true contacts"),
     ]
     if result.error is not None:
         parts.append("ended early")
@@ -71,6 +72,6 @@ def _legend(shown: list[Shown]) -> list[Artist]:
         entries.append(
             Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
         )
-    if any(len(view.contacts) for _, _, view in shown):
-        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="body contact"))
+    if any(len(view.true_contacts) for _, _, view in shown):
+        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="true contact"))
     return entries + legend_entries(shown[0][2].plan)
