@@ -186,7 +186,7 @@ def test_poses_from_commands_are_marked_as_such(robot: str, source: str) -> None
     assert result.odometry_source == result.table()["odometry_source"] == source
     assert boebot.run(Brain([Wander()]), robot=robot, seconds=0.1).table()["odometry_source"] is None
     asleep = Odometry(utility=Utility(b=-1.0))
-    assert boebot.run(Brain([Wander(), asleep]), robot=robot, seconds=0.1).table()["odometry"] is None
+    assert boebot.run(Brain([Wander(), asleep]), robot=robot, seconds=0.1).table()["odometry_source"] is None
 
 
 def test_poses_from_commands_are_those_of_ideal_wheels() -> None:

@@ -202,8 +202,8 @@ def _outcome(one: Journey, measured: list[Measured]) -> Outcome:
     data = {
         "time_s": (steps * PERIOD)[shown],
         "phase": phase[shown],
-        "x_m": one.x[shown],
-        "y_m": one.y[shown],
+        "true_x_m": one.x[shown],
+        "true_y_m": one.y[shown],
         "home_x_m": one.vector[shown, 0],
         "home_y_m": one.vector[shown, 1],
     }

@@ -91,5 +91,5 @@ def wood_louse(seed: int, progress: Progress) -> Outcome:
         beside.set(xlabel="time (min)", ylabel="humid share of the time so far", ylim=(0.5, 1))
         beside.legend(loc="lower right", fontsize=9, frameon=False)
 
-    data = {"time_s": time[along], "x_m": x[along], "y_m": y[along], "share": share[along]}
+    data = {"time_s": time[along], "true_x_m": x[along], "true_y_m": y[along], "share": share[along]}
     return Outcome(measured, data, draw)

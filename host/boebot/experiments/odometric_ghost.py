@@ -167,8 +167,8 @@ def shieldbot_ghosts(seed: int, progress: Progress) -> Outcome:
         trials.append(drive(brain, "shieldbot", 14.0, trial_seed, "native"))
     data = {
         "seed": list(seeds),
-        "x_m": [trial.end[0] for trial in trials],
-        "y_m": [trial.end[1] for trial in trials],
+        "true_x_m": [trial.end[0] for trial in trials],
+        "true_y_m": [trial.end[1] for trial in trials],
         "believed_x_m": [ghost(trial)[0] for trial in trials],
         "believed_y_m": [ghost(trial)[1] for trial in trials],
         "error_m": [error(trial) for trial in trials],

@@ -148,8 +148,8 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
     poses = [trial.start for trial in done]
     data = {
         "seed": list(trial_seeds(seed, len(done))),
-        "x_m": [x for x, _, _ in poses],
-        "y_m": [y for _, y, _ in poses],
+        "true_x_m": [x for x, _, _ in poses],
+        "true_y_m": [y for _, y, _ in poses],
         "heading_rad": [heading for _, _, heading in poses],
         "time_s": times,
     }

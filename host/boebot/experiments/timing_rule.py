@@ -70,8 +70,8 @@ def timing_rule(seed: int, progress: Progress) -> Outcome:
     data = {
         "sensors": [count for count, _ in events],
         "event": [event.name for _, event in events],
-        "begins_ms": [event.begin * 1000 for _, event in events],
-        "ends_ms": [event.end * 1000 for _, event in events],
+        "begins_s": [event.begin for _, event in events],
+        "ends_s": [event.end for _, event in events],
     }
     return Outcome(measured, data, draw)
 

@@ -90,15 +90,15 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
         Measured("turns about the room", float(turns[-1]), least=1.0),
         Measured("least distance from a wall", float(distance.min()), "m", least=least),
         Measured("greatest distance", float(distance.max()), "m", most=most),
-        Measured("contacts", float(truth.contact.sum()), most=0.0),
+        Measured("true contacts", float(result.true_contacts or 0), most=0.0),
     ]
     shown = slice(None, None, max(1, len(time) // 2000))
     data = {
         "time_s": time[shown],
-        "x_m": x[shown],
-        "y_m": y[shown],
-        "heading_rad": truth.heading[shown],
-        "distance_m": distance[shown],
+        "true_x_m": x[shown],
+        "true_y_m": y[shown],
+        "true_heading_rad": truth.heading[shown],
+        "true_distance_from_wall_m": distance[shown],
     }
 
     def draw(figure: Figure) -> None:

@@ -175,7 +175,7 @@ def _data(done: list[Trial], seed: int) -> dict[str, object]:
     return {
         "seed": list(trial_seeds(seed, len(done))),
         "first_contact_s": [trial.first_contact for trial in done],
-        "way_m": [trial.way for trial in done],
+        "true_distance_m": [trial.way for trial in done],
         "times_avoided": [trial.times_on("avoid") for trial in done],
     }
 
@@ -210,7 +210,7 @@ def _avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
     def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2)
         draw_paths(left, done)
-        left.set_title(f"{len(done)} paths of {setting.seconds:g} s, contacts ×")
+        left.set_title(f"{len(done)} paths of {setting.seconds:g} s, true contacts ×")
         _draw_activity(right, done[0])
 
     return Outcome(judge_avoiding(done), _data(done, seed), draw)
