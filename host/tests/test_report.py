@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import csv
+import dataclasses
 import json
+import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -56,6 +58,45 @@ def test_table_counts_what_happened(result: RunResult) -> None:
     assert table["ticks"] == 3001 and table["steps"] == 600
     assert table["ended"] == "complete"
     assert table["image_hash"] is None, "a board without flash has no image"
+
+
+def test_what_only_a_simulator_knows_is_none_without_one(result: RunResult) -> None:
+    """One run with the truth and without it: what the robot knows stays the same, bit for bit."""
+    real = dataclasses.replace(result, truth=None)
+    assert (real.true_pose, real.true_distance, real.true_contacts, real.placed_odometry) == (None,) * 4
+    assert real.odometry is not None and result.odometry is not None
+    for mine, theirs in zip(dataclasses.astuple(real.odometry), dataclasses.astuple(result.odometry), strict=True):
+        assert mine[0] == 0.0 and np.array_equal(mine, theirs)
+    assert real.whisker_touches == result.whisker_touches == 2
+    assert real.odometry_distance == result.odometry_distance
+    figures, known = real.table(), result.table()
+    hidden = {name for name, value in figures.items() if value != known[name]}
+    assert hidden == {"true_distance_m", "true_contacts", "odometry_error_m", "arena"}
+    assert all(figures[name] is None for name in hidden)
+    assert "true" not in real.summary() and f"odometry distance {real.odometry_distance:.2f} m" in real.summary()
+
+
+def test_odometry_lies_in_the_arena_from_the_true_start(result: RunResult) -> None:
+    assert result.placed_odometry is not None and result.true_pose is not None
+    assert result.placed_odometry.at(0) == pytest.approx(result.true_pose.at(0))
+    assert result.odometry_error == pytest.approx(
+        math.dist(result.placed_odometry.at(-1)[:2], result.true_pose.at(-1)[:2])
+    )
+
+
+@pytest.mark.parametrize(
+    ("former", "now"),
+    [("distance", "true_distance, .*or odometry_distance"), ("contacts", "true_contacts, .*or whisker")],
+)
+def test_former_names_are_refused_with_the_new_ones(result: RunResult, former: str, now: str) -> None:
+    with pytest.raises(AttributeError, match=f"^'{former}' was renamed; expected {now}"):
+        getattr(result, former)
+    with pytest.raises(KeyError, match="'period_ms' was renamed; expected period_s"):
+        result.table()["period_ms"]
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        result.nothing  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(KeyError, match=r"^'nothing'$"):
+        result.table()["nothing"]
 
 
 def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:

@@ -466,7 +466,8 @@ def test_speeds_are_sent_as_speeds(session: InProcess) -> None:
 def test_odometry_follows_the_truth(session: InProcess) -> None:
     result = boebot.run(lambda robot: robot.drive(0.4, 0.5), seconds=6)
     assert result.true_pose is not None and result.odometry is not None and result.odometry_error is not None
-    assert (result.true_distance or 0.0) > 0.3
+    assert result.true_distance is not None and result.true_distance > 0.3
+    assert result.odometry_distance == pytest.approx(result.true_distance, rel=0.02)
     assert result.odometry_error < 0.02
     assert abs(result.odometry.heading[-1] - (result.true_pose.heading[-1] - result.true_pose.heading[0])) < 0.1
 
