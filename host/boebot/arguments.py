@@ -30,6 +30,11 @@ def number(
     raise error(f"{what} is {shown(value)}; expected a finite number{_range(least, most)}")
 
 
+def duration(seconds: float) -> str:
+    """In words: "50 ms", "2 s"."""
+    return f"{seconds:.4g} s" if abs(seconds) >= 1.0 else f"{seconds * 1000:.4g} ms"
+
+
 def switch(what: str, value: Any, error: type[BoebotError]) -> bool:
     """True or False, also numpy's, else raises `error`; `what` names it."""
     if isinstance(value, (bool, np.bool_)):

@@ -70,9 +70,11 @@ def test_folder_that_cannot_be_written_is_said_before_the_run(
     assert code == 1 and "cannot be written to" in err
 
 
-def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = boebot(capsys, "run", "wander", "--seconds", "1", "--period", "20", "--json")
-    assert json.loads(out)["steps"] == 50
+@pytest.mark.parametrize("period", ["0.02", "20ms", "20 ms", "2e-2s"])
+def test_period_is_in_seconds_or_has_a_unit(peer: Peer, capsys: pytest.CaptureFixture[str], period: str) -> None:
+    _, out, _ = boebot(capsys, "run", "wander", "--seconds", "1000ms", "--period", period, "--json")
+    values = json.loads(out)
+    assert (values["steps"], values["period_s"], values["run_time_s"]) == (50, 0.02, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +83,22 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
         (("run", "wonder"), 1, "there is no brain 'wonder'"),
         (("run", "none.py"), 1, "there is no brain file none.py"),
         (("run", "wander", "--robot", "r2d2"), 1, "there is no robot 'r2d2'"),
-        (("run", "wander", "--period", "15"), 1, "does not fit; expected a multiple of 10 ms"),
+        (("run", "wander", "--period", "15ms"), 1, "does not fit; expected a multiple of 10 ms"),
+        (
+            ("run", "wander", "--period", "50"),
+            1,
+            "a brain period of 50 s is too long; expected at most 800 ms; 50 ms would be 0.05, or 50ms as an option",
+        ),
+        (
+            ("run", "wander", "--period", "50", "--robot", "arsim"),
+            1,
+            "of 50 s is too long; expected at most 10 s; 50 ms",
+        ),
+        (
+            ("run", "wander", "--period", "5 parsec"),
+            2,
+            "'5 parsec' is no time; expected a number, in s, or with one of",
+        ),
         (("run", "wander", "--seconds", "0"), 1, "a run cannot last 0 s"),
         (("run", "wander", "--seconds", "ten"), 2, "--seconds"),
         (("run", "wander", "--robots", "0"), 2, "--robots"),
@@ -93,13 +110,23 @@ def test_period_is_in_milliseconds(peer: Peer, capsys: pytest.CaptureFixture[str
             "3 times --robot for 2",
         ),
         (("run", "wander", "--robots", "65", "--arena", "empty"), 1, "65 robots are too many; expected at most 64"),
-        (("run", "wander", "--pose", "1,2"), 1, "--pose '1,2' is no pose; expected X,Y,DEGREES, as in 0.5,1.2,90"),
+        (
+            ("run", "wander", "--pose", "1,2,90"),
+            1,
+            "its heading is 90 rad; expected one turn at most, 6.28 rad or 360deg",
+        ),
+        (("run", "wander", "--pose", "1,2ms,0"), 1, "is no pose: '2ms' is no length; expected a number, in m, or with"),
+        (("run", "wander", "--pose", "1,2"), 1, "--pose '1,2' is no pose; expected X,Y,HEADING, as in 0.5,20cm,90deg"),
         (
             ("run", "wander", "--robot", "arsim", "--pose", "90,9,0"),
             1,
             "cannot start at x = 90 m, y = 9 m: no free space",
         ),
-        (("run", "wander", "--pose", "0,0,0", "--pose", "0.1,0,90", "--arena", "empty"), 1, "robots 1 and 2 overlap"),
+        (
+            ("run", "wander", "--pose", "0,0,0", "--pose", "10cm,0,90deg", "--arena", "empty"),
+            1,
+            "robots 1 and 2 overlap",
+        ),
         (
             ("run", "wander", "--robots", "2", "--robot", "arsim", "--on", "avr"),
             1,
@@ -158,7 +185,7 @@ def test_several_robots_print_a_row_each(capsys: pytest.CaptureFixture[str], tmp
 def test_options_given_several_times_go_to_one_robot_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "still.py").write_text("def step(robot):\n    robot.stop()\n")
     arguments = ("wander", str(tmp_path / "still.py"), "--robot", "shieldbot", "--robot", "shieldbot-quad")
-    poses = ("--pose", "0,0,0", "--pose", "0,2,90", "--arena", "empty", "--seconds", "2", "--json")
+    poses = ("--pose", "0,0,0", "--pose", "0,2,90deg", "--arena", "empty", "--seconds", "2", "--json")
     code, out, _ = boebot(capsys, "run", *arguments, *poses)
     first, second = json.loads(out)["robots"]
     assert code == 0
@@ -485,12 +512,12 @@ def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixtu
     code, out, err = boebot(capsys, "link", "--once", "--json")
     seen = json.loads(out)
     assert (code, err) == (0, "")
-    assert seen["task_longest_us"] == {task.name.lower(): task / 2 for task in messages.Task}
+    assert seen["task_longest_s"] == {task.name.lower(): pytest.approx(task / 2e6) for task in messages.Task}
     assert seen["last_reset"] == "power"
     assert seen["host"]["good"] > 90 and seen["board_end"]["good"] > 1 and seen["host"]["bad"] == 0
     assert 120 <= seen["frame_rate_hz"] <= 175, "telemetry, a quarter of that about the board itself, hello, probes"
-    assert seen["round_trip_p50_ms"] == pytest.approx(0.52, abs=0.3), "10 bytes there and 14 back"
-    assert abs(seen["clock_drift_ppm"]) < 200 and seen["clock_bound_us"] < 500
+    assert seen["round_trip_p50_s"] == pytest.approx(0.52e-3, abs=0.3e-3), "10 bytes there and 14 back"
+    assert abs(seen["clock_drift"]) < 200e-6 and seen["clock_bound_s"] < 500e-6
     board.read(0.01)
     assert board.peer.session == 0 and board.peer.accepted == [], "closed, and nothing has moved"
     board.peer._happened(messages.EventKind.DEAD_MAN, 7)
@@ -521,7 +548,7 @@ def test_link_says_that_telemetry_is_thinned(board: InProcess, capsys: pytest.Ca
     board.peer.telemetry_period = 5
     _, out, err = boebot(capsys, "link", "--once", "--json")
     assert "sends telemetry every 50 ms, not every 10 ms" in err
-    assert json.loads(out)["telemetry_period_ms"] == 50
+    assert json.loads(out)["telemetry_period_s"] == 0.05
 
 
 def test_link_refuses_to_watch_for_less_than_no_time(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
@@ -536,13 +563,13 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     while watched.transport.now() < 1.0:
         watched.poll(0.01)
     before = link_command.Rates(watched)
-    assert link_command.look(watched, before)["clock_bound_us"] < 500
+    assert link_command.look(watched, before)["clock_bound_s"] < 500e-6
     board.peer.reset()
     while watched.counts.sessions == 1:
         watched.poll(0.001)
     seen = link_command.look(watched, before)
     assert watched.clock.estimate.probes > 0
-    assert (seen["clock_bound_us"], seen["clock_offset_s"], seen["clock_drift_ppm"]) == (None, None, None)
+    assert (seen["clock_bound_s"], seen["clock_offset_s"], seen["clock_drift"]) == (None, None, None)
 
 
 @pytest.mark.parametrize("columns", [80, 120])

@@ -265,7 +265,7 @@ def test_bad_input_is_one_sentence_and_code_2(
 
 
 def test_robot_without_a_board_is_judged_by_its_sensors(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--period", "10", "--step", "12", "--json")
+    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--period", "10ms", "--step", "12ms", "--json")
     answer = json.loads(out)
     assert code == timing.EXIT_BROKEN and answer["image"] is None
     assert "brain, 12 ms, ends 12 ms after the step began" in answer["realisable"]["faults"][0]
@@ -275,20 +275,20 @@ def test_line_too_slow_for_the_period_that_is_asked_for_is_code_1(
     image: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ("timing", "--elf", str(image), "--no-measure", "--baud", "9600", "--period")
-    code, out, _ = command(capsys, *arguments, "50")
+    code, out, _ = command(capsys, *arguments, "50ms")
     said = " ".join(out.split())
     assert code == timing.EXIT_BROKEN and "all budgets are met" in said
     assert "brain period of 50 ms is not realisable: telemetry, " in said
     assert "expected a period of 100 ms or a line of 19200 bit/s" in said
-    code, out, _ = command(capsys, *arguments, "100", "--json")
+    code, out, _ = command(capsys, *arguments, "0.1", "--json")
     answer = json.loads(out)["realisable"]
-    assert code == 0 and answer["realisable"] and answer["period_ms"] == answer["period_forced_ms"] == 100
+    assert code == 0 and answer["realisable"] and answer["period_s"] == answer["period_forced_s"] == 0.1
 
 
 def test_brain_is_measured(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--brain", "wander", "--json", "--period", "1000")
+    code, out, _ = command(capsys, "timing", "--robot", "arsim", "--brain", "wander", "--json", "--period", "1")
     (step,) = json.loads(out)["realisable"]["events"]
-    assert code == 0 and step["kind"] == "process" and 0 < step["takes_ms"] < 1000
+    assert code == 0 and step["kind"] == "process" and 0 < step["takes_s"] < 1
 
 
 # ---- the diagram ----------------------------------------------------------------------------------------------------

@@ -250,7 +250,7 @@ def test_one_robot_starts_where_it_is_told(robot: str) -> None:
     assert result.truth is not None
     assert (result.truth.x[0], result.truth.y[0], result.truth.heading[0]) == pose
     command = [sys.executable, "-m", "boebot", "run", "wander", "--robot", robot, "--arena", "empty", "--seconds", "1"]
-    done = subprocess.run([*command, "--pose", "0.3,-0.4,90", "--json"], capture_output=True, text=True, check=True)
+    done = subprocess.run([*command, "--pose", "0.3,-0.4,90deg", "--json"], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout)["robot"] == robot, "the table of one robot"
 
 

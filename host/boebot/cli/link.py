@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from boebot.boards import BoardRequest
-from boebot.cli import options, output
+from boebot.cli import options, output, quantity
 from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.link import reset_cause
@@ -18,14 +18,17 @@ from boebot.link.transport import BaudSelectable
 
 _PERIOD_S = 1.0
 _WAIT_S = 0.05
-_CYCLES_PER_US = 16
-_TABLES = ("host", "board_end", "task_longest_us")
+_CYCLES_PER_S = 16_000_000
+_TABLES = ("host", "board_end", "task_longest_s")
 
 
 def link(
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
-    seconds: Annotated[float, typer.Option(metavar="S", min=0, help="End by itself after this time.")] = float("inf"),
+    seconds: Annotated[
+        float,
+        typer.Option(metavar="TIME", parser=quantity.parser("s", least=0), help="End by itself after this time."),
+    ] = float("inf"),
     once: Annotated[bool, typer.Option("--once", help="Print one look, after a second of listening, and end.")] = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object every second in place of the table.")
@@ -81,28 +84,28 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "robot": None if hello is None else text(hello.robot),
         "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
         "session": None if hello is None or not watched.session.is_open else f"{hello.session:06x}",
-        "telemetry_period_ms": None if hello is None else round(1000 * hello.telemetry_period / hello.tick_rate, 3),
+        "telemetry_period_s": None if hello is None else round(hello.telemetry_period / hello.tick_rate, 6),
         "last_reset": None if hello is None else reset_cause.in_words(hello.reset_cause),
-        "session_time_out_ms": None if hello is None else hello.session_time_out,
+        "session_time_out_s": None if hello is None else hello.session_time_out / 1000,
         "frame_rate_hz": round((watched.line.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
-        "round_trip_p50_ms": _ms(trips.quantile(0.5)),
-        "round_trip_p99_ms": _ms(trips.quantile(0.99)),
+        "round_trip_p50_s": _rounded(trips.quantile(0.5)),
+        "round_trip_p99_s": _rounded(trips.quantile(0.99)),
         "clock_offset_s": round(clock.offset, 6) if clock.bounded else None,
-        "clock_drift_ppm": round(clock.drift * 1e6, 2) if clock.bounded else None,
-        "clock_bound_us": round(clock.bound * 1e6, 1) if clock.bounded else None,
+        "clock_drift": round(clock.drift, 8) if clock.bounded else None,
+        "clock_bound_s": round(clock.bound, 7) if clock.bounded else None,
         "clock_restarts": clock.restarts,
         "events": before.events,
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
-        "task_longest_us": {
-            name: None if cycles is None else cycles / _CYCLES_PER_US
+        "task_longest_s": {
+            name: None if cycles is None else cycles / _CYCLES_PER_S
             for name, cycles in watched.task_times.cycles.items()
         },
     }
 
 
-def _ms(seconds: float | None) -> float | None:
-    return None if seconds is None else round(seconds * 1000, 3)
+def _rounded(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds, 6)
 
 
 def _show_table(watched: Link, seconds: float, once: bool) -> None:
@@ -130,14 +133,14 @@ def _table(seen: dict[str, Any]) -> Any:
     for name in dict.fromkeys((*seen["host"], *board)):
         cells = [f"{end[name]:,}" if name in end else "" for end in (seen["host"], board)]
         counted.add_row(name.replace("_", " "), *cells)
-    return Group(state, Columns([counted, _tasks(seen["task_longest_us"])], padding=(0, 4)))
+    return Group(state, Columns([counted, _tasks(seen["task_longest_s"])], padding=(0, 4)))
 
 
-def _tasks(longest_us: Mapping[str, float | None]) -> Any:
+def _tasks(longest_s: Mapping[str, float | None]) -> Any:
     """The longest time of each task, if the board takes any."""
     tasks = output.empty_table()
     tasks.add_column("task", style="dim")
     tasks.add_column("longest, us", justify="right")
-    for name, took_us in longest_us.items():
-        tasks.add_row(name, "" if took_us is None else f"{took_us:,.0f}")
-    return tasks if any(longest_us.values()) else ""
+    for name, took_s in longest_s.items():
+        tasks.add_row(name, "" if took_s is None else f"{1e6 * took_s:,.0f}")
+    return tasks if any(longest_s.values()) else ""

@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperCommand
 
 from boebot.boards import imperfections
+from boebot.cli import quantity
 
 On = Annotated[
     str,
@@ -31,7 +32,12 @@ ArenaName = Annotated[
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the brain's chance and of the world's noise.")]
 Period = Annotated[
     float | None,
-    typer.Option("--period", metavar="MS", help="Milliseconds from step to step; a multiple of the 10 ms tick."),
+    typer.Option(
+        "--period",
+        metavar="TIME",
+        parser=quantity.parser("s"),
+        help="From step to step, as in 0.05 or 50ms; a multiple of the 10 ms tick.",
+    ),
 ]
 Without = Annotated[
     str | None,

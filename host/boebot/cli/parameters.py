@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from boebot.boards import BoardRequest, is_live
-from boebot.cli import options, output
+from boebot.cli import options, output, quantity
 from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.link import messages
@@ -124,16 +124,17 @@ def get(
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may begin with a minus sign
 def set_one(
     name: Name,
-    value: Annotated[float, typer.Argument(metavar="VALUE", help="In the parameter's unit.")],
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="In the parameter's unit, or with another: 50ms.")],
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
     save: Save = False,
     json: options.Json = False,
 ) -> None:
     """Set a parameter until the board's next reset; --save keeps it. Opening a port resets most boards."""
-    parameter_counts(name, value)
+    number = quantity.parse(value, parameter_spec(name).unit)
+    parameter_counts(name, number)
     with _link(on, robot, changes=True) as link:
-        now = link.parameters.set(name, value)
+        now = link.parameters.set(name, number)
         if save:
             _save(link, on)
     if json:

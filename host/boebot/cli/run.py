@@ -10,7 +10,7 @@ import typer
 
 from boebot import view
 from boebot.brains import bundled
-from boebot.cli import options, output
+from boebot.cli import options, output, quantity
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
 from boebot.running.runner import execute
@@ -18,6 +18,7 @@ from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
+TURN = 2 * math.pi + 1e-9  # rad
 _HELP = f"""Let a brain drive a robot, and say what happened.
 
 Several robots in one simulated world:
@@ -26,9 +27,11 @@ Several robots in one simulated world:
 
   boebot run wander chase.py                two robots, a brain for each
 
-  boebot run wander --robots 2 --pose 0.5,0.5,90 --pose 1.5,0.5,180
+  boebot run wander --robots 2 --pose 0.5,0.5,90deg --pose 1.5,0.5,180deg
 
 An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
+
+Times, lengths and angles are in s, m and rad, or have a unit: 50ms, 2min, 20cm, 90deg.
 
 Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --brain, one of several behaviors."""
 
@@ -54,13 +57,15 @@ def run(
         list[str] | None,
         typer.Option(
             "--pose",
-            metavar="X,Y,DEG",
-            help="Where a robot starts: m, m, degrees; again for each further robot. Else at the arena's start, "
+            metavar="X,Y,HEADING",
+            help="Where a robot starts, as in 0.5,20cm,90deg; again for each further robot. Else at the arena's start, "
             "further ones at free places near it.",
         ),
     ] = None,
     arena: options.ArenaName = None,
-    seconds: Annotated[float, typer.Option(metavar="S", help="Length of the run by the board's clock.")] = 60.0,
+    seconds: Annotated[
+        float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="Length of the run by the board's clock.")
+    ] = 60.0,
     seed: options.Seed = 1,
     period: options.Period = None,
     without: options.Without = None,
@@ -68,7 +73,8 @@ def run(
     step_timeout: Annotated[
         float | None,
         typer.Option(
-            metavar="S",
+            metavar="TIME",
+            parser=quantity.parser("s"),
             help="Wall time after which a step of the brain that has not ended is an error. Else 10 s; in real time "
             "the time after which the board's dead-man stops the motors.",
         ),
@@ -86,7 +92,6 @@ def run(
     json: options.Json = False,
 ) -> None:
     """See `_HELP`."""
-    period_s = None if period is None else period / 1000
     ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
@@ -98,7 +103,7 @@ def run(
                 brain=brain[index % len(brain)],
                 robot=kinds[index % len(kinds)],
                 pose=poses[index] if index < len(poses) else None,
-                period=period_s,
+                period=period,
                 without=ideal,
             )
             for index in range(count)
@@ -146,13 +151,21 @@ def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:
 
 
 def _pose(text: str) -> tuple[float, float, float]:
-    """Of "X,Y,DEG".
+    """Of "X,Y,HEADING".
 
     Raises:
         BoebotError: it is no pose.
     """
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise BoebotError(f"--pose {text!r} is no pose; expected X,Y,HEADING, as in 0.5,20cm,90deg")
     try:
-        x, y, degrees = (float(part) for part in text.split(","))
-    except ValueError:
-        raise BoebotError(f"--pose {text!r} is no pose; expected X,Y,DEGREES, as in 0.5,1.2,90") from None
-    return x, y, math.radians(degrees)
+        x, y, heading = (quantity.parse(part, unit) for part, unit in zip(parts, ("m", "m", "rad"), strict=True))
+    except BoebotError as error:
+        raise BoebotError(f"--pose {text!r} is no pose: {error}") from None
+    if abs(heading) > TURN:
+        raise BoebotError(
+            f"--pose {text!r} is no pose: its heading is {heading:g} rad; expected one turn at most, "
+            f"6.28 rad or 360deg ({heading:g} degrees are {heading:g}deg)"
+        )
+    return x, y, heading

@@ -16,7 +16,7 @@ from typing import Annotated, TextIO
 import typer
 
 from boebot import view
-from boebot.cli import options, output
+from boebot.cli import options, output, quantity
 from boebot.cli.ending import end
 from boebot.errors import BoebotError
 from boebot.robot import Robot
@@ -107,7 +107,9 @@ def teleop(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
-    seconds: Annotated[float, typer.Option(metavar="S", help="End by itself after this time.")] = float("inf"),
+    seconds: Annotated[
+        float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="End by itself after this time.")
+    ] = float("inf"),
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
     json: options.Json = False,
 ) -> None:

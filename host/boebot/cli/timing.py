@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output, timing_board
+from boebot.cli import options, output, quantity, timing_board
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -57,7 +57,12 @@ def timing(
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
     ] = True,
     seconds: Annotated[
-        float, typer.Option(metavar="S", help="Of the board's time, for each that is measured: 0.1 to 3600.")
+        float,
+        typer.Option(
+            metavar="TIME",
+            parser=quantity.parser("s"),
+            help="Of the board's time, for each that is measured: 0.1 to 3600.",
+        ),
     ] = 1.0,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios, 0 or more.")] = 1,
     port: Annotated[
@@ -70,7 +75,10 @@ def timing(
         str | None, typer.Option("--brain", metavar="B", help="Measure the steps of this brain in a simulated run.")
     ] = None,
     step: Annotated[
-        float | None, typer.Option("--step", metavar="MS", help="What a step of the brain takes (ms), if it is known.")
+        float | None,
+        typer.Option(
+            "--step", metavar="TIME", parser=quantity.parser("s"), help="What a step of the brain takes, as in 4ms."
+        ),
     ] = None,
     period: options.Period = None,
     baud: Annotated[
@@ -117,7 +125,7 @@ def timing(
                 watch({label: 0.0})
                 found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
         brain_s, own_period = _brain(brain, step, description, seed)
-        period_s = period / 1000 if period is not None else own_period or DEFAULT_PERIOD
+        period_s = period if period is not None else own_period or DEFAULT_PERIOD
         times = None if found is None else _board_times(found)
         verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
         distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
@@ -220,17 +228,17 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
 
 
-def _brain(brain: str | None, step_ms: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
+def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
     """What a step of the brain takes at most (s; 0: not known), as given or as measured, and the brain's own period."""
     if brain is None:
-        return (step_ms or 0.0) / 1000, None
+        return step_s or 0.0, None
     from boebot.brains import load_brain
     from boebot.running.runner import execute
     from boebot.running.tasks import Request
 
     own_period = load_brain(brain).period
-    if step_ms is not None:
-        return step_ms / 1000, own_period
+    if step_s is not None:
+        return step_s, own_period
     result = execute(Request.single(brain, robot=robot, seconds=5.0, seed=seed, force_timing=True))
     if result.error is not None:
         raise result.error

@@ -17,6 +17,7 @@ import time as wall
 from collections.abc import Iterator
 from typing import Any
 
+from boebot.arguments import duration
 from boebot.boards import BoardSession
 from boebot.description.board_parameters import configure
 from boebot.devices.latest import NO_MESSAGES, Latest
@@ -72,13 +73,14 @@ def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
     """The set-points' time to live (ms) at a brain period; at least `least_s`.
 
     Raises:
-        BoebotError: the period is so long that the motors would stop between two steps.
+        BoebotError: the period is so long that the motors would stop between two steps, or telemetry so seldom.
     """
-    check_period(period_s)
+    check_period(period_s, TIME_TO_LIVE_LIMIT_MS / 2500)
     time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
     if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
         raise BoebotError(
-            f"a brain period of {period_s * 1000:g} ms is too long; expected at most {TIME_TO_LIVE_LIMIT_MS / 2.5:g} ms"
+            f"set-points would have to live {duration(least_s)}, so seldom does telemetry come; "
+            f"expected at most {duration(TIME_TO_LIVE_LIMIT_MS / 1000)}"
         )
     return time_to_live_ms
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from boebot.arguments import duration
 from boebot.boards import BoardRequest
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
@@ -21,6 +22,7 @@ from boebot.running.stepping import AT_LEISURE, StepLimit
 Progress = Callable[[float], None]
 """Called now and then with the seconds of the run that have passed."""
 
+PERIOD_MAXIMUM_S = 10.0  # of any brain
 PROGRESS_S = 0.1  # wall time between two reports of progress
 
 
@@ -82,10 +84,16 @@ def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:
     return otherwise if task.step_timeout_s is None else AT_LEISURE._replace(seconds=task.step_timeout_s)
 
 
-def check_period(period_s: float) -> None:
-    """Raises BoebotError where a brain's period is none."""
+def check_period(period_s: float, most_s: float = PERIOD_MAXIMUM_S) -> None:
+    """Raises BoebotError where a brain's period is none, or longer than `most_s`."""
     if not (period_s > 0 and math.isfinite(period_s)):
-        raise BoebotError(f"a brain period of {period_s * 1000:g} ms is none; expected more than 0")
+        raise BoebotError(f"a brain period of {duration(period_s)} is none; expected more than 0")
+    if period_s > most_s:
+        meant = f"; {period_s:g} ms would be {period_s / 1000:g}, or {period_s:g}ms as an option"
+        raise BoebotError(
+            f"a brain period of {duration(period_s)} is too long; expected at most {duration(most_s)}"
+            + (meant if period_s / 1000 <= most_s else "")
+        )
 
 
 def whole_ticks(period_s: float, tick_s: float) -> int:
@@ -98,6 +106,6 @@ def whole_ticks(period_s: float, tick_s: float) -> int:
     ticks = round(period_s / tick_s)
     if ticks < 1 or abs(ticks * tick_s - period_s) > 1e-6:
         raise BoebotError(
-            f"a brain period of {period_s * 1000:g} ms does not fit; expected a multiple of {tick_s * 1000:g} ms"
+            f"a brain period of {duration(period_s)} does not fit; expected a multiple of {duration(tick_s)}"
         )
     return ticks

@@ -14,10 +14,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from boebot.arguments import duration
 from boebot.timing.budget import Report
 from boebot.timing.costs import SLOT_BEGINS
 from boebot.timing.measured import Moment
-from boebot.timing.realisable import TICK_S, Event, Verdict, ms
+from boebot.timing.realisable import TICK_S, Event, Verdict
 from boebot.view import style
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def _step(axes: Axes, verdict: Verdict) -> None:
     for lane, event in [*enumerate(path), *enumerate(beside, len(path) + 1)]:
         _event(axes, lane, event, longest)
     if verdict.is_realisable:
-        _span(axes, verdict.seconds * 1000, period, len(path), ms(verdict.period_s - verdict.seconds))
+        _span(axes, verdict.seconds * 1000, period, len(path), duration(verdict.period_s - verdict.seconds))
     axes.axvline(period, color=style.INK, linewidth=1.2)
     _span(axes, 0, period, -1, f"Δt = {period:g} ms")
     names = [*(event.name for event in path), "what is left", *(event.name for event in beside)]
@@ -150,7 +151,7 @@ def _event(axes: Axes, lane: int, event: Event, longest: float) -> None:
     begin, length = event.begin * 1000, event.seconds * 1000
     kind = event.kind if event.beside or event.kind != "sense" else "task"
     axes.barh(lane, length, _HEIGHT, left=begin, color=_COLOURS[kind], linewidth=0)
-    text = ms(event.seconds) + (f", every {ms(event.every)}" if event.beside else "")
+    text = duration(event.seconds) + (f", every {duration(event.every)}" if event.beside else "")
     if length > 0.3 * longest:
         axes.text(begin + length / 2, lane, text, ha="center", va="center", color=_ON[kind], fontsize=8)
     else:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from boebot import resources
+from boebot.arguments import duration
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import Sensor
 from boebot.devices.uart import Uart
@@ -115,21 +116,21 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """The answer in one sentence."""
-        who = f"robot {self.robot!r} with a brain period of {ms(self.period_s)}"
+        who = f"robot {self.robot!r} with a brain period of {duration(self.period_s)}"
         if self.faults:
             return f"{who} is not realisable: {'; '.join(self.faults)}"
         if not self.events:
             return f"{who}: nothing is known of its times (no board, no reading_s)"
-        return f"{who} is realisable: {ms(self.seconds)} of it are taken"
+        return f"{who} is realisable: {duration(self.seconds)} of it are taken"
 
     def as_dict(self) -> dict[str, object]:
         """For programs; units in the keys."""
         return {
             "robot": self.robot,
-            "period_ms": round(self.period_s * 1000, 3),
-            "period_forced_ms": round(self.forced_s * 1000, 3),
+            "period_s": round(self.period_s, 6),
+            "period_forced_s": round(self.forced_s, 6),
             "baud_rate_bit_s": self.baud or None,
-            "taken_ms": round(self.seconds * 1000, 4),
+            "taken_s": round(self.seconds, 7),
             "realisable": self.is_realisable,
             "breaking_events": self.breaking,
             "faults": list(self.faults),
@@ -138,19 +139,14 @@ class Verdict:
                 {
                     "name": event.name,
                     "kind": event.kind,
-                    "takes_ms": round(event.seconds * 1000, 4),
-                    "begins_ms": round(event.begin * 1000, 4),
+                    "takes_s": round(event.seconds, 7),
+                    "begins_s": round(event.begin, 7),
                     "beside": event.beside,
-                    "own_period_ms": round(event.every * 1000, 4) if event.beside else None,
+                    "own_period_s": round(event.every, 7) if event.beside else None,
                 }
                 for event in self.events
             ],
         }
-
-
-def ms(seconds: float) -> str:
-    """Milliseconds in words, to four digits."""
-    return f"{seconds * 1000:.4g} ms"
 
 
 def judge(
@@ -293,20 +289,20 @@ def _notes(beside: list[Event], asked_s: float, period_s: float, rate: int) -> t
     """`period_s`: the one that is run, if need be by force."""
     notes = []
     if period_s > asked_s + 1e-9:
-        notes.append(f"a forced run steps every {ms(period_s)}: at {rate} bit/s telemetry comes no oftener")
+        notes.append(f"a forced run steps every {duration(period_s)}: at {rate} bit/s telemetry comes no oftener")
     for event in beside:
         if event.seconds > event.every + 1e-9:
             notes.append(
-                f"{event.name}: a reading takes {ms(event.seconds)} and is looked at every {ms(event.every)}: "
-                "it is often the one before"
+                f"{event.name}: a reading takes {duration(event.seconds)} and is looked at every "
+                f"{duration(event.every)}: it is often the one before"
             )
         elif event.every > period_s + 1e-9 and event.seconds > TICK_S:
             notes.append(
-                f"{event.name}: a reading takes {ms(event.seconds)}; it is sampled every {ms(event.every)}, and the "
-                f"brain sees each of them {event.every / period_s:.3g} times"
+                f"{event.name}: a reading takes {duration(event.seconds)}; it is sampled every "
+                f"{duration(event.every)}, and the brain sees each of them {event.every / period_s:.3g} times"
             )
     if period_s < SERVO_FRAME_S - 1e-9:
-        notes.append(f"servos take a new pulse every {ms(SERVO_FRAME_S)}: set-points in between go unheeded")
+        notes.append(f"servos take a new pulse every {duration(SERVO_FRAME_S)}: set-points in between go unheeded")
     return tuple(notes)
 
 
@@ -324,8 +320,8 @@ def _one_after_another(events: list[Event]) -> list[Event]:
 def _slow_sensor(event: Event, key: str) -> str:
     ticks = math.floor(event.seconds / TICK_S + 1e-9) + 1
     return (
-        f"{event.name} every {ms(event.every)} cannot be, a reading takes {ms(event.seconds)}; expected a {key} of at "
-        f"least {ticks if key == 'period_ticks' else ticks * TICK_S:g}"
+        f"{event.name} every {duration(event.every)} cannot be, a reading takes {duration(event.seconds)}; "
+        f"expected a {key} of at least {ticks if key == 'period_ticks' else ticks * TICK_S:g}"
     )
 
 
@@ -340,16 +336,16 @@ def _overfull(
         return []
     total = path[-1].end
     longest = max(path, key=lambda event: event.seconds)
-    mend = [f"a period of {ms(_enough(total, grain_s))}"]
+    mend = [f"a period of {duration(_enough(total, grain_s))}"]
     rest = total - longest.seconds
     if rest < period_s:
         if longest.kind == "process":
-            mend.append(f"a step of the brain of less than {ms(period_s - rest)}")
+            mend.append(f"a step of the brain of less than {duration(period_s - rest)}")
         elif longest.kind == "sense" and own_period is not None:
             mend.append(f"an {own_period[0]} for {longest.name}, {own_period[1]}")
     return [
-        f"{broken.name}, {ms(broken.seconds)}, ends {ms(broken.end)} after the step began, and all {len(path)} events "
-        f"need {ms(total)}; expected {' or '.join(mend)}"
+        f"{broken.name}, {duration(broken.seconds)}, ends {duration(broken.end)} after the step began, "
+        f"and all {len(path)} events need {duration(total)}; expected {' or '.join(mend)}"
     ]
 
 
@@ -363,12 +359,12 @@ def _slow_line(events: tuple[Event, ...], period_s: float, rate: int, telemetry_
     line_s = telemetry_ticks(rate, telemetry_bytes) * TICK_S
     total = sum(event.seconds for event in events if not event.beside)
     longer = max(_next_multiple(period_s, line_s), _enough(total, line_s))
-    mend = [f"a period of {ms(longer)}"] if longer <= _LONGEST_PERIOD_S else []
+    mend = [f"a period of {duration(longer)}"] if longer <= _LONGEST_PERIOD_S else []
     if faster := _faster_line(events, period_s, rate, telemetry_bytes, command_bytes):
         mend.append(faster)
     return (
-        f"telemetry, {telemetry_bytes} B, comes every {ms(line_s)} over a line of {rate} bit/s, which a step every "
-        f"{ms(period_s)} does not go with; expected {' or '.join(mend) or 'a faster line'}"
+        f"telemetry, {telemetry_bytes} B, comes every {duration(line_s)} over a line of {rate} bit/s, "
+        f"which a step every {duration(period_s)} does not go with; expected {' or '.join(mend) or 'a faster line'}"
     )
 
 

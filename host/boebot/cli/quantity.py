@@ -1,0 +1,58 @@
+"""Quantities at the command line: a bare number has the unit of the API (s, m, rad), and others may be said: `50ms`,
+`2min`, `20cm`, `90deg`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from decimal import Decimal
+
+import typer
+
+from boebot.errors import BoebotError
+
+_KINDS: tuple[tuple[str, dict[str, Decimal]], ...] = (
+    (
+        "time",
+        {"s": Decimal(1), "ms": Decimal("1e-3"), "us": Decimal("1e-6"), "min": Decimal(60), "h": Decimal(3600)},
+    ),
+    ("length", {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3")}),
+    ("angle", {"rad": Decimal(1), "deg": Decimal(math.pi) / 180}),
+    ("voltage", {"V": Decimal(1), "mV": Decimal("1e-3")}),
+)
+_FORM = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan) ?([^\d\s.]*)")
+
+
+def parse(text: str, unit: str) -> float:
+    """The number that `text` says, in `unit`.
+
+    Raises:
+        BoebotError: it is none.
+    """
+    kind, factors = next(
+        ((name, units) for name, units in _KINDS if unit in units), ("quantity", {unit: Decimal(1)} if unit else {})
+    )
+    match = _FORM.fullmatch(text.strip())
+    if match is None or (match[2] and match[2] not in factors):
+        others = ", ".join(sorted(factors.keys() - {unit}))
+        said = f", or with one of the units {others}" if others else ""
+        raise BoebotError(f"{text!r} is no {kind}; expected a number, in {unit or 'no unit'}{said}")
+    number = Decimal(match[1])
+    return float(number * factors[match[2]] / factors[unit]) if match[2] else float(number)
+
+
+def parser(unit: str, least: float = -math.inf) -> Callable[[str | float], float]:
+    """What typer reads an option with that is a quantity, in `unit`, and at least `least`."""
+
+    def read(given: str | float) -> float:
+        """Of the command line's text; a default is a number already."""
+        try:
+            number = parse(given, unit) if isinstance(given, str) else float(given)
+        except BoebotError as error:
+            raise typer.BadParameter(str(error)) from None
+        if number < least:
+            raise typer.BadParameter(f"{number:g} {unit} is too small; expected at least {least:g} {unit}")
+        return number
+
+    return read
