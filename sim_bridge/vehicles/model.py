@@ -184,7 +184,7 @@ class VehicleModel:
         self.sensor("charge", name, empty=empty, full=full, sigma=sigma)
 
     def sensor(
-        self, kind: str, name: str, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any
+        self, kind: str, name: str, /, *, period: float = 0.0, table: ReadingTable | None = None, **parameters: Any
     ) -> None:
         """Adds a sensor.
 

@@ -167,7 +167,7 @@ def _find(source: str | Path) -> Path:
     if path.suffix in (PYTHON, TOML) or len(path.parts) > 1:
         if path.is_file():
             return path.resolve()
-        raise BrainError(f"there is no brain file {path}")
+        raise BrainError(f"there is no brain file {path}; expected a Python or TOML file")
     files = bundled_files()
     if str(source) in files:
         return files[str(source)]

@@ -64,7 +64,7 @@ def find(kind: str, name: str | Path, error: type[BoebotError]) -> Path:
     if path.suffix == ".toml":
         if path.is_file():
             return path
-        raise error(f"there is no {thing} file {path}")
+        raise error(f"there is no {thing} file {path}; expected a .toml file")
     known = bundled_names(kind)
     if str(name) not in known:
         raise error(
