@@ -152,7 +152,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     line = BadLine(board)
     link = Link(line)
     link.open()
-    link.parameters.set("session_time_out", 1000)
+    link.parameters.set("session_time_out", 1.0)
     link.arm()
     listen(link, 0.05)
     assert link.telemetry.latest is not None

@@ -61,7 +61,8 @@ def python_module(spec: schema.Schema) -> str:
     lines += [f"    0x{m.id:02X}: 0x{spec.message_hash(m):08X}," for m in spec.message]
     lines += ["}"]
     lines += ["", "", "class ParameterSpec(NamedTuple):", '    """A run-time parameter of the firmware."""', ""]
-    lines += ["    id: int", "    unit: str", "    scale: float  # unit per count", "    minimum: int  # counts"]
+    lines += ["    id: int", "    unit: str  # the host's: SI; us for pulse widths and edges, as in data sheets"]
+    lines += ["    scale: float  # unit per count", "    minimum: int  # counts"]
     lines += ["    maximum: int  # counts", "    doc: str"]
     lines += [
         '    default_from: str = ""  # key of the robot description that gives the default',
@@ -71,7 +72,8 @@ def python_module(spec: schema.Schema) -> str:
         "PARAMETERS: dict[str, ParameterSpec] = {",
     ]
     for p in spec.parameter:
-        row = f'{p.id}, "{p.unit}", {p.scale!r}, {p.min}, {p.max}, "{p.doc}"'
+        unit, scale = ("s", p.scale / 1000) if p.unit == "ms" else (p.unit, p.scale)
+        row = f'{p.id}, "{unit}", {scale!r}, {p.min}, {p.max}, "{p.doc}"'
         row += f', "{p.default_from}"' if p.default_from else ""
         row += f", since={p.since}" if p.since else ""
         lines.append(f'    "{p.name}": ParameterSpec({row}),')

@@ -97,7 +97,7 @@ def test_period_is_in_seconds_or_has_a_unit(peer: Peer, capsys: pytest.CaptureFi
         (
             ("run", "wander", "--period", "5 parsec"),
             2,
-            "'5 parsec' is no time; expected a number, in s, or with one of",
+            "'5 parsec' is no time; expected a number, in s, or with another",
         ),
         (("run", "wander", "--seconds", "0"), 1, "a run cannot last 0 s"),
         (("run", "wander", "--seconds", "ten"), 2, "--seconds"),
@@ -596,6 +596,8 @@ def test_parameters_are_listed_set_saved_and_reset(board: InProcess, capsys: pyt
     assert (centre["value"], centre["unit"], centre["least"], centre["greatest"]) == (1500.0, "us", 1400.0, 1600.0)
     code, out, _ = boebot(capsys, "parameters", "set", "servo_right_gain", "-190.5")
     assert (code, out) == (0, "servo_right_gain = -190.5 us\n")
+    assert boebot(capsys, "parameters", "set", "time_to_live", "300ms")[1] == "time_to_live = 0.3 s\n"
+    assert board.peer.parameter("time_to_live") == 300, "ms on the wire"
     assert boebot(capsys, "parameters", "save")[0] == 0
     assert board.peer.saved is not None
     assert boebot(capsys, "parameters", "reset")[0] == 0
@@ -685,6 +687,11 @@ def test_board_that_the_opening_does_not_reset_is_not_said_to_be(capsys: pytest.
     [
         (("get", "speed"), "there is no parameter 'speed'; expected one of devices, time_to_live"),
         (("set", "ping_period", "300"), "parameter ping_period cannot be 300 ticks; expected 4 to 250"),
+        (("set", "time_to_live", "250"), "parameter time_to_live cannot be 250 s; expected 0.02 to 2"),
+        (
+            ("set", "time_to_live", "20cm"),
+            "'20cm' is no time; expected a number, in s, or with another",
+        ),
         (("set", "wheel_radius", "nan"), "parameter wheel_radius cannot be nan m; expected 0.005 to 0.2"),
     ],
 )

@@ -356,7 +356,7 @@ def test_host_that_slept_finds_its_session_ended_and_opens_another() -> None:
 @pytest.mark.parametrize("time_out_ms", [200, 1000, 1500])
 def test_idle_host_keeps_the_session(time_out_ms: int) -> None:
     link, _peer, _session = open_link()
-    link.parameters.set("session_time_out", time_out_ms)
+    link.parameters.set("session_time_out", time_out_ms / 1000)
     before = len([kind for kind in sent_kinds(link) if kind == "clock_probe"])
     listen(link, 6 + 20 * time_out_ms / 1000)
     probes = [at for at, frame in sent(link) if frame[2] == messages.ClockProbe.ID][before:]
@@ -645,7 +645,7 @@ def test_motion_held_up_for_two_seconds_moves_nothing(protected: bool) -> None:
     channel = Channel()
     peer = Peer(protections=without(age=protected))
     link, peer, _session = open_link(peer, channel)
-    link.parameters.set("session_time_out", 1500)
+    link.parameters.set("session_time_out", 1.5)
     link.arm()
     channel.stalled = True
     for _ in range(100):

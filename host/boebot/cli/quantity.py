@@ -31,13 +31,13 @@ def parse(text: str, unit: str) -> float:
         BoebotError: it is none.
     """
     kind, factors = next(
-        ((name, units) for name, units in _KINDS if unit in units), ("quantity", {unit: Decimal(1)} if unit else {})
+        ((name, units) for name, units in _KINDS if unit in units), (f"number of {unit}", {unit: Decimal(1)})
     )
     match = _FORM.fullmatch(text.strip())
     if match is None or (match[2] and match[2] not in factors):
         others = ", ".join(sorted(factors.keys() - {unit}))
-        said = f", or with one of the units {others}" if others else ""
-        raise BoebotError(f"{text!r} is no {kind}; expected a number, in {unit or 'no unit'}{said}")
+        said = f", or with another unit: {others}" if others else ""
+        raise BoebotError(f"{text!r} is no {kind}; expected a number, in {unit}{said}")
     number = Decimal(match[1])
     return float(number * factors[match[2]] / factors[unit]) if match[2] else float(number)
 

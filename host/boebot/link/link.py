@@ -404,7 +404,7 @@ class Link:
         assert request.answer is not None
         self._due = AT_ONCE  # the next may go
         if request.arguments[:1] == (_TIME_OUT.id,) and request.answer.status == messages.AnswerStatus.OK:
-            self.session.time_out_s = request.answer.value * _TIME_OUT.scale / 1000
+            self.session.time_out_s = request.answer.value * _TIME_OUT.scale
 
     def _report_thinning(self) -> None:
         """Where the line is slow the board sends telemetry less often than its parameter says."""
