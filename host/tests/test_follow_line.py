@@ -90,7 +90,7 @@ def test_brain_of_a_file_follows_a_line(tmp_path: Path) -> None:
 
 
 def test_a_sensor_that_was_not_read_is_not_over_a_line() -> None:
-    sensor = LineSensor(pin=7, position_m=(0.05, 0.0), dark_us=1000)
+    sensor = LineSensor(pin=7, position_m=(0.05, 0.0), dark_s=0.001)
     assert read(sensor, "line_left", NOTHING._replace(line_left=1001, line_age=1)).dark
     assert not read(sensor, "line_left", NOTHING._replace(line_left=1000, line_age=1)).dark
     for silent in (NOTHING, NOTHING._replace(line_left=0, line_age=1), NOTHING._replace(line_left=5000, line_age=7)):

@@ -92,10 +92,10 @@ def test_slow_devices_are_read_at_the_cursor(result: RunResult, shown: list[dict
         assert set(table) == {
             "battery", "light left", "light right", "compass", "analog infrared", "turret", "buzzer", "supply",
         }  # fmt: skip
-        battery, age = series.number("battery")[index], series.number("battery", "age")[index]
+        battery, age = series.number("battery", "voltage")[index], series.number("battery", "age")[index]
         assert table["battery"] == (f"{battery:.2f} V", f"{age * 1000:.0f} ms")
-        assert table["light left"][0] == f"{series.number('light_left')[index] * 1000:.3f} ms"
-        degrees = np.degrees(series.number("compass")[index])
+        assert table["light left"][0] == f"{series.number('light_left', 'decay_time')[index] * 1000:.3f} ms"
+        degrees = np.degrees(series.number("compass", "heading")[index])
         assert table["compass"][0] == ("–" if np.isnan(degrees) else f"{degrees:.1f} °".replace("-", "−"))
     assert {name: value for name, value, _ in shown[-1]["readings"]}["turret"] == "28.6 °", "0.5 rad"
 

@@ -190,7 +190,7 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     assert len(time) == len(x) == len(flags) == result.ticks
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
-    assert np.array_equal(flags & replay.LEFT_WHISKER != 0, result.series.flag("whisker_left"))
+    assert np.array_equal(flags & replay.LEFT_WHISKER != 0, result.series.flag("whisker_left", "pressed"))
     assert len(data["true_contacts"]) == 1 and data["known"]
 
 

@@ -261,8 +261,12 @@ def test_run_csv_has_the_slow_devices(monkeypatch: pytest.MonkeyPatch, tmp_path:
     with (tmp_path / "run.csv").open() as file:
         rows = list(csv.DictReader(file))
     last = rows[-1]
-    assert (last["light_left_s"], last["light_right_s"], last["turret_rad"]) == ("0.000800", "0.001600", "0.2500")
-    assert float(last["battery_v"]) == pytest.approx(7.2, abs=0.01) and last["analog_infrared_m"] == ""
+    assert (last["light_left_decay_time_s"], last["light_right_decay_time_s"], last["turret_angle_rad"]) == (
+        "0.000800",
+        "0.001600",
+        "0.2500",
+    )
+    assert float(last["battery_voltage_v"]) == pytest.approx(7.2, abs=0.01) and last["analog_infrared_distance_m"] == ""
     plain = run_on(Peer(SHIELDBOT), lambda robot: None, monkeypatch, seconds=0.5)
     assert not plain.record.rows("devices_telemetry") and not any("light" in name for name in plain.telemetry.columns())
 

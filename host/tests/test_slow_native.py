@@ -161,4 +161,4 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
         "boebot": {"lights", "compass", "battery", "analog_infrared", "turret", "buzzer"},
         "arsim": {"compass"},
     }
-    assert "light_left_s" in (tmp_path / "shieldbot-basic" / "run.csv").read_text().splitlines()[0]
+    assert "light_left_decay_time_s" in (tmp_path / "shieldbot-basic" / "run.csv").read_text().splitlines()[0]

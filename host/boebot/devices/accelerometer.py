@@ -37,8 +37,8 @@ class Accelerometer(Sensor, tag="accelerometer", frozen=True, kw_only=True):
 
     READING: ClassVar = Acceleration
     NAMES: ClassVar[tuple[str, ...]] = ("accelerometer",)
-    COLUMNS: ClassVar = (("value", "", "m_s2", 5),)
-    SHOWN: ClassVar = ("", "m/s²", 1.0, 2)
+    COLUMNS: ClassVar = (("value", "m_s2", 5),)
+    SHOWN: ClassVar = ("value", "m/s²", 1.0, 2)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -62,8 +62,8 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
-    COLUMNS: ClassVar = (("distance", "", "m", 4),)
-    SHOWN: ClassVar = ("", "m", 1.0, 3)
+    COLUMNS: ClassVar = (("distance", "m", 4),)
+    SHOWN: ClassVar = ("distance", "m", 1.0, 3)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

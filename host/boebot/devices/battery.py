@@ -57,8 +57,8 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
-    COLUMNS: ClassVar = (("voltage", "", "v", 3),)
-    SHOWN: ClassVar = ("", "V", 1.0, 2)
+    COLUMNS: ClassVar = (("voltage", "v", 3),)
+    SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
@@ -86,8 +86,8 @@ class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
     sigma_v: NotNegative = 0.0
 
     READING: ClassVar = Battery
-    COLUMNS: ClassVar = (("voltage", "", "v", 5),)
-    SHOWN: ClassVar = ("", "V", 1.0, 2)
+    COLUMNS: ClassVar = (("voltage", "v", 5),)
+    SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""

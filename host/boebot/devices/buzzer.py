@@ -64,7 +64,7 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
     NAMES: ClassVar[tuple[str, ...]] = ("buzzer",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
-    COLUMNS: ClassVar = (("token", "token", "", 0),)
+    COLUMNS: ClassVar = (("token", "", 0),)
     SHOWN: ClassVar = ("token", "tones", 1.0, 0)
 
     def reader(self, place: Place) -> Reader:

@@ -29,7 +29,7 @@ from boebot.link.messages import CompassStatus, DevicesTelemetry
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
 OVERFLOW = -4096
 READ_TICKS = 4
-_SHOWN = ("", "°", 180 / math.pi, 1)
+_SHOWN = ("heading", "°", 180 / math.pi, 1)
 
 
 class Compass(NamedTuple):
@@ -59,7 +59,7 @@ class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
     PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
-    COLUMNS: ClassVar = (("heading", "", "rad", 5),)
+    COLUMNS: ClassVar = (("heading", "rad", 5),)
     SHOWN: ClassVar = _SHOWN
 
     def reader(self, place: Place) -> Reader:
@@ -90,7 +90,7 @@ class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):
     bias_rad: Annotated[float, msgspec.Meta(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
 
     READING: ClassVar = Compass
-    COLUMNS: ClassVar = (("heading", "", "rad", 5),)
+    COLUMNS: ClassVar = (("heading", "rad", 5),)
     SHOWN: ClassVar = _SHOWN
 
     def reader(self, place: Place) -> Reader:

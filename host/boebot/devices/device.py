@@ -80,7 +80,7 @@ class Column(NamedTuple):
     """One column of run.csv; its heading is the device's name, `name` and `unit`."""
 
     name: str
-    """What it says of the device; empty: the reading itself."""
+    """Of the field of the reading, as a brain reads it."""
     unit: str
     """As in headings: "m", "rad"."""
     values: NDArray[Any]
@@ -145,8 +145,8 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     PINS: ClassVar[dict[str, str]] = {}  # key of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that can do it
-    COLUMNS: ClassVar[tuple[tuple[str, str, str, int | None], ...]] = ()
-    """Field of the reading, name, unit and digits of its column in run.csv."""
+    COLUMNS: ClassVar[tuple[tuple[str, str, int | None], ...]] = ()
+    """Field of the reading, unit and digits of its column in run.csv."""
     SHOWN: ClassVar[tuple[str, str, float, int] | None] = None
     """What pages show of it as a number: name of the column, unit, factor, digits."""
 
@@ -204,8 +204,8 @@ class SlowDevice(Device, frozen=True, kw_only=True):
             return found[held.newest]
 
         found = [
-            Column(name, unit, array([getattr(reading, field) for reading in readings]), digits)
-            for field, name, unit, digits in self.COLUMNS
+            Column(field, unit, array([getattr(reading, field) for reading in readings]), digits)
+            for field, unit, digits in self.COLUMNS
         ]
         return [*found, Column("age", "s", array([reading.age for reading in readings]) + held.since_s, 3)]
 
@@ -216,7 +216,7 @@ class VehicleDevice(Device, frozen=True, kw_only=True):
     def columns(self, place: Place, run: Run) -> list[Column]:
         """One per entry of COLUMNS, each of which is one number of the device."""
         values = run.values(place.name)
-        return [Column(name, unit, values[:, i], digits) for i, (_, name, unit, digits) in enumerate(self.COLUMNS)]
+        return [Column(field, unit, values[:, i], digits) for i, (field, unit, digits) in enumerate(self.COLUMNS)]
 
 
 class Sensor(VehicleDevice, frozen=True, kw_only=True):

@@ -76,7 +76,7 @@ class WheelEncoder(Device, frozen=True, kw_only=True):
         """Edges counted, and the time between the last two."""
         side = place.name.removeprefix("encoder_")
         return [
-            Column("", "", run.raw[place.name], None),
+            Column("count", "", run.raw[place.name], None),
             Column("period", "s", run.raw[f"edge_period_{side}"] * EDGE_PERIOD_SCALE, 6),
         ]
 

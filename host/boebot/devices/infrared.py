@@ -124,7 +124,7 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
         """Detected or not, the age, and the zone of a robot that sweeps."""
         age = run.raw["infrared_age"]
         found = [
-            Column("", "", (run.raw["infrared"] & _bit(place)) != 0, None),
+            Column("detected", "", (run.raw["infrared"] & _bit(place)) != 0, None),
             Column("age", "s", np.where(age < NEVER, age * place.tick_s, np.nan), 3),
         ]
         if _schedule(place.devices).sweep:
@@ -198,7 +198,7 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Detected or not, and the reading."""
         values = run.values(place.name)[:, 0]
-        return [Column("", "", values >= self.threshold, None), Column("reading", "", values, 5)]
+        return [Column("detected", "", values >= self.threshold, None), Column("reading", "", values, 5)]
 
     def drawing(self) -> list[Shape]:
         """Its beam."""

@@ -65,7 +65,7 @@ class Laser(Sensor, tag="laser_range_finder", frozen=True, kw_only=True):
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """One per ray."""
-        return [Column(str(ray), "m", values, 4) for ray, values in enumerate(run.values(place.name).T)]
+        return [Column(f"distance_{ray}", "m", values, 4) for ray, values in enumerate(run.values(place.name).T)]
 
     def readout(self, place: Place, run: Run, columns: Mapping[str, Column]) -> Readout | None:
         """The nearest distance."""

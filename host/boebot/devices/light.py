@@ -69,8 +69,8 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     # Port D has its own pin-change interrupt; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
-    COLUMNS: ClassVar = (("decay_time", "", "s", 6),)
-    SHOWN: ClassVar = ("", "ms", 1e3, 3)
+    COLUMNS: ClassVar = (("decay_time", "s", 6),)
+    SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
@@ -104,8 +104,8 @@ class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
 
     READING: ClassVar = Light
     GROUP: ClassVar[str] = "lights"
-    COLUMNS: ClassVar = (("brightness", "", "", 5),)
-    SHOWN: ClassVar = ("", "W/m²", 1.0, 2)
+    COLUMNS: ClassVar = (("brightness", "w_m2", 5),)
+    SHOWN: ClassVar = ("brightness", "W/m²", 1.0, 2)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

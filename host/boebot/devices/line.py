@@ -48,7 +48,7 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
 
     pin: int | str
     position_m: Point
-    dark_us: Annotated[float, msgspec.Meta(gt=0, lt=14000)] = 1000.0  # a longer decay is a dark floor
+    dark_s: Annotated[float, msgspec.Meta(gt=0, lt=0.014)] = 0.001  # a longer decay is a dark floor
 
     READING: ClassVar = Line
     GROUP: ClassVar[str] = "lines"
@@ -57,13 +57,13 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port D": "line sensors"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": tuple(range(8))}
     MESSAGE: ClassVar[type] = LineTelemetry
-    COLUMNS: ClassVar = (("decay_time", "", "s", 6),)
-    SHOWN: ClassVar = ("", "ms", 1e3, 3)
+    COLUMNS: ClassVar = (("decay_time", "s", 6),)
+    SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
         field = LineTelemetry._fields.index(place.name)
-        fresh, tick_s, dark_us = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s, self.dark_us
+        fresh, tick_s, dark_s = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s, self.dark_s
 
         def read(_: object, slow: Latest) -> Line:
             message, since = slow.of(LineTelemetry)
@@ -71,7 +71,7 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
             age = ticks * tick_s if message.line_age < NEVER else float("inf")
             if message.line_age >= NEVER or us == 0:
                 return Line(None, None, False, age, False)
-            return Line(us * 1e-6, None, us > dark_us, age, ticks <= fresh)
+            return Line(us * 1e-6, None, us * 1e-6 > dark_s, age, ticks <= fresh)
 
         return read
 
@@ -90,8 +90,8 @@ class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=T
 
     READING: ClassVar = Line
     GROUP: ClassVar[str] = "lines"
-    COLUMNS: ClassVar = (("reflectance", "", "", 4),)
-    SHOWN: ClassVar = ("", "", 1.0, 2)
+    COLUMNS: ClassVar = (("reflectance", "", 4),)
+    SHOWN: ClassVar = ("reflectance", "", 1.0, 2)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -38,7 +38,7 @@ class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
 
     READING: ClassVar = OdometerPose
     NAMES: ClassVar[tuple[str, ...]] = ("odometer",)
-    COLUMNS: ClassVar = (("x", "x", "m", 5), ("y", "y", "m", 5), ("heading", "heading", "rad", 5))
+    COLUMNS: ClassVar = (("x", "m", 5), ("y", "m", 5), ("heading", "rad", 5))
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -71,8 +71,8 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
-    COLUMNS: ClassVar = (("angle", "", "rad", 4),)
-    SHOWN: ClassVar = ("", "°", 180 / math.pi, 1)
+    COLUMNS: ClassVar = (("angle", "rad", 4),)
+    SHOWN: ClassVar = ("angle", "°", 180 / math.pi, 1)
 
     def pulse_of(self, message: TurretMessage) -> int:
         """The pulse (counts) by which the board shows that it has done so; 0: none."""

@@ -55,7 +55,7 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Pressed or not."""
-        return [Column("", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
+        return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
 
     def drawing(self) -> list[Shape]:
         """The wire."""
@@ -88,7 +88,7 @@ class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Pressed or not."""
-        return [Column("", "", run.values(place.name)[:, 0] > 0, None)]
+        return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
 
     def drawing(self) -> list[Shape]:
         """The wire."""

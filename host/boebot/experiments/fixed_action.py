@@ -70,7 +70,7 @@ class Escape:
     def seen(self) -> Floats:
         """Whether a sensor saw something, at those ticks."""
         series = self.result.series
-        return self.span(series.flag("infrared_left") | series.flag("infrared_right"))
+        return self.span(series.flag("infrared_left", "detected") | series.flag("infrared_right", "detected"))
 
     @property
     def turned(self) -> float:
@@ -169,7 +169,9 @@ def _outcome(stays: Escape, gone: Escape, measured: list[Measured]) -> Outcome:
     ticks = min(len(one) for one in series)
     data: dict[str, Any] = {"time_s": series[0].time[:ticks]}
     for name, one in zip(("stays", "gone"), series, strict=True):
-        data[f"seen_{name}"] = (one.flag("infrared_left") | one.flag("infrared_right"))[:ticks].astype(int)
+        data[f"seen_{name}"] = (one.flag("infrared_left", "detected") | one.flag("infrared_right", "detected"))[
+            :ticks
+        ].astype(int)
         data[f"left_{name}"] = one.signals[0][:ticks]
         data[f"right_{name}"] = one.signals[1][:ticks]
 

@@ -202,7 +202,7 @@ class RunResult(FormerNames):
         """How many times a whisker was pressed; None: the robot has none."""
         if not self.whiskers:
             return None
-        return sum(onsets(self.series.flag(whisker)) for whisker in self.whiskers)
+        return sum(onsets(self.series.flag(whisker, "pressed")) for whisker in self.whiskers)
 
     @property
     def ticks(self) -> int:

@@ -114,12 +114,12 @@ class Series(Run, ABC):
             self._device_columns[device] = {column.name: column for column in found}
         return self._device_columns[device]
 
-    def flag(self, device: str, name: str = "") -> Bools:
-        """A column of yes and no, such as a whisker's; no, if the robot does not have the device."""
+    def flag(self, device: str, name: str) -> Bools:
+        """A column of yes and no, such as a whisker's "pressed"; no, if the robot does not have the device."""
         column = self.device_columns(device).get(name)
         return np.zeros(len(self), dtype=np.bool_) if column is None else np.asarray(column.values, dtype=np.bool_)
 
-    def number(self, device: str, name: str = "") -> Floats:
+    def number(self, device: str, name: str) -> Floats:
         """A column of numbers, such as the Ping's "distance"; NaN, if the robot does not have the device."""
         column = self.device_columns(device).get(name)
         return np.full(len(self), np.nan) if column is None else np.asarray(column.values, dtype=np.float64)

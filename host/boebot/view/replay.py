@@ -102,10 +102,10 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
     thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
     status = series.status
     flags = (
-        series.flag("whisker_left") * LEFT_WHISKER
-        | series.flag("whisker_right") * RIGHT_WHISKER
-        | series.flag("infrared_left") * LEFT_IR
-        | series.flag("infrared_right") * RIGHT_IR
+        series.flag("whisker_left", "pressed") * LEFT_WHISKER
+        | series.flag("whisker_right", "pressed") * RIGHT_WHISKER
+        | series.flag("infrared_left", "detected") * LEFT_IR
+        | series.flag("infrared_right", "detected") * RIGHT_IR
         | _contact(result) * CONTACT
         | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF

@@ -60,7 +60,9 @@ def view(result: RunResult) -> View:
         inside = truth.time >= result.clock_offset
         begins = touch_indices(truth.time, truth.contact & inside)
         contacts = np.column_stack((truth.x[begins], truth.y[begins]))
-    begins = _onset_indices(np.any([series.flag(name) for name in result.whiskers] or [series.time < 0], axis=0))
+    begins = _onset_indices(
+        np.any([series.flag(name, "pressed") for name in result.whiskers] or [series.time < 0], axis=0)
+    )
     touches = np.column_stack((path.x[begins], path.y[begins]))
     return View(
         known=known,
@@ -69,7 +71,7 @@ def view(result: RunResult) -> View:
         plan=truth.plan if truth is not None else FloorPlan(),
         true_contacts=contacts,
         touches=touches,
-        turret=np.nan_to_num(series.number("turret"), nan=0.0),
+        turret=np.nan_to_num(series.number("turret", "angle"), nan=0.0),
         path_is_seen=seen is not None,
     )
 
