@@ -21,7 +21,8 @@ from boebot.link.ports.serial_port import open_serial
 from hil_tests.bootloader import with_bootloader
 from hil_tests.calibration import board
 from hil_tests.calibration.talk import START, Talk
-from sim_bridge.serve import PtyPort, carry
+from sim_bridge.serve import carry
+from sim_bridge.served_ports.pty_port import PtyPort
 from sim_bridge.sessions.with_board import SimSession, open_avr
 
 pytestmark = pytest.mark.emulated
@@ -36,7 +37,7 @@ def served(image: Path) -> Iterator[tuple[str, SimSession]]:
     """The port of an emulated board, as `boebot serve` offers it."""
     request = BoardRequest(robot=load_robot("shieldbot"), arena="empty", seed=1, noise=False, image=str(image))
     session, port, ended = open_avr(request), PtyPort(board.BAUD), threading.Event()
-    thread = threading.Thread(target=carry, args=(session, port, lambda: not ended.is_set()))
+    thread = threading.Thread(target=carry, args=(session, port, lambda: not ended.is_set(), lambda _: None))
     thread.start()
     try:
         yield port.url, session

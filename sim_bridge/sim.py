@@ -331,8 +331,14 @@ class Sim:
         count = ffi.new("size_t *")
         inputs = lib.sim_inputs(self.handle, count)
         if inputs == ffi.NULL:
-            raise saved.SavedStateError("this simulation cannot be saved: a board has crashed, or memory ran out")
+            raise saved.SavedStateError(
+                "this simulation cannot be saved: a board has crashed, its inputs are not kept, or memory ran out"
+            )
         return saved.encode(self._heading(), ffi.buffer(inputs, count[0])[:])
+
+    def keep_no_inputs(self) -> None:
+        """What robots are sent is not kept any more, so that a run of days takes no more memory; `save` then raises."""
+        lib.sim_keep_no_inputs(self.handle)
 
     def restore(self, state: bytes, progress: Progress | None = None) -> None:
         """Goes to a saved state, and on from there as the simulation went on that was saved, bit for bit.

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError
@@ -187,6 +187,17 @@ class TogetherFactory(Protocol):
         """Opens them; arena, seed of the world and pace are the first request's."""
 
 
+class Visit(NamedTuple):
+    """What a client of a served robot did."""
+
+    what: str
+    """"came", "went" or "refused"."""
+    client: str
+    """Its address, or the process that has opened the pseudo-terminal."""
+    why: str = ""
+    """Why it was refused or had to go."""
+
+
 class Server(Protocol):
     """What an entry point of the group `boebot.servers` loads to: offers an emulated robot to other programs."""
 
@@ -197,11 +208,12 @@ class Server(Protocol):
         *,
         tcp: int | None,
         announce: Callable[[str], None],
+        visit: Callable[[Visit], None],
         running: Callable[[], bool],
     ) -> None:
         """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty,
         or on TCP port `tcp` of loopback (0: any free one). Calls `announce(url)` once clients may open that
-        URL."""
+        URL, and `visit` when one comes, goes or is refused."""
 
 
 class LiveSession:

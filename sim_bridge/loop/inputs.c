@@ -39,6 +39,7 @@ static double double_of_input(uint64_t word) {
 
 void sim_note(sim *self, int number, input_kind kind, const uint64_t *words, size_t count, const uint8_t *bytes,
               size_t size) {
+  if (self->inputs.lost > 0) return; /* with a gap they are of no use */
   uint8_t fixed[HEADING_BYTES + 8 * INPUT_WORDS];
   put(fixed, self->now, 8);
   put(fixed + 8, (uint32_t)number, 4);
@@ -62,6 +63,11 @@ const uint8_t *sim_inputs(const sim *self, size_t *count) {
   *count = self->inputs.count;
   if (self->inputs.lost > 0 || self->crashed) return NULL;
   return self->inputs.count > 0 ? self->inputs.data + self->inputs.start : nothing;
+}
+
+void sim_keep_no_inputs(sim *self) {
+  buffer_free(&self->inputs);
+  self->inputs.lost = 1;
 }
 
 /* ---- playing again ------------------------------------------------------------------------------------------------- */

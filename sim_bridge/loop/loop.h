@@ -105,8 +105,11 @@ int sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
 size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
 
 /* All that has come from outside since power-on (bytes sent and whatever below changes something), with its cycles; NULL
- * where some of it found no memory, or a board has crashed. Good until the next input. */
+ * where some of it is missing, or a board has crashed. Good until the next input. */
 const uint8_t *sim_inputs(const sim *self, size_t *count);
+
+/* Notes no input from now on, and forgets those so far. */
+void sim_keep_no_inputs(sim *self);
 
 /* Plays such inputs again, from byte `at` of them on, which goes on with them, and runs until that cycle; the simulation
  * has the same arena, robots, boards and firmware, and has heard nothing else. Returns 0, 1 + the number of a robot whose

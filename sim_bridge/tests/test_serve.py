@@ -6,13 +6,13 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
 import serial
 
-from boebot.boards import BoardRequest, open_port
+from boebot.boards import BoardRequest, Visit, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
@@ -29,8 +29,8 @@ def request() -> BoardRequest:
 
 
 @contextmanager
-def served(tcp: int | None) -> Iterator[str]:
-    """The URL of a served native board."""
+def served(tcp: int | None, visit: Callable[[Visit], None] = lambda _: None) -> Iterator[str]:
+    """The URL of a served native board; `visit` hears who comes and goes."""
     urls: list[str] = []
     announced, stop = threading.Event(), threading.Event()
 
@@ -39,7 +39,7 @@ def served(tcp: int | None) -> Iterator[str]:
         announced.set()
 
     def work() -> None:
-        serve("native", request(), tcp=tcp, announce=announce, running=lambda: not stop.is_set())
+        serve("native", request(), tcp=tcp, announce=announce, visit=visit, running=lambda: not stop.is_set())
 
     thread = threading.Thread(target=work)
     thread.start()
@@ -132,6 +132,6 @@ def test_what_cannot_be_served_is_told() -> None:
     with served(0) as url:
         taken = int(url.rpartition(":")[2])
         with pytest.raises(BoardError, match=f"^TCP port {taken} cannot be opened: it is in use$"):
-            serve("native", request(), tcp=taken, announce=print, running=lambda: False)
+            serve("native", request(), tcp=taken, announce=print, visit=print, running=lambda: False)
     with pytest.raises(BoardError, match="no emulated board 'toaster'"):
-        serve("toaster", request(), tcp=0, announce=print, running=lambda: False)
+        serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)

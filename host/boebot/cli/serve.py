@@ -8,10 +8,12 @@ from typing import Annotated
 
 import typer
 
-from boebot.boards import BoardRequest, board_kinds, check_board, find_server
+from boebot.boards import BoardRequest, Visit, board_kinds, check_board, find_server
 from boebot.cli import options, output
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+
+_WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused"}
 
 
 def serve(
@@ -49,5 +51,11 @@ def serve(
             output.line(f"{request.robot.name} on {on} is at {url}")
             output.line(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C")
 
+    def visit(event: Visit) -> None:
+        if json:
+            output.print_json({"event": event.what, "client": event.client, "why": event.why}, indent=None)
+        else:
+            output.line(f"{event.client} {_WORDS[event.what]}{event.why and f': {event.why}'}")
+
     with contextlib.suppress(KeyboardInterrupt):
-        find_server()(on, request, tcp=tcp, announce=announce, running=lambda: True)
+        find_server()(on, request, tcp=tcp, announce=announce, visit=visit, running=lambda: True)

@@ -16,6 +16,7 @@ _SHORTEST = 3 + _CHECK_BYTES  # code byte, id, sequence number
 _TEXT_LEAST = 8  # characters that make a text
 _TEXT_SHARE = 0.9
 _QUOTED = 40
+_LONGEST_SENTENCE = 200  # characters of a refusal
 _SPOILT_SHARE = 0.2  # of the frames damaged: then that is why there is no session
 
 
@@ -121,6 +122,12 @@ class BoardSearch:
             f"other firmware, {tried}"
         )
 
+    def explained(self, error: BoardError) -> BoardError:
+        """Why the search ended by that error: where the other side has closed with a sentence, as `boebot serve` does
+        that has a client, by that sentence."""
+        said = _text(self._sample, _LONGEST_SENTENCE)
+        return BoardError(f"{self._where} was closed by the other side, which says {said!r}") if said else error
+
     def _put_sample_aside(self) -> None:
         if self._sample:
             self._samples.append((self.baud, bytes(self._sample)))
@@ -185,13 +192,13 @@ def _has_checksum(piece: bytes) -> bool:
     return checksum(piece[:-_CHECK_BYTES], SEED) == int.from_bytes(piece[-_CHECK_BYTES:], "big")
 
 
-def _text(sample: bytes) -> str:
-    """What people could read of it; empty if that is little."""
+def _text(sample: bytes | bytearray, longest: int = _QUOTED) -> str:
+    """What people could read of it, cut to `longest` characters; empty if that is little."""
     readable = [byte for byte in sample if 32 <= byte < 127 or byte in b"\r\n\t"]
     if len(sample) < _TEXT_LEAST or len(readable) < _TEXT_SHARE * len(sample):
         return ""
     lines = bytes(readable).decode("ascii").split()
-    return " ".join(lines)[:_QUOTED]
+    return " ".join(lines)[:longest]
 
 
 def _at(baud: int | None) -> str:

@@ -136,6 +136,8 @@ class Session:
                 elif self.hello is None and (baud := search.next_baud(now)) is not None:
                     line.change_baud(baud)
                 self._wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
+        except BoardError as error:
+            raise (search.explained(error) if self.hello is None else error) from None
         finally:
             line.listener = None
         if search.changed:

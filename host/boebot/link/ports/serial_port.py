@@ -26,6 +26,7 @@ from serial.tools import list_ports
 
 from boebot.errors import BoardError
 from boebot.link.ports.descriptor import DescriptorTransport
+from boebot.link.ports.holders import holder_of, in_words
 from boebot.link.ports.lock_file import LockFile, PortBusyError
 from boebot.link.ports.polled import PolledTransport
 from boebot.link.transport import Transport
@@ -175,17 +176,7 @@ def take_lock(port: str) -> LockFile:
     try:
         return LockFile(port)
     except PortBusyError as busy:
-        raise BoardError(f"{port} is busy: {who(busy.owner)} has it open") from None
-
-
-def who(process: int) -> str:
-    """A process in words."""
-    if process == os.getpid():
-        return f"this program itself (process {process})"
-    try:
-        return f"process {process} ({Path(f'/proc/{process}/comm').read_text().strip()})"
-    except OSError:
-        return f"process {process}"
+        raise BoardError(f"{port} is busy: {in_words(busy.owner)} has it open") from None
 
 
 def why_not(port: str, baud: int, error: Exception) -> str:
@@ -197,7 +188,7 @@ def why_not(port: str, baud: int, error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM) or "permissionerror" in text:
         return f"{port} may not be opened by this user: permission denied{_remedy(port)}"
     if number in _BUSY:
-        return f"{port} is busy: another program has it open"
+        return f"{port} is busy: {holder_of(port) or 'another program'} has it open"
     if "baud" in text:
         return f"{port} does not run at {baud} baud"
     if number in _NO_TERMINAL or "configure" in text:
