@@ -24,3 +24,10 @@ def folder(kind: str) -> Path:
     """The folder that holds `kind`: "robots", "images" (firmware) or "arenas"."""
     installed, in_checkout = _FOLDERS[kind]
     return in_checkout if checkout() is not None else installed
+
+
+def remedy(target: str) -> str:
+    """What to do about a file of the kit that is missing: a target of make where there is a makefile."""
+    return (
+        f"build it with `make {target}`" if checkout() is not None else "this installation of boebot does not have it"
+    )

@@ -67,6 +67,15 @@ def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
         ("PERIOD = 'fast'\ndef step(robot): ...\n", r"mine\.py: PERIOD is 'fast'; expected seconds"),
         ("NEEDS = 3\ndef step(robot): ...\n", r"mine\.py: NEEDS is 3; expected a list of device names"),
         ("async def step(robot): ...\n", r"mine\.py: step is an async function; expected a plain one"),
+        (
+            "def step(): ...\n",
+            r"mine\.py: step cannot be called with the robot alone \(too many pos.*\); expected step\(",
+        ),
+        ("class Brain:\n    def step(self): ...\n", r"mine\.py: step cannot be called with the robot alone"),
+        (
+            "def step(robot, world): ...\n",
+            r"mine\.py: step cannot be called with .* \(missing a required argument: 'world'",
+        ),
         ("def step(robot):\n    yield\n", r"mine\.py: step contains yield; expected a function that returns"),
         ("async def step(robot):\n    yield\n", r"mine\.py: step contains yield"),
         ("class Brain:\n    async def step(self, robot): ...\n", r"mine\.py: step is an async function"),

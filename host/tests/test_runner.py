@@ -79,6 +79,8 @@ def test_time_to_live_outlasts_the_period(session: InProcess, period_ms: int, ti
         ({"period": math.nan}, "expected more than 0"),
         ({"seconds": 0}, "cannot last 0 s"),
         ({"seconds": math.nan}, "cannot last nan s"),
+        ({"realtime": "no"}, "realtime is 'no'; expected True or False"),
+        ({"progress": 5}, "progress is 5; expected a function of the seconds that have passed, or None"),
         ({"seconds": "5"}, "seconds is '5'; expected a number"),
         ({"seconds": None}, "seconds is None; expected a number"),
         ({"seed": "x"}, "seed is 'x'; expected a whole number"),

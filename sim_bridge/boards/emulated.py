@@ -113,7 +113,7 @@ def native_library(pin_map: str) -> Path:
         path = folder / f"firmware-{pin_map}{suffix}"
         if path.is_file():
             return path
-    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; build it with `make setup`")
+    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; {resources.remedy('setup')}")
 
 
 def native_board(library: Path) -> EmulatedBoard:
@@ -164,7 +164,7 @@ def avr_image(pin_map: str) -> Path:
     """
     image = resources.folder("images") / f"{pin_map}.elf"
     if not image.is_file():
-        raise BoardError(f"there is no firmware image {image.name}; build it with `make firmware`")
+        raise BoardError(f"there is no firmware image {image.name}; {resources.remedy('firmware')}")
     return image
 
 

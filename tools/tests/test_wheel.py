@@ -53,3 +53,17 @@ def test_an_installed_wheel_runs_bundled_brains(installed: Path, tmp_path: Path,
     assert done.returncode == 0, done.stdout + done.stderr
     assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in out.iterdir()}
     assert len((out / "run.csv").read_text(encoding="utf-8").splitlines()) > 450  # 100 ticks a second
+
+
+def test_an_installed_wheel_speaks_of_no_makefile(installed: Path, tmp_path: Path) -> None:
+    """A robot of one's own whose pin map no bundled firmware has."""
+    shieldbot = (PROJECT / "protocol" / "robots" / "shieldbot.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        shieldbot.replace('pin_map = "shieldbot"', 'pin_map = "mine"'), encoding="utf-8"
+    )
+    for arguments in (["run", "wander", "--on", "native"], ["run", "wander", "--on", "avr"], ["timing"]):
+        command = [str(installed / "bin" / "boebot"), *arguments, "--robot", "mine.toml"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        assert "this installation of boebot does not have it" in done.stderr and "make" not in done.stderr
+        assert len(done.stderr.splitlines()) == 1

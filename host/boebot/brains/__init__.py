@@ -253,12 +253,21 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
 
 
 def _check_step(step: Callable[..., object], where: str) -> None:
-    """Refuses a step whose body would never run, for a call of it only makes a coroutine or a generator."""
+    """Refuses a step whose body would never run: one that cannot be called with the robot, or a call of which only
+    makes a coroutine or a generator."""
     whole = (step, getattr(step, "__call__", step))  # noqa: B004
     if any(inspect.iscoroutinefunction(part) for part in whole):
         raise BrainError(f"{where}: step is an async function; expected a plain one, def step(robot)")
     if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
         raise BrainError(f"{where}: step contains yield; expected a function that returns, def step(robot)")
+    try:
+        inspect.signature(step).bind("the robot")
+    except TypeError as error:
+        raise BrainError(
+            f"{where}: step cannot be called with the robot alone ({error}); expected step(robot)"
+        ) from None
+    except ValueError:  # a function in C that does not say its arguments
+        pass
 
 
 def _construct(kind: type, path: Path | None) -> Any:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import signal
 import sys
 import time
 from typing import NoReturn
 
+from boebot.cli import streams
 from boebot.errors import BoebotError, printable
 from boebot.running.interrupts import SIGNALS
 
@@ -30,6 +32,7 @@ def main() -> NoReturn:
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
                 signal.signal(number, _interrupt)
         sys.unraisablehook = _ask_again
+        streams.accept_all_characters()
         code = _run()
     except KeyboardInterrupt as error:
         code = _interrupted("interrupted", error)
@@ -46,7 +49,10 @@ def _run() -> object:
     from boebot.cli.ending import InterruptedRunError
 
     try:
-        code = app(standalone_mode=False)
+        try:
+            code = app(standalone_mode=False)
+        finally:
+            streams.finish()
     except InterruptedRunError as error:
         return _interrupted(str(error), error)
     except BoebotError as error:
@@ -55,6 +61,10 @@ def _run() -> object:
     except typer.Abort:
         raise KeyboardInterrupt from None
     except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EBADF) and error.filename is None:
+            streams.discard()
+            _say(f"the output cannot be written: {os.strerror(error.errno).lower()}", error)
+            return EXIT_ERROR
         if error.errno not in (errno.EPIPE, errno.EIO):
             raise
         sys.stderr.close()  # what reads our output has closed it, as `head` does, or the terminal has gone

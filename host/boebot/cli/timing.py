@@ -210,7 +210,7 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
         return elf
     image = resources.folder("images") / f"{robot.pin_map}.elf"
     if not image.is_file():
-        raise TimingError(f"there is no image {image}; expected one built by `make firmware`, or --elf F")
+        raise TimingError(f"there is no image {image}; {resources.remedy('firmware')}, or name one by --elf F")
     return image
 
 

@@ -25,7 +25,7 @@ from boebot.running.board_driver import BoardDriver
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task
 from boebot.running.stepping import StepTimes, StepWatch, step_once
-from boebot.running.tasks import Request, expect
+from boebot.running.tasks import Request, check_progress, expect
 
 Result = TypeVar("Result", RunResult, TogetherResult)
 
@@ -83,6 +83,7 @@ def execute(request: Request, progress: Progress | None = None) -> RunResult:
     Raises:
         BoebotError: the run could not begin.
     """
+    check_progress(progress)
     (task,) = request.tasks()
     task = replace(task, progress=progress)
     opening = open_board if task.request.robot.has_board else open_vehicle

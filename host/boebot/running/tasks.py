@@ -97,8 +97,9 @@ class Request:
         expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
         if self.step_timeout is not None and not self.step_timeout > 0:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
-        if not isinstance(self.force_timing, bool):
-            raise BoebotError(f"force_timing is {self.force_timing!r}; expected True or False")
+        for name, switch in (("realtime", self.realtime), ("force_timing", self.force_timing)):
+            if not isinstance(switch, bool):
+                raise BoebotError(f"{name} is {switch!r}; expected True or False")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
@@ -188,6 +189,12 @@ def expect(name: str, value: object, expected: str, *kinds: type) -> None:
     """Raises a BoebotError if an argument of `run` is of no such kind."""
     if not isinstance(value, kinds) or isinstance(value, bool):
         raise BoebotError(f"{name} is {value!r}; expected {expected}")
+
+
+def check_progress(progress: object) -> None:
+    """Raises a BoebotError if that is nothing to report progress to."""
+    if progress is not None and not callable(progress):
+        raise BoebotError(f"progress is {progress!r}; expected a function of the seconds that have passed, or None")
 
 
 def _names(argument: str, names: object) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from boebot.running.driver import PROGRESS_S, Driver, Progress, Task
 from boebot.running.pausable_thread import PAUSED, PausableThread
 from boebot.running.runner import driver_of, keep, with_times
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
-from boebot.running.tasks import Member, Request, of_robot
+from boebot.running.tasks import Member, Request, check_progress, of_robot
 
 __all__ = ["Member", "StoppedError", "execute_together", "run_together"]
 
@@ -83,6 +83,7 @@ def execute_together(request: Request, progress: Progress | None = None) -> Toge
     Raises:
         BoebotError: the run could not begin.
     """
+    check_progress(progress)
     tasks = request.tasks()
     _check_own_brains([task.brain for task in tasks])
     kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)

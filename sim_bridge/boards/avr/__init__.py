@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot import resources
 from boebot.errors import BoardError
 from sim_bridge.boards.board import BoardAccess
 
@@ -56,7 +57,7 @@ def _extension() -> Any:
         if any(Path(__file__).parent.glob("_avr.*.so")):
             raise BoardError(f"the AVR emulator cannot be loaded: {error}") from error
         raise BoardError(
-            "the AVR emulator is not built; run `make setup` in a checkout, or choose the native board (--on native)"
+            f"there is no AVR emulator; {resources.remedy('setup')}, or choose the native board (--on native)"
         ) from error
 
 
