@@ -64,6 +64,6 @@ def test_an_installed_wheel_speaks_of_no_makefile(installed: Path, tmp_path: Pat
     for arguments in (["run", "wander", "--on", "native"], ["run", "wander", "--on", "avr"], ["timing"]):
         command = [str(installed / "bin" / "boebot"), *arguments, "--robot", "mine.toml"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 1
+        assert done.returncode in (1, 2)
         assert "this installation of boebot does not have it" in done.stderr and "make" not in done.stderr
         assert len(done.stderr.splitlines()) == 1

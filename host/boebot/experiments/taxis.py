@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from boebot import rates
 from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
@@ -133,7 +134,7 @@ def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straigh
     left.add_patch(Circle((0, 0), REACHED_M, fill=False, ls="--", ec=style.FAINT, zorder=8))
     draw_robot(left, done[0].result.robot, done[0].start, style.START)
     reached = [time for time in times if time < math.inf]
-    left.set_title(f"{len(reached)} of {len(times)} starts reach the lamp")
+    left.set_title(f"starts that reach the lamp: {rates.in_words(len(reached), len(times))}")
     right.hist(reached, bins=24)
     right.axvline(straight, color="0.3", ls="--", lw=1, label=f"straight {straight:.1f} s")
     if reached:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot import rates
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
@@ -193,14 +194,17 @@ def _alone(setting: Setting, seed: int, progress: Progress) -> Outcome:
 
 
 def _draw_survivors(axes: Axes, done: list[Trial], seconds: float) -> None:
-    """Share of runs without a contact so far, against time."""
+    """Share of runs without a contact so far, against time, with its interval."""
     times = np.sort([trial.first_contact for trial in done if trial.has_collided])
-    left = 1 - np.arange(len(times) + 1) / len(done)
-    axes.step([0, *times, seconds], [*left, left[-1]], where="post")
+    counts = [*range(len(done), len(done) - len(times) - 1, -1), len(done) - len(times)]
+    least, most = np.transpose([rates.interval(count, len(done)) for count in counts])
+    steps = [0, *times, seconds]
+    axes.fill_between(steps, least, most, step="post", color="0.88", label="95 %")
+    axes.step(steps, np.array(counts) / len(done), where="post")
     if len(times) > len(done) / 2:
         middle = float(np.median([trial.first_contact if trial.has_collided else math.inf for trial in done]))
         axes.axvline(middle, color="0.5", ls="--", lw=1, label=f"median {middle:.1f} s")
-        axes.legend(fontsize="small")
+    axes.legend(fontsize="small")
     axes.set(xlabel="time (s)", ylabel="share of runs without contact", ylim=(0, 1.02), xlim=(0, seconds))
 
 
