@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 import time
 import weakref
@@ -19,6 +20,7 @@ from boebot.arguments import point, shown, whole
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.former_names import FormerNames
+from boebot.record.blocks import Block, Group
 from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
@@ -42,6 +44,7 @@ NEVER = 2**64 - 1
 
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
 TONE = ("time", "duration", "frequency")
+_WAIT = struct.Struct("<dd")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 BAUD_MAXIMUM = 4_000_000
@@ -293,6 +296,22 @@ class Sim:
             raise BoardError(
                 f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {board.fault()}"
             )
+
+    @property
+    def is_recorded(self) -> bool:
+        """The truth is kept."""
+        return self._record
+
+    def drain_waits(self) -> Group:
+        """The stream "waits" of a record since it was last drained: rows (shape, how long it has waited in all, s), the
+        last one of each shape of now. Empty without recording, and without moving shapes."""
+        rows = [
+            (time, _WAIT.pack(shape, waited))
+            for shape, late in enumerate(self.lateness())
+            for time, waited in zip(late.time.tolist(), late.waited.tolist(), strict=True)
+        ]
+        lib.sim_forget_waits(self.handle)
+        return {"waits": Block.of(sorted(rows))} if rows else {}
 
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
@@ -632,6 +651,21 @@ class SimRobot(FormerNames):
     def tones(self) -> dict[str, Floats]:
         """Columns `TONE`, one row per tone that a buzzer has sounded."""
         return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
+
+    def drain(self, *, to_now: bool = False) -> Group:
+        """The streams "truth", "looks" and "tones" of a record since they were last drained: rows of doubles, columns
+        `TRUTH`, `LOOK`, `TONE` without the time. Empty without recording. `to_now`: as `truth_to_now`."""
+        if not self.sim.is_recorded:
+            return {}
+        found = {}
+        truth = self.truth_to_now() if to_now else self.truth()
+        for stream, table in (("truth", truth), ("looks", self.looks()), ("tones", self.tones())):
+            time, *columns = table.values()
+            if len(time):
+                data = np.column_stack(columns)
+                found[stream] = Block(time.copy(), data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))
+        lib.sim_forget(self._handle, self.number)
+        return found
 
     def turret_angle(self, pin: int) -> float:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""

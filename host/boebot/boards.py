@@ -14,12 +14,14 @@ from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
+from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
 from boebot.link.ports.tcp import SocketTransport
 from boebot.link.transport import Transport
+from boebot.record.blocks import Group
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,7 +55,7 @@ class BoardRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What really happened, for pictures and figures after a run. No brain ever sees it.
+    """What really happened, for pictures and figures after a run (boebot.record.truth). No brain ever sees it.
 
     The series have one row per sample; `time` is on the clock of the session's transport (s).
     """
@@ -94,8 +96,13 @@ class BoardSession(Protocol):
     def description(self) -> str:
         """The board in a few words, such as "emulated ATmega328P"."""
 
-    def truth(self) -> Truth | None:
-        """What happened so far, or None where nobody knows (a real robot)."""
+    @property
+    def arena(self) -> Arena | None:
+        """Where the robot is; None where nobody knows (a real robot)."""
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """The streams of a record that only a simulator knows, from where it was last drained (`Truth`); empty where
+        nobody knows. `ended`: the run has ended now."""
 
     def counters(self) -> Mapping[str, float]:
         """What the board counted, by name; may be empty."""
@@ -135,8 +142,12 @@ class VehicleSession(Protocol):
     def ended(self) -> str:
         """Why it can go no further, or ""."""
 
-    def truth(self) -> Truth | None:
-        """What happened so far, a row a step from the start on; `time` is in s since then."""
+    @property
+    def arena(self) -> Arena:
+        """Where the robot is."""
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """See `BoardSession`."""
 
     def counters(self) -> Mapping[str, float]:
         """What the world counted, by name; may be empty."""
@@ -223,9 +234,11 @@ class LiveSession:
         self.transport = transport
         self.description = description
 
-    def truth(self) -> Truth | None:
+    arena = None
+
+    def drain(self, *, ended: bool = False) -> Group:
         """Nobody knows where a real robot is."""
-        return None
+        return {}
 
     def counters(self) -> Mapping[str, float]:
         """A port counts nothing."""

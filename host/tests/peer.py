@@ -15,6 +15,7 @@ import math
 import os
 import random
 import select
+import struct
 import threading
 import time
 import tty
@@ -22,21 +23,26 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
 from channel import Channel
 
-from boebot.arenas.floor_plan import FloorPlan, Solid
-from boebot.boards import Truth, WatchdogReset
+from boebot.arenas.arena import Arena
+from boebot.arenas.description import ArenaDescription, Polygon, Start
+from boebot.boards import WatchdogReset
 from boebot.description.board_parameters import parameters_of
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch, Status
+from boebot.record.blocks import Block, Group
 
 TICK_S = 0.01
 BYTE_S = 2e-5  # 500,000 baud
 ROOM_M = 1.5
+CORNERS = [(0.0, 0.0), (ROOM_M, 0.0), (ROOM_M, ROOM_M), (0.0, ROOM_M)]
+ROOM = Arena(
+    ArenaDescription(name="square", outline=[Polygon(corners_m=CORNERS)], start=Start(x_m=ROOM_M / 2, y_m=ROOM_M / 2))
+)
 NONCES = 1 << 21
 SLOW_DEVICES = (
     Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED | Devices.COMPASS | Devices.TURRET | Devices.BUZZER
@@ -558,18 +564,14 @@ class Peer:
 
     # ---- world -------------------------------------------------------------------------------------------------------
 
-    def truth(self) -> Truth:
-        """Where the robot was."""
-        time_s, x, y, heading, contact = np.array(self.path or [(0, self.x, self.y, self.heading, False)]).T
-        corners = np.array([(0, 0), (ROOM_M, 0), (ROOM_M, ROOM_M), (0, ROOM_M)], dtype=np.float64)
-        return Truth(
-            time=time_s,
-            x=x,
-            y=y,
-            heading=heading,
-            contact=contact.astype(bool),
-            plan=FloorPlan(name="square", solids=[Solid(kind="outline", points=corners)]),
-        )
+    def drain(self) -> Group:
+        """Where the robot was since the last time."""
+        rows = [
+            (time_s, struct.pack("<8d", x, y, heading, 0, 0, 0, 0, contact))
+            for time_s, x, y, heading, contact in self.path or [(0.0, self.x, self.y, self.heading, False)]
+        ]
+        self.path = []
+        return {"truth": Block.of(rows)}
 
     def _pulse(self, signal: float, gain_us: float) -> int:
         return 0 if self._coasting else round((1500 + gain_us * signal) * 16)
@@ -686,8 +688,10 @@ class InProcess:
     def now(self) -> float:
         return self._now
 
-    def truth(self) -> Truth | None:
-        return self.peer.truth()
+    arena = ROOM
+
+    def drain(self, *, ended: bool = False) -> Group:
+        return self.peer.drain()
 
     def counters(self) -> Mapping[str, float]:
         return {}

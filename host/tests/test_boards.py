@@ -118,5 +118,5 @@ def test_board_behind_a_port_has_the_robots_rate_unless_the_url_names_one() -> N
             session = open_board(f"serial:{board.path}{query}", REQUEST)
             assert session.description == f"board at {board.path}"
             assert getattr(session.transport, "baud", None) == rate
-            assert session.truth() is None and session.counters() == {}
+            assert not session.drain() and session.counters() == {}
             session.close()

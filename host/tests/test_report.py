@@ -214,7 +214,7 @@ def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) ->
 
 def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = InProcess(Peer())
-    session.truth = lambda: None  # type: ignore[method-assign]
+    session.drain = lambda **_: {}  # type: ignore[method-assign]
     monkeypatch.setattr(runner, "open_board", lambda url, request: session)
     result = boebot.run("wander", seconds=5, out=tmp_path)
     assert result.odometry_error is None

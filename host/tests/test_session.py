@@ -19,7 +19,7 @@ from boebot.link.fields import text
 from boebot.link.frame import encode
 from boebot.link.link import Link
 from boebot.link.times import LinkTimes
-from boebot.record.record import Memory
+from boebot.record.record import Record
 from peer import InProcess, Peer, without
 
 Latch = messages.Latch
@@ -42,7 +42,7 @@ class Recorded(Link):
     """A link that keeps what it sends."""
 
     def __init__(self, session: InProcess, **options: object) -> None:
-        self.memory = Memory()
+        self.memory = Record()
         super().__init__(session, self.memory.append, **options)  # type: ignore[arg-type]
 
 

@@ -137,6 +137,9 @@ uint64_t sim_hash(const sim *self);                /* of the whole state of all 
 
 /* What buzzers sounded, oldest first; a tone that sounds is not yet in it. */
 const sim_tone *sim_tones(const sim *self, int robot, size_t *count);
+/* All of the above that has been read is forgotten: of one robot, and of the arena's moving shapes. */
+void sim_forget(sim *self, int robot);
+void sim_forget_waits(sim *self);
 double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 where there is no turret */
 
 /* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */

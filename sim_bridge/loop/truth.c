@@ -42,6 +42,13 @@ const sim_wait *sim_waits(const sim *self, size_t *count) {
   return (const sim_wait *)(const void *)self->waits.data;
 }
 
+void sim_forget(sim *self, int number) {
+  robot *r = sim_robot(self, number);
+  if (r != NULL) r->truth.count = r->looks.count = r->tones.count = 0;
+}
+
+void sim_forget_waits(sim *self) { self->waits.count = 0; }
+
 const mover *sim_movers(const sim *self, size_t *count, double *time) {
   *count = self->world.obstacles;
   *time = (double)self->world_at / BOARD_CLOCK_HZ;

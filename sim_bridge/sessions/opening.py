@@ -8,6 +8,7 @@ from collections.abc import Callable
 from boebot.arenas import load_arena
 from boebot.arenas.floor_plan import floor_plan
 from boebot.boards import BoardRequest, Truth
+from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import Sim, SimRobot
 
@@ -64,6 +65,12 @@ def alone(sim: Sim, *, paced: bool = False) -> Wait:
         pace.wait()
 
     return wait
+
+
+def drain(robot: SimRobot, *, ended: bool) -> Group:
+    """See `boebot.boards.BoardSession`. What belongs to the world goes with its first robot."""
+    waits = robot.sim.drain_waits() if robot.number == min(robot.sim.members) else {}
+    return {**robot.drain(to_now=ended and not robot.description.has_board), **waits}
 
 
 def truth_of(robot: SimRobot) -> Truth | None:

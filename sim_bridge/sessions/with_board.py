@@ -15,12 +15,13 @@ from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, Vehicl
 from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError
+from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins
 from sim_bridge.robots.switches import switches
-from sim_bridge.sessions.opening import Wait, alone, new_sim, truth_of
+from sim_bridge.sessions.opening import Wait, alone, drain, new_sim, truth_of
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sessions.without_board import DirectSession, add_vehicle
 from sim_bridge.sim import Floats, Sim, SimRobot
@@ -98,6 +99,10 @@ class SimSession:
         self.board = BoardPins(robot)
         self._shared = shared
         self._closed = False
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """See `boebot.boards.BoardSession`."""
+        return drain(self.robot, ended=ended)
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from boebot.boards import BoardRequest, SharedWorld, Truth
+from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.sessions.opening import Wait, alone, new_sim, truth_of
+from sim_bridge.sessions.opening import Wait, alone, drain, new_sim, truth_of
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.vehicles.model_file import STEP_S
@@ -31,6 +32,7 @@ class DirectSession:
         self.sim = robot.sim
         self.layout: Mapping[str, slice] = robot.layout
         self.description = f"robot without a board in arena {robot.sim.arena.name}"
+        self.arena = robot.sim.arena
         self._wait = wait
         self._cycles = round(STEP_S * CLOCK_HZ)
         self._shared = shared
@@ -52,6 +54,10 @@ class DirectSession:
     def ended(self) -> str:
         """Why it can go no further, or ""."""
         return self.robot.ended
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """See `boebot.boards.BoardSession`."""
+        return drain(self.robot, ended=ended)
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""

@@ -9,8 +9,10 @@ import pytest
 
 from boebot.arenas import Arena, ArenaDescription, Disc, Moving, Polygon, Wall, Waypoint, load_arena
 from boebot.arenas.floor_plan import SAMPLES_MAXIMUM, Solid, floor_plan, path_end, poses_of
-from boebot.boards import BoardRequest, open_board, open_vehicle
+from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
+from sim_bridge.sessions.with_board import open_native
+from sim_bridge.sessions.without_board import open_direct
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import Vehicle, arsim
 from sim_bridge.view import View
@@ -61,7 +63,7 @@ def test_poses_go_on_over_full_turns() -> None:
 
 def test_a_run_tells_of_its_own_time() -> None:
     """From the first recorded instant to the last, with a board and without."""
-    session = open_board("native", BoardRequest(robot=load_robot("shieldbot"), arena="showcase"))
+    session = open_native(BoardRequest(robot=load_robot("shieldbot"), arena="showcase"))
     try:
         session.transport.read(2.0, 2.0)
         truth = session.truth()
@@ -70,7 +72,7 @@ def test_a_run_tells_of_its_own_time() -> None:
     assert truth is not None and truth.plan.name == "showcase"
     cart = truth.plan.moving[0]
     assert (cart.time[0], cart.time[-1]) == (truth.time[0], truth.time[-1]) and cart.time[-1] > 1.9
-    vehicle = open_vehicle("direct", BoardRequest(robot=load_robot("arsim"), arena="showcase"))
+    vehicle = open_direct(BoardRequest(robot=load_robot("arsim"), arena="showcase"))
     for _ in range(100):
         vehicle.step(0.1, 0.1)
     truth = vehicle.truth()

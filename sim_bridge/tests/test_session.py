@@ -15,7 +15,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from boebot.link import frame, messages
 from boebot.link.link import Link
-from boebot.record.record import Memory
+from boebot.record.record import Record
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.sessions.with_board import SimSession, open_native
 
@@ -34,7 +34,7 @@ def session() -> Iterator[SimSession]:
 
 def drive(session: SimSession, left: float, right: float, seconds: float) -> bytes:
     """Opens a link, arms and sends motor signals every 50 ms; returns what the board said."""
-    memory = Memory()
+    memory = Record()
     link = Link(session.transport, memory.append)
     link.open()
     link.arm()

@@ -1,6 +1,6 @@
 """The record of a run: an append-only sequence of (stream, time, bytes), and what its streams mean.
 
-While a run goes on, only that is put aside, into a sink. Everything else is computed afterwards (boebot.record.series).
+While a run goes on, only that is kept. Everything else is computed afterwards (boebot.record.series, overview).
 
 stream              time, s                     bytes
 to_board, to_host   transport's clock           as they crossed the wire, piece by piece
@@ -9,27 +9,33 @@ NAME of a message   that of the newest tick     the payload of a message of slow
 event               the board's, since reset    kind, value, whether it was before the session
 readings            the run's, of the step      of a robot without a board: tick, status, motor signals, ages, readings
 command             that of the observation     kind (index of KINDS), left, right: what the brain asked for in one step
+truth               the world's                 of a simulated robot: doubles, `boebot.boards.TRUTH` without the time
+waits               the world's                 a moving shape has begun or ended to wait for a robot: shape, waited (s)
 vehicle, movers     the run's, of the step      of a vehicle stepped by hand (sim_bridge.recorder)
 """
 
 from __future__ import annotations
 
 import bisect
-from collections import defaultdict
-from collections.abc import Callable, Sequence
+import threading
+import time as wall
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
 from struct import Struct
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.events import BoardEvent
+from boebot.record.blocks import Block, Group, Row, chain
+from boebot.record.keepers import InMemory, Keeper
 
-Row = tuple[float, bytes]
 Append = Callable[[str, float, bytes], None]
 Decoded = TypeVar("Decoded")
 
+EACH_S = 1.0  # wall time that a group spans at most
 KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
 _COMMAND = Struct("<Bdd")
@@ -37,51 +43,59 @@ _EVENT = Struct("<BIB")
 _READINGS = Struct("<IHdd")
 
 
-class Sink(Protocol):
-    """Where a record goes."""
-
-    def append(self, stream: str, time_s: float, data: bytes) -> None:
-        """Puts a row at the end of a stream."""
-
-    def rows(self, stream: str) -> Sequence[Row]:
-        """The rows of a stream, oldest first."""
-
-
-class Memory:
-    """A sink in memory."""
-
-    def __init__(self) -> None:
-        self._streams: defaultdict[str, list[Row]] = defaultdict(list)
-
-    def append(self, stream: str, time_s: float, data: bytes) -> None:
-        """See `Sink`."""
-        self._streams[stream].append((time_s, data))
-
-    def rows(self, stream: str) -> Sequence[Row]:
-        """See `Sink`."""
-        return self._streams.get(stream, ())
-
-
 class Record:
-    """A record: written row by row while the run goes on, read by stream afterwards.
+    """A record: written row by row while the run goes on, read by stream afterwards."""
 
-    Attributes:
-        append: puts (stream, time in s, bytes) at the end.
-        rows: the rows (time, bytes) of a stream, oldest first.
-    """
-
-    def __init__(self, sink: Sink | None = None) -> None:
-        """Into that sink; None: into memory."""
-        sink = Memory() if sink is None else sink
-        self.append: Append = sink.append
-        self.rows = sink.rows
-        self._decoded: dict[str, list[Any]] = {}
+    def __init__(self, keeper: Keeper | None = None, *, is_new: bool = True) -> None:
+        """Kept there; None: in memory. `is_new`: nothing is kept there yet."""
+        self._keeper: Keeper = InMemory() if keeper is None else keeper
+        self._rows: defaultdict[str, list[Row]] = defaultdict(list)
+        self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
+        self._taking = threading.Lock()
+        self._due_s = wall.perf_counter() + EACH_S
+        self._decoded: dict[str, tuple[int, Any]] = {}
 
     def __repr__(self) -> str:
         names = ("telemetry", "readings", "event", "command", "vehicle")
-        return "<Record: " + ", ".join(f"{len(self.rows(name))} {name}" for name in names if self.rows(name)) + ">"
+        return "<Record: " + ", ".join(f"{count} {name}" for name in names if (count := self.count(name))) + ">"
 
     # ---- writing -----------------------------------------------------------------------------------------------------
+
+    def append(self, stream: str, time_s: float, data: bytes) -> None:
+        """A row at the end of a stream."""
+        self._rows[stream].append((time_s, data))
+
+    def is_due(self) -> bool:
+        """A second of the wall clock has passed since rows were last handed over to be kept."""
+        return wall.perf_counter() >= self._due_s
+
+    def keep(self, time_s: float, more: Group | None = None) -> None:
+        """Hands over the rows so far to be kept, as a group; `time_s`: of the run; `more`: of other streams.
+
+        Raises:
+            RecordError: they cannot be kept.
+        """
+        with self._taking:
+            self._due_s = wall.perf_counter() + EACH_S
+            group = {stream: Block.of(rows) for stream, rows in self._taken().items()} | dict(more or {})
+            if group:
+                self._counted(group)
+                self._keeper.write(group, time_s)
+
+    def _counted(self, group: Group) -> None:
+        if self._counts is not None:
+            self._counts.update({stream: len(block) for stream, block in group.items()})
+
+    def _taken(self) -> dict[str, list[Row]]:
+        """The rows that wait, and no more: others may come meanwhile, from another thread."""
+        found = {}
+        for stream in list(self._rows):
+            rows = self._rows[stream]
+            count = len(rows)
+            if count:
+                found[stream] = rows[:count]
+                del rows[:count]
+        return found
 
     def append_telemetry(self, time_s: float, payload: bytes, host_s: float, bound_s: float) -> None:
         """One tick of a board."""
@@ -102,40 +116,79 @@ class Record:
 
     # ---- reading -----------------------------------------------------------------------------------------------------
 
+    def groups(self) -> Iterator[Group]:
+        """What is kept, and what waits to be, oldest first; each group by itself is small."""
+        yield from self._keeper.groups()
+        waiting = {stream: Block.of(list(rows)) for stream, rows in self._rows.items() if rows}
+        if waiting:
+            yield waiting
+
+    def count(self, stream: str) -> int:
+        """Rows of a stream."""
+        if self._counts is None:
+            self._counts = Counter()
+            for group in self._keeper.groups():
+                self._counted(group)
+        return self._counts[stream] + len(self._rows.get(stream, ()))
+
+    def rows(self, stream: str) -> list[Row]:
+        """The rows of a stream, oldest first."""
+        return [row for block in self._blocks(stream) for row in block.rows()]
+
+    def table(self, stream: str, dtype: np.dtype[Any]) -> NDArray[Any]:
+        """The rows of a stream whose rows all have this form, shape (rows,)."""
+        return np.frombuffer(b"".join(block.data for block in self._blocks(stream)), dtype=dtype)
+
+    def times_of(self, stream: str) -> NDArray[np.float64]:
+        """Of each row of a stream (s), shape (rows,)."""
+        blocks = [block.times for block in self._blocks(stream)]
+        return np.concatenate(blocks) if blocks else np.empty(0)
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks or steps there are."""
+        return self.count(self._tick_stream)
+
     @property
     def times(self) -> list[float]:
         """The run's time (s) of each tick or step, by the board's clock."""
-        return self._each("times", self.rows("telemetry") or self.rows("readings"), lambda row: row[0])
+        return self._each("times", self._tick_stream, lambda row: row[0])
 
     @property
     def telemetry(self) -> list[bytes]:
         """A board's payloads."""
-        return self._each("telemetry", self.rows("telemetry"), lambda row: row[1][: -_STAMP.size])
+        return self._each("telemetry", "telemetry", lambda row: row[1][: -_STAMP.size])
 
     @property
     def stamps(self) -> list[tuple[float, float]]:
         """(host time of the tick in s, its error bound in s) of each telemetry."""
-        return self._each("stamps", self.rows("telemetry"), lambda row: _STAMP.unpack(row[1][-_STAMP.size :]))
+        return self._each("stamps", "telemetry", lambda row: _STAMP.unpack(row[1][-_STAMP.size :]))
 
     def readings(self, count: int) -> NDArray[np.void]:
         """Steps of a robot without a board that has `count` readings, with the motor signals in force."""
         numbers = [("left", "<f8"), ("right", "<f8"), ("ages", "<f8", (count,)), ("values", "<f8", (count,))]
-        columns = np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers])
-        return np.frombuffer(b"".join(data for _, data in self.rows("readings")), dtype=columns)
+        return self.table("readings", np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers]))
 
     @property
     def events(self) -> list[BoardEvent]:
         """What the board sent exactly once."""
-        return self._each("event", self.rows("event"), _event)
+        return self._each("event", "event", _event)
 
     @property
     def steps(self) -> list[tuple[int, str, float, float]]:
         """(index of the tick of the observation, command kind, left, right), one per step of the brain."""
-        return self._each("command", self.rows("command"), self._step)
+        return self._each("command", "command", self._step)
 
     def messages(self, kind: Any) -> list[tuple[int, Any]]:
         """(index of the newest tick when it came, message) of each message of slow devices of that kind."""
         return [(self._index(time_s), kind.unpack(data)) for time_s, data in self.rows(kind.NAME)]
+
+    @property
+    def _tick_stream(self) -> str:
+        return "telemetry" if self.count("telemetry") else "readings"
+
+    def _blocks(self, stream: str) -> Iterator[Block]:
+        return chain(self.groups(), stream)
 
     def _index(self, time_s: float) -> int:
         return bisect.bisect_right(self.times, time_s) - 1
@@ -144,12 +197,29 @@ class Record:
         kind, left, right = _COMMAND.unpack(row[1])
         return self._index(row[0]), KINDS[kind], left, right
 
-    def _each(self, name: str, rows: Sequence[Row], decode: Callable[[Row], Decoded]) -> list[Decoded]:
-        """Each row decoded; kept until there are more."""
-        found = self._decoded.get(name)
-        if found is None or len(found) != len(rows):
-            found = self._decoded[name] = [decode(row) for row in rows]
-        return found
+    def _each(self, name: str, stream: str, decode: Callable[[Row], Decoded]) -> list[Decoded]:
+        """Each row of a stream decoded; kept until there are more."""
+        count, found = self._decoded.get(name, (-1, []))
+        if count == self.count(stream):
+            known: list[Decoded] = found
+            return known
+        new = [decode(row) for row in self.rows(stream)]
+        self._decoded[name] = (len(new), new)
+        return new
+
+
+class Unrecorded(Record):
+    """The record of a run that is not recorded: it stays empty."""
+
+    def append(self, stream: str, time_s: float, data: bytes) -> None:
+        """Nothing is kept."""
+
+    def is_due(self) -> bool:
+        """Never."""
+        return False
+
+    def keep(self, time_s: float, more: Group | None = None) -> None:
+        """Nothing is kept."""
 
 
 def _event(row: Row) -> BoardEvent:

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from boebot.arenas import Arena
 from boebot.boards import Truth, WatchdogReset
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
@@ -27,6 +28,7 @@ from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record
 from boebot.record.series import Pose, Series, onsets, touch_indices, truth_at
 from boebot.record.telemetry_series import TelemetrySeries
+from boebot.record.truth import truth_of
 from boebot.running import hangs
 
 ODOMETRY_S = 0.1  # from place to place of a path by odometry
@@ -42,7 +44,7 @@ class RunResult(FormerNames):
         description: the board in words.
         tick: seconds from one control tick to the next.
         error: why the run ended before its time, or None.
-        truth: what really happened, where somebody knows (simulated runs); no brain saw it.
+        world: the arena, where somebody knows it (simulated runs).
         steps: steps of the brain. late_steps: brain periods that passed without one (in real time only).
         long_steps: steps that took longer than the brain's period, by the wall clock, in any run. longest_step: the
             longest of all, in s of the wall clock.
@@ -74,7 +76,7 @@ class RunResult(FormerNames):
     tick: float
     error: BaseException | None
     record: Record
-    truth: Truth | None
+    world: Arena | None
     clock_offset: float
     steps: int
     late_steps: int
@@ -133,6 +135,11 @@ class RunResult(FormerNames):
         return parts
 
     # ---- arrays --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def truth(self) -> Truth | None:
+        """What really happened, where somebody knows (simulated runs); no brain saw it."""
+        return None if self.world is None else truth_of(self.record, self.world)
 
     @cached_property
     def series(self) -> Series:
@@ -207,7 +214,7 @@ class RunResult(FormerNames):
     @property
     def ticks(self) -> int:
         """Control ticks whose telemetry was received, or steps of a robot without a board."""
-        return len(self.record.times)
+        return self.record.ticks
 
     @property
     def overruns(self) -> int:

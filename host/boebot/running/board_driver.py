@@ -30,11 +30,10 @@ from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.link import Link
 from boebot.link.telemetry import StampedTelemetry as Received
 from boebot.record.brain_record import BrainRecord
-from boebot.record.record import Record
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import hangs
-from boebot.running.driver import PROGRESS_S, Task, check_period, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, Task, check_period, keep_rest, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
@@ -97,7 +96,7 @@ class BoardDriver:
         self.session = session
         self.task = task
         request = task.request
-        self.record = Record()
+        self.record = task.record
         self.link = Link(session.transport, self.record.append)
         hello = self.link.open()
         self.tick_s = 1.0 / hello.tick_rate
@@ -269,7 +268,8 @@ class BoardDriver:
         link, robot, transport = self.link, self.robot, self.session.transport
         poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK
         make, waiting_events = _Telemetry._make, link.events.waiting
-        put_aside, command_given = self.record.append_telemetry, self.record.append_command
+        record = self.record
+        put_aside, command_given = record.append_telemetry, record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
         paced = self.task.request.realtime and not transport.realtime
         time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
@@ -332,6 +332,8 @@ class BoardDriver:
                 if progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + PROGRESS_S
                     progress(time_s)
+                if record.is_due():
+                    record.keep(time_s, self.session.drain())
                 slow = self._slow(last) if equipment.needs_messages else NO_MESSAGES
                 sample = make(unpack(payload))
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
@@ -394,6 +396,7 @@ class BoardDriver:
         """See `boebot.running.driver.Driver`."""
         link, watchdog_resets = self.link, self.session.watchdog_resets()
         self.notices += hangs.sentences(watchdog_resets)
+        unkept = keep_rest(self.record, self.session, max(self._last_s, 0.0))
         return RunResult(
             brain=self.task.brain.name,
             robot=self.description,
@@ -403,11 +406,11 @@ class BoardDriver:
             seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.tick_s,
-            error=error,
+            error=error or unkept,
             record=self.record,
-            truth=self.session.truth(),
+            world=self.session.arena,
             clock_offset=self.clock_offset_s,
-            steps=len(self.record.rows("command")),
+            steps=self.record.count("command"),
             late_steps=self.late_steps,
             odometry_source=self.task.brain.odometry,
             resets=self.resets,

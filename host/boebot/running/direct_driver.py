@@ -12,10 +12,9 @@ from collections.abc import Iterator
 from boebot.boards import VehicleSession
 from boebot.errors import BoardError
 from boebot.record.brain_record import BrainRecord
-from boebot.record.record import Record
 from boebot.record.result import RunResult
 from boebot.running.direct_robot import DirectRobot
-from boebot.running.driver import PROGRESS_S, Task, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, Task, keep_rest, step_limit, whole_ticks
 
 
 class DirectDriver:
@@ -31,9 +30,10 @@ class DirectDriver:
         count = len(session.readings())
         self._direct = DirectRobot(request.robot, session.layout, count, session.tick_s, self.period_s, task.brain_seed)
         self.robot = self._direct.robot
-        self.record = Record()
+        self.record = task.record
         self.step_limit = step_limit(task)
         self.late_steps = 0
+        self._last_s = 0.0
 
     def begin(self) -> None:
         """Nothing is to be made ready."""
@@ -42,7 +42,8 @@ class DirectDriver:
         """See `boebot.running.driver.Driver`."""
         session, robot, direct, n = self.session, self.robot, self._direct, self.period_ticks
         tick_s, progress = session.tick_s, self.task.progress
-        put_aside, command_given = self.record.append_readings, self.record.append_command
+        record = self.record
+        put_aside, command_given = record.append_readings, record.append_command
         end_s = self.task.seconds - tick_s / 2
         paced = self.task.request.realtime
         started = next_progress = wall.perf_counter()
@@ -56,6 +57,8 @@ class DirectDriver:
             if progress is not None and wall.perf_counter() >= next_progress:
                 next_progress = wall.perf_counter() + PROGRESS_S
                 progress(time_s)
+            if record.is_due():
+                record.keep(time_s, session.drain())
             direct.show(sample)
             shown = wall.perf_counter()
             yield time_s
@@ -66,7 +69,7 @@ class DirectDriver:
             for _ in range(n):
                 session.step(left, right)
                 tick += 1
-                time_s = tick * tick_s
+                self._last_s = time_s = tick * tick_s
                 sample = direct.sample(tick, session.readings())
                 put_aside(time_s, sample, left, right)
                 if time_s >= end_s:
@@ -81,6 +84,7 @@ class DirectDriver:
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.running.driver.Driver`."""
         request = self.task.request
+        unkept = keep_rest(self.record, self.session, self._last_s)
         return RunResult(
             brain=self.task.brain.name,
             robot=request.robot,
@@ -90,17 +94,17 @@ class DirectDriver:
             seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.session.tick_s,
-            error=error,
+            error=error or unkept,
             record=self.record,
-            truth=self.session.truth(),
+            world=self.session.arena,
             clock_offset=0.0,
-            steps=len(self.record.rows("command")),
+            steps=self.record.count("command"),
             late_steps=self.late_steps,
             odometry_source=self.task.brain.odometry,
             resets=0,
             lost_frames=0,
             bad_frames=0,
-            run_time=self.record.rows("readings")[-1][0] if self.record.rows("readings") else 0.0,
+            run_time=self._last_s,
             wall_time=elapsed_s,
             counters=dict(self.session.counters()),
             layout=self.session.layout,

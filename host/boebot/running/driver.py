@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from boebot.arguments import duration
-from boebot.boards import BoardRequest
+from boebot.boards import BoardRequest, BoardSession, VehicleSession
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
+from boebot.record.keepers import Temporary
+from boebot.record.record import Record
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running.stepping import AT_LEISURE, StepLimit
@@ -37,6 +39,8 @@ class Task:
     seconds: float
     """may be infinite"""
     period_s: float
+    record: Record = field(default_factory=lambda: Record(Temporary()))
+    """where what happens goes"""
     progress: Progress | None = None
     step_timeout_s: float | None = None
     """how long a step of the brain may take by the wall clock; None: the driver's choice"""
@@ -77,6 +81,15 @@ class Driver(Protocol):
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """The run's result; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
+
+
+def keep_rest(record: Record, session: BoardSession | VehicleSession, time_s: float) -> BoebotError | None:
+    """At the end of a run: what is not kept yet. Returns why it cannot be."""
+    try:
+        record.keep(time_s, session.drain(ended=True))
+    except BoebotError as error:
+        return error
+    return None
 
 
 def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:

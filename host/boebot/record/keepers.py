@@ -1,0 +1,129 @@
+"""Where the groups of a record are kept: in memory, on disk, in memory first and then on disk."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from typing import IO, Protocol
+
+from boebot.record.blocks import Group
+from boebot.record.record_file import RecordReader, RecordWriter
+
+
+class Keeper(Protocol):
+    """Keeps the groups of a record, in their order."""
+
+    def write(self, group: Group, time_s: float) -> None:
+        """Keeps a group that ends at that time of the run (s).
+
+        Raises:
+            RecordError: it cannot be kept.
+        """
+
+    def groups(self) -> Iterator[Group]:
+        """All groups, oldest first."""
+
+
+class InMemory:
+    """In this process."""
+
+    def __init__(self) -> None:
+        self._groups: list[Group] = []
+
+    def write(self, group: Group, time_s: float) -> None:
+        """See `Keeper`."""
+        self._groups.append(group)
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        return iter(self._groups)
+
+
+class OnDisk:
+    """In an open file, which can be read once it is finished.
+
+    Attributes:
+        writer: for attachments.
+    """
+
+    def __init__(self, file: IO[bytes], name: str, *, sync: bool = True) -> None:
+        """Into an empty file that is open for reading and writing; `name`: as errors call it."""
+        self._file, self._name = file, name
+        self.writer = RecordWriter(file, name, sync=sync)
+
+    def write(self, group: Group, time_s: float) -> None:
+        """See `Keeper`."""
+        self.writer.write(group, time_s)
+
+    def finish(self) -> None:
+        """Nothing is written any more. Raises RecordError where something could not be."""
+        self.writer.finish()
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`; those up to where the disk was full, if it was."""
+        return RecordReader(self._file, self._name).groups()
+
+
+class Temporary:
+    """In memory, and from the second group on in a temporary file that vanishes with this object, however it ends."""
+
+    def __init__(self) -> None:
+        self._memory: InMemory | None = InMemory()
+        self._disk: OnDisk | None = None
+        self._end_s = 0.0
+
+    def write(self, group: Group, time_s: float) -> None:
+        """See `Keeper`."""
+        if self._disk is not None:
+            self._disk.write(group, time_s)
+            return
+        assert self._memory is not None
+        first = list(self._memory.groups())
+        if not first:
+            self._memory.write(group, time_s)
+            self._end_s = time_s
+            return
+        file = tempfile.TemporaryFile(prefix="boebot-")  # noqa: SIM115 (closed with this object)
+        self._disk = OnDisk(file, "a temporary file", sync=False)
+        self._disk.write(first[0], self._end_s)
+        self._disk.write(group, time_s)
+        self._memory = None
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        if self._disk is not None:
+            self._disk.finish()
+            return self._disk.groups()
+        assert self._memory is not None
+        return self._memory.groups()
+
+
+class Shared:
+    """One robot's part of a record of several robots.
+
+    Its streams are named "robot-2/telemetry" there; those of the world have no such name, and are every robot's.
+    """
+
+    def __init__(self, keeper: Keeper, number: int) -> None:
+        self._keeper, self._prefix = keeper, f"robot-{number}/"
+
+    def write(self, group: Group, time_s: float) -> None:
+        """See `Keeper`."""
+        self._keeper.write({self._named(stream): block for stream, block in group.items()}, time_s)
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        for group in self._keeper.groups():
+            own = {
+                stream.removeprefix(self._prefix): block
+                for stream, block in group.items()
+                if stream in WORLD or stream.startswith(self._prefix)
+            }
+            if own:
+                yield own
+
+    def _named(self, stream: str) -> str:
+        return stream if stream in WORLD else self._prefix + stream
+
+
+WORLD = ("waits",)  # streams of a world, not of one of its robots
