@@ -129,6 +129,7 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
+        self.drained_s: dict[int, float] = {}  # of each robot: up to when its truth was drained
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -653,19 +654,18 @@ class SimRobot(FormerNames):
         return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
 
     def drain(self, *, to_now: bool = False) -> Group:
-        """The streams "truth", "looks" and "tones" of a record since they were last drained: rows of doubles, columns
-        `TRUTH`, `LOOK`, `TONE` without the time. Empty without recording. `to_now`: as `truth_to_now`."""
+        """The stream "truth" of a record since it was last drained: rows of doubles, columns `TRUTH` without the time.
+        What is kept of looks and tones is forgotten, too. Empty without recording. `to_now`: as `truth_to_now`."""
         if not self.sim.is_recorded:
             return {}
-        found = {}
-        truth = self.truth_to_now() if to_now else self.truth()
-        for stream, table in (("truth", truth), ("looks", self.looks()), ("tones", self.tones())):
-            time, *columns = table.values()
-            if len(time):
-                data = np.column_stack(columns)
-                found[stream] = Block(time.copy(), data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))
+        time, *columns = (self.truth_to_now() if to_now else self.truth()).values()
+        new = time > self.sim.drained_s.get(self.number, -1.0)  # a restored simulation has old rows again
         lib.sim_forget(self._handle, self.number)
-        return found
+        if not new.any():
+            return {}
+        self.sim.drained_s[self.number] = float(time[-1])
+        data = np.column_stack(columns)[new]
+        return {"truth": Block(time[new], data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))}
 
     def turret_angle(self, pin: int) -> float:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""

@@ -62,7 +62,7 @@ def test_table_counts_what_happened(result: RunResult) -> None:
 
 def test_what_only_a_simulator_knows_is_none_without_one(result: RunResult) -> None:
     """One run with the truth and without it: what the robot knows stays the same, bit for bit."""
-    real = dataclasses.replace(result, truth=None)
+    real = dataclasses.replace(result, world=None)
     assert (real.true_pose, real.true_distance, real.true_contacts, real.placed_odometry) == (None,) * 4
     assert real.odometry is not None and result.odometry is not None
     for mine, theirs in zip(dataclasses.astuple(real.odometry), dataclasses.astuple(result.odometry), strict=True):

@@ -19,13 +19,16 @@ Wait = Callable[[SimRobot, int, int], None]
 def new_sim(request: BoardRequest, step_s: float) -> Sim:
     """The world that a request wants, without robots; `step_s`: its step, unless the request has one."""
     step_cycles = round(float(request.options.get("world_step_s", step_s)) * CLOCK_HZ)
-    return Sim(
+    sim = Sim(
         load_arena(request.arena),
         seed=request.seed,
         noise=request.noise,
         record=request.record,
         step_cycles=step_cycles,
     )
+    if not request.saveable:
+        sim.keep_no_inputs()
+    return sim
 
 
 class Pace:

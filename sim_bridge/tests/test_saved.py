@@ -9,6 +9,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +161,7 @@ def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: 
     opened: list[Sim] = []
 
     def watched(request: BoardRequest, step_s: float) -> Sim:
-        opened.append(opening.new_sim(request, step_s))
+        opened.append(opening.new_sim(replace(request, saveable=True), step_s))
         return opened[-1]
 
     monkeypatch.setattr(with_board, "new_sim", watched)

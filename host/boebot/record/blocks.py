@@ -55,6 +55,14 @@ class Block:
 Group = Mapping[str, Block]
 """What came in one stretch of a run, at most a second of the wall clock: a block of each stream that had rows."""
 
+Rows = Mapping[str, Sequence[Row] | Block]
+"""The same, as it comes."""
+
+
+def group_of(rows: Rows) -> Group:
+    """Its blocks."""
+    return {name: some if isinstance(some, Block) else Block.of(some) for name, some in rows.items() if some}
+
 
 def schema() -> bytes:
     """Of a block on disk: a FileDescriptorSet, as MCAP wants it for Protobuf."""

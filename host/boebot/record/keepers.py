@@ -6,15 +6,15 @@ import tempfile
 from collections.abc import Iterator
 from typing import IO, Protocol
 
-from boebot.record.blocks import Group
+from boebot.record.blocks import Group, Rows, group_of
 from boebot.record.record_file import RecordReader, RecordWriter
 
 
 class Keeper(Protocol):
     """Keeps the groups of a record, in their order."""
 
-    def write(self, group: Group, time_s: float) -> None:
-        """Keeps a group that ends at that time of the run (s).
+    def write(self, rows: Rows, time_s: float) -> None:
+        """Keeps rows that end at that time of the run (s), as a group.
 
         Raises:
             RecordError: it cannot be kept.
@@ -30,9 +30,9 @@ class InMemory:
     def __init__(self) -> None:
         self._groups: list[Group] = []
 
-    def write(self, group: Group, time_s: float) -> None:
+    def write(self, rows: Rows, time_s: float) -> None:
         """See `Keeper`."""
-        self._groups.append(group)
+        self._groups.append(group_of(rows))
 
     def groups(self) -> Iterator[Group]:
         """See `Keeper`."""
@@ -51,9 +51,9 @@ class OnDisk:
         self._file, self._name = file, name
         self.writer = RecordWriter(file, name, sync=sync)
 
-    def write(self, group: Group, time_s: float) -> None:
+    def write(self, rows: Rows, time_s: float) -> None:
         """See `Keeper`."""
-        self.writer.write(group, time_s)
+        self.writer.write(rows, time_s)
 
     def finish(self) -> None:
         """Nothing is written any more. Raises RecordError where something could not be."""
@@ -72,21 +72,21 @@ class Temporary:
         self._disk: OnDisk | None = None
         self._end_s = 0.0
 
-    def write(self, group: Group, time_s: float) -> None:
+    def write(self, rows: Rows, time_s: float) -> None:
         """See `Keeper`."""
         if self._disk is not None:
-            self._disk.write(group, time_s)
+            self._disk.write(rows, time_s)
             return
         assert self._memory is not None
         first = list(self._memory.groups())
         if not first:
-            self._memory.write(group, time_s)
+            self._memory.write(rows, time_s)
             self._end_s = time_s
             return
         file = tempfile.TemporaryFile(prefix="boebot-")  # noqa: SIM115 (closed with this object)
         self._disk = OnDisk(file, "a temporary file", sync=False)
         self._disk.write(first[0], self._end_s)
-        self._disk.write(group, time_s)
+        self._disk.write(rows, time_s)
         self._memory = None
 
     def groups(self) -> Iterator[Group]:
@@ -107,9 +107,9 @@ class Shared:
     def __init__(self, keeper: Keeper, number: int) -> None:
         self._keeper, self._prefix = keeper, f"robot-{number}/"
 
-    def write(self, group: Group, time_s: float) -> None:
+    def write(self, rows: Rows, time_s: float) -> None:
         """See `Keeper`."""
-        self._keeper.write({self._named(stream): block for stream, block in group.items()}, time_s)
+        self._keeper.write({self._named(stream): some for stream, some in rows.items()}, time_s)
 
     def groups(self) -> Iterator[Group]:
         """See `Keeper`."""

@@ -17,7 +17,6 @@ vehicle, movers     the run's, of the step      of a vehicle stepped by hand (si
 from __future__ import annotations
 
 import bisect
-import threading
 import time as wall
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -29,7 +28,7 @@ from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.events import BoardEvent
-from boebot.record.blocks import Block, Group, Row, chain
+from boebot.record.blocks import Block, Group, Row, Rows, chain, group_of
 from boebot.record.keepers import InMemory, Keeper
 
 Append = Callable[[str, float, bytes], None]
@@ -51,7 +50,6 @@ class Record:
         self._keeper: Keeper = InMemory() if keeper is None else keeper
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
         self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
-        self._taking = threading.Lock()
         self._due_s = wall.perf_counter() + EACH_S
         self._decoded: dict[str, tuple[int, Any]] = {}
 
@@ -75,27 +73,16 @@ class Record:
         Raises:
             RecordError: they cannot be kept.
         """
-        with self._taking:
-            self._due_s = wall.perf_counter() + EACH_S
-            group = {stream: Block.of(rows) for stream, rows in self._taken().items()} | dict(more or {})
-            if group:
-                self._counted(group)
-                self._keeper.write(group, time_s)
+        self._due_s = wall.perf_counter() + EACH_S
+        rows: Rows = {**self._rows, **(more or {})}
+        self._rows = defaultdict(list)
+        if any(rows.values()):
+            self._counted(rows)
+            self._keeper.write(rows, time_s)
 
-    def _counted(self, group: Group) -> None:
+    def _counted(self, rows: Rows) -> None:
         if self._counts is not None:
-            self._counts.update({stream: len(block) for stream, block in group.items()})
-
-    def _taken(self) -> dict[str, list[Row]]:
-        """The rows that wait, and no more: others may come meanwhile, from another thread."""
-        found = {}
-        for stream in list(self._rows):
-            rows = self._rows[stream]
-            count = len(rows)
-            if count:
-                found[stream] = rows[:count]
-                del rows[:count]
-        return found
+            self._counts.update({stream: len(some) for stream, some in rows.items()})
 
     def append_telemetry(self, time_s: float, payload: bytes, host_s: float, bound_s: float) -> None:
         """One tick of a board."""
@@ -119,7 +106,7 @@ class Record:
     def groups(self) -> Iterator[Group]:
         """What is kept, and what waits to be, oldest first; each group by itself is small."""
         yield from self._keeper.groups()
-        waiting = {stream: Block.of(list(rows)) for stream, rows in self._rows.items() if rows}
+        waiting = group_of(self._rows)
         if waiting:
             yield waiting
 

@@ -6,6 +6,7 @@ attachments. What each chunk and attachment holds is on the disk once it is writ
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import struct
@@ -16,9 +17,8 @@ from functools import cache, partial
 from typing import IO, Any, cast
 
 from boebot.errors import BoebotError
-from boebot.record.blocks import SCHEMA, Group, packed, schema, unpacked
+from boebot.record.blocks import SCHEMA, Group, Rows, group_of, packed, schema, unpacked
 
-WAITING = 2  # groups that may wait for the disk; whoever brings another one waits, too
 LARGEST_CHUNK = 1 << 28  # B, that is read; a second of a run has a hundredth of it
 TEXT = "text/plain"
 
@@ -28,21 +28,27 @@ class RecordError(BoebotError):
 
 
 class RecordWriter:
-    """Writes a record. A thread of its own packs, compresses and waits for the disk."""
+    """Writes a record. A second thread packs, compresses and waits for the disk."""
 
     def __init__(self, file: IO[bytes], name: str, *, sync: bool = True) -> None:
         """Into an open and empty file; `name`: as errors call it. `sync`: wait until the disk has each group."""
         from mcap.writer import Writer
 
-        self._file, self._name, self._sync = file, name, sync
-        self._writer: Any = Writer(file, chunk_size=sys.maxsize)
+        self._file, self._name, self._sync = file.fileno(), name, sync
+        self._tail = _Tail()
+        self._writer: Any = Writer(cast(IO[bytes], self._tail), chunk_size=sys.maxsize)
         self._channels: dict[str, int] = {}
         self._schema = 0
-        self._work: queue.Queue[Callable[[], None] | None] = queue.Queue(WAITING)
+        self._work: queue.Queue[Callable[[], None] | None] = queue.Queue()
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
         self._thread.start()
         self._put(self._start)
+
+    @property
+    def waiting(self) -> int:
+        """Groups and attachments that wait for the disk."""
+        return self._work.qsize()
 
     def check(self) -> None:
         """Raises RecordError where something could not be written."""
@@ -50,9 +56,9 @@ class RecordWriter:
             reason = self._failure.strerror or self._failure
             raise RecordError(f"the record cannot be written to {self._name}: {reason}")
 
-    def write(self, group: Group, time_s: float) -> None:
+    def write(self, rows: Rows, time_s: float) -> None:
         """A group, at that time of the run (s). Raises as `check`."""
-        self._put(partial(self._write, group, max(0, round(time_s * 1e9))))
+        self._put(partial(self._write, rows, max(0, round(time_s * 1e9))))
 
     def attach(self, name: str, data: bytes, media_type: str = TEXT) -> None:
         """A file within the file. Raises as `check`."""
@@ -77,28 +83,61 @@ class RecordWriter:
         self._do(self._writer.finish)
 
     def _do(self, work: Callable[[], None]) -> None:
-        """Whoever brings work never waits for a thread that has failed."""
-        if self._failure is None:
-            try:
-                work()
-                self._writer.flush()
-                if self._sync:
-                    os.fsync(self._file.fileno())
-            except OSError as error:
-                self._failure = error
+        """What cannot be written whole is not written at all, and nothing after it."""
+        if self._failure is not None:
+            return
+        work()
+        self._writer.flush()
+        whole, data = self._tail.take()
+        try:
+            while data:
+                data = data[os.write(self._file, data) :]
+            if self._sync:
+                os.fsync(self._file)
+        except OSError as error:
+            self._failure = error
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, whole)
 
     def _start(self) -> None:
         self._writer.start(profile="boebot", library="boebot")
         self._schema = self._writer.register_schema(name=SCHEMA, encoding="protobuf", data=schema())
 
-    def _write(self, group: Group, time_ns: int) -> None:
-        for stream, block in group.items():
+    def _write(self, rows: Rows, time_ns: int) -> None:
+        for stream, block in group_of(rows).items():
             if stream not in self._channels:
                 self._channels[stream] = self._writer.register_channel(stream, "protobuf", self._schema)
             self._writer.add_message(self._channels[stream], time_ns, packed(block), time_ns)
 
     def _attach(self, name: str, data: bytes, media_type: str) -> None:
         self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+
+
+class _Tail:
+    """The end of the file, before it is written."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = self._written = 0
+
+    def write(self, data: bytes) -> None:
+        """At the end."""
+        self._parts.append(bytes(data))
+        self._size += len(data)
+
+    def tell(self) -> int:
+        """Where the file ends."""
+        return self._size
+
+    def flush(self) -> None:
+        """It is written by whoever takes it."""
+
+    def take(self) -> tuple[int, memoryview]:
+        """How much was taken before (B), and what is new."""
+        before, self._written = self._written, self._size
+        data = memoryview(b"".join(self._parts))
+        self._parts.clear()
+        return before, data
 
 
 class RecordReader:

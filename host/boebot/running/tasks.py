@@ -147,6 +147,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         arena=None if request.arena is None else str(request.arena),
         seed=request.seed,
         realtime=request.realtime,
+        saveable=False,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
     )
