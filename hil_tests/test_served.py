@@ -62,7 +62,7 @@ def test_served_board_answers_no_sooner_than_it_was_asked(native_pty: str) -> No
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
     assert last["clock_restarts"] == 0
-    assert 0 < last["clock_bound_us"] < 10_000
+    assert 0 < last["clock_bound_s"] < 0.01
 
 
 @pytest.mark.parametrize(

@@ -206,18 +206,18 @@ class Report:
             "tick": {
                 "length_cycles": self.tick_cycles,
                 "work_bound_cycles": self.tick_work,
-                "work_bound_percent": _percent(self.tick_work, self.tick_cycles),
+                "work_bound_share": _share(self.tick_work, self.tick_cycles),
                 "response_bound_cycles": None if found is None else found.tick,
-                "response_bound_percent": None if found is None else _percent(found.tick, self.tick_cycles),
+                "response_bound_share": None if found is None else _share(found.tick, self.tick_cycles),
                 "demand_bound_cycles": self.demand,
                 "demand_emulator_max_cycles": own.worst_tick if own else None,
                 "executed_bound_cycles": self.executed,
                 "executed_emulator_max_cycles": own.busiest_tick if own else None,
                 "slot_response_bound_cycles": None if found is None else list(found.slots),
             },
-            "load_bound_percent": round(100 * self.load_bound, 2),
-            "load_emulator_percent": None if own is None else round(100 * own.load, 2),
-            "interrupt_load_bound_percent": round(100 * float(load(self.sources)), 2),
+            "load_bound_share": round(self.load_bound, 4),
+            "load_emulator_share": None if own is None else round(own.load, 4),
+            "interrupt_load_bound_share": round(float(load(self.sources)), 4),
             "poll_gap_bound_cycles": self.gap,
             "poll_gap_emulator_max_cycles": own.between_polls if own else None,
             "receive_ring_needed_bytes": self.ring,
@@ -491,5 +491,5 @@ def _row_dict(row: Row) -> dict[str, Any]:
     }
 
 
-def _percent(part: int, whole: int) -> float:
-    return round(100 * part / whole, 2)
+def _share(part: int, whole: int) -> float:
+    return round(part / whole, 4)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-CYCLES_PER_US = 16.0
+CYCLES_PER_S = 16e6
 CYCLES_PER_TICK = 160_000.0
 
 
@@ -66,11 +66,11 @@ class Distribution:
         }
         said = {name: value if self.count else None for name, value in numbers.items()}
         cycles = {f"{name}_cycles": value for name, value in said.items()}
-        us = {f"{name}_us": None if value is None else value / CYCLES_PER_US for name, value in said.items()}
+        seconds = {f"{name}_s": None if value is None else value / CYCLES_PER_S for name, value in said.items()}
         ticks = {"max_ticks": None if said["max"] is None else said["max"] / CYCLES_PER_TICK}
         texts = {name: getattr(self, name) for name in ("subject", "quantity", "meaning", "load")}
         limits = {"least_cycles": self.least, "most_cycles": self.most}
-        return {**texts, **limits, "count": self.count, **cycles, **us, **ticks, "broken": self.broken}
+        return {**texts, **limits, "count": self.count, **cycles, **seconds, **ticks, "broken": self.broken}
 
 
 @dataclass(frozen=True, slots=True)
