@@ -173,7 +173,9 @@ def served(elf: Path) -> Iterator[str]:
     running.set()
     request = BoardRequest(robot=load_robot("shieldbot"), image=str(elf))
     server = threading.Thread(
-        target=serve, args=("avr", request), kwargs={"tcp": None, "announce": urls.put, "running": running.is_set}
+        target=serve,
+        args=("avr", request),
+        kwargs={"tcp": None, "announce": urls.put, "visit": lambda _: None, "running": running.is_set},
     )
     server.start()
     try:
