@@ -81,6 +81,23 @@ def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_pat
         assert json.loads(info.stdout)["pin_map"] == "shieldbot"
 
 
+def test_doctor_finds_a_served_robot_well_and_another_robots_pin_map_wrong(native_pty: str) -> None:
+    done = boebot("doctor", native_pty, "--json")
+    assert done.returncode == 0, done.stdout
+    checks = json.loads(done.stdout)["checks"]
+    assert [check["part"] for check in checks][:4] == ["kit", "port", "permission", "held by"]
+    assert {check["part"] for check in checks} > {"telemetry", "supply", "whisker_left", "ping"}
+    done = boebot("doctor", native_pty, "--robot", "shieldbot-quad", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["checks"][-1] == {
+        "part": "pin map",
+        "reads": "shieldbot",
+        "expected": "shieldbot-quad",
+        "hint": "flash its image, or name another --robot",
+        "well": False,
+    }
+
+
 def late_run(url: str, folder: Path, *options: str) -> tuple[copied_process.Done, list[dict[str, str]]]:
     """Runs a brain, one of whose steps sleeps for 0.8 s, on a served board; what it said, and its record."""
     path = folder / "late.py"

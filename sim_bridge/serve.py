@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from boebot.boards import BoardRequest, Visit
 from boebot.errors import BoardError
@@ -64,7 +65,6 @@ def carry(
         BoardError: the board's program crashed.
     """
     sim = session.sim
-    sim.keep_no_inputs()
     pace = Pace(sim)
     line = LineToBoard(session)
     baud = None
@@ -104,7 +104,7 @@ def serve(
     if kind not in openers:
         raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}")
     with contextlib.ExitStack() as stack:
-        session = openers[kind](request)
+        session = openers[kind](replace(request, saveable=False))
         stack.callback(session.close)
         port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from boebot.running.tasks import Member
     from boebot.running.together import run_together
 
+    __version__: str
+
 __all__ = [
     "BoebotError",
     "Command",
@@ -53,6 +55,8 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("boebot.resources").version()
     if name == "boards":
         return import_module("boebot.boards")
     if name not in _HOMES:

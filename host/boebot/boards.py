@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError
+from boebot.link.ports.holders import holder_of as holder_of  # for those who serve boards
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
 from boebot.link.ports.tcp import SocketTransport

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as version_of
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -31,3 +33,11 @@ def remedy(target: str) -> str:
     return (
         f"build it with `make {target}`" if checkout() is not None else "this installation of boebot does not have it"
     )
+
+
+def version() -> str:
+    """This kit's version, `boebot.__version__`."""
+    try:
+        return version_of("boebot")
+    except PackageNotFoundError:  # the sources alone
+        return "not installed"

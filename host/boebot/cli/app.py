@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
 import typer
 
-from boebot.cli import experiment, info, link, names, new, options, output, parameters, run, serve, teleop, timing
+import boebot
+from boebot.cli import (
+    doctor,
+    experiment,
+    info,
+    link,
+    names,
+    new,
+    options,
+    output,
+    parameters,
+    run,
+    serve,
+    teleop,
+    timing,
+)
 from boebot.link import messages, mismatch
 
 app = typer.Typer(
@@ -24,6 +38,7 @@ app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
 app.command("list")(names.list_names)
 app.command("info")(info.info)
+app.command("doctor")(doctor.doctor)
 app.command("teleop", cls=options.Command)(teleop.teleop)
 app.command("link")(link.link)
 app.add_typer(parameters.app, name="parameters")
@@ -34,12 +49,8 @@ app.command("timing")(timing.timing)
 
 def _version(wanted: bool) -> None:
     if wanted:
-        try:
-            installed = version("boebot")
-        except PackageNotFoundError:
-            installed = "not installed"
         output.line(
-            f"boebot {installed} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
+            f"boebot {boebot.__version__} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
             f"Python {sys.version.split()[0]})"
         )
         raise typer.Exit

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from boebot import resources
 from boebot.cli import options, output
 from boebot.errors import BoebotError
 
@@ -112,7 +113,7 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
             experiment_files.record(one, verdict.measured, verdict.error)
             for one, verdict in zip(experiments, verdicts, strict=True)
         ]
-        version = experiment_files.installed()
+        version = resources.version()
         output.print_json({"seed": seed, "version": version, "experiments": found, "files": list(map(str, files))})
     else:
         _print(experiments, verdicts)

@@ -16,10 +16,11 @@ Wiring: 5 V, ground, the output to an analog pin.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.device import ANALOG_PINS, Place, Point, Reader, SlowDevice
+from boebot.devices.device import ANALOG_PINS, NOT_READ, Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Ray, Shape
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.link.messages import DevicesTelemetry
@@ -28,6 +29,7 @@ SCALE_V_M = 0.339
 OFFSET_M = 0.0474
 RANGE_MIN_M = 0.10
 RANGE_MAX_M = 0.80
+VOLTS_MOST = 3.5  # that it gives, with room for its spread
 
 
 def distance(volts: float) -> float | None:
@@ -64,6 +66,16 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     COLUMNS: ClassVar = (("distance", "m", 4),)
     SHOWN: ClassVar = ("distance", "m", 1.0, 3)
+
+    def checkup(self, readings: Sequence[AnalogInfrared]) -> Checkup:
+        """See `Device`."""
+        newest = readings[-1]
+        expected = f"{RANGE_MIN_M:g} to {RANGE_MAX_M:g} m, or nothing near; less with a hand ahead"
+        if newest.voltage is None:
+            return Checkup("no reading", expected, NOT_READ)
+        seen = "nothing near" if newest.distance is None else f"{newest.distance:.2f} m"
+        plug = "" if newest.voltage <= VOLTS_MOST else f"is its output plugged to {self.wired_to}?"
+        return Checkup(f"{seen}, {newest.voltage:.2f} V", expected, plug)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

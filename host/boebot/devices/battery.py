@@ -16,6 +16,7 @@ Wiring: two equal resistors from the pack to ground, their middle to an analog p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
@@ -23,6 +24,8 @@ import msgspec
 from boebot.devices.analog import READ_TICKS, voltage
 from boebot.devices.device import (
     ANALOG_PINS,
+    NOT_READ,
+    Checkup,
     NotNegative,
     Place,
     Positive,
@@ -33,6 +36,8 @@ from boebot.devices.device import (
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
 from boebot.link.messages import DevicesTelemetry
+
+LEAST_V = 4.5  # of the pack; with less the servos hardly turn
 
 
 class Battery(NamedTuple):
@@ -59,6 +64,14 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     COLUMNS: ClassVar = (("voltage", "v", 3),)
     SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
+
+    def checkup(self, readings: Sequence[Battery]) -> Checkup:
+        """See `Device`."""
+        newest, expected = readings[-1], f"at least {LEAST_V:g} V"
+        if newest.voltage is None:
+            return Checkup("no reading", expected, NOT_READ)
+        low = f"charge or change the battery; if it is full, look at the divider on {self.wired_to}"
+        return Checkup(f"{newest.voltage:.2f} V", expected, "" if newest.voltage >= LEAST_V else low)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -13,9 +13,10 @@ Wiring: a piezo speaker from the pin to ground.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-from boebot.devices.device import Place, Reader, SlowDevice
+from boebot.devices.device import NOT_READ, Checkup, Place, Reader, SlowDevice
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
@@ -66,6 +67,11 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
     COLUMNS: ClassVar = (("token", "", 0),)
     SHOWN: ClassVar = ("token", "tones", 1.0, 0)
+
+    def checkup(self, readings: Sequence[Buzzer]) -> Checkup:
+        """See `Device`."""
+        valid = "" if readings[-1].valid else NOT_READ
+        return Checkup("silent" if readings[-1].token == 0 else "a tone has sounded", "silent", valid)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -17,11 +17,12 @@ Wiring: SDA to A4, SCL to A5.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import NotNegative, Place, Reader, Sensor, SlowDevice
+from boebot.devices.device import Checkup, NotNegative, Place, Reader, Sensor, SlowDevice
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
 from boebot.link.messages import CompassStatus, DevicesTelemetry
@@ -29,6 +30,7 @@ from boebot.link.messages import CompassStatus, DevicesTelemetry
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
 OVERFLOW = -4096
 READ_TICKS = 4
+FIELD_LEAST_UT, FIELD_MOST_UT = 15.0, 100.0  # the earth's is 22 to 67 µT; the robot's own iron adds to it
 _SHOWN = ("heading", "°", 180 / math.pi, 1)
 
 
@@ -61,6 +63,22 @@ class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
     COLUMNS: ClassVar = (("heading", "rad", 5),)
     SHOWN: ClassVar = _SHOWN
+
+    def checkup(self, readings: Sequence[Compass]) -> Checkup:
+        """See `Device`."""
+        newest = readings[-1]
+        expected = f"-180 to 180°, a field of {FIELD_LEAST_UT:g} to {FIELD_MOST_UT:g} µT"
+        if newest.status != CompassStatus.OK or newest.field is None or newest.heading is None:
+            hints = {
+                CompassStatus.NO_ANSWER: f"is it plugged in: power, ground, SDA and SCL to {self.wired_to}?",
+                CompassStatus.BUS_STUCK: f"something holds a wire of the bus low: {self.wired_to}",
+            }
+            reads = newest.status.name.lower().replace("_", " ")
+            return Checkup(reads, expected, hints.get(newest.status, "its exchanges fail: look at its wires"))
+        field_ut = 1e6 * math.hypot(*newest.field)
+        reads = f"{math.degrees(newest.heading):.0f}°, {field_ut:.0f} µT"
+        near = "is iron, a magnet or a motor near it? the field of the earth has 22 to 67 µT"
+        return Checkup(reads, expected, "" if FIELD_LEAST_UT <= field_ut <= FIELD_MOST_UT else near)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol
 
@@ -35,6 +35,7 @@ BeamRays = Annotated[int, msgspec.Meta(ge=1, le=32)]
 Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
 Point = tuple[Finite, Finite]
 
+NOT_READ = "no reading of it comes from the board: is it switched on there?"  # hint of a checkup
 ANALOG_PINS = tuple(range(14, 20))
 
 Reader = Callable[[Any, Any], Any]
@@ -104,6 +105,16 @@ class Readout(NamedTuple):
     """s"""
 
 
+class Checkup(NamedTuple):
+    """How a device's readings compare with what they should be while the robot stands still, for `boebot doctor`."""
+
+    reads: str
+    """In words, with units."""
+    expected: str
+    hint: str = ""
+    """What may be wrong, and what to look at; empty: the readings are as expected."""
+
+
 class Run(Protocol):
     """A run after its end, as devices make their columns of it (`boebot.record`)."""
 
@@ -161,6 +172,17 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     def reader(self, place: Place) -> Reader:
         """What makes its reading; for kinds that have one."""
         raise NotImplementedError
+
+    def checkup(self, readings: Sequence[Any]) -> Checkup:
+        """Judges the readings of about a second, oldest first and at least one, of a robot that stands still; for kinds
+        that a board has and a brain reads."""
+        raise NotImplementedError
+
+    @property
+    def wired_to(self) -> str:
+        """Its pins in words, as the board's print names them: "pin 5", "pins A4 and A5"."""
+        pins = [pin_name(number) for number in self.pins().values()]
+        return f"pin {pins[0]}" if len(pins) == 1 else f"pins {' and '.join(pins)}"
 
     def has_messages(self, devices: Mapping[str, Device]) -> bool:
         """Whether it speaks in messages besides telemetry, among these devices of its robot's board."""

@@ -16,11 +16,12 @@ Wiring: each output to a pin of port C (A0 to A5), whose interrupt stamps the ed
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import ANALOG_PINS, Column, Device, Place, Reader, Run
+from boebot.devices.device import ANALOG_PINS, Checkup, Column, Device, Place, Reader, Run
 from boebot.link.messages import Status, Telemetry
 
 EDGE_PERIOD_SCALE = 16e-6  # seconds per count of the edge periods on the wire
@@ -57,6 +58,18 @@ class WheelEncoder(Device, frozen=True, kw_only=True):
     def metres_per_edge(self, wheel_radius_m: float) -> float:
         """What the wheel rolls from one edge to the next (m)."""
         return 2 * math.pi * wheel_radius_m / self.edges_per_turn
+
+    def checkup(self, readings: Sequence[Encoder]) -> Checkup:
+        """See `Device`."""
+        expected = "the same count; another one after you have turned the wheel"
+        if not readings[-1].valid:
+            return Checkup("too many edges", expected, f"the line fires by itself: look at {self.wired_to}")
+        new = abs(readings[-1].count - readings[0].count)
+        if new <= 1:  # a sensor may stand at the edge of a hole
+            return Checkup(f"{readings[-1].count} edges", expected)
+        return Checkup(
+            f"{new} new edges", expected, f"if the wheel stands: look at the sensor, its gap and {self.wired_to}"
+        )
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

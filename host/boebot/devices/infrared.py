@@ -22,15 +22,17 @@ Wiring: LED with 2 kOhm from `led_pin` to ground, the receiver's output to `rece
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
 
 from boebot.devices.device import (
+    NOT_READ,
     Angle,
     BeamRays,
+    Checkup,
     Column,
     Device,
     NotNegative,
@@ -86,6 +88,16 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
     NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
     PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
     NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
+
+    def checkup(self, readings: Sequence[Infrared]) -> Checkup:
+        """See `Device`."""
+        expected = f"nothing; something while a hand is {100 * self.range_m / 2:.0f} cm ahead of it"
+        if not readings[-1].valid:
+            return Checkup("no fresh reading", expected, NOT_READ)
+        if sum(reading.detected for reading in readings) <= len(readings) / 2:
+            return Checkup("nothing", expected)
+        hint = "if nothing is ahead: does the LED, the sun or a lamp shine into the receiver? has it power?"
+        return Checkup("something", expected, f"{hint} ({self.wired_to})")
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -18,11 +18,13 @@ pin to ground, 220 Ohm before the pin.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from boebot.devices.device import (
     ANALOG_PINS,
     Angle,
+    Checkup,
     NotNegative,
     Place,
     Point,
@@ -71,6 +73,16 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
     COLUMNS: ClassVar = (("decay_time", "s", 6),)
     SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
+
+    def checkup(self, readings: Sequence[Light]) -> Checkup:
+        """See `Device`."""
+        newest = readings[-1]
+        expected = f"up to {LONGEST_US / 1000:g} ms, less in brighter light"
+        if newest.decay_time is None:
+            return Checkup("not measured", expected, f"is its capacitor (0.1 µF) between {self.wired_to} and ground?")
+        if newest.dark:
+            return Checkup(f"dark, {LONGEST_US / 1000:g} ms or longer", expected)
+        return Checkup(f"{1000 * newest.decay_time:.3f} ms", expected)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -15,11 +15,12 @@ Wiring: white to 5 V, black to ground, red to the pin (Parallax, "QTI Sensor", d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import NotNegative, Place, Point, Reader, Sensor, Share, SlowDevice
+from boebot.devices.device import Checkup, NotNegative, Place, Point, Reader, Sensor, Share, SlowDevice
 from boebot.devices.drawing import Shape, Spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
@@ -59,6 +60,14 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
     MESSAGE: ClassVar[type] = LineTelemetry
     COLUMNS: ClassVar = (("decay_time", "s", 6),)
     SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
+
+    def checkup(self, readings: Sequence[Line]) -> Checkup:
+        """See `Device`."""
+        newest = readings[-1]
+        expected = f"less than {1000 * self.dark_s:g} ms over a bright floor, more over a line"
+        if newest.decay_time is None:
+            return Checkup("not measured", expected, f"is it plugged in: 5 V, ground, red to {self.wired_to}?")
+        return Checkup(f"{1000 * newest.decay_time:.3f} ms, {'dark' if newest.dark else 'bright'}", expected)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -21,14 +21,17 @@ Wiring: 5 V, ground, and the signal on pin 8, the timer's capture input.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
 
 from boebot.devices.device import (
+    NOT_READ,
     Angle,
     BeamRays,
+    Checkup,
     Column,
     Device,
     NotNegative,
@@ -95,6 +98,17 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     def _echo_range_us(self) -> tuple[float, float]:
         """The range's ends on the wire. A Ping that hears nothing ends its pulse after 18.5 ms, as if at 3.18 m."""
         return 0.9 * self.range_min_m / METRES_PER_US, 1.03 * self.range_max_m / METRES_PER_US
+
+    def checkup(self, readings: Sequence[Ping]) -> Checkup:
+        """See `Device`."""
+        newest = readings[-1]
+        expected = f"{self.range_min_m:g} to {self.range_max_m:g} m, or nothing near"
+        reads = newest.status.name.lower().replace("_", " ") if newest.distance is None else f"{newest.distance:.3f} m"
+        if newest.absent:
+            return Checkup("no answer", expected, f"is it plugged in: 5 V, ground, its signal to {self.wired_to}?")
+        if newest.too_near:
+            return Checkup(reads, expected, "take away what is before it; if nothing is, it is dirty or broken")
+        return Checkup(reads, expected, "" if newest.valid else NOT_READ)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`. Echoes from outside its range count as nothing near or too near."""

@@ -15,11 +15,12 @@ What a brain reads is the pulse that the firmware sends now. Wiring: the signal 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Column, Device, Place, Reader, Run
+from boebot.devices.device import Checkup, Column, Device, Place, Reader, Run
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire
@@ -51,6 +52,13 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+
+    def checkup(self, readings: Sequence[Servo]) -> Checkup:
+        """See `Device`."""
+        expected = "no pulses, as nothing drives"
+        if readings[-1].pulse_us is None:
+            return Checkup("no pulses", expected)
+        return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something drives: the board's own brain?")
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

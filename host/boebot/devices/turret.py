@@ -16,11 +16,12 @@ Wiring: the signal to one of the pins 8 to 13. A Ping is mounted on it, where th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Place, Point, Reader, SlowDevice
+from boebot.devices.device import NOT_READ, Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Axis, Shape
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
@@ -80,6 +81,14 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
             return 0
         pulse_us = self.centre_us + self.gain_us_per_rad * message.angle * ANGLE_SCALE
         return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
+
+    def checkup(self, readings: Sequence[Turret]) -> Checkup:
+        """See `Device`."""
+        expected = "no pulses, as nothing turns it"
+        if readings[-1].pulse_us is None:
+            valid = "" if readings[-1].valid else NOT_READ
+            return Checkup("no pulses", expected, valid)
+        return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something turns it: the board's own brain?")
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

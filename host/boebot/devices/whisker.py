@@ -14,9 +14,10 @@ debounces it and samples it in every tick. In a robot without a board it is a se
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, Final, NamedTuple
 
-from boebot.devices.device import Column, Device, Place, Point, Reader, Run, VehicleDevice
+from boebot.devices.device import Checkup, Column, Device, Place, Point, Reader, Run, VehicleDevice
 from boebot.devices.drawing import Shape, Stroke
 from boebot.link.messages import Whiskers
 
@@ -47,6 +48,15 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "whiskers"
     NAMES: ClassVar[tuple[str, ...]] = ("whisker_left", "whisker_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+
+    def checkup(self, readings: Sequence[Whisker]) -> Checkup:
+        """See `Device`."""
+        expected = "free; pressed while you bend it"
+        if not any(reading.pressed for reading in readings):
+            return Checkup("free", expected)
+        return Checkup(
+            "pressed", expected, f"if nothing bends it, {self.wired_to} has contact with ground: look for a bent wire"
+        )
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

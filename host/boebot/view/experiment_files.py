@@ -14,7 +14,6 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from boebot import resources
 from boebot.errors import BoebotError
 from boebot.experiments.experiment import Experiment, Measured, Outcome
 from boebot.running import interrupts
@@ -44,7 +44,7 @@ def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, byte
     name = stem(experiment.name)
     table = as_csv(outcome)  # first: it finds fault sooner than the figure is drawn
     png, svg = pictures(experiment, outcome, {"png": style.DPI, "svg": style.DPI})
-    verdict = record(experiment, outcome.measured) | {"seed": seed, "version": installed()}
+    verdict = record(experiment, outcome.measured) | {"seed": seed, "version": resources.version()}
     return {f"{name}.png": png, f"{name}.svg": svg, f"{name}.csv": table, f"{name}.json": as_json(verdict)}
 
 
@@ -114,14 +114,6 @@ def as_json(values: dict[str, Any]) -> bytes:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def installed() -> str:
-    """This kit's version."""
-    try:
-        return version("boebot")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def write(folder: Path, contents: dict[str, bytes]) -> list[Path]:

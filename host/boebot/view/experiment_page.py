@@ -6,9 +6,10 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
+from boebot import resources
 from boebot.experiments.experiment import Experiment
 from boebot.experiments.running import Verdict
-from boebot.view.experiment_files import installed, stem
+from boebot.view.experiment_files import stem
 
 NAME = "index.html"
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
@@ -49,7 +50,7 @@ def page(experiments: Sequence[Experiment], verdicts: Sequence[Verdict], seed: i
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>{STYLE}</style>\n</head>\n'
         "<body>\n<main>",
         f"<h1>{title}</h1>",
-        f'<p class="faint">{met} of {len(pairs)} met · seed {seed} · boebot {escape(installed())}</p>',
+        f'<p class="faint">{met} of {len(pairs)} met · seed {seed} · boebot {escape(resources.version())}</p>',
         _contents(pairs),
         *(_section(experiment, verdict) for experiment, verdict in pairs),
         "</main>\n</body>\n</html>\n",

@@ -186,7 +186,7 @@ def why_not(port: str, baud: int, error: Exception) -> str:
     if number == errno.ENOENT or "filenotfound" in text:
         return f"there is no port {port}{_those_there_are()}"
     if number in (errno.EACCES, errno.EPERM) or "permissionerror" in text:
-        return f"{port} may not be opened by this user: permission denied{_remedy(port)}"
+        return f"{port} may not be opened by this user: permission denied; {remedy(port)}"
     if number in _BUSY:
         return f"{port} is busy: {holder_of(port) or 'another program'} has it open"
     if "baud" in text:
@@ -201,16 +201,16 @@ def _those_there_are() -> str:
     return f"; those there are: {', '.join(found)}" if found else "; there is none at all: is the board plugged in?"
 
 
-def _remedy(port: str) -> str:
-    """What to do, where the group of the port may open it."""
+def remedy(port: str) -> str:
+    """What to do about a port that this user may not open."""
     if not POSIX:
-        return ": another program may have it open"
+        return "another program may have it open"
     with contextlib.suppress(OSError, KeyError):
         status = Path(port).stat()
         if status.st_mode & 0o060 == 0o060 and status.st_gid != 0:
             group = grp.getgrgid(status.st_gid).gr_name
-            return f"; join its group with: sudo usermod -aG {group} $USER, and log in again"
-    return "; its owner is another user"
+            return f"join its group with: sudo usermod -aG {group} $USER, and log in again"
+    return "its owner is another user"
 
 
 def _keep_for_us_alone(descriptor: int) -> None:

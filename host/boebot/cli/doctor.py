@@ -1,0 +1,215 @@
+"""`boebot doctor URL`: what is there, what it reads, what it should read, and where to look if it does not. Nothing
+moves."""
+
+from __future__ import annotations
+
+import os
+import sys
+import zlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
+
+import typer
+from serial.tools import list_ports
+
+import boebot
+from boebot import resources
+from boebot.boards import BoardRequest, board_kinds, is_live
+from boebot.cli import options, output
+from boebot.cli.board_link import board_link
+from boebot.description.board_parameters import configure
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.device import Checkup
+from boebot.devices.equipment import Equipment
+from boebot.devices.latest import Latest
+from boebot.errors import BoebotError
+from boebot.link import messages, mismatch, reset_cause
+from boebot.link.fields import text
+from boebot.link.link import Link
+from boebot.link.ports.holders import holder_of
+from boebot.link.ports.serial_port import remedy
+
+EXIT_WRONG = 1
+SETTLE_S = 0.5  # until all sensors have been read
+LISTEN_S = 1.0
+_TELEMETRY_SHARE = 0.9  # of what should come in that time
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at."""
+
+    part: str
+    reads: str
+    expected: str = ""
+    hint: str = ""
+    """What to do; empty: all is well."""
+
+
+def doctor(
+    url: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="URL",
+            help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT; without it the only port that there is.",
+        ),
+    ] = None,
+    robot: options.RobotName = "shieldbot",
+    json: options.Json = False,
+) -> None:
+    """Examine port, firmware and each device of a robot that stands still; say what is not as it should be.
+
+    Exit code: 0 all is well; 1 something is not.
+    """
+    description = load_robot(robot)
+    if not description.has_board:
+        raise BoebotError(f"robot {description.name!r} has no board: there is nothing to examine")
+    checks = list(_checks(url, description))
+    wrong = [check for check in checks if check.hint]
+    if json:
+        output.print_json({"well": not wrong, "checks": [asdict(check) | {"well": not check.hint} for check in checks]})
+    else:
+        _show(checks)
+        count = len(wrong)
+        output.line(f"{count} of {len(checks)} to be looked at" if count else f"all {len(checks)} are well")
+    if wrong:
+        raise typer.Exit(EXIT_WRONG)
+
+
+def _checks(url: str | None, robot: RobotDescription) -> Iterator[Check]:
+    """From the kit to the last device, as far as each leads on to the next.
+
+    Raises:
+        BoebotError: there is no such board.
+    """
+    yield Check("kit", f"boebot {boebot.__version__}, protocol {mismatch.version_name()}, Python {_python()}")
+    if url is None:
+        ports = _ports()
+        if len(ports) != 1:
+            yield Check("ports", ", ".join(ports) or "none", "one", _which(ports))
+            return
+        (url,) = ports
+    for check in _port(url):
+        yield check
+        if check.hint:
+            return
+    try:
+        with board_link(url, BoardRequest(robot=robot, record=False)) as (link, where):
+            yield Check("board", where, "a board that says hello")
+            yield from _firmware(link, robot)
+            pin_map = text(link.identity().pin_map)
+            fits = pin_map == robot.pin_map
+            yield Check("pin map", pin_map, robot.pin_map, "" if fits else "flash its image, or name another --robot")
+            if fits:
+                yield from _running(link, configure(link, robot))
+    except BoebotError as error:
+        if not is_live(url):
+            raise
+        yield Check("link", str(error), "an answer", "is the robot on, its cable sound, its firmware flashed?")
+
+
+def _python() -> str:
+    return sys.version.split()[0]
+
+
+def _ports() -> list[str]:
+    return sorted(port.device for port in list_ports.comports())
+
+
+def _which(ports: list[str]) -> str:
+    if ports:
+        return "name one: boebot doctor PORT"
+    emulated = "".join(f", or boebot doctor {kind}" for kind in board_kinds())
+    return f"is the robot plugged in? then boebot doctor PORT{emulated}"
+
+
+def _port(url: str) -> Iterator[Check]:
+    """A serial port of this computer: whether it is there, may be opened, and is free."""
+    path = url.removeprefix("serial:").partition("?")[0]
+    if os.name != "posix" or not is_live(url) or "://" in path:
+        return
+    if not os.access(path, os.F_OK):
+        yield Check("port", "missing", path, f"is it plugged in? those there are: {', '.join(_ports()) or 'none'}")
+        return
+    yield Check("port", path, path)
+    is_allowed = os.access(path, os.R_OK | os.W_OK)
+    yield Check("permission", "given" if is_allowed else "denied", "given", "" if is_allowed else remedy(path))
+    holder = holder_of(path)
+    yield Check("held by", holder or "nobody", "nobody", f"end {holder}" if holder else "")
+
+
+def _firmware(link: Link, robot: RobotDescription) -> Iterator[Check]:
+    """What the board runs, and why it was started."""
+    hello, identity = link.open(), link.identity()
+    version = text(identity.firmware_version)
+    yield Check("firmware", f"{version}, {text(identity.compiler)}, for {text(hello.robot)}")
+    image = resources.folder("images") / f"{robot.pin_map}.elf"
+    if identity.image_size and image.is_file():
+        from avr_timing.image.elf import read_image  # it takes a while
+
+        code = read_image(image).code
+        runs, ours = (identity.image_size, identity.image_hash), (len(code), zlib.crc32(code))
+        reads, expected = (f"{size} bytes, CRC-32 {crc:08x}" for size, crc in (runs, ours))
+        yield Check(
+            "image", reads, f"{expected}, the kit's", "" if runs == ours else "if it is not meant, flash the kit's"
+        )
+    cause = hello.reset_cause
+    hint = "the firmware hung there: boebot link names the task" if reset_cause.by_watchdog(cause) else ""
+    if cause == messages.ResetCause.BROWN_OUT:
+        hint = "the supply was too low: charge or change the battery"
+    yield Check("last reset", reset_cause.in_words(cause), "power or external", hint)
+
+
+def _running(link: Link, robot: RobotDescription) -> Iterator[Check]:
+    """What comes from the board in a second: the line, the supply, each device."""
+    hello = link.open()
+    tick_s = 1.0 / hello.tick_rate
+    _listen(link, SETTLE_S)
+    good, bad = link.counters().good, link.counters().bad
+    heard = _listen(link, LISTEN_S)
+    counts = link.counters()
+    good, bad = counts.good - good, counts.bad - bad
+    yield Check("line", f"{bad} of {good + bad} frames damaged", "none", "look at the cable" if bad else "")
+    expected = round(LISTEN_S / (hello.telemetry_period * tick_s))
+    enough = len(heard) >= _TELEMETRY_SHARE * expected
+    hint = "" if enough else "frames are lost, or this computer is busy"
+    yield Check("telemetry", f"{len(heard)} in {LISTEN_S:g} s", f"{expected}", hint)
+    if not heard:
+        return
+    newest, _ = heard[-1]
+    late = (newest.overruns - heard[0][0].overruns) % 256
+    yield Check("ticks", f"{late} overrun", "0", "a task of the firmware takes too long: boebot timing" if late else "")
+    least = link.parameters.get("supply_minimum")
+    low = f"charge or change the battery; below {least:g} V the motors do not run"
+    volts = newest.supply / 1000
+    yield Check("supply", f"{volts:.2f} V", f"at least {least:g} V", low if volts < least else "")
+    equipment = Equipment(robot, tick_s)
+    for name, reader in equipment.readers.items():
+        found: Checkup = robot.device[name].checkup([reader(sample, slow) for sample, slow in heard])
+        yield Check(name, found.reads, found.expected, found.hint)
+
+
+def _listen(link: Link, seconds: float) -> list[tuple[messages.Telemetry, Latest]]:
+    """The telemetry of that time, with the newest messages of the slow devices then."""
+    end = link.transport.now() + seconds
+    heard: list[tuple[messages.Telemetry, Latest]] = []
+    while (left := end - link.transport.now()) > 0:
+        for payload, *_ in link.poll(min(left, 0.05)):
+            sample = messages.Telemetry.unpack(payload)
+            newest: dict[type, Any] = {kind: kind.unpack(data) for kind, data in link.devices.latest.items()}
+            heard.append((sample, Latest(newest, sample.tick)))
+    return heard
+
+
+def _show(checks: list[Check]) -> None:
+    """A row for each, and the hints below."""
+    table = output.empty_table()
+    for title in ("", "", "reads", "should read"):
+        table.add_column(title, overflow="fold")
+    for check in checks:
+        table.add_row("look" if check.hint else "well", check.part, check.reads, check.expected)
+    output.console().print(table)
+    for check in checks:
+        if check.hint:
+            output.line(f"{check.part}: {check.hint}")
