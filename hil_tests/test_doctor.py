@@ -64,7 +64,7 @@ def test_people_read_a_table_and_the_hints_below_it() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals")
-def test_port_is_missing_forbidden_held_or_silent() -> None:
+def test_port_is_missing_or_held() -> None:
     master, slave = os.openpty()
     port = os.ttyname(slave)
     try:
@@ -72,10 +72,8 @@ def test_port_is_missing_forbidden_held_or_silent() -> None:
         assert code == 1 and found["port"]["reads"] == "missing"
         code, found = examined(port)
         assert code == 1 and found["held by"]["reads"].startswith(f"process {os.getpid()} (")
-        os.close(slave)
-        code, found = examined(port)
-        assert code == 1 and "nothing answers" in found["link"]["reads"]
     finally:
+        os.close(slave)
         os.close(master)
 
 

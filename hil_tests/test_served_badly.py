@@ -129,6 +129,20 @@ def test_browser_is_refused(tcp: Server, pieces: list[bytes]) -> None:
     tcp.said(f"{name} was refused: it speaks HTTP, as browsers do")
 
 
+def test_robot_is_served_on_when_nobody_reads_who_comes() -> None:
+    command = [sys.executable, "-m", "boebot", "serve", "--on", "native", "--tcp", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        url, drive_it = process.stdout.readline().split()[-1], process.stdout.readline()
+        assert drive_it.startswith("drive it:")
+        process.stdout.close()
+        for _ in range(2):
+            with socket.create_connection(("127.0.0.1", int(url.rpartition(":")[2])), timeout=3.0) as client:
+                assert client.recv(1)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10) == 0
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="no /proc")
 def test_noise_on_a_pseudo_terminal_ends_with_its_client(tmp_path: Path) -> None:
     server = Server(tmp_path, "--pty")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from boebot.boards import BoardRequest, Visit, board_kinds, check_board, find_server
-from boebot.cli import options, output
+from boebot.cli import options, output, streams
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 
@@ -52,10 +52,13 @@ def serve(
             output.line(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C")
 
     def visit(event: Visit) -> None:
-        if json:
-            output.print_json({"event": event.what, "client": event.client, "why": event.why}, indent=None)
-        else:
-            output.line(f"{event.client} {_WORDS[event.what]}{event.why and f': {event.why}'}")
+        try:
+            if json:
+                output.print_json({"event": event.what, "client": event.client, "why": event.why}, indent=None)
+            else:
+                output.line(f"{event.client} {_WORDS[event.what]}{event.why and f': {event.why}'}")
+        except OSError:  # what started this has read where the robot is, and listens no more
+            streams.discard()
 
     with contextlib.suppress(KeyboardInterrupt):
         find_server()(on, request, tcp=tcp, announce=announce, visit=visit, running=lambda: True)

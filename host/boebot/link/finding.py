@@ -122,10 +122,10 @@ class BoardSearch:
             f"other firmware, {tried}"
         )
 
-    def explained(self, error: BoardError) -> BoardError:
+    def explained(self, error: BoardError, held: bytes) -> BoardError:
         """Why the search ended by that error: where the other side has closed with a sentence, as `boebot serve` does
-        that has a client, by that sentence."""
-        said = _text(self._sample, _LONGEST_SENTENCE)
+        that has a client, by that sentence. `held`: what came before the search."""
+        said = _text(held + self._sample, _LONGEST_SENTENCE)
         return BoardError(f"{self._where} was closed by the other side, which says {said!r}") if said else error
 
     def _put_sample_aside(self) -> None:

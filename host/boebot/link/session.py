@@ -123,8 +123,9 @@ class Session:
         search = finding.BoardSearch(transport, limit_s)
         self._wanted = True
         self._other_host_since = None
+        held = b""
         if transport.realtime and self.hello is None:
-            transport.read(0.0)  # what the port has held is of an earlier time
+            held = transport.read(0.0)  # what the port has held is of an earlier time
         line.listener = search.listen
         try:
             while not self.is_open:
@@ -137,7 +138,7 @@ class Session:
                     line.change_baud(baud)
                 self._wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
         except BoardError as error:
-            raise (search.explained(error) if self.hello is None else error) from None
+            raise (search.explained(error, held) if self.hello is None else error) from None
         finally:
             line.listener = None
         if search.changed:
