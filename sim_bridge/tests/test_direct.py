@@ -144,7 +144,7 @@ def test_period_of_the_brain_is_a_multiple_of_the_step() -> None:
     with pytest.raises(boebot.BoebotError, match="period of 15 ms does not fit; expected a multiple of 10 ms"):
         boebot.run("wander", robot="arsim", period=0.015)
     for none in (0.0, -0.05, math.nan, math.inf):
-        with pytest.raises(boebot.BoebotError, match="m?s is none; expected more than 0"):
+        with pytest.raises(boebot.BoebotError, match=r"m?s is none; expected more than 0"):
             boebot.run("wander", robot="arsim", period=none)
     assert boebot.run("wander", robot="arsim", period=1.5, seconds=6).steps == 4, "no set-point has to outlive it"
 
