@@ -13,6 +13,9 @@ import pytest
 import boebot
 import copied_process
 from boebot import cli, load_robot
+from boebot.boards import BoardRequest
+from boebot.cli import doctor
+from boebot.cli.board_link import board_link
 from boebot.description.robots import robot_names
 
 pytestmark = pytest.mark.emulated
@@ -110,3 +113,20 @@ def test_what_is_no_board_is_one_sentence() -> None:
     for arguments, sentence in no_boards.items():
         done = copied_process.command(["doctor", *arguments], Path.cwd())
         assert done.returncode == 1 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_image_that_is_not_the_kits_is_found() -> None:
+    """The flash holds what another pin map's image is."""
+    with board_link("avr", BoardRequest(robot=load_robot("shieldbot-quad"), record=False)) as (link, _):
+        found = {check.part: check for check in doctor._firmware(link, load_robot("shieldbot"))}
+    assert found["image"].reads not in found["image"].expected
+    assert found["image"].hint == "if it is not meant, flash the kit's"
+    assert not found["last reset"].hint
+
+
+def test_device_that_is_switched_off_on_the_board_is_found() -> None:
+    """The image's defaults have the battery off; the robot's description is not given to the board here."""
+    with board_link("native", BoardRequest(robot=load_robot("shieldbot"), record=False)) as (link, _):
+        found = {check.part: check for check in doctor._running(link, load_robot("shieldbot-charging"))}
+    assert found["battery"].reads == "no reading" and found["battery"].hint.startswith("no fresh reading of it comes")
+    assert not found["ping"].hint

@@ -186,8 +186,10 @@ def _running(link: Link, robot: RobotDescription) -> Iterator[Check]:
     yield Check("supply", f"{volts:.2f} V", f"at least {least:g} V", low if volts < least else "")
     equipment = Equipment(robot, tick_s)
     for name, reader in equipment.readers.items():
-        found: Checkup = robot.device[name].checkup([reader(sample, slow) for sample, slow in heard])
-        yield Check(name, found.reads, found.expected, found.hint)
+        readings = [reader(sample, slow) for sample, slow in heard]
+        found: Checkup = robot.device[name].checkup(readings)
+        stale = "" if readings[-1].valid else "no fresh reading of it comes from the board: is it switched on there?"
+        yield Check(name, found.reads, found.expected, found.hint or stale)
 
 
 def _listen(link: Link, seconds: float) -> list[tuple[messages.Telemetry, Latest]]:

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.device import ANALOG_PINS, NOT_READ, Checkup, Place, Point, Reader, SlowDevice
+from boebot.devices.device import ANALOG_PINS, Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Ray, Shape
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.link.messages import DevicesTelemetry
@@ -72,7 +72,7 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
         newest = readings[-1]
         expected = f"{RANGE_MIN_M:g} to {RANGE_MAX_M:g} m, or nothing near; less with a hand ahead"
         if newest.voltage is None:
-            return Checkup("no reading", expected, NOT_READ)
+            return Checkup("no reading", expected)
         seen = "nothing near" if newest.distance is None else f"{newest.distance:.2f} m"
         plug = "" if newest.voltage <= VOLTS_MOST else f"is its output plugged to {self.wired_to}?"
         return Checkup(f"{seen}, {newest.voltage:.2f} V", expected, plug)

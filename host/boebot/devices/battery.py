@@ -24,7 +24,6 @@ import msgspec
 from boebot.devices.analog import READ_TICKS, voltage
 from boebot.devices.device import (
     ANALOG_PINS,
-    NOT_READ,
     Checkup,
     NotNegative,
     Place,
@@ -69,7 +68,7 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
         """See `Device`."""
         newest, expected = readings[-1], f"at least {LEAST_V:g} V"
         if newest.voltage is None:
-            return Checkup("no reading", expected, NOT_READ)
+            return Checkup("no reading", expected)
         low = f"charge or change the battery; if it is full, look at the divider on {self.wired_to}"
         return Checkup(f"{newest.voltage:.2f} V", expected, "" if newest.voltage >= LEAST_V else low)
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-from boebot.devices.device import NOT_READ, Checkup, Place, Reader, SlowDevice
+from boebot.devices.device import Checkup, Place, Reader, SlowDevice
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
@@ -70,8 +70,7 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
 
     def checkup(self, readings: Sequence[Buzzer]) -> Checkup:
         """See `Device`."""
-        valid = "" if readings[-1].valid else NOT_READ
-        return Checkup("silent" if readings[-1].token == 0 else "a tone has sounded", "silent", valid)
+        return Checkup("silent" if readings[-1].token == 0 else "a tone has sounded", "silent")
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -35,7 +35,6 @@ BeamRays = Annotated[int, msgspec.Meta(ge=1, le=32)]
 Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
 Point = tuple[Finite, Finite]
 
-NOT_READ = "no reading of it comes from the board: is it switched on there?"  # hint of a checkup
 ANALOG_PINS = tuple(range(14, 20))
 
 Reader = Callable[[Any, Any], Any]
@@ -175,7 +174,7 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
 
     def checkup(self, readings: Sequence[Any]) -> Checkup:
         """Judges the readings of about a second, oldest first and at least one, of a robot that stands still; for kinds
-        that a board has and a brain reads."""
+        that a board has and a brain reads. That the newest is not valid is for the caller to judge."""
         raise NotImplementedError
 
     @property

@@ -29,7 +29,6 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import (
-    NOT_READ,
     Angle,
     BeamRays,
     Checkup,
@@ -92,8 +91,6 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
     def checkup(self, readings: Sequence[Infrared]) -> Checkup:
         """See `Device`."""
         expected = f"nothing; something while a hand is {100 * self.range_m / 2:.0f} cm ahead of it"
-        if not readings[-1].valid:
-            return Checkup("no fresh reading", expected, NOT_READ)
         if sum(reading.detected for reading in readings) <= len(readings) / 2:
             return Checkup("nothing", expected)
         hint = "if nothing is ahead: does the LED, the sun or a lamp shine into the receiver? has it power?"

@@ -28,7 +28,6 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import (
-    NOT_READ,
     Angle,
     BeamRays,
     Checkup,
@@ -108,7 +107,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
             return Checkup("no answer", expected, f"is it plugged in: 5 V, ground, its signal to {self.wired_to}?")
         if newest.too_near:
             return Checkup(reads, expected, "take away what is before it; if nothing is, it is dirty or broken")
-        return Checkup(reads, expected, "" if newest.valid else NOT_READ)
+        return Checkup(reads, expected)
 
     def reader(self, place: Place) -> Reader:
         """See `Device`. Echoes from outside its range count as nothing near or too near."""

@@ -21,7 +21,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import NOT_READ, Checkup, Place, Point, Reader, SlowDevice
+from boebot.devices.device import Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Axis, Shape
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
@@ -86,8 +86,7 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
         """See `Device`."""
         expected = "no pulses, as nothing turns it"
         if readings[-1].pulse_us is None:
-            valid = "" if readings[-1].valid else NOT_READ
-            return Checkup("no pulses", expected, valid)
+            return Checkup("no pulses", expected)
         return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something turns it: the board's own brain?")
 
     def reader(self, place: Place) -> Reader:
