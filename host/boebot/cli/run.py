@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from boebot import view
 from boebot.brains import bundled
 from boebot.cli import options, output, quantity
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
+from boebot.record import run_folder
 from boebot.running.runner import execute
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
@@ -95,8 +95,6 @@ def run(
     ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
-    if out is not None:
-        view.make_folder(out)
     request = Request(
         members=[
             Member(
@@ -117,18 +115,19 @@ def run(
         force_timing=force_timing,
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
-    with (
-        output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
-        output.step_watch(bar) as progress,
-    ):
+    with run_folder.locked(out) as folder:
+        with (
+            output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
+            output.step_watch(bar) as progress,
+        ):
+            if count == 1:
+                result = execute(request, progress, folder)
+            else:
+                together = execute_together(request, progress, folder)
         if count == 1:
-            result = execute(request, progress)
+            end(result, out, json)
         else:
-            together = execute_together(request, progress)
-    if count == 1:
-        end(result, out, json)
-    else:
-        end_together(together, out, json)
+            end_together(together, out, json)
 
 
 run.__doc__ = _HELP

@@ -15,10 +15,10 @@ from typing import Annotated, TextIO
 
 import typer
 
-from boebot import view
 from boebot.cli import options, output, quantity
 from boebot.cli.ending import end
 from boebot.errors import BoebotError
+from boebot.record import run_folder
 from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
@@ -116,14 +116,12 @@ def teleop(
     """Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."""
     if not sys.stdin.isatty():
         raise BoebotError("teleop needs a keyboard, but its input is not a terminal")
-    if out is not None:
-        view.make_folder(out)
     screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
     output.line(HELP, screen)
-    with raw_keyboard() as read_keys:
-        brain = Keyboard(read_keys, functools.partial(_show, screen))
-        result = execute(
-            Request.single(
+    with run_folder.locked(out) as folder:
+        with raw_keyboard() as read_keys:
+            brain = Keyboard(read_keys, functools.partial(_show, screen))
+            request = Request.single(
                 brain,
                 robot=robot,
                 arena=arena,
@@ -133,10 +131,10 @@ def teleop(
                 realtime=True,
                 without=options.names(without),
             )
-        )
-    with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
-        output.line(file=screen)
-    end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)
+            result = execute(request, folder=folder)
+        with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
+            output.line(file=screen)
+        end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)
 
 
 def _show(screen: TextIO, line: str) -> None:

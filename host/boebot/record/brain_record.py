@@ -4,18 +4,24 @@ why it switched (section 8.2 of the notes). Made when a run has ended; it change
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
     from boebot.brain.brain import Brain, BrainStep, Switch
+    from boebot.record.record import Record
     from boebot.record.series import Floats
     from boebot.robot import Robot
+
+
+STEPS, SWITCHES = "brain_step", "switch"  # streams
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,6 +55,22 @@ class BrainRecord:
             steps=tuple(brain.steps) if met else (),
             switches=tuple(brain.switches) if met else (),
         )
+
+    @classmethod
+    def read(
+        cls, record: Record, processes: tuple[str, ...], behaviors: tuple[str, ...], variables: tuple[str, ...]
+    ) -> BrainRecord:
+        """From the streams of a record (`append_brain`), and the names."""
+        from boebot.brain.brain import BrainStep, Switch
+
+        z, u = len(variables), len(processes)
+        steps = []
+        for time_s, data in record.rows(STEPS):
+            motor, *numbers = struct.unpack(f"<{1 + z + 2 * u}d", data)
+            values = tuple(numbers)
+            steps.append(BrainStep(time_s, processes[int(motor)], values[:z], values[z : z + u], values[z + u :]))
+        switches = (Switch(time_s, *msgspec.json.decode(data)) for time_s, data in record.rows(SWITCHES))
+        return cls(processes, behaviors, variables, tuple(steps), tuple(switches))
 
     def __repr__(self) -> str:
         """How much there is."""
@@ -120,3 +142,15 @@ class BrainRecord:
     @staticmethod
     def _table(rows: list[tuple[float, ...]], columns: int) -> Floats:
         return np.array(rows, dtype=float).reshape(len(rows), columns)
+
+
+def append_brain(record: Record, brain: Brain | None, robot: Robot) -> None:
+    """Puts what a brain of processes has done with that robot, and is not in the record yet, into its streams."""
+    if brain is None or not brain.has_stepped(robot):
+        return
+    index = {process.name: number for number, process in enumerate(brain.processes)}
+    for step in brain.steps[record.count(STEPS) :]:
+        numbers = (index[step.motor], *step.variables, *step.utilities, *step.gammas)
+        record.append(STEPS, step.time, struct.pack(f"<{len(numbers)}d", *numbers))
+    for switch in brain.switches[record.count(SWITCHES) :]:
+        record.append(SWITCHES, switch.time, msgspec.json.encode(switch[1:]))

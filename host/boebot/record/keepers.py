@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tempfile
+import time as wall
 from collections.abc import Iterator
 from typing import IO, Protocol
 
 from boebot.record.blocks import Group, Rows, group_of
 from boebot.record.record_file import RecordReader, RecordWriter
+
+IN_MEMORY_S = 2.0  # of the wall clock, that a run without a folder writes to no disk
 
 
 class Keeper(Protocol):
@@ -64,38 +67,48 @@ class OnDisk:
         return RecordReader(self._file, self._name).groups()
 
 
-class Temporary:
-    """In memory, and from the second group on in a temporary file that vanishes with this object, however it ends."""
+class Finished:
+    """On disk, by a run that is over."""
 
-    def __init__(self) -> None:
-        self._memory: InMemory | None = InMemory()
-        self._disk: OnDisk | None = None
-        self._end_s = 0.0
+    def __init__(self, file: IO[bytes], name: str) -> None:
+        self._file, self._name = file, name
 
     def write(self, rows: Rows, time_s: float) -> None:
-        """See `Keeper`."""
-        if self._disk is not None:
-            self._disk.write(rows, time_s)
-            return
-        assert self._memory is not None
-        first = list(self._memory.groups())
-        if not first:
-            self._memory.write(rows, time_s)
-            self._end_s = time_s
-            return
-        file = tempfile.TemporaryFile(prefix="boebot-")  # noqa: SIM115 (closed with this object)
-        self._disk = OnDisk(file, "a temporary file", sync=False)
-        self._disk.write(first[0], self._end_s)
-        self._disk.write(rows, time_s)
-        self._memory = None
+        """Raises TypeError: nothing is written there any more."""
+        raise TypeError(f"the record {self._name} is finished")
 
     def groups(self) -> Iterator[Group]:
         """See `Keeper`."""
-        if self._disk is not None:
-            self._disk.finish()
-            return self._disk.groups()
-        assert self._memory is not None
-        return self._memory.groups()
+        return RecordReader(self._file, self._name).groups()
+
+
+class Temporary:
+    """In memory for the first seconds, then in a temporary file that vanishes with this object, however it ends."""
+
+    def __init__(self) -> None:
+        self._first: list[tuple[Group, float]] = []
+        self._until_s = wall.perf_counter() + IN_MEMORY_S
+        self._disk: OnDisk | None = None
+
+    def write(self, rows: Rows, time_s: float) -> None:
+        """See `Keeper`."""
+        if self._disk is None and wall.perf_counter() < self._until_s:
+            self._first.append((group_of(rows), time_s))
+            return
+        if self._disk is None:
+            file = tempfile.TemporaryFile(prefix="boebot-", buffering=0)  # noqa: SIM115 (closed with this object)
+            self._disk = OnDisk(file, "a temporary file", sync=False)
+            for group, at_s in self._first:
+                self._disk.write(group, at_s)
+            self._first.clear()
+        self._disk.write(rows, time_s)
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        if self._disk is None:
+            return iter([group for group, _ in self._first])
+        self._disk.finish()
+        return self._disk.groups()
 
 
 class Shared:

@@ -9,8 +9,12 @@ NAME of a message   that of the newest tick     the payload of a message of slow
 event               the board's, since reset    kind, value, whether it was before the session
 readings            the run's, of the step      of a robot without a board: tick, status, motor signals, ages, readings
 command             that of the observation     kind (index of KINDS), left, right: what the brain asked for in one step
+clock               0                           the transport's clock at the run's time 0 (s)
 truth               the world's                 of a simulated robot: doubles, `boebot.boards.TRUTH` without the time
 waits               the world's                 a moving shape has begun or ended to wait for a robot: shape, waited (s)
+brain_step          the run's, of the step      of a brain of processes, doubles: index of the active motor behavior,
+                                                state variables, utilities, gammas
+switch              the run's, of the step      of a brain of processes, JSON: what became inactive, active, and why
 vehicle, movers     the run's, of the step      of a vehicle stepped by hand (sim_bridge.recorder)
 """
 
@@ -39,6 +43,7 @@ KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
 _COMMAND = Struct("<Bdd")
 _EVENT = Struct("<BIB")
+_CLOCK = Struct("<d")
 _READINGS = Struct("<IHdd")
 
 
@@ -62,6 +67,16 @@ class Record:
     def append(self, stream: str, time_s: float, data: bytes) -> None:
         """A row at the end of a stream."""
         self._rows[stream].append((time_s, data))
+
+    def keep_in(self, keeper: Keeper) -> None:
+        """Where rows are kept from now on, those so far included.
+
+        Raises:
+            RecordError: they cannot be kept there.
+        """
+        for group in self._keeper.groups():
+            keeper.write(group, 0.0)
+        self._keeper = keeper
 
     def is_due(self) -> bool:
         """A second of the wall clock has passed since rows were last handed over to be kept."""
@@ -96,6 +111,10 @@ class Record:
     def append_command(self, time_s: float, kind: str, left: float, right: float) -> None:
         """What the brain asked for in one step."""
         self.append("command", time_s, _COMMAND.pack(KINDS.index(kind), left, right))
+
+    def append_clock(self, offset_s: float) -> None:
+        """The transport's clock (s) at the run's time 0."""
+        self.append("clock", 0.0, _CLOCK.pack(offset_s))
 
     def append_event(self, event: BoardEvent) -> None:
         """What the board sends exactly once."""
@@ -135,6 +154,12 @@ class Record:
     def ticks(self) -> int:
         """How many ticks or steps there are."""
         return self.count(self._tick_stream)
+
+    @property
+    def clock_offset(self) -> float:
+        """The transport's clock (s) at the run's time 0; 0 where that is not known."""
+        rows = self.rows("clock")
+        return float(_CLOCK.unpack(rows[0][1])[0]) if rows else 0.0
 
     @property
     def times(self) -> list[float]:
@@ -207,6 +232,9 @@ class Unrecorded(Record):
 
     def keep(self, time_s: float, more: Group | None = None) -> None:
         """Nothing is kept."""
+
+    def keep_in(self, keeper: Keeper) -> None:
+        """Nothing is kept there."""
 
 
 def _event(row: Row) -> BoardEvent:

@@ -115,7 +115,7 @@ class RunResult(FormerNames):
             f"{self.run_time:.1f} s",
             *self.way_in_words(),
             f"seed {self.seed}",
-            "complete" if self.error is None else f"ended early: {textwrap.shorten(_why(self.error), 120)}",
+            "complete" if self.error is None else f"ended early: {textwrap.shorten(why(self.error), 120)}",
         ]
         return ", ".join(parts)
 
@@ -320,7 +320,7 @@ class RunResult(FormerNames):
                 "firmware": None if identity is None else text(identity.firmware_version),
                 "compiler": None if identity is None else text(identity.compiler),
                 "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
-                "ended": "complete" if self.error is None else _why(self.error),
+                "ended": "complete" if self.error is None else why(self.error),
             }
         )
 
@@ -357,7 +357,7 @@ class TogetherResult:
 
     def table(self) -> dict[str, Any]:
         """The figures by name: of each robot, and how the run ended."""
-        ended = "complete" if self.error is None else _why(self.error)
+        ended = "complete" if self.error is None else why(self.error)
         return {"robots": [result.table() for result in self.robots], "ended": ended}
 
     def save(self, folder: str | Path) -> list[Path]:
@@ -372,5 +372,6 @@ def _rounded(value: float | None, digits: int) -> float | None:
     return None if value is None else round(value, digits)
 
 
-def _why(error: BaseException) -> str:
+def why(error: BaseException) -> str:
+    """Why a run ended before its time, in words."""
     return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)

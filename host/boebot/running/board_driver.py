@@ -33,7 +33,7 @@ from boebot.record.brain_record import BrainRecord
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import hangs
-from boebot.running.driver import PROGRESS_S, Task, check_period, keep_rest, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, Task, check_period, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
@@ -268,8 +268,7 @@ class BoardDriver:
         link, robot, transport = self.link, self.robot, self.session.transport
         poll, unpack, tick_of = link.poll_until, _Telemetry.STRUCT.unpack, _TICK
         make, waiting_events = _Telemetry._make, link.events.waiting
-        record = self.record
-        put_aside, command_given = record.append_telemetry, record.append_command
+        put_aside, command_given = self.record.append_telemetry, self.record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
         paced = self.task.request.realtime and not transport.realtime
         time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
@@ -306,6 +305,7 @@ class BoardDriver:
                     due = tick + -tick % n
                     time_zero = -due * tick_s
                     self.clock_offset_s = host_s + (due - tick) * tick_s
+                    self.record.append_clock(self.clock_offset_s)
                 elif restarted or tick <= last:  # the board was reset: its ticks begin afresh
                     restarted = False
                     due = tick + -tick % n
@@ -332,8 +332,6 @@ class BoardDriver:
                 if progress is not None and wall.perf_counter() >= next_progress:
                     next_progress = wall.perf_counter() + PROGRESS_S
                     progress(time_s)
-                if record.is_due():
-                    record.keep(time_s, self.session.drain())
                 slow = self._slow(last) if equipment.needs_messages else NO_MESSAGES
                 sample = make(unpack(payload))
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
@@ -395,8 +393,6 @@ class BoardDriver:
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.running.driver.Driver`."""
         link, watchdog_resets = self.link, self.session.watchdog_resets()
-        self.notices += hangs.sentences(watchdog_resets)
-        unkept = keep_rest(self.record, self.session, max(self._last_s, 0.0))
         return RunResult(
             brain=self.task.brain.name,
             robot=self.description,
@@ -406,7 +402,7 @@ class BoardDriver:
             seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.tick_s,
-            error=error or unkept,
+            error=error,
             record=self.record,
             world=self.session.arena,
             clock_offset=self.clock_offset_s,
@@ -421,7 +417,7 @@ class BoardDriver:
             wall_time=elapsed_s,
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
-            notices=self.notices,
+            notices=[*self.notices, *hangs.sentences(watchdog_resets)],
             watchdog_resets=watchdog_resets,
             counters=dict(self.session.counters()),
             without=self.task.request.without,

@@ -14,7 +14,7 @@ from boebot.errors import BoardError
 from boebot.record.brain_record import BrainRecord
 from boebot.record.result import RunResult
 from boebot.running.direct_robot import DirectRobot
-from boebot.running.driver import PROGRESS_S, Task, keep_rest, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, Task, step_limit, whole_ticks
 
 
 class DirectDriver:
@@ -42,8 +42,7 @@ class DirectDriver:
         """See `boebot.running.driver.Driver`."""
         session, robot, direct, n = self.session, self.robot, self._direct, self.period_ticks
         tick_s, progress = session.tick_s, self.task.progress
-        record = self.record
-        put_aside, command_given = record.append_readings, record.append_command
+        put_aside, command_given = self.record.append_readings, self.record.append_command
         end_s = self.task.seconds - tick_s / 2
         paced = self.task.request.realtime
         started = next_progress = wall.perf_counter()
@@ -57,8 +56,6 @@ class DirectDriver:
             if progress is not None and wall.perf_counter() >= next_progress:
                 next_progress = wall.perf_counter() + PROGRESS_S
                 progress(time_s)
-            if record.is_due():
-                record.keep(time_s, session.drain())
             direct.show(sample)
             shown = wall.perf_counter()
             yield time_s
@@ -84,7 +81,6 @@ class DirectDriver:
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.running.driver.Driver`."""
         request = self.task.request
-        unkept = keep_rest(self.record, self.session, self._last_s)
         return RunResult(
             brain=self.task.brain.name,
             robot=request.robot,
@@ -94,7 +90,7 @@ class DirectDriver:
             seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.session.tick_s,
-            error=error or unkept,
+            error=error,
             record=self.record,
             world=self.session.arena,
             clock_offset=0.0,

@@ -15,6 +15,7 @@ from boebot.arguments import duration
 from boebot.boards import BoardRequest, BoardSession, VehicleSession
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
+from boebot.record.brain_record import append_brain
 from boebot.record.keepers import Temporary
 from boebot.record.record import Record
 from boebot.record.result import RunResult
@@ -54,6 +55,10 @@ class Driver(Protocol):
     """Drives one robot through one run."""
 
     @property
+    def session(self) -> BoardSession | VehicleSession:
+        """The robot as it was opened."""
+
+    @property
     def robot(self) -> Robot:
         """What the brain meets."""
 
@@ -80,13 +85,23 @@ class Driver(Protocol):
         """Stops the motors and lets go of the robot, whatever happened before."""
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
-        """The run's result; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
+        """The run's result so far; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
 
 
-def keep_rest(record: Record, session: BoardSession | VehicleSession, time_s: float) -> BoebotError | None:
-    """At the end of a run: what is not kept yet. Returns why it cannot be."""
+def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False) -> None:
+    """Hands over what has happened up to that time of the run to be kept. `ended`: the run has ended.
+
+    Raises:
+        BoebotError: it cannot be kept.
+    """
+    append_brain(task.record, task.brain.brain, driver.robot)
+    task.record.keep(time_s, driver.session.drain(ended=ended))
+
+
+def end_rows(driver: Driver, task: Task) -> BoebotError | None:
+    """The same at the end of a run. Returns why they cannot be kept."""
     try:
-        record.keep(time_s, session.drain(ended=True))
+        keep_rows(driver, task, driver.result(None, 0.0).run_time, ended=True)
     except BoebotError as error:
         return error
     return None

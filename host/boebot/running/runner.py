@@ -15,15 +15,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
 
-from boebot import view
 from boebot.boards import BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
+from boebot.record.recording import Recording
 from boebot.record.result import RunResult, TogetherResult
+from boebot.record.run_folder import RunFolder
 from boebot.running import hangs, interrupts
 from boebot.running.board_driver import BoardDriver
 from boebot.running.direct_driver import DirectDriver
-from boebot.running.driver import Driver, Progress, Task
+from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.stepping import StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, check_progress, expect
 
@@ -45,13 +46,15 @@ def run(
     pose: tuple[float, float, float] | None = None,
     step_timeout: float | None = None,
     force_timing: bool = False,
+    record: bool = True,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
     Args:
         brain, robot, pose, period, without: as of `boebot.Member`.
         arena, on, seconds, seed, realtime, step_timeout, force_timing: as of `boebot.running.tasks.Request`.
-        out: folder for run.csv, run.png, replay.html and the raw bytes.
+        out: folder for the record, and the files that are made from it (boebot.view).
+        record: False: nothing is recorded; a result then has few figures, and `out` is refused.
         progress: called with the seconds that have passed, about ten times a second.
 
     Raises:
@@ -72,46 +75,63 @@ def run(
         realtime=realtime,
         step_timeout=step_timeout,
         force_timing=force_timing,
+        record=record,
     )
-    return keep(lambda: execute(request, progress), out)
+    return keep(lambda folder: execute(request, progress, folder), out)
 
 
-def execute(request: Request, progress: Progress | None = None) -> RunResult:
-    """Runs the one robot of a request. Once the run has begun every end of it, even by an error, is a result: see
-    `RunResult.error`.
+def execute(request: Request, progress: Progress | None = None, folder: RunFolder | None = None) -> RunResult:
+    """Runs the one robot of a request; its record goes to the folder as it comes. Once the run has begun every end of
+    it, even by an error, is a result: see `RunResult.error`.
 
     Raises:
         BoebotError: the run could not begin.
     """
     check_progress(progress)
     (task,) = request.tasks()
-    task = replace(task, progress=progress)
+    recording = Recording(1, recorded=request.record)
+    task = replace(task, progress=progress, record=recording.records[0])
     opening = open_board if task.request.robot.has_board else open_vehicle
     session = opening(task.on, task.request)
     try:
-        return _drive(driver_of(session, task), task)
+        driver = driver_of(session, task)
+        recording.begin(folder, [driver.result(None, 0.0)], sources([task]))
+        result = _drive(driver, task)
+        result.error = recording.end([result]) or result.error
+        return result
     finally:
         session.close()
 
 
-def keep(work: Callable[[], Result], out: str | Path | None) -> Result:
+def sources(tasks: Sequence[Task]) -> dict[str, bytes]:
+    """The files of the brains, by name."""
+    paths = {task.brain.path for task in tasks if task.brain.path is not None}
+    return {path.name: path.read_bytes() for path in sorted(paths) if path.is_file()}
+
+
+def keep(work: Callable[[RunFolder | None], Result], out: str | Path | None) -> Result:
     """Does the whole of a run, and writes what came of it to the folder `out`, if there is one.
 
     Raises:
         BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
     """
-    if out is not None:
-        expect("out", out, "a folder or None", str, Path)
-        view.make_folder(Path(out))
-    result = work()
-    if out is not None:
+    if out is None:
+        return _whole(work(None))
+    expect("out", out, "a folder or None", str, Path)
+    with RunFolder(Path(out)) as folder:
+        result = work(folder)
         try:
             with interrupts.ignored():
-                result.save(out)
+                result.save(folder.path)
         except BoebotError as unsaved:
             if result.error is None:
                 raise
             result.error.add_note(str(unsaved))
+    return _whole(result)
+
+
+def _whole(result: Result) -> Result:
+    """Raises whatever ended the run before its time."""
     if result.error is not None:
         raise result.error
     return result
@@ -143,7 +163,9 @@ def _drive(driver: Driver, task: Task) -> RunResult:
         driver.begin()
         started = wall.perf_counter()
         with StepWatch(driver.step_limit) as watch:
-            for _ in driver.steps():
+            for time_s in driver.steps():
+                if task.record.is_due():
+                    keep_rows(driver, task, time_s)
                 step_once(driver.robot, task.brain, watch, times)
     except (BoebotError, KeyboardInterrupt) as caught:
         error = caught
@@ -151,6 +173,7 @@ def _drive(driver: Driver, task: Task) -> RunResult:
         elapsed_s = wall.perf_counter() - started
         with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
             driver.end()
+            error = error or end_rows(driver, task)
     return with_times(driver.result(error, elapsed_s), task, times)
 
 

@@ -61,6 +61,7 @@ class Request:
             the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after
             which its dead-man stops the motors.
         force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
+        record: what happens is recorded.
     """
 
     members: Sequence[Member]
@@ -71,6 +72,7 @@ class Request:
     realtime: bool = False
     step_timeout: float | None = None
     force_timing: bool = False
+    record: bool = True
 
     @classmethod
     def single(
@@ -97,7 +99,7 @@ class Request:
         expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
         if self.step_timeout is not None and not self.step_timeout > 0:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
-        for name, switch in (("realtime", self.realtime), ("force_timing", self.force_timing)):
+        for name, switch in (("realtime", self.realtime), ("force_timing", self.force_timing), ("record", self.record)):
             if not isinstance(switch, bool):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
@@ -148,6 +150,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         seed=request.seed,
         realtime=request.realtime,
         saveable=False,
+        record=request.record,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
     )

@@ -12,16 +12,19 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, open_together
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
+from boebot.record.recording import Recording
 from boebot.record.result import RunResult, TogetherResult
+from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
-from boebot.running.driver import PROGRESS_S, Driver, Progress, Task
+from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.pausable_thread import PAUSED, PausableThread
-from boebot.running.runner import driver_of, keep, with_times
+from boebot.running.runner import driver_of, keep, sources, with_times
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot
 
@@ -73,23 +76,27 @@ def run_together(
         step_timeout=step_timeout,
         force_timing=force_timing,
     )
-    return keep(lambda: execute_together(request, progress), out)
+    return keep(lambda folder: execute_together(request, progress, folder), out)
 
 
-def execute_together(request: Request, progress: Progress | None = None) -> TogetherResult:
-    """Runs all robots of a request in one world. Once the run has begun every end of it, even by an error, is a result:
-    see `TogetherResult.error`.
+def execute_together(
+    request: Request, progress: Progress | None = None, folder: RunFolder | None = None
+) -> TogetherResult:
+    """Runs all robots of a request in one world; their record goes to the folder as it comes. Once the run has begun
+    every end of it, even by an error, is a result: see `TogetherResult.error`.
 
     Raises:
         BoebotError: the run could not begin.
     """
     check_progress(progress)
     tasks = request.tasks()
+    recording = Recording(len(tasks), recorded=request.record)
+    tasks = [replace(task, record=record) for task, record in zip(tasks, recording.records, strict=True)]
     _check_own_brains([task.brain for task in tasks])
     kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
     world = open_together(kind, [task.request for task in tasks])
     try:
-        return _Run(world, tasks, progress).run()
+        return _Run(world, tasks, progress, recording, folder).run()
     finally:
         world.close()
 
@@ -138,6 +145,7 @@ class _Robot:
         finally:
             self.is_ending = True
             driver.end()
+            self.error = self.error or end_rows(driver, self.task)
             self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
 
     def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
@@ -166,8 +174,16 @@ class _Robot:
 class _Run:
     """All robots of a run, turned on one clock."""
 
-    def __init__(self, world: SharedWorld, tasks: Sequence[Task], progress: Progress | None) -> None:
+    def __init__(
+        self,
+        world: SharedWorld,
+        tasks: Sequence[Task],
+        progress: Progress | None,
+        recording: Recording,
+        folder: RunFolder | None,
+    ) -> None:
         self._world = world
+        self._recording, self._folder, self._is_recorded = recording, folder, False
         self._robots = [
             _Robot(session, task, number)
             for number, (session, task) in enumerate(zip(world.sessions, tasks, strict=True), 1)
@@ -203,6 +219,7 @@ class _Run:
             if all(robot.thread.is_done for robot in self._robots):
                 return
             awake = [self._robots[index] for index in self._world.advance()]
+            self._record()
             self._report()
 
     def _turn(self, robot: _Robot, watch: StepWatch) -> None:
@@ -212,6 +229,20 @@ class _Run:
             raise of_robot(error, robot.number, len(self._robots)) from error
         if (failure := robot.failure) is not None:
             raise of_robot(failure, robot.number, len(self._robots)) from failure
+
+    def _record(self) -> None:
+        """What is due to be kept; nothing happens meanwhile."""
+        if not self._is_recorded and all(robot.driver is not None for robot in self._robots):
+            self._begin_record()
+        for robot in self._robots:
+            if self._is_recorded and not robot.is_ending and robot.task.record.is_due():
+                assert robot.driver is not None
+                keep_rows(robot.driver, robot.task, robot.time_s)
+
+    def _begin_record(self) -> None:
+        self._is_recorded = True
+        results = [robot.driver.result(None, 0.0) for robot in self._robots if robot.driver is not None]
+        self._recording.begin(self._folder, results, sources([robot.task for robot in self._robots]))
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:
@@ -243,4 +274,6 @@ class _Run:
             result.error = error if isinstance(error, KeyboardInterrupt) else robot.failure
             result.wall_time = elapsed_s
             results.append(result)
-        return TogetherResult(robots=results, error=error)
+        if not self._is_recorded:
+            self._begin_record()
+        return TogetherResult(robots=results, error=self._recording.end(results) or error)

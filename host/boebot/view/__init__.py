@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
+from boebot.record.run_folder import unwritable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,11 +47,7 @@ def make_folder(folder: Path) -> None:
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        raise _unwritable(folder, error) from None
-
-
-def _unwritable(folder: Path, error: OSError) -> BoebotError:
-    return BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}")
+        raise unwritable(folder, error) from None
 
 
 def save(result: RunResult, folder: Path) -> list[Path]:
@@ -72,7 +69,7 @@ def save(result: RunResult, folder: Path) -> list[Path]:
         if result.brain_record is not None:
             paths += tables.write_brain(result.brain_record, folder)
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise unwritable(folder, error) from None
     if not result.ticks:
         return paths
     drawn, failed = _draw(
@@ -117,7 +114,7 @@ def _draw(folder: Path, files: dict[str, Callable[[Path], Path]]) -> tuple[list[
         try:
             paths.append(write(folder / name))
         except OSError as error:
-            raise _unwritable(folder, error) from None
+            raise unwritable(folder, error) from None
         except Exception as error:  # whatever drawing meets: the run is worth more than its picture
             what = str(error).strip().partition("\n")[0]
             failed.append(f"{name} cannot be made: {type(error).__name__}" + (f": {what}" if what else ""))

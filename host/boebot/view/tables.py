@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boebot.record.recording import FORMAT
+
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
-
-FORMAT = 3  # of a run's files; CHANGELOG.md says what is new in each
 
 
 def columns(result: RunResult) -> dict[str, list[str]]:

@@ -1,0 +1,82 @@
+"""A run on its way into its record: where its rows go, and what the record says of the run itself."""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from boebot.errors import BoebotError
+from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
+from boebot.record.record import Record, Unrecorded
+from boebot.record.run_folder import RECORD, RunFolder
+
+if TYPE_CHECKING:
+    from boebot.record.result import RunResult
+
+FORMAT = 3  # of a record and of the files made from it; CHANGELOG.md says what is new in each
+BEGIN, END = "begin.json", "end.json"
+JSON = "application/json"
+
+
+class Recording:
+    """Of one run.
+
+    Attributes:
+        records: one for each robot.
+    """
+
+    def __init__(self, robots: int, *, recorded: bool = True) -> None:
+        """`recorded`: else nothing is kept."""
+        self._disk: OnDisk | None = None
+        self.records: list[Record] = [Record() if recorded else Unrecorded() for _ in range(robots)]
+
+    def begin(self, folder: RunFolder | None, results: Sequence[RunResult], sources: Mapping[str, bytes]) -> None:
+        """From now on rows go into that folder; None: into a temporary file, once a second of the wall clock is over.
+
+        Args:
+            results: what is known of the run as it begins.
+            sources: of brains, robots and arena, by file name.
+
+        Raises:
+            BoebotError: the folder cannot be written to.
+        """
+        keeper: Keeper = Temporary()
+        if folder is not None:
+            keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD))
+            for name, data in sources.items():
+                self._disk.writer.attach(name, data)
+            self._say(BEGIN, results)
+        for number, record in enumerate(self.records, 1):
+            record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
+
+    def end(self, results: Sequence[RunResult]) -> BoebotError | None:
+        """Nothing comes any more. Returns why the record is not whole. `results`: what is known at the run's end."""
+        if self._disk is None:
+            return None
+        try:
+            self._say(END, results)
+            self._disk.finish()
+        except BoebotError as error:
+            return error
+        return None
+
+    def _say(self, name: str, results: Sequence[RunResult]) -> None:
+        from boebot.record.facts import facts_of
+
+        assert self._disk is not None
+        world = next((result.world.description for result in results if result.world is not None), None)
+        said = {
+            "format": FORMAT,
+            "versions": {"boebot": version("boebot"), "python": platform.python_version()},
+            "command_line": sys.argv,
+            "written": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "arena": world,
+            "robots": [facts_of(result) for result in results],
+        }
+        self._disk.writer.attach(name, msgspec.json.format(msgspec.json.encode(said), indent=1), JSON)

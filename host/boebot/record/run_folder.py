@@ -1,0 +1,110 @@
+"""The folder of a run: its record, record.mcap, and the files that are made from it. It holds one run.
+
+A new run replaces the record and the files that runs leave, and no others. While a run writes, the folder is locked.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import re
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from boebot.errors import BoebotError
+
+RECORD = "record.mcap"
+FILES = (
+    "summary.json",
+    "run.png",
+    "replay.html",
+    "run.csv",
+    "brain.csv",
+    "switches.csv",
+    "to_board.bin",
+    "to_host.bin",
+    "wire.csv",
+)
+"""What is made from a record; of a run of several robots also in a folder for each, `robot-1` and so on."""
+_ROBOT = re.compile(r"robot-[1-9]\d*\Z")
+
+
+class RunFolder:
+    """A folder that a run may write to, locked until it is closed."""
+
+    def __init__(self, path: Path) -> None:
+        """Made if need be.
+
+        Raises:
+            BoebotError: it cannot be written to, another run writes there, or it holds other things than a run.
+        """
+        self.path = path
+        self._lock = -1
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            if not os.access(path, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            self._lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            there = {entry.name for entry in path.iterdir()}
+        except BlockingIOError:
+            self.close()
+            raise BoebotError(f"another run writes to {path} now; expected a folder for this one alone") from None
+        except OSError as error:
+            self.close()
+            raise unwritable(path, error) from None
+        if there and RECORD not in there:
+            self.close()
+            raise BoebotError(
+                f"{path} holds {sorted(there)[0]!r} and no record of a run ({RECORD}); expected an empty folder, a new "
+                "one, or that of a former run, which is replaced"
+            )
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Others may write there. May be called twice."""
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def new_record(self) -> IO[bytes]:
+        """An empty record, open for reading and writing; what a former run has left is gone.
+
+        Raises:
+            BoebotError: it cannot be written.
+        """
+        try:
+            for folder in (self.path, *sorted(path for path in self.path.iterdir() if _is_of_robot(path))):
+                for name in (*FILES, RECORD):
+                    (folder / name).unlink(missing_ok=True)
+                if folder != self.path and not any(folder.iterdir()):
+                    folder.rmdir()
+            file = (self.path / RECORD).open("x+b", buffering=0)
+            os.fsync(self._lock)
+        except OSError as error:
+            raise unwritable(self.path, error) from None
+        return file
+
+
+def locked(path: Path | None) -> AbstractContextManager[RunFolder | None]:
+    """That folder, while a run writes to it; None: none. Raises as `RunFolder`."""
+    return nullcontext() if path is None else RunFolder(path)
+
+
+def unwritable(folder: Path, error: OSError) -> BoebotError:
+    """Why a run's files cannot be written."""
+    return BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}")
+
+
+def _is_of_robot(path: Path) -> bool:
+    return _ROBOT.match(path.name) is not None and path.is_dir() and not path.is_symlink()
