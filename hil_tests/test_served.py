@@ -17,6 +17,8 @@ import pytest
 import serial
 
 import copied_process
+from boebot.record.reading import read_run
+from boebot.record.result import RunResult
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 
@@ -74,7 +76,7 @@ def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_pat
         assert done.returncode == 0, done.stderr
         summary = json.loads(done.stdout)
         assert summary["lost_frames"] == 0 and summary["bad_frames"] == 0
-        assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in tmp_path.iterdir()}
+        assert {"record.mcap", "run.png", "replay.html"} <= {path.name for path in tmp_path.iterdir()}
         # a second client finds the robot as the first one left it: ready
         info = boebot("info", url, "--json")
         assert info.returncode == 0, info.stderr
@@ -105,9 +107,10 @@ def late_run(url: str, folder: Path, *options: str) -> tuple[copied_process.Done
         "import time\nslept = []\ndef step(robot):\n    robot.drive(0.5, 0.5)\n"
         "    if robot.time > 0.499 and not slept:\n        slept.append(robot.time)\n        time.sleep(0.8)\n"
     )
-    out = ["--out", str(folder), "--json"]
-    done = boebot("run", str(path), "--on", url, "--seconds", "2", *out, *options)
-    with (folder / "run.csv").open() as file:
+    out = folder / "run"
+    done = boebot("run", str(path), "--on", url, "--seconds", "2", "--out", str(out), "--json", *options)
+    assert boebot("report", str(out), "--csv").returncode == 0
+    with (out / "run.csv").open() as file:
         return done, list(csv.DictReader(file))
 
 
@@ -148,7 +151,8 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
         _, errors = client.communicate(timeout=20)
     assert client.returncode == 1
     assert "has gone" in errors and "Traceback" not in errors
-    assert len((tmp_path / "run.csv").read_text().splitlines()) > 20
+    result = read_run(tmp_path)
+    assert isinstance(result, RunResult) and result.ticks > 20
     assert (tmp_path / "replay.html").is_file()
 
 

@@ -26,7 +26,7 @@ def test_full_output_is_one_sentence_and_files_are_written(arguments: list[str],
         done = subprocess.run([*BOEBOT, *arguments, *out], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     assert done.stderr == "boebot: the output cannot be written: no space left on device\n"
     assert done.returncode == 1
-    assert not out or (tmp_path / "out" / "run.csv").is_file()
+    assert not out or (tmp_path / "out" / "summary.json").is_file()
 
 
 def test_terminal_with_ascii_only_is_given_the_nearest_characters() -> None:

@@ -16,6 +16,7 @@ import boebot
 from boebot.brain import Brain, BrainStep, CognitiveProcess, MotorBehavior, StateVariable, Switch, Utility
 from boebot.errors import BrainError
 from boebot.record.brain_record import BrainRecord
+from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.view import style, utility_panel
@@ -85,7 +86,7 @@ def result(witness: Witness) -> RunResult:
 @pytest.fixture(scope="module")
 def folder(result: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("composed")
-    assert {path.name for path in result.save(folder)} == {path.name for path in folder.iterdir()}
+    assert {path.name for path in result.save(folder, csv=True)} == {path.name for path in folder.iterdir()}
     return folder
 
 
@@ -203,12 +204,14 @@ def test_brain_that_fails_leaves_its_steps_up_to_there(tmp_path: Path) -> None:
 
     with pytest.raises(BrainError, match="no more"):
         boebot.run(Brain([Failing()]), robot="arsim", arena="empty", seconds=5, out=tmp_path)
-    times = column(rows_of(tmp_path / "brain.csv"), "time_s")
-    assert times == pytest.approx(np.arange(20) * 0.05)
+    failed = read_run(tmp_path)
+    assert isinstance(failed, RunResult)
+    assert record_of(failed).time == pytest.approx(np.arange(20) * 0.05)
 
 
 def test_other_brains_have_no_record(tmp_path: Path) -> None:
-    result = boebot.run(lambda robot: robot.drive(0.1, 0.1), robot="arsim", seconds=0.5, out=tmp_path)
+    result = boebot.run(lambda robot: robot.drive(0.1, 0.1), robot="arsim", seconds=0.5)
+    result.save(tmp_path, csv=True)
     assert result.brain_record is None
     assert not (tmp_path / "brain.csv").exists() and not (tmp_path / "switches.csv").exists()
     table = result.table()
@@ -220,7 +223,8 @@ def test_each_of_several_robots_has_its_own(tmp_path: Path) -> None:
     members = [
         boebot.Member(brain=brain, robot="arsim", pose=(x, 0.0, 0.0)) for x, brain in zip((0, 1), brains, strict=True)
     ]
-    together = boebot.run_together(members, arena="empty", seconds=3, out=tmp_path)
+    together = boebot.run_together(members, arena="empty", seconds=3)
+    together.save(tmp_path, csv=True)
     assert [len(record_of(robot).behaviors) for robot in together.robots] == [2, 1]
     assert {row["active"] for row in rows_of(tmp_path / "robot-1" / "brain.csv")} == {"ahead", "spin"}
     assert {row["active"] for row in rows_of(tmp_path / "robot-2" / "brain.csv")} == {"ahead"}

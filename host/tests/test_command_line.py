@@ -22,6 +22,8 @@ from boebot.cli import board_link, teleop
 from boebot.cli import link as link_command
 from boebot.link import messages, mismatch
 from boebot.link.link import Link
+from boebot.record.reading import read_run
+from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.tasks import Request
@@ -175,7 +177,7 @@ def test_several_robots_print_a_row_each(capsys: pytest.CaptureFixture[str], tmp
     code, out, err = boebot(capsys, *arguments, "--out", str(tmp_path))
     assert (code, err) == (0, "")
     assert [line[0] for line in out.splitlines() if "shieldbot" in line] == ["1", "2", "3"]
-    assert f"files in {tmp_path}: run.png, replay.html, robot-1/, robot-2/, robot-3/" in out
+    assert f"files in {tmp_path}: record.mcap, run.png, replay.html, robot-1/, robot-2/, robot-3/" in out
     code, out, _ = boebot(capsys, *arguments, "--json")
     values = json.loads(out)
     assert (code, len(values["robots"]), values["ended"]) == (0, 3, "complete")
@@ -286,7 +288,7 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
     assert process.returncode == 130
     assert err == "boebot: interrupted\n"
     assert "interrupted" in out
-    assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 20
+    assert ticks_in(tmp_path / "out") > 20
 
 
 @pytest.mark.parametrize("after_s", [0.04, 0.1, 0.2, 0.3])
@@ -432,7 +434,7 @@ def test_picture_that_fails_costs_no_other_file(
     assert code == 1
     assert err == f"boebot: {missing} cannot be made: RuntimeError: no ink; the run's other files are in {tmp_path}\n"
     there = {path.name for path in tmp_path.iterdir()}
-    assert {"run.csv", "wire.csv", "run.png", "replay.html"} - there == {missing}
+    assert {"record.mcap", "summary.json", "run.png", "replay.html"} - there == {missing}
     assert {Path(name).name for name in json.loads(out)["files"]} == there
 
 
@@ -452,7 +454,7 @@ def test_error_of_the_brain_comes_before_that_of_its_files(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("boebot.view.tables.write_run", full)
+    monkeypatch.setattr("boebot.view.tables.write_summary", full)
     brain = tmp_path / "wrong.py"
     brain.write_text(f"def step(robot):\n    {line}\n")
     got, out, err = boebot(capsys, "run", str(brain), "--out", str(tmp_path / "out"))
@@ -473,6 +475,13 @@ def test_files_are_written_even_if_nobody_reads_the_table(
     assert code == 1 and (tmp_path / "replay.html").is_file()
 
 
+def ticks_in(folder: Path) -> int:
+    """Of the run whose record is there."""
+    result = read_run(folder)
+    assert isinstance(result, RunResult)
+    return result.ticks
+
+
 @pytest.mark.wall_clock
 def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     served = Pty(Peer())
@@ -488,7 +497,7 @@ def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.Capture
     code, _, err = boebot(capsys, "run", str(brain), "--on", served.path, "--out", str(tmp_path / "out"))
     assert code == 1
     assert err == f"boebot: {served.path} has gone: unplugged, or closed by the other side\n"
-    assert (tmp_path / "out" / "run.csv").read_text().count("\n") > 10
+    assert ticks_in(tmp_path / "out") > 10
 
 
 # ---- link and parameters ---------------------------------------------------------------------------------------------

@@ -20,10 +20,11 @@ from matplotlib.figure import Figure
 import boebot
 from boebot.errors import BoebotError
 from boebot.link import frame, messages
+from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.running import board_driver as board
 from boebot.running import runner
-from boebot.view import picture, replay, scene
+from boebot.view import picture, replay, scene, tables
 from peer import InProcess, Peer
 
 
@@ -48,7 +49,7 @@ def result() -> RunResult:
 @pytest.fixture(scope="module")
 def folder(result: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "deep" / "run"
-    assert {path.name for path in result.save(folder)} == {path.name for path in folder.iterdir()}
+    assert {path.name for path in result.save(folder, csv=True)} == {path.name for path in folder.iterdir()}
     return folder
 
 
@@ -221,7 +222,7 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
     content = content_of((tmp_path / "replay.html").read_text())
     data = content["runs"][0]
     assert not data["known"] and data["estimate"] is None and content["plan"]["solids"] == []
-    header = (tmp_path / "run.csv").read_text().splitlines()[0]
+    header = tables.columns(result)
     assert "odometry_x_m" in header and "true_x_m" not in header
 
 
@@ -231,7 +232,8 @@ def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, mo
     monkeypatch.setattr(board, "configure", lambda link, robot: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         boebot.run("wander", seconds=5, out=tmp_path)
-    assert (tmp_path / "run.csv").read_text().count("\n") == 1
+    unheard = read_run(tmp_path)
+    assert isinstance(unheard, RunResult) and unheard.ticks == 0
     assert json.loads((tmp_path / "summary.json").read_text())["ended"] == "interrupted"
 
 

@@ -14,6 +14,7 @@ import boebot
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
+from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner
@@ -146,7 +147,7 @@ def test_error_of_the_brain_is_not_hidden_by_that_of_its_files(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("boebot.view.tables.write_run", full)
+    monkeypatch.setattr("boebot.view.tables.write_summary", full)
     with pytest.raises(BrainError, match="division") as caught:
         boebot.run(fails_after(0.5, ZeroDivisionError("division")), seconds=10, out=tmp_path)
     assert "No space left on device" in caught.value.__notes__[0]
@@ -170,8 +171,8 @@ def test_run_that_ends_early_stops_the_motors_and_keeps_its_record(
         boebot.run(fails_after(0.5, error), seconds=10, out=tmp_path)
     assert session.peer.stops >= 1 and session.peer.latch == messages.Latch.STOP_COMMAND
     assert not session.peer.moving and session.closed
-    rows = (tmp_path / "run.csv").read_text().splitlines()
-    assert rows[-1].startswith("0.5000,")
+    result = read_run(tmp_path)
+    assert isinstance(result, RunResult) and result.record.times[-1] == pytest.approx(0.5)
     assert (tmp_path / "replay.html").exists()
     assert '"ended"' in (tmp_path / "summary.json").read_text()
 

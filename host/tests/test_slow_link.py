@@ -257,7 +257,7 @@ def test_link_counts_lost_messages_of_slow_devices_as_lost_frames(monkeypatch: p
 
 def test_run_csv_has_the_slow_devices(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     result = run_on(Peer(BOEBOT), lambda robot: robot.turn_turret(0.25), monkeypatch, seconds=1)
-    result.save(tmp_path)
+    result.save(tmp_path, csv=True)
     with (tmp_path / "run.csv").open() as file:
         rows = list(csv.DictReader(file))
     last = rows[-1]

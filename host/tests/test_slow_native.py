@@ -154,7 +154,7 @@ def test_same_brain_on_robots_with_other_devices(tmp_path: Path) -> None:
         result = execute(Request.single(step, robot=name, arena="showcase", seconds=2))
         assert result.error is None, (name, result.error)
         assert (result.true_distance or 0.0) > 0.05
-        result.save(tmp_path / name)
+        result.save(tmp_path / name, csv=True)
     assert used == {
         "shieldbot-basic": {"lights", "buzzer"},
         "shieldbot": set(),

@@ -8,7 +8,6 @@ were carried out, the one at 0.30 s was not, and there is a row for each hundred
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import os
 import signal
@@ -26,6 +25,7 @@ import boebot
 from boebot import cli
 from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.errors import BoebotError, BrainError
+from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner
@@ -95,7 +95,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         return session
 
     for kind in ("picture", "replay"):  # tested elsewhere, and they take long
-        monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path)
+        monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path.touch())
     monkeypatch.setattr(runner, "open_board", board)
     monkeypatch.setattr(runner, "open_vehicle", vehicle)
     return stopped
@@ -114,10 +114,10 @@ def spy(session: DirectSession, name: str, calls: list[str]) -> None:
 
 def complete(folder: Path) -> None:
     """The record has a row for each tick up to that of the bad step."""
-    with (folder / "run.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["time_s"]) for row in rows] == pytest.approx([n / 100 for n in range(31)])
-    assert {row["command"] for row in rows[1:]} == {"signal"}
+    result = read_run(folder)
+    assert isinstance(result, RunResult)
+    assert result.record.times == pytest.approx([n / 100 for n in range(31)])
+    assert {kind for kind, *_ in result.series.commands[1:]} == {"signal"}
     assert (folder / "summary.json").exists()
 
 

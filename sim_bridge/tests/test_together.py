@@ -241,7 +241,7 @@ def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) ->
     brain, begun = tmp_path / "brain.py", tmp_path / "begun"
     brain.write_text(f"def step(robot):\n    robot.drive(0.3, 0.3)\n    open({str(begun)!r}, 'w').close()\n")
     process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path),
+        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path / "out"),
          "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
@@ -254,7 +254,7 @@ def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) ->
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
     values = json.loads(out)
     assert values["ended"] == "interrupted" and len(values["robots"]) == 2
-    assert (tmp_path / "run.png").is_file() and (tmp_path / "robot-2" / "run.csv").is_file()
+    assert (tmp_path / "out" / "run.png").is_file() and (tmp_path / "out" / "robot-2" / "summary.json").is_file()
 
 
 def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
@@ -329,8 +329,8 @@ def test_no_place_left_is_told(tmp_path: Path) -> None:
 
 def test_files_show_all_robots(tmp_path: Path) -> None:
     result = boebot.run_together([Member(), Member(brain=ahead)], "room", 3.0, out=tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"run.png", "replay.html", "robot-1", "robot-2"}
-    assert {path.name for path in (tmp_path / "robot-2").iterdir()} >= {"run.csv", "run.png", "replay.html"}
+    assert {path.name for path in tmp_path.iterdir()} == {"record.mcap", "run.png", "replay.html", "robot-1", "robot-2"}
+    assert {path.name for path in (tmp_path / "robot-2").iterdir()} >= {"summary.json", "run.png", "replay.html"}
     page = re.search(r"const page = (\{.*\});\n", (tmp_path / "replay.html").read_text())
     assert page
     runs = json.loads(page[1].replace("<\\/", "</"))["runs"]

@@ -5,6 +5,7 @@ The packages it depends on come from build/wheelhouse, which `make test` fills.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -51,8 +52,9 @@ def test_an_installed_wheel_runs_bundled_brains(installed: Path, tmp_path: Path,
     bare = {"PATH": str(installed / "bin"), "HOME": str(tmp_path), "LANG": os.environ.get("LANG", "C.UTF-8")}
     done = subprocess.run(without_network(command), cwd=tmp_path, env=bare, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert {"run.csv", "run.png", "replay.html"} <= {path.name for path in out.iterdir()}
-    assert len((out / "run.csv").read_text(encoding="utf-8").splitlines()) > 450  # 100 ticks a second
+    assert {"record.mcap", "run.png", "replay.html"} <= {path.name for path in out.iterdir()}
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["ticks"] > 450, "100 a second"
 
 
 def test_an_installed_wheel_speaks_of_no_makefile(installed: Path, tmp_path: Path) -> None:

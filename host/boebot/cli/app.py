@@ -18,6 +18,7 @@ from boebot.cli import (
     options,
     output,
     parameters,
+    report,
     run,
     serve,
     teleop,
@@ -36,6 +37,7 @@ app = typer.Typer(
 )
 app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
+app.command("report")(report.report)
 app.command("list")(names.list_names)
 app.command("info")(info.info)
 app.command("doctor")(doctor.doctor)

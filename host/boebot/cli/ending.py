@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from boebot.cli import output
 from boebot.errors import BoebotError
 from boebot.record.result import RunResult, TogetherResult
+from boebot.record.run_folder import RECORD
 from boebot.running import interrupts
 from boebot.view import IncompleteError
 
@@ -34,19 +35,27 @@ def end_together(result: TogetherResult, out: Path | None, as_json: bool) -> Non
     for number, robot in enumerate(result.robots, 1):
         for notice in robot.notices:
             output.say(f"robot {number}: {notice}")
-    _end(result, lambda: output.print_rows(HEADER, _rows(result)), out, as_json)
+    _end(result, lambda: output.print_rows(HEADER, rows(result)), out, as_json)
 
 
-def _rows(result: TogetherResult) -> list[tuple[str, ...]]:
-    rows = []
+def rows(result: TogetherResult) -> list[tuple[str, ...]]:
+    """A row for each robot, under `HEADER`."""
+    found = []
     for number, robot in enumerate(result.robots, 1):
         table = robot.table()
         figures = (
             table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches", "late_steps", "resets")
         )
         ended = "complete" if robot.error is None else "ended early"
-        rows.append((f"{number}  {robot.robot.name}", *map(str, figures), f"{robot.brain}, {ended}"))
-    return rows
+        found.append((f"{number}  {robot.robot.name}", *map(str, figures), f"{robot.brain}, {ended}"))
+    return found
+
+
+def files_in(folder: Path, files: Sequence[Path]) -> str:
+    """The files in words; of those in folders below only the folders."""
+    here = [path.name for path in files if path.parent == folder]
+    folders = sorted({f"{path.relative_to(folder).parts[0]}/" for path in files if path.parent != folder})
+    return f"files in {folder}: {', '.join(here + folders)}"
 
 
 def _end(result: RunResult | TogetherResult, show: Callable[[], None], out: Path | None, as_json: bool) -> None:
@@ -59,17 +68,15 @@ def _end(result: RunResult | TogetherResult, show: Callable[[], None], out: Path
         finally:
             if out is not None:
                 try:
-                    files = result.save(out)
+                    files = [out / RECORD, *result.save(out)]
                 except BoebotError as error:
                     unsaved = error
-                    files = error.files if isinstance(error, IncompleteError) else []
+                    files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
         if as_json:
             output.print_json(result.table() | {"files": [str(path) for path in files]})
         elif files:
             assert out is not None
-            here = [path.name for path in files if path.parent == out]
-            folders = sorted({f"{path.relative_to(out).parts[0]}/" for path in files if path.parent != out})
-            output.line(f"files in {out}: {', '.join(here + folders)}")
+            output.line(files_in(out, files))
     interrupted = isinstance(result.error, KeyboardInterrupt)
     first = InterruptedRunError("interrupted") if interrupted else result.error
     if first is not None:

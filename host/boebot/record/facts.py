@@ -51,7 +51,7 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     link: dict[str, dict[str, int]]
     notices: list[str]
     watchdog_resets: list[WatchdogReset]
-    counters: dict[str, float | None]
+    counters: dict[str, int | float | None]
     without: list[str]
     odometry_source: str | None
     long_steps: int

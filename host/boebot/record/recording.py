@@ -51,7 +51,7 @@ class Recording:
             keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD))
             for name, data in sources.items():
                 self._disk.writer.attach(name, data)
-            self._say(BEGIN, results)
+            self._disk.writer.attach(BEGIN, say(results), JSON)
         for number, record in enumerate(self.records, 1):
             record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
 
@@ -60,23 +60,23 @@ class Recording:
         if self._disk is None:
             return None
         try:
-            self._say(END, results)
+            self._disk.writer.attach(END, say(results), JSON)
             self._disk.finish()
         except BoebotError as error:
             return error
         return None
 
-    def _say(self, name: str, results: Sequence[RunResult]) -> None:
-        from boebot.record.facts import facts_of
 
-        assert self._disk is not None
-        world = next((result.world.description for result in results if result.world is not None), None)
-        said = {
-            "format": FORMAT,
-            "versions": {"boebot": version("boebot"), "python": platform.python_version()},
-            "command_line": sys.argv,
-            "written": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "arena": world,
-            "robots": [facts_of(result) for result in results],
-        }
-        self._disk.writer.attach(name, msgspec.json.format(msgspec.json.encode(said), indent=1), JSON)
+def say(results: Sequence[RunResult]) -> bytes:
+    """What a record says of a run, as JSON."""
+    from boebot.record.facts import facts_of
+
+    said = {
+        "format": FORMAT,
+        "versions": {"boebot": version("boebot"), "python": platform.python_version()},
+        "command_line": sys.argv,
+        "written": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "arena": next((result.world.description for result in results if result.world is not None), None),
+        "robots": [facts_of(result) for result in results],
+    }
+    return msgspec.json.format(msgspec.json.encode(said), indent=1)

@@ -326,12 +326,12 @@ class RunResult(FormerNames):
 
     # ---- files ---------------------------------------------------------------------------------------------
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Writes run.csv, summary.json, to_board.bin, to_host.bin, wire.csv, run.png and replay.html, and of a brain
-        of processes brain.csv and switches.csv; returns their paths."""
+    def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
+        """Writes summary.json, run.png and replay.html; returns their paths. `csv`: also run.csv, to_board.bin,
+        to_host.bin and wire.csv, and of a brain of processes brain.csv and switches.csv."""
         from boebot.view import save
 
-        return save(self, Path(folder))
+        return save(self, Path(folder), csv=csv)
 
 
 @dataclass(kw_only=True, repr=False)
@@ -360,12 +360,12 @@ class TogetherResult:
         ended = "complete" if self.error is None else why(self.error)
         return {"robots": [result.table() for result in self.robots], "ended": ended}
 
-    def save(self, folder: str | Path) -> list[Path]:
+    def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
         """Writes run.png and replay.html with all robots, and the files of each into robot-1, robot-2 and so on;
         returns their paths."""
         from boebot.view import save_together
 
-        return save_together(self, Path(folder))
+        return save_together(self, Path(folder), csv=csv)
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

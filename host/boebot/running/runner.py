@@ -173,7 +173,8 @@ def _drive(driver: Driver, task: Task) -> RunResult:
         elapsed_s = wall.perf_counter() - started
         with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
             driver.end()
-            error = error or end_rows(driver, task)
+            unkept = end_rows(driver, task)
+    error = error or unkept
     return with_times(driver.result(error, elapsed_s), task, times)
 
 

@@ -145,7 +145,8 @@ class _Robot:
         finally:
             self.is_ending = True
             driver.end()
-            self.error = self.error or end_rows(driver, self.task)
+            unkept = end_rows(driver, self.task)
+            self.error = self.error or unkept
             self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
 
     def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:

@@ -1,18 +1,22 @@
-"""Files that a run leaves behind:
+"""Files that are made from the record of a run, each whole or not at all:
 
-run.csv        one row per control tick: sensors, commands, estimated and, where known, true pose
-brain.csv      of a brain of processes: one row per step of it; switches.csv: what it switched, and why
 summary.json   the figures of the run; `format` numbers the form of all these files
-to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
-wire.csv       when which stretch of those two files crossed the wire
 run.png        a picture of the run
 replay.html    a page that plays it; needs no network
 
-A run of several robots leaves the last two with all of them, and a folder of all files for each.
+and, if asked for:
+
+run.csv        one row per control tick: sensors, commands, odometry and, where known, the true pose
+brain.csv      of a brain of processes: one row per step of it; switches.csv: what it switched, and why
+to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
+wire.csv       when which stretch of those two files crossed the wire
+
+A run of several robots leaves picture and page with all of them, and a folder of all files for each.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 from functools import partial
@@ -23,9 +27,11 @@ from boebot.errors import BoebotError
 from boebot.record.run_folder import unwritable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from boebot.record.result import RunResult, TogetherResult
+
+    Write = Callable[[Path], object]
 
 
 class IncompleteError(BoebotError):
@@ -50,8 +56,9 @@ def make_folder(folder: Path) -> None:
         raise unwritable(folder, error) from None
 
 
-def save(result: RunResult, folder: Path) -> list[Path]:
-    """Writes all files of a run into `folder`, which is made if need be; returns their paths.
+def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
+    """Writes the files of a run into `folder`, which is made if need be; returns their paths. `csv`: also its tables
+    and bytes.
 
     Raises:
         BoebotError: the folder cannot be written to.
@@ -60,20 +67,25 @@ def save(result: RunResult, folder: Path) -> list[Path]:
     from boebot.view import tables
 
     make_folder(folder)
-    try:
-        paths = [
-            tables.write_summary(result, folder / "summary.json"),
-            tables.write_run(result, folder / "run.csv"),
-            *tables.write_wire(result, folder),
-        ]
-        if result.brain_record is not None:
-            paths += tables.write_brain(result.brain_record, folder)
-    except OSError as error:
-        raise unwritable(folder, error) from None
+    brain = result.brain_record
+    wanted: dict[str, Write] = {"summary.json": partial(tables.write_summary, result)}
+    if csv:
+        wanted |= {
+            "run.csv": partial(tables.write_run, result),
+            "to_board.bin": lambda path: path.write_bytes(result.bytes_to_board),
+            "to_host.bin": lambda path: path.write_bytes(result.bytes_from_board),
+            "wire.csv": partial(tables.write_wire, result),
+        }
+        if brain is not None:
+            wanted |= {
+                "brain.csv": partial(tables.write_steps, brain),
+                "switches.csv": partial(tables.write_switches, brain),
+            }
+    paths = [_write(folder / name, write) for name, write in wanted.items()]
     if not result.ticks:
         return paths
     drawn, failed = _draw(
-        folder, {"run.png": partial(_write_picture, result), "replay.html": partial(_write_page, result)}
+        folder, {"run.png": partial(_write_picture, result), "replay.html": partial(_write_page, [result])}
     )
     paths += drawn
     if failed:
@@ -81,7 +93,7 @@ def save(result: RunResult, folder: Path) -> list[Path]:
     return paths
 
 
-def save_together(result: TogetherResult, folder: Path) -> list[Path]:
+def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) -> list[Path]:
     """Writes picture and page of all robots into `folder`, and the files of each into its own folder; returns
     their paths.
 
@@ -92,14 +104,14 @@ def save_together(result: TogetherResult, folder: Path) -> list[Path]:
     failed: list[str] = []
     for number, robot in enumerate(result.robots, 1):
         try:
-            paths += save(robot, folder / f"robot-{number}")
+            paths += save(robot, folder / f"robot-{number}", csv=csv)
         except IncompleteError as error:
             paths += error.files
             failed.append(str(error))
-    if any(robot.ticks for robot in result.robots):
+    shown = [robot for robot in result.robots if robot.ticks]
+    if shown:
         drawn, missing = _draw(
-            folder,
-            {"run.png": partial(_write_common_picture, result), "replay.html": partial(_write_common_page, result)},
+            folder, {"run.png": partial(_write_common_picture, result), "replay.html": partial(_write_page, shown)}
         )
         paths, failed = drawn + paths, missing + failed
     if failed:
@@ -107,39 +119,51 @@ def save_together(result: TogetherResult, folder: Path) -> list[Path]:
     return paths
 
 
-def _draw(folder: Path, files: dict[str, Callable[[Path], Path]]) -> tuple[list[Path], list[str]]:
+def _write(path: Path, write: Write) -> Path:
+    """A file, whole or not at all.
+
+    Raises:
+        BoebotError: the folder cannot be written to.
+    """
+    part = path.with_name(f".part-{path.name}")
+    try:
+        write(part)
+        part.replace(path)
+    except OSError as error:
+        raise unwritable(path.parent, error) from None
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
+
+
+def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]:
     """Writes those files; returns the paths of those that could be made, and why others could not."""
     paths, failed = [], []
     for name, write in files.items():
         try:
-            paths.append(write(folder / name))
-        except OSError as error:
-            raise unwritable(folder, error) from None
+            paths.append(_write(folder / name, write))
+        except BoebotError:
+            raise
         except Exception as error:  # whatever drawing meets: the run is worth more than its picture
             what = str(error).strip().partition("\n")[0]
             failed.append(f"{name} cannot be made: {type(error).__name__}" + (f": {what}" if what else ""))
     return paths, failed
 
 
-def _write_picture(result: RunResult, path: Path) -> Path:
+def _write_picture(result: RunResult, path: Path) -> None:
     from boebot.view import picture
 
-    return picture.write(result, path)
+    picture.write(result, path)
 
 
-def _write_page(result: RunResult, path: Path) -> Path:
+def _write_page(results: Sequence[RunResult], path: Path) -> None:
     from boebot.view import replay
 
-    return replay.write([result], path)
+    replay.write(results, path)
 
 
-def _write_common_picture(result: TogetherResult, path: Path) -> Path:
+def _write_common_picture(result: TogetherResult, path: Path) -> None:
     from boebot.view import together_picture
 
-    return together_picture.write(result, path)
-
-
-def _write_common_page(result: TogetherResult, path: Path) -> Path:
-    from boebot.view import replay
-
-    return replay.write([robot for robot in result.robots if robot.ticks], path)
+    together_picture.write(result, path)

@@ -49,14 +49,13 @@ def columns(result: RunResult) -> dict[str, list[str]]:
     return table
 
 
-def write_run(result: RunResult, path: Path) -> Path:
+def write_run(result: RunResult, path: Path) -> None:
     """run.csv"""
     table = columns(result)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(table)
         writer.writerows(zip(*table.values(), strict=True))
-    return path
 
 
 def brain_columns(record: BrainRecord) -> dict[str, list[str]]:
@@ -69,46 +68,45 @@ def brain_columns(record: BrainRecord) -> dict[str, list[str]]:
     return table
 
 
-def write_brain(record: BrainRecord, folder: Path) -> list[Path]:
-    """brain.csv and switches.csv"""
+def write_steps(record: BrainRecord, path: Path) -> None:
+    """brain.csv"""
     table = brain_columns(record)
-    steps, switches = folder / "brain.csv", folder / "switches.csv"
-    with steps.open("w", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(table)
         writer.writerows(zip(*table.values(), strict=True))
-    with switches.open("w", newline="", encoding="utf-8") as file:
+
+
+def write_switches(record: BrainRecord, path: Path) -> None:
+    """switches.csv"""
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time_s", "off", "on", "reason"))
         writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in record.switches)
-    return [steps, switches]
 
 
-def write_summary(result: RunResult, path: Path) -> Path:
+def write_summary(result: RunResult, path: Path) -> None:
     """summary.json"""
     summary: dict[str, Any] = {"format": FORMAT} | result.table() | {"counters": result.counters}
     summary["watchdog_resets"] = [
         asdict(reset) | {"time_s": round(reset.time_s - result.clock_offset, 6)} for reset in result.watchdog_resets
     ]
     path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-    return path
 
 
-def write_wire(result: RunResult, folder: Path) -> list[Path]:
-    """to_board.bin and to_host.bin; wire.csv says when which of their bytes were sent or read (transport's clock)."""
+def write_wire(result: RunResult, path: Path) -> None:
+    """wire.csv: when which bytes of to_board.bin and to_host.bin were sent or read (transport's clock)."""
     rows: list[tuple[float, str, int, int]] = []
-    for name, chunks in ((name, result.record.rows(name)) for name in ("to_board", "to_host")):
-        (folder / f"{name}.bin").write_bytes(b"".join(data for _, data in chunks))
+    for name in ("to_board", "to_host"):
         first = 0
-        for stamp, data in chunks:
+        for stamp, data in result.record.rows(name):
             rows.append((stamp, name, first, len(data)))
             first += len(data)
     rows.sort(key=lambda row: row[0])
-    with (folder / "wire.csv").open("w", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time_s", "file", "first_byte", "bytes"))
         writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
-    return [folder / "to_board.bin", folder / "to_host.bin", folder / "wire.csv"]
 
 
 def _cells(values: Any, digits: int | None = None) -> list[str]:

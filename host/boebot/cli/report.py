@@ -1,0 +1,43 @@
+"""`boebot report DIR`: the figures and files of a run, made anew from its record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from boebot.cli import ending, options, output
+from boebot.record.mending import mend
+from boebot.record.reading import CutError, read_run
+from boebot.record.result import RunResult
+from boebot.record.run_folder import RECORD, RunFolder
+
+
+def report(
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, with its record.mcap.")],
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Also run.csv, the bytes of the line, and a brain's steps.")
+    ] = False,
+    mended: Annotated[
+        bool, typer.Option("--mend", help="Of a record that is cut: a whole one beside it, record-mended.mcap.")
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there."""
+    folder = run if run.is_dir() else run.parent
+    result = read_run(run)
+    with RunFolder(folder):
+        files = result.save(folder, csv=csv)
+        if mended and isinstance(result.error, CutError):
+            files.append(mend(folder / RECORD, result))
+    if isinstance(result.error, CutError):
+        output.say(str(result.error))
+    if json:
+        output.print_json(result.table() | {"files": [str(path) for path in files]})
+        return
+    if isinstance(result, RunResult):
+        output.print_table(result.table())
+    else:
+        output.print_rows(ending.HEADER, ending.rows(result))
+    output.line(ending.files_in(folder, files))
