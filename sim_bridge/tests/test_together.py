@@ -241,8 +241,8 @@ def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) ->
     brain, begun = tmp_path / "brain.py", tmp_path / "begun"
     brain.write_text(f"def step(robot):\n    robot.drive(0.3, 0.3)\n    open({str(begun)!r}, 'w').close()\n")
     process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--out", str(tmp_path / "out"),
-         "--json"],
+        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--json",
+         "--out", str(tmp_path / "out")],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
     )  # fmt: skip

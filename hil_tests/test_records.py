@@ -1,0 +1,136 @@
+"""Tests of a run's record and its folder, by whole commands: killed, on a full disk, beside another run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from boebot.record.reading import CutError, read_run
+from boebot.record.result import RunResult, TogetherResult
+
+BOEBOT = (sys.executable, "-m", "boebot")
+
+
+def boebot(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*BOEBOT, *arguments], capture_output=True, text=True, check=False)
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([*BOEBOT, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(record: Path, size: int) -> None:
+    until = time.monotonic() + 30
+    while (not record.exists() or record.stat().st_size < size) and time.monotonic() < until:
+        time.sleep(0.05)
+
+
+def read(folder: Path) -> RunResult:
+    result = read_run(folder)
+    assert isinstance(result, RunResult)
+    return result
+
+
+def test_killed_run_leaves_all_but_its_last_second(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    process = started(
+        "run", "demo", "--robot", "shieldbot-charging", "--arena", "station", "--seconds", "1e6", "--out", str(run)
+    )
+    wait_for(run / "record.mcap", 200_000)
+    other = boebot("run", "wander", "--seconds", "1", "--out", str(run))
+    process.kill()
+    process.wait()
+    assert (other.returncode, other.stdout) == (1, "")
+    assert other.stderr == f"boebot: another run writes to {run} now; expected a folder for this one alone\n"
+    cut = read(run)
+    assert isinstance(cut.error, CutError) and "the record is cut: it ends at" in str(cut.error)
+    assert cut.run_time == cut.record.times[-1] > 1 and cut.steps > 20
+    assert cut.brain_record is not None and len(cut.brain_record.steps) == cut.steps
+    assert cut.true_distance is not None and cut.odometry_error is not None and cut.odometry_error < 1
+    report = boebot("report", str(run), "--mend", "--csv")
+    assert report.returncode == 0 and str(cut.error) in report.stderr
+    whole = read(run / "record-mended.mcap")
+    assert whole.record.rows("to_host") == cut.record.rows("to_host") and whole.table() == cut.table()
+    rows = (run / "run.csv").read_text().splitlines()
+    assert len(rows) == 1 + cut.ticks
+
+
+@pytest.mark.parametrize("robots", [1, 2])
+def test_report_is_that_of_the_run(tmp_path: Path, robots: int) -> None:
+    run = tmp_path / "run"
+    assert boebot("run", "wander", "--robots", str(robots), "--seconds", "3", "--out", str(run)).returncode == 0
+    files = sorted(path for path in run.rglob("*") if path.is_file())
+    before = {path: path.read_bytes() for path in files}
+    again = boebot("report", str(run), "--json")
+    assert (again.returncode, again.stderr) == (0, "")
+    assert {path: path.read_bytes() for path in files} == before
+    result = read_run(run)
+    assert result.error is None and isinstance(result, RunResult if robots == 1 else TogetherResult)
+
+
+def test_folder_holds_one_run(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    assert boebot("run", "wander", "--robots", "2", "--seconds", "0.5", "--out", str(run)).returncode == 0
+    (run / "robot-2" / "notes.txt").write_text("mine")
+    (run / "notes.txt").write_text("mine, too")
+    assert boebot("run", "wander", "--seconds", "0.5", "--out", str(run)).returncode == 0
+    there = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
+    assert there == {
+        "record.mcap", "summary.json", "run.png", "replay.html", "notes.txt", "robot-2/notes.txt",
+    }  # fmt: skip
+
+
+def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("mine")
+    done = boebot("run", "wander", "--seconds", "0.5", "--out", str(tmp_path))
+    assert done.returncode == 1 and [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    assert done.stderr.startswith(
+        f"boebot: {tmp_path} holds 'thesis.tex' and no record of a run (record.mcap); expected"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("none", None, "there is no record of a run; expected the folder of a run, or its record.mcap"),
+        ("record.mcap", b"# Notes\n", "is no record of a run; expected an MCAP file"),
+        ("record.mcap", b"", "does not say whose run it is; it is cut after 0 B; expected begin.json in it"),
+    ],
+)
+def test_what_is_no_record_is_one_sentence(tmp_path: Path, name: str, content: bytes | None, sentence: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    done = boebot("report", str(tmp_path / name))
+    assert done.returncode == 1 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a small disk")
+def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("a small disk cannot be mounted")
+    try:
+        done = boebot("run", "wander", "--seconds", "1e6", "--out", str(disk / "run"))
+        assert done.returncode == 1
+        first = done.stderr.splitlines()[0]
+        assert first == f"boebot: the record cannot be written to {disk}/run/record.mcap: No space left on device"
+        result = read(disk / "run")
+        assert isinstance(result.error, CutError) and result.run_time > 1
+    finally:
+        subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
+def test_run_without_a_record_has_none() -> None:
+    import boebot as library
+
+    result = library.run("wander", seconds=1, record=False)
+    assert (result.ticks, result.truth, result.odometry_distance) == (0, None, None)
+    assert result.run_time == pytest.approx(1.0)
