@@ -113,12 +113,13 @@ def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)], capture_output=True, check=False
+        ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", str(disk)], capture_output=True, check=False
     )
     if mounted.returncode:
         pytest.skip("a small disk cannot be mounted")
     try:
-        done = boebot("run", "wander", "--seconds", "1e6", "--out", str(disk / "run"))
+        (tmp_path / "slow.py").write_text("import time\ndef step(robot):\n    time.sleep(0.005)\n")
+        done = boebot("run", str(tmp_path / "slow.py"), "--seconds", "1e6", "--out", str(disk / "run"))
         assert done.returncode == 1
         first = done.stderr.splitlines()[0]
         assert first == f"boebot: the record cannot be written to {disk}/run/record.mcap: No space left on device"
