@@ -273,17 +273,17 @@ reading_s = 0.003
 def test_command_refuses_and_the_record_of_a_forced_run_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "four.toml"
+    file, out = tmp_path / "four.toml", tmp_path / "out"
     file.write_text(FOUR)
-    arguments = ("run", "wander", "--robot", str(file), "--seconds", "0.2", "--period", "10ms", "--out", str(tmp_path))
+    arguments = ("run", "wander", "--robot", str(file), "--seconds", "0.2", "--period", "10ms", "--out", str(out))
     code, _, err = command(capsys, *arguments)
     assert code == 1 and "infrared_back_right, 3 ms, ends 12 ms after the step began" in err
-    assert not (tmp_path / "summary.json").exists()
+    assert not (out / "summary.json").exists()
     code, _, err = command(capsys, *arguments, "--force-timing")
     assert code == 0 and "forced: robot 'four' with a brain period of 10 ms is not realisable" in err
-    assert "infrared_back_right" in json.loads((tmp_path / "summary.json").read_text())["unrealisable"]
-    assert command(capsys, *arguments[:-4], "--period", "20ms", "--out", str(tmp_path))[0] == 0
-    assert json.loads((tmp_path / "summary.json").read_text())["unrealisable"] is None
+    assert "infrared_back_right" in json.loads((out / "summary.json").read_text())["unrealisable"]
+    assert command(capsys, *arguments[:-4], "--period", "20ms", "--out", str(out))[0] == 0
+    assert json.loads((out / "summary.json").read_text())["unrealisable"] is None
 
 
 def test_steps_longer_than_the_period_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,6 +110,7 @@ class Checkup(NamedTuple):
     reads: str
     """In words, with units."""
     expected: str
+    """What they should be, in the same words."""
     hint: str = ""
     """What may be wrong, and what to look at; empty: the readings are as expected."""
 

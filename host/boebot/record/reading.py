@@ -15,9 +15,9 @@ from boebot.record.facts import result_of
 from boebot.record.keepers import Finished, Keeper, Shared
 from boebot.record.record import Record
 from boebot.record.record_file import RecordError, RecordReader
-from boebot.record.recording import BEGIN, END, FORMAT
+from boebot.record.recording import BEGIN, END
 from boebot.record.result import RunResult, TogetherResult
-from boebot.record.run_folder import RECORD
+from boebot.record.run_folder import FORMAT, RECORD
 
 
 class CutError(RecordError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import sys
 import time
@@ -14,12 +15,11 @@ import msgspec
 from boebot.errors import BoebotError
 from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
 from boebot.record.record import Record, Unrecorded
-from boebot.record.run_folder import RECORD, RunFolder
+from boebot.record.run_folder import FORMAT, RECORD, RunFolder
 
 if TYPE_CHECKING:
     from boebot.record.result import RunResult
 
-FORMAT = 3  # of a record and of the files made from it; CHANGELOG.md says what is new in each
 BEGIN, END = "begin.json", "end.json"
 JSON = "application/json"
 
@@ -79,4 +79,4 @@ def say(results: Sequence[RunResult]) -> bytes:
         "arena": next((result.world.description for result in results if result.world is not None), None),
         "robots": [facts_of(result) for result in results],
     }
-    return msgspec.json.format(msgspec.json.encode(said), indent=1)
+    return json.dumps(msgspec.to_builtins(said), indent=1).encode()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boebot.record.recording import FORMAT
+from boebot.record.run_folder import FORMAT
 
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainRecord
