@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from boebot.errors import BoebotError
     from boebot.record.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
+    from boebot.running.main_brain import MainRobot
     from boebot.running.runner import run
     from boebot.running.tasks import Member
     from boebot.running.together import run_together
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BoebotError",
     "Command",
+    "MainRobot",
     "Member",
     "Observation",
     "Robot",
@@ -43,6 +45,7 @@ __all__ = [
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
+    "MainRobot": "running.main_brain",
     "Member": "running.tasks",
     "Observation": "robot",
     "Robot": "robot",

@@ -61,7 +61,7 @@ def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
         ("def step(robot):\n    robot.drive(1, 1\n", r"mine\.py, line 2: '\(' was never closed"),
         ("import nowhere_to_be_found\n", r"mine\.py, line 1: ModuleNotFoundError"),
         ("x = 1\n\ny = x / 0\n", r"mine\.py, line 3: ZeroDivisionError: division by zero"),
-        ("x = 1\n", r"mine\.py has neither a function step\(robot\) nor a class Brain"),
+        ("x = 1\n", r"mine\.py has neither a function step\(robot\) nor main\(robot\) nor a class Brain"),
         ("class Brain:\n    pass\n", r"mine\.py: class Brain has no method step"),
         ("class Brain:\n    def __init__(self):\n        oops\n", r"mine\.py, line 3: NameError"),
         ("PERIOD = 'fast'\ndef step(robot): ...\n", r"mine\.py: PERIOD is 'fast'; expected seconds"),

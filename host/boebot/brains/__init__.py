@@ -3,6 +3,7 @@
 A brain is a Python file with one of
 
     def step(robot): ...                     # called every PERIOD
+    def main(robot): ...                     # runs once from top to bottom (boebot.running.main_brain)
     class Brain: ...                         # with a method step(self, robot); made afresh for each run
     brain = Brain([Wander(), Avoid()])       # a boebot.brain.Brain: processes chosen by utility
 
@@ -23,7 +24,7 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from sysconfig import get_path
@@ -35,6 +36,7 @@ from boebot.brain import Brain, Process, StateVariable, composition
 from boebot.cognition import Odometry
 from boebot.errors import BrainError, did_you_mean
 from boebot.robot import Robot
+from boebot.running.main_brain import MainBrain
 
 FOLDER = Path(__file__).resolve().parent
 _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages
@@ -55,13 +57,30 @@ class LoadedBrain:
     """The brain's file, if it came from one."""
     brain: Brain | None = None
     """The brain of processes behind `step`, if it is one: its `steps` and `switches` record the run."""
+    main: MainBrain | None = None
+    """What runs `main(robot)` behind `step`, if that is the brain."""
+
+    @property
+    def is_over(self) -> bool:
+        """It has done what it is for, and the run may end: its `main` has returned."""
+        return self.main is not None and self.main.is_over
+
+    @property
+    def notices(self) -> Sequence[str]:
+        """What a user should know of the run, in sentences."""
+        return () if self.main is None else self.main.notices
+
+    def end(self) -> None:
+        """The run has ended: lets go of what the brain still holds."""
+        if self.main is not None:
+            self.main.end()
 
     @property
     def odometry(self) -> str | None:
         """What the poses in the brain came from in this run: "odometer", "encoders", or "commands" where the robot
         has neither; None: nothing in it kept a pose."""
         if self.brain is None:
-            return None
+            return None if self.main is None else self.main.odometry_source
         begun = {switch.on for switch in self.brain.switches}
         poses = [one for one in self.brain.processes if isinstance(one, Odometry) and one.name in begun]
         return ", ".join(dict.fromkeys(one.source for one in poses)) or None
@@ -102,7 +121,9 @@ def load_brain(source: object) -> LoadedBrain:
         return _from_object(source, "brain" if type(source) is Brain else type(source).__name__, None)
     if callable(source):
         name = getattr(source, "__name__", "brain")
-        _check_step(source, name)
+        if name == "main" and _takes_one(source):
+            return _from_main(source, "main", name, source, None)
+        _check_function(source, name, "step")
         return LoadedBrain(name, source, _period(source, name), _needs(source, name))
     raise BrainError(
         f"{arguments.shown(source)} is no brain; expected a name, a Python or TOML file, a boebot.brain.Brain, or "
@@ -215,16 +236,23 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
     where = str(path or name)
     period, needs = _period(module, where), _needs(module, where)
     made = _made(module, where, path)
+    main, step = getattr(module, "main", None), getattr(module, "step", None)
+    if callable(main) and _takes_one(main):
+        if callable(step) or made is not None:
+            second = "a function step(robot)" if callable(step) else "a brain of a class or of processes"
+            raise BrainError(f"{where} has both a function main(robot) and {second}; expected one of them")
+        return _from_main(main, name, where, module, path)
     if made is not None:
         return replace(made, name=name, period=period or made.period, needs=tuple(dict.fromkeys(needs + made.needs)))
-    step = getattr(module, "step", None)
     if callable(step):
-        _check_step(step, where)
+        _check_function(step, where, "step")
         return LoadedBrain(name, step, period, needs, path)
+    if callable(main):
+        raise BrainError(f"{where}: main takes no robot; expected def main(robot)")
     other = next((key for key, value in vars(module).items() if isinstance(value, Brain)), None)
     hint = f"; it has a Brain called {other}, expected the name brain" if other else ""
     raise BrainError(
-        f"{where} has neither a function step(robot) nor a class Brain with step(self, robot) nor a "
+        f"{where} has neither a function step(robot) nor main(robot) nor a class Brain with step(self, robot) nor a "
         f"brain = Brain([...]){hint}"
     )
 
@@ -247,24 +275,40 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
     step = getattr(brain, "step", None)
     if not callable(step):
         raise BrainError(f"{name}: class {type(brain).__name__} has no method step(self, robot)")
-    _check_step(step, name)
+    _check_function(step, name, "step")
     composed = brain if isinstance(brain, Brain) else None
     return LoadedBrain(name, step, _period(brain, name), _needs(brain, name), path, composed)
 
 
-def _check_step(step: Callable[..., object], where: str) -> None:
-    """Refuses a step whose body would never run: one that cannot be called with the robot, or a call of which only
-    makes a coroutine or a generator."""
-    whole = (step, getattr(step, "__call__", step))  # noqa: B004
-    if any(inspect.iscoroutinefunction(part) for part in whole):
-        raise BrainError(f"{where}: step is an async function; expected a plain one, def step(robot)")
-    if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
-        raise BrainError(f"{where}: step contains yield; expected a function that returns, def step(robot)")
+def _from_main(main: Callable[..., object], name: str, where: str, owner: object, path: Path | None) -> LoadedBrain:
+    """Of a function main(robot); `owner` has its PERIOD and NEEDS."""
+    _check_function(main, where, "main")
+    runs = MainBrain(main)
+    return LoadedBrain(name, runs.step, _period(owner, where), _needs(owner, where), path, main=runs)
+
+
+def _takes_one(function: Callable[..., object]) -> bool:
+    """It can be called with a robot; a `main()` without parameters is a script's own."""
     try:
-        inspect.signature(step).bind("the robot")
+        inspect.signature(function).bind(None)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _check_function(function: Callable[..., object], where: str, name: str) -> None:
+    """Refuses a step or main whose body would never run: one that cannot be called with the robot, or a call of which
+    only makes a coroutine or a generator."""
+    whole = (function, getattr(function, "__call__", function))  # noqa: B004
+    if any(inspect.iscoroutinefunction(part) for part in whole):
+        raise BrainError(f"{where}: {name} is an async function; expected a plain one, def {name}(robot)")
+    if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
+        raise BrainError(f"{where}: {name} contains yield; expected a function that returns, def {name}(robot)")
+    try:
+        inspect.signature(function).bind("the robot")
     except TypeError as error:
         raise BrainError(
-            f"{where}: step cannot be called with the robot alone ({error}); expected step(robot)"
+            f"{where}: {name} cannot be called with the robot alone ({error}); expected {name}(robot)"
         ) from None
     except ValueError:  # a function in C that does not say its arguments
         pass

@@ -1,4 +1,5 @@
-"""`boebot new NAME`: writes a brain to start from: a first one, or one of several behaviors."""
+"""`boebot new NAME`: writes a brain to start from: a first one, one that runs from top to bottom, or one of several
+behaviors."""
 
 from __future__ import annotations
 
@@ -36,6 +37,33 @@ def step(robot: Robot) -> None:
 
     # More to look at:  robot.ping.distance (m, or None)    robot.encoder_left.count    robot.time (s)
     # More to do:       robot.drive_speed(0.1, 0.1) (m/s)   robot.stop()                robot.chance(0.02)
+'''
+
+FROM_TOP = '''"""{name}: drives a square, then goes on until a whisker touches something.
+
+Run it:    boebot run {file} --out {stem}
+Watch it:  open {stem}/replay.html in a browser
+"""
+
+from boebot import MainRobot
+
+NEEDS = ["whiskers"]  # a robot without them is refused
+
+
+def main(robot: MainRobot) -> None:
+    """Runs once, from top to bottom; the run ends when it returns. Between two waits it may not take long."""
+    for _ in range(4):
+        robot.forward(0.2)  # m
+        robot.turn(90)  # degrees, to the left
+
+    robot.drive(0.5, 0.5)  # motor signals, -1 full backward ... 1 full forward; they hold until the next ones
+    if robot.wait_until(lambda: robot.whisker_left.pressed or robot.whisker_right.pressed, timeout=20):
+        robot.forward(-0.1)
+        robot.turn(180)
+    robot.stop()
+
+    # More to look at:  robot.ping.distance (m, or None)    robot.encoder_left.count    robot.time (s)
+    # More to do:       robot.wait(0.5) (s)                 robot.drive_speed(0.1, 0.1) (m/s)
 '''
 
 SEVERAL_BEHAVIORS = '''"""{name}: wanders, turns away from near things, and backs off from what it touches.
@@ -93,8 +121,12 @@ brain = Brain(
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Letters, digits and underscores.")],
     brain: Annotated[bool, typer.Option("--brain", help="A brain of several behaviors, chosen by utility.")] = False,
+    main: Annotated[bool, typer.Option("--main", help="A brain that runs from top to bottom: main(robot).")] = False,
 ) -> None:
     """Write a brain, NAME.py, to start from."""
+    if brain and main:
+        raise BrainError("--brain and --main are two kinds of brain; expected one of them")
+    template = SEVERAL_BEHAVIORS if brain else FROM_TOP if main else FIRST_BRAIN
     stem = name.removesuffix(".py")
     if not stem.isidentifier():
         raise BrainError(f"{stem!r} cannot be a brain's name; expected letters, digits and underscores")
@@ -103,7 +135,7 @@ def new(
     path = Path(f"{stem}.py")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write((SEVERAL_BEHAVIORS if brain else FIRST_BRAIN).format(name=stem, file=path, stem=stem))
+            file.write(template.format(name=stem, file=path, stem=stem))
     except FileExistsError:
         raise BrainError(f"{path} exists already; it was left as it is") from None
     except OSError as error:

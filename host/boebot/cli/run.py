@@ -33,7 +33,8 @@ An option that is given once goes for all of them; given several times, it goes 
 
 Times, lengths and angles are in s, m and rad, or have a unit: 50ms, 2min, 20cm, 90deg.
 
-Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --brain, one of several behaviors."""
+Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --main, one that runs
+from top to bottom; with --brain, one of several behaviors."""
 
 
 def run(
@@ -41,8 +42,8 @@ def run(
         list[str],
         typer.Argument(
             metavar="BRAIN",
-            help="What drives it: a bundled brain by its name, a Python file with step(robot), a class Brain or "
-            "brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
+            help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
+            "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
         ),
     ],
     on: options.RunOn = None,

@@ -166,6 +166,8 @@ def _drive(driver: Driver, task: Task) -> RunResult:
             for time_s in driver.steps():
                 if task.record.is_due():
                     keep_rows(driver, task, time_s)
+                if task.brain.is_over:
+                    break
                 step_once(driver.robot, task.brain, watch, times)
     except (BoebotError, KeyboardInterrupt) as caught:
         error = caught
@@ -174,12 +176,15 @@ def _drive(driver: Driver, task: Task) -> RunResult:
         with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
             driver.end()
             unkept = end_rows(driver, task)
+            task.brain.end()
     error = error or unkept
     return with_times(driver.result(error, elapsed_s), task, times)
 
 
 def with_times(result: RunResult, task: Task, times: StepTimes) -> RunResult:
-    """Its timing, into the record: how long its brain's steps took, and what of it was forced."""
+    """Its timing, into the record: how long its brain's steps took, and what of it was forced; and what a user should
+    know of its brain."""
+    result.notices += task.brain.notices
     result.longest_step, result.long_steps = times.longest, times.long
     result.unrealisable = task.unrealisable
     if task.unrealisable is not None:

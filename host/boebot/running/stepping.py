@@ -8,7 +8,6 @@ periods, and a computer that was busy for a moment is no error in the brain.
 
 from __future__ import annotations
 
-import ctypes
 import signal
 import sys
 import threading
@@ -23,6 +22,7 @@ from boebot.brains import LoadedBrain
 from boebot.errors import BrainError
 from boebot.robot import Command, Robot
 from boebot.running import interrupts
+from boebot.running.pausable_thread import throw
 
 STEP_LIMIT_S = 10.0  # for a step, by the wall clock, where nothing waits for it
 _LOOKS = 10  # of the watching thread while a step may last
@@ -188,7 +188,7 @@ class StepWatch:
                 with self._lock:
                     self._inside = False
                     if self._thrown:
-                        _throw(self._thread, None)
+                        throw(self._thread, None)
                 return
             except _OverdueError:  # came before the lock was ours
                 continue
@@ -210,24 +210,19 @@ class StepWatch:
         with self._lock:
             if self._inside:
                 self._thrown = True
-                _throw(self._thread, _OverdueError)
+                throw(self._thread, _OverdueError)
                 if self._wakes:
                     signal.pthread_kill(self._thread, _WAKE)
 
     def _in_debugger(self) -> bool:
-        """Somebody traces the step line by line."""
-        frame = sys._current_frames().get(self._thread)
-        while frame is not None:
-            if frame.f_trace is not None:
-                return True
-            frame = frame.f_back
+        """Somebody traces the step line by line, or a thread of the brain."""
+        for innermost in sys._current_frames().values():
+            frame: FrameType | None = innermost
+            while frame is not None:
+                if frame.f_trace is not None:
+                    return True
+                frame = frame.f_back
         return False
-
-
-def _throw(thread: int, kind: type[BaseException] | None) -> None:
-    """Has an exception raised in a thread at its next line of Python; None: the one that is on its way is not."""
-    what = None if kind is None else ctypes.py_object(kind)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)
 
 
 def _nothing(number: int, frame: FrameType | None) -> None:

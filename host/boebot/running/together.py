@@ -139,6 +139,8 @@ class _Robot:
         try:
             driver.begin()
             for self.time_s in driver.steps():
+                if self.task.brain.is_over:
+                    break
                 self.thread.pause(_STEP)
         except BoebotError as error:
             self.error = self.error or error
@@ -147,6 +149,7 @@ class _Robot:
             driver.end()
             unkept = end_rows(driver, self.task)
             self.error = self.error or unkept
+            self.task.brain.end()
             self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
 
     def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
