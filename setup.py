@@ -3,6 +3,7 @@ else it makes what follows from the protocol and the robots' files (protocol/gen
 
 * `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
 * `boebot.link.ports._reader`: the thread that reads a port (host/boebot/link/ports/build_reader.py), MIT.
+* `boebot.running._last_resort`: ends a process that Python cannot end (host/boebot/running/build_last_resort.py), MIT.
 * `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py), MIT.
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
 * `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
@@ -47,12 +48,14 @@ WHEEL_DATA = {
     "boebot/data/images": ("build/images", ("*.elf", "*.hex")),
 }
 
+MSVC = sys.platform == "win32"
 HAS_POLL = sys.platform not in ("win32", "darwin")  # for devices
 CFFI_MODULES = [
     f"{script}:ffi"
     for script, wanted in (
         ("host/boebot/link/build_codec.py", True),
         ("host/boebot/link/ports/build_reader.py", HAS_POLL),
+        ("host/boebot/running/build_last_resort.py", not MSVC),
         ("host/boebot/arenas/build_arena.py", True),
         ("sim_bridge/build_core.py", True),
         ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),
@@ -68,7 +71,6 @@ SANITIZERS = [
     "-g1",
 ]
 SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
-MSVC = sys.platform == "win32"
 
 
 def firmware_sources() -> list[str]:

@@ -1,6 +1,7 @@
 """The `boebot` command: one file per sub-command.
 
-Exit codes: 0 done; 1 something the user can mend, said in one sentence; 2 wrong usage; 130 interrupted.
+Exit codes: 0 done; 1 something the user can mend, said in one sentence; 2 wrong usage; 130 interrupted by Ctrl-C, 143
+by SIGTERM, 129 by SIGHUP.
 """
 
 from __future__ import annotations
@@ -10,18 +11,16 @@ import errno
 import os
 import signal
 import sys
-import time
+import threading
 from typing import NoReturn
 
 from boebot.cli import streams
 from boebot.errors import BoebotError, printable
+from boebot.running import interrupts
 from boebot.running.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
 _ASK_AGAIN_S = 0.02
-_ONE_PRESS_S = 0.5  # signals that follow one another faster than this are one wish
-
-_last_signal = float("-inf")
 
 
 def main() -> NoReturn:
@@ -30,14 +29,30 @@ def main() -> NoReturn:
     try:
         for number in SIGNALS:  # motors are stopped and the record is written at each of them
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
-                signal.signal(number, _interrupt)
+                signal.signal(number, interrupts.interrupt)
         sys.unraisablehook = _ask_again
         streams.accept_all_characters()
         code = _run()
+        if not _is_interrupted(code):
+            _await_threads()
     except KeyboardInterrupt as error:
         code = _interrupted("interrupted", error)
+    if _is_interrupted(code) and threading.active_count() > 1:
+        interrupts.leave(interrupts.exit_code())  # a brain's thread may never end
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _is_interrupted(code: object) -> bool:
+    """It is the exit code of a program that was asked to end."""
+    return code == interrupts.exit_code()
+
+
+def _await_threads() -> None:
+    """Python waits for a brain's threads before it ends, and takes no Ctrl-C then: so it is done here."""
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and not thread.daemon:
+            thread.join()
 
 
 def _run() -> object:
@@ -86,7 +101,7 @@ def _interrupted(sentence: str, error: BaseException) -> int:
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     _say(sentence, error)
-    return EXIT_INTERRUPTED
+    return interrupts.exit_code()
 
 
 def _say(sentence: str, error: BaseException) -> None:
@@ -103,10 +118,3 @@ def _ask_again(ignored: sys.UnraisableHookArgs) -> None:
         return
     signal.signal(signal.SIGALRM, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_REAL, _ASK_AGAIN_S)
-
-
-def _interrupt(*_: object) -> None:
-    global _last_signal
-    before, _last_signal = _last_signal, time.monotonic()
-    if _last_signal - before > _ONE_PRESS_S:
-        raise KeyboardInterrupt

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,7 @@ from boebot.cli import options, output, quantity
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
 from boebot.record import run_folder
+from boebot.record.result import RunResult, TogetherResult
 from boebot.running.runner import execute
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
@@ -117,21 +119,31 @@ def run(
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
-        with (
-            output.progress_bar(name if on is None else f"{name} on {on}", seconds) as bar,
-            output.step_watch(bar) as progress,
-        ):
-            if count == 1:
-                result = execute(request, progress, folder)
-            else:
-                together = execute_together(request, progress, folder)
-        if count == 1:
-            end(result, out, json)
-        else:
-            end_together(together, out, json)
+        with contextlib.ExitStack() as shown:
+            bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds))
+            progress = shown.enter_context(output.step_watch(bar))
+
+            def put_away(result: RunResult | TogetherResult) -> None:
+                """What this function cannot do itself: a brain goes on after Ctrl-C."""
+                shown.close()
+                try:
+                    _end(result, out, json)
+                except BoebotError as error:
+                    output.say(str(error))
+
+            run_all = execute if count == 1 else execute_together
+            result = run_all(request, progress, folder, put_away)
+        _end(result, out, json)
 
 
 run.__doc__ = _HELP
+
+
+def _end(result: RunResult | TogetherResult, out: Path | None, json: bool) -> None:
+    if isinstance(result, TogetherResult):
+        end_together(result, out, json)
+    else:
+        end(result, out, json)
 
 
 def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:

@@ -9,6 +9,7 @@ the motors are stopped and the record is complete up to there.
 
 from __future__ import annotations
 
+import sys
 import time as wall
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -28,6 +29,7 @@ from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.stepping import StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, check_progress, expect
 
+UNENDED = "the brain went on after Ctrl-C, so the whole program was ended; expected no `except:` that catches it"
 Result = TypeVar("Result", RunResult, TogetherResult)
 
 
@@ -77,30 +79,44 @@ def run(
         force_timing=force_timing,
         record=record,
     )
-    return keep(lambda folder: execute(request, progress, folder), out)
+    return keep(lambda folder, put_away: execute(request, progress, folder, put_away), out)
 
 
-def execute(request: Request, progress: Progress | None = None, folder: RunFolder | None = None) -> RunResult:
+def execute(
+    request: Request,
+    progress: Progress | None = None,
+    folder: RunFolder | None = None,
+    put_away: Callable[[RunResult], None] | None = None,
+) -> RunResult:
     """Runs the one robot of a request; its record goes to the folder as it comes. Once the run has begun every end of
-    it, even by an error, is a result: see `RunResult.error`.
+    it, even by an error, is a result: see `RunResult.error`. If the brain goes on after Ctrl-C, `put_away` gets the
+    result, in another thread, and then the process ends.
 
     Raises:
         BoebotError: the run could not begin.
     """
     check_progress(progress)
-    (task,) = request.tasks()
-    recording = Recording(1, recorded=request.record)
-    task = replace(task, progress=progress, record=recording.records[0])
-    opening = open_board if task.request.robot.has_board else open_vehicle
-    session = opening(task.on, task.request)
-    try:
-        driver = driver_of(session, task)
-        recording.begin(folder, [driver.result(None, 0.0)], sources([task]))
-        result = _drive(driver, task)
-        result.error = recording.end([result]) or result.error
-        return result
-    finally:
-        session.close()
+    with interrupts.heard():
+        (task,) = request.tasks()
+        recording = Recording(1, recorded=request.record)
+        task = replace(task, progress=progress, record=recording.records[0])
+        opening = open_board if task.request.robot.has_board else open_vehicle
+        session = opening(task.on, task.request)
+
+        def unended(result: RunResult) -> None:
+            recording.end([result])
+            result.notices.append(UNENDED)
+            if put_away is not None:
+                put_away(result)
+
+        try:
+            driver = driver_of(session, task)
+            recording.begin(folder, [driver.result(None, 0.0)], sources([task]))
+            result = _drive(driver, task, unended)
+            result.error = recording.end([result]) or result.error
+            return result
+        finally:
+            session.close()
 
 
 def sources(tasks: Sequence[Task]) -> dict[str, bytes]:
@@ -109,17 +125,24 @@ def sources(tasks: Sequence[Task]) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(paths) if path.is_file()}
 
 
-def keep(work: Callable[[RunFolder | None], Result], out: str | Path | None) -> Result:
-    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one.
+def keep(work: Callable[[RunFolder | None, Callable[[Result], None]], Result], out: str | Path | None) -> Result:
+    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one. `work` gets the folder,
+    and what to do with a result that it cannot return, for the brain goes on after Ctrl-C.
 
     Raises:
         BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
     """
+
+    def put_away(unended: Result) -> None:
+        print(f"boebot: interrupted; {UNENDED}", file=sys.stderr)
+        if out is not None:
+            unended.save(out)
+
     if out is None:
-        return _whole(work(None))
+        return _whole(work(None, put_away))
     expect("out", out, "a folder or None", str, Path)
     with RunFolder(Path(out)) as folder:
-        result = work(folder)
+        result = work(folder, put_away)
         try:
             with interrupts.ignored():
                 result.save(folder.path)
@@ -154,15 +177,21 @@ def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
     return DirectDriver(cast(VehicleSession, session), task)
 
 
-def _drive(driver: Driver, task: Task) -> RunResult:
-    """The whole run, from the robot made ready to its result."""
+def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> RunResult:
+    """The whole run, from the robot made ready to its result; `unended` gets one that cannot be returned."""
     error: BaseException | None = None
     times = StepTimes()
     started = wall.perf_counter()
+
+    def take_over() -> None:
+        driver.end()
+        end_rows(driver, task)
+        unended(with_times(driver.result(KeyboardInterrupt(), wall.perf_counter() - started), task, times))
+
     try:
         driver.begin()
         started = wall.perf_counter()
-        with StepWatch(driver.step_limit) as watch:
+        with StepWatch(driver.step_limit, take_over) as watch:
             for time_s in driver.steps():
                 if task.record.is_due():
                     keep_rows(driver, task, time_s)

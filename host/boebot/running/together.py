@@ -11,7 +11,7 @@ An error in one ends the run: all motors are stopped, and the error says which r
 from __future__ import annotations
 
 import time as wall
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.pausable_thread import PAUSED, PausableThread
-from boebot.running.runner import driver_of, keep, sources, with_times
+from boebot.running.runner import UNENDED, driver_of, keep, sources, with_times
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot
 
@@ -76,29 +76,34 @@ def run_together(
         step_timeout=step_timeout,
         force_timing=force_timing,
     )
-    return keep(lambda folder: execute_together(request, progress, folder), out)
+    return keep(lambda folder, put_away: execute_together(request, progress, folder, put_away), out)
 
 
 def execute_together(
-    request: Request, progress: Progress | None = None, folder: RunFolder | None = None
+    request: Request,
+    progress: Progress | None = None,
+    folder: RunFolder | None = None,
+    put_away: Callable[[TogetherResult], None] | None = None,
 ) -> TogetherResult:
     """Runs all robots of a request in one world; their record goes to the folder as it comes. Once the run has begun
-    every end of it, even by an error, is a result: see `TogetherResult.error`.
+    every end of it, even by an error, is a result: see `TogetherResult.error`. If a brain goes on after Ctrl-C,
+    `put_away` gets the result, in another thread, and then the process ends.
 
     Raises:
         BoebotError: the run could not begin.
     """
     check_progress(progress)
-    tasks = request.tasks()
-    recording = Recording(len(tasks), recorded=request.record)
-    tasks = [replace(task, record=record) for task, record in zip(tasks, recording.records, strict=True)]
-    _check_own_brains([task.brain for task in tasks])
-    kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
-    world = open_together(kind, [task.request for task in tasks])
-    try:
-        return _Run(world, tasks, progress, recording, folder).run()
-    finally:
-        world.close()
+    with interrupts.heard():
+        tasks = request.tasks()
+        recording = Recording(len(tasks), recorded=request.record)
+        tasks = [replace(task, record=record) for task, record in zip(tasks, recording.records, strict=True)]
+        _check_own_brains([task.brain for task in tasks])
+        kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
+        world = open_together(kind, [task.request for task in tasks])
+        try:
+            return _Run(world, tasks, progress, recording, folder).run(put_away)
+        finally:
+            world.close()
 
 
 def _check_own_brains(loaded: Sequence[LoadedBrain]) -> None:
@@ -196,12 +201,21 @@ class _Run:
         self._next_progress = 0.0
         world.on_wait(lambda index: self._robots[index].thread.pause(PAUSED))
 
-    def run(self) -> TogetherResult:
+    def run(self, put_away: Callable[[TogetherResult], None] | None) -> TogetherResult:
         """The whole run, from the first hello to the last stop."""
         started = wall.perf_counter()
         error: BaseException | None = None
+
+        def take_over() -> None:
+            interrupted = KeyboardInterrupt()
+            self._stop_all(interrupted)
+            result = self._result(interrupted, wall.perf_counter() - started)
+            result.robots[0].notices.append(UNENDED)
+            if put_away is not None:
+                put_away(result)
+
         try:
-            with StepWatch(AT_LEISURE) as watch:
+            with StepWatch(AT_LEISURE, take_over) as watch:
                 self._loop(watch)
         except (BoebotError, KeyboardInterrupt) as caught:
             error = caught
