@@ -8,8 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -44,22 +45,47 @@ LOCKS = "lock = ctypes.create_string_buffer(64); [ctypes.{kind}(None).pthread_mu
 THREAD = "threading.Thread(target=time.sleep, args=(1e6,)).start(); time.sleep(1e6)"
 BACKTRACKS = 're.match("(a+)+b", "a" * 60)  # holds the interpreter, and no signal reaches it outside the main thread'
 LEAVES = "boebot: the brain went on after Ctrl-C, so the whole program was ended; expected no `except:` that catches it"
-COMMAND = (sys.executable, "-m", "boebot", "run", "mine.py", "--step-timeout", "inf", "--seconds", "60")
+SCRIPT = "import boebot\nboebot.run(step, seconds=60, step_timeout=float('inf'))\n"
+RETURNS = "\n        ".join(("try: time.sleep(1e6)", "except BaseException: pass"))
 MISSING = "boebot: interrupted; the brain gave Python no turn, so what is written at the end of a run is missing"
 
 
-def run(
-    folder: Path,
-    brain: str,
-    *options: str,
-    signals: Sequence[int] = (signal.SIGINT,),
-    command: Sequence[str] = COMMAND,
-) -> tuple[int, str, str, float]:
-    """Exit code, what it printed, and the seconds from the first signal, sent once the brain misbehaves, to its end; a
-    further one comes 0.6 s after the one before."""
-    (folder / "mine.py").write_text(brain)
+class Case(NamedTuple):
+    """A brain that misbehaves, and what is sent to its process then: a further signal 0.6 s after the one before."""
+
+    brain: str
+    options: tuple[str, ...] = ()
+    signals: tuple[int, ...] = (signal.SIGINT,)
+    command: tuple[str, ...] = ("-m", "boebot", "run", "mine.py", "--step-timeout", "inf", "--seconds", "60")
+
+
+class Ended(NamedTuple):
+    """How its process ended."""
+
+    code: int
+    out: str
+    err: str
+    took_s: float
+    """from the first signal"""
+    folder: Path
+
+
+CASES = {
+    "catches": Case(STEP.format(deed=CATCHES), ("--out", "out", "--json")),
+    "sigterm": Case(STEP.format(deed=CATCHES), ("--robots", "2", "--json"), (signal.SIGTERM,)),
+    "waits in C": Case(STEP.format(deed=LOCKS.format(kind="CDLL"))),
+    "leaves a thread": Case(STEP.format(deed=THREAD)),
+    "keeps the interpreter": Case(STEP.format(deed=LOCKS.format(kind="PyDLL"))),
+    "twice": Case(MAIN.format(deed=BACKTRACKS), signals=(signal.SIGINT, signal.SIGTERM)),
+    "script": Case(STEP.format(deed=CATCHES) + SCRIPT, command=("mine.py",)),
+    "returns": Case(STEP.format(deed=RETURNS)),
+}
+
+
+def end(folder: Path, case: Case) -> Ended:
+    (folder / "mine.py").write_text(case.brain)
     process = subprocess.Popen(
-        [*command, *options],
+        [sys.executable, *case.command, *case.options],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -72,58 +98,54 @@ def run(
             time.sleep(0.01)
         time.sleep(0.1)
         sent = time.monotonic()
-        process.send_signal(signals[0])
-        for number in signals[1:]:
+        process.send_signal(case.signals[0])
+        for number in case.signals[1:]:
             time.sleep(0.6)
             process.send_signal(number)
         out, err = process.communicate(timeout=20)
-        return process.returncode, out, err, time.monotonic() - sent
+        return Ended(process.returncode, out, err, time.monotonic() - sent, folder)
     finally:
         process.kill()
 
 
-def test_a_brain_that_catches_everything_leaves_a_whole_record(tmp_path: Path) -> None:
-    code, out, err, took_s = run(tmp_path, STEP.format(deed=CATCHES), "--out", "out", "--json")
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ended]:
+    """All cases, two at a time: they wait more than they compute."""
+    folders = [tmp_path_factory.mktemp("brain") for _ in CASES]
+    with ThreadPoolExecutor(2) as pool:
+        return dict(zip(CASES, pool.map(end, folders, CASES.values()), strict=True))
+
+
+def test_a_brain_that_catches_everything_leaves_a_whole_record(ended: dict[str, Ended]) -> None:
+    code, out, err, took_s, folder = ended["catches"]
     assert (code, err) == (130, f"{LEAVES}\nboebot: interrupted\n") and took_s < 3.0
     values = json.loads(out)
     assert values["ended"] == "interrupted" and values["run_time_s"] == pytest.approx(0.3)
-    assert all(Path(tmp_path, name).stat().st_size > 0 for name in values["files"])
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["ended"] == "interrupted"
+    assert all(Path(folder, name).stat().st_size > 0 for name in values["files"])
+    assert json.loads((folder / "out" / "summary.json").read_text())["ended"] == "interrupted"
 
 
-def test_sigterm_has_its_own_exit_code_also_among_several_robots(tmp_path: Path) -> None:
-    options = ("--robots", "2", "--json")
-    code, out, err, took_s = run(tmp_path, STEP.format(deed=CATCHES), *options, signals=[signal.SIGTERM])
+def test_sigterm_has_its_own_exit_code_also_among_several_robots(ended: dict[str, Ended]) -> None:
+    code, out, err, took_s, _ = ended["sigterm"]
     assert code == 143 and err.endswith("boebot: interrupted\n") and took_s < 3.0
     assert [robot["run_time_s"] for robot in json.loads(out)["robots"]] == pytest.approx([0.3, 0.3], abs=0.06)
 
 
 @pytest.mark.parametrize(
-    ("brain", "sentence"),
+    ("name", "sentence", "limit_s"),
     [
-        (STEP.format(deed=LOCKS.format(kind="CDLL")), f"{LEAVES}\nboebot: interrupted"),
-        (STEP.format(deed=THREAD), "boebot: interrupted"),
-        (STEP.format(deed=LOCKS.format(kind="PyDLL")), MISSING),
+        ("waits in C", f"{LEAVES}\nboebot: interrupted", 3.0),
+        ("leaves a thread", "boebot: interrupted", 3.0),
+        ("keeps the interpreter", MISSING, 3.2),
+        ("twice", MISSING, 2.0),
+        ("returns", "boebot: interrupted", 3.0),
     ],
-    ids=["waits in C", "leaves a thread", "keeps the interpreter"],
 )
-def test_a_brain_that_nothing_wakes(tmp_path: Path, brain: str, sentence: str) -> None:
-    code, _, err, took_s = run(tmp_path, brain)
-    assert (code, err) == (130, f"{sentence}\n") and took_s < 3.4
+def test_a_brain_that_does_not_heed_it(ended: dict[str, Ended], name: str, sentence: str, limit_s: float) -> None:
+    code, _, err, took_s, _ = ended[name]
+    assert (code, err) == (130, f"{sentence}\n") and took_s < limit_s
 
 
-def test_the_second_one_ends_it_at_once(tmp_path: Path) -> None:
-    code, _, err, took_s = run(tmp_path, MAIN.format(deed=BACKTRACKS), signals=[signal.SIGINT, signal.SIGTERM])
-    assert (code, err) == (130, f"{MISSING}\n") and took_s < 2.0
-
-
-def test_a_script_ends_too(tmp_path: Path) -> None:
-    script = STEP.format(deed=CATCHES) + "import boebot\nboebot.run(step, seconds=60, step_timeout=float('inf'))\n"
-    code, _, err, took_s = run(tmp_path, script, command=(sys.executable, "mine.py"))
-    assert code == 130 and err.startswith("boebot: interrupted; the brain went on after Ctrl-C") and took_s < 3.0
-
-
-def test_a_brain_that_catches_it_and_returns_has_ended(tmp_path: Path) -> None:
-    deed = "\n        ".join(("try: time.sleep(1e6)", "except BaseException: pass"))
-    code, _, err, took_s = run(tmp_path, STEP.format(deed=deed))
-    assert (code, err) == (130, "boebot: interrupted\n") and took_s < 1.0
+def test_a_script_ends_too(ended: dict[str, Ended]) -> None:
+    code, _, err, took_s, _ = ended["script"]
+    assert (code, err) == (130, f"boebot: interrupted; {LEAVES.removeprefix('boebot: ')}\n") and took_s < 3.0
