@@ -291,6 +291,36 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
     assert ticks_in(tmp_path / "out") > 20
 
 
+@pytest.mark.wall_clock
+def test_brain_that_catches_ctrl_c_leaves_a_board_that_was_stopped(tmp_path: Path) -> None:
+    brain = tmp_path / "mine.py"
+    brain.write_text("""
+import time
+def step(robot):
+    robot.drive(0.5, 0.5)
+    if robot.time > 0.5:
+        open("begun", "w").close()
+    while robot.time > 0.5:
+        try:
+            time.sleep(0.01)
+        except BaseException:
+            pass
+""")
+    with pty(Peer()) as served:
+        command = [sys.executable, "-m", "boebot", "run", str(brain), "--on", served.path, "--step-timeout", "inf"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_signals, cwd=tmp_path
+        )
+        until = time.monotonic() + 20
+        while not (tmp_path / "begun").exists() and time.monotonic() < until:
+            time.sleep(0.02)
+        assert not served.peer.stops
+        process.send_signal(signal.SIGINT)  # soon: a host that is silent for 1 s has lost its session
+        out, err = process.communicate(timeout=20)
+        assert served.peer.stops, "by the stop message, not by the dead-man"
+    assert process.returncode == 130 and "interrupted" in out and err.endswith("boebot: interrupted\n")
+
+
 @pytest.mark.parametrize("after_s", [0.04, 0.1, 0.2, 0.3])
 def test_interrupt_while_the_command_starts_is_no_traceback(after_s: float) -> None:
     process = subprocess.Popen(

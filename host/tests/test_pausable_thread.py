@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
 import time
@@ -9,7 +10,7 @@ import time
 import pytest
 
 from boebot.errors import BoardError
-from boebot.running.pausable_thread import DONE, PAUSED, PausableThread
+from boebot.running.pausable_thread import DONE, PAUSED, EndedError, PausableThread
 
 
 def test_stretches_alternate_with_the_resuming_thread() -> None:
@@ -97,3 +98,61 @@ def test_interrupt_waits_for_the_end_of_the_stretch() -> None:
     assert done == ["whole stretch"] and thread.said == PAUSED
     assert thread.resume() == DONE
     assert done == ["whole stretch", "next"]
+
+
+def test_what_is_raised_in_an_open_wait_is_raised_at_once_and_the_stretch_can_be_ended() -> None:
+    cleared: list[str] = []
+
+    def work() -> None:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        try:
+            while True:
+                pass
+        finally:
+            cleared.append("up")
+
+    thread = PausableThread(work, "test")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            thread.resume_openly()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not thread.is_done and cleared == []
+    thread.end(within_s=5.0)
+    assert thread.is_done and isinstance(thread.error, EndedError) and cleared == ["up"]
+
+
+@pytest.mark.parametrize("before_its_first_stretch", [True, False])
+def test_one_that_paused_is_ended_there(before_its_first_stretch: bool) -> None:
+    caught: list[BaseException] = []
+
+    def work() -> None:
+        for _ in range(2):
+            try:
+                thread.pause()
+            except BaseException as error:
+                caught.append(error)
+
+    thread = PausableThread(work, "test")
+    if not before_its_first_stretch:
+        thread.resume_openly()
+    thread.end(within_s=5.0)
+    assert thread.is_done and thread.resume() == DONE
+    assert [type(error) for error in caught] == ([] if before_its_first_stretch else [EndedError] * 2)
+
+
+def test_one_that_does_not_end_is_left_to_itself_in_time() -> None:
+    release = threading.Event()
+
+    def work() -> None:
+        with contextlib.suppress(BaseException):
+            thread.pause()
+        release.wait()  # in C, where no exception comes
+
+    thread = PausableThread(work, "test")
+    thread.resume()
+    begun = time.monotonic()
+    thread.end(within_s=0.2)
+    assert 0.15 < time.monotonic() - begun < 5 and not thread.is_done
+    release.set()

@@ -26,6 +26,7 @@ _ASK_AGAIN_S = 0.02
 def main() -> NoReturn:
     """Runs the command; every error that people can make ends as one sentence."""
     code: object
+    others = set(threading.enumerate())
     try:
         for number in SIGNALS:  # motors are stopped and the record is written at each of them
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
@@ -34,10 +35,10 @@ def main() -> NoReturn:
         streams.accept_all_characters()
         code = _run()
         if not _is_interrupted(code):
-            _await_threads()
+            _await(others)
     except KeyboardInterrupt as error:
         code = _interrupted("interrupted", error)
-    if _is_interrupted(code) and threading.active_count() > 1:
+    if _is_interrupted(code) and not others.issuperset(threading.enumerate()):
         interrupts.leave(interrupts.exit_code())  # a brain's thread may never end
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
@@ -48,10 +49,10 @@ def _is_interrupted(code: object) -> bool:
     return code == interrupts.exit_code()
 
 
-def _await_threads() -> None:
-    """Python waits for a brain's threads before it ends, and takes no Ctrl-C then: so it is done here."""
-    for thread in threading.enumerate():
-        if thread is not threading.main_thread() and not thread.daemon:
+def _await(others: set[threading.Thread]) -> None:
+    """Waits for a brain's threads, all but the `others`. Python would do so as it ends, and take no Ctrl-C then."""
+    for thread in set(threading.enumerate()) - others:
+        if not thread.daemon:
             thread.join()
 
 

@@ -1,8 +1,9 @@
 """A function that runs a stretch at a time: until it pauses, and on when it is resumed.
 
 The link's conversations (opening, requests, stopping) wait inside their calls, so each robot's driver needs a stack to
-wait on while others go on: a thread's. But two stretches never run at the same time: who resumes a thread waits until
-it pauses, so that nothing depends on the machine's scheduling.
+wait on while others go on: a thread's. So does a brain that runs from top to bottom (main_brain.py). But two stretches
+never run at the same time: who resumes a thread waits until it pauses, so that nothing depends on the machine's
+scheduling.
 """
 
 from __future__ import annotations
