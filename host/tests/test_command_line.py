@@ -151,6 +151,7 @@ def test_period_is_in_seconds_or_has_a_unit(peer: Peer, capsys: pytest.CaptureFi
         (("new", "my brain"), 1, "'my brain' cannot be a brain's name"),
         (("new", "nowhere/brain"), 1, "'nowhere/brain' cannot be a brain's name"),
         (("new", "../brain"), 1, "'../brain' cannot be a brain's name; expected letters, digits and underscores"),
+        (("new", "mine", "--main", "--brain"), 1, "--brain and --main are two kinds of brain; expected one of them"),
         (("new", "wander"), 1, "'wander' is the name of a bundled brain"),
     ],
 )

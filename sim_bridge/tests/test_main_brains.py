@@ -176,6 +176,16 @@ def test_the_end_of_the_run_ends_main_and_its_thread() -> None:
     assert result.error is None and left == ["cleared up"] and threading.active_count() == before
 
 
+def test_each_run_begins_it_anew() -> None:
+    def main(robot: MainRobot) -> None:
+        robot.turn(90)
+
+    loaded = load_brain(main)
+    runs = [boebot.run(loaded, robot="arsim", seconds=seconds) for seconds in (0.5, 9.0, 9.0)]
+    assert [run.run_time for run in runs[1:]] == [pytest.approx(runs[1].run_time)] * 2 and 0.9 < runs[1].run_time < 4
+    assert digest(runs[1]) == digest(runs[2])
+
+
 def test_main_that_catches_everything_does_not_keep_the_run() -> None:
     def main(robot: MainRobot) -> None:
         while True:

@@ -223,7 +223,7 @@ class MainBrain:
         except BaseException as error:  # it takes too long, or Ctrl-C
             place = _trace(self._thread.frame)
             try:
-                self._thread.end(END_S)
+                self.end()
             finally:  # also where the same is raised once more
                 raise error.with_traceback(place) from None
         if self._thread.is_done:
@@ -244,12 +244,13 @@ class MainBrain:
 
     def end(self) -> None:
         """The run has ended: so does `main` at its wait, by an exception that runs its `finally` blocks."""
-        if self._thread is not None and not self._thread.is_done:
-            self._thread.end(END_S)
+        thread, self._thread, self._of = self._thread, None, None
+        if thread is not None and not thread.is_done:
+            thread.end(END_S)
 
     @property
     def is_over(self) -> bool:
-        """It has returned."""
+        """It has returned, in the present run."""
         return self._thread is not None and self._thread.is_done
 
     @property
