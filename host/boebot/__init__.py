@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from boebot import boards
+    from boebot.brain.main_brain import MainRobot
     from boebot.description.robots import load_robot
     from boebot.errors import BoebotError
     from boebot.record.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
-    from boebot.running.main_brain import MainRobot
     from boebot.running.runner import run
     from boebot.running.tasks import Member
     from boebot.running.together import run_together
@@ -45,7 +45,7 @@ __all__ = [
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
-    "MainRobot": "running.main_brain",
+    "MainRobot": "brain.main_brain",
     "Member": "running.tasks",
     "Observation": "robot",
     "Robot": "robot",

@@ -3,7 +3,7 @@
 A brain is a Python file with one of
 
     def step(robot): ...                     # called every PERIOD
-    def main(robot): ...                     # runs once from top to bottom (boebot.running.main_brain)
+    def main(robot): ...                     # runs once from top to bottom (boebot.brain.main_brain)
     class Brain: ...                         # with a method step(self, robot); made afresh for each run
     brain = Brain([Wander(), Avoid()])       # a boebot.brain.Brain: processes chosen by utility
 
@@ -33,10 +33,10 @@ from typing import Any
 
 from boebot import arguments
 from boebot.brain import Brain, Process, StateVariable, composition
+from boebot.brain.main_brain import MainBrain
 from boebot.cognition import Odometry
 from boebot.errors import BrainError, did_you_mean
 from boebot.robot import Robot
-from boebot.running.main_brain import MainBrain
 
 FOLDER = Path(__file__).resolve().parent
 _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages

@@ -23,12 +23,12 @@ from types import FrameType, TracebackType
 from typing import Any, NamedTuple
 
 from boebot import brains
+from boebot.brain.pausable_thread import throw
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError
 from boebot.robot import Command, Robot
 from boebot.running import interrupts
 from boebot.running.interrupts import wishes
-from boebot.running.pausable_thread import throw
 
 STEP_LIMIT_S = 10.0  # for a step, by the wall clock, where nothing waits for it
 _LOOKS = 10  # of the watching thread while a step may last

@@ -1,7 +1,7 @@
 """Runs several robots in one simulated world: `boebot.run_together(...)`, and `boebot run` with several of them.
 
 Each has its own brain and seed, and a board or none, and they sense and bump each other. Brains step here, in the
-caller's thread; each robot is driven by a thread that pauses while it waits (boebot.running.pausable_thread). One clock
+caller's thread; each robot is driven by a thread that pauses while it waits (boebot.brain.pausable_thread). One clock
 turns them all: when all of them wait, time passes up to the earliest wake-up, and robots that wake at the same instant
 go on in the order of their numbers. The run of each is then a function of what its own robot meets.
 
@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from boebot.boards import DIRECT, BoardSession, SharedWorld, VehicleSession, open_together
+from boebot.brain.pausable_thread import PAUSED, PausableThread
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
 from boebot.record.recording import Recording
@@ -23,7 +24,6 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.pausable_thread import PAUSED, PausableThread
 from boebot.running.runner import UNENDED, driver_of, keep, sources, with_times
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot

@@ -19,11 +19,11 @@ from types import FrameType, TracebackType
 from typing import ClassVar
 
 from boebot import arguments
+from boebot.brain.pausable_thread import PausableThread
 from boebot.cognition import Odometry
 from boebot.cognition.odometry import LAG_S, wrapped
 from boebot.errors import BrainError
 from boebot.robot import Robot
-from boebot.running.pausable_thread import PausableThread
 
 END_S = 0.5  # that a main which is ended has to clear up
 _ON_TIME = 1e-9  # s; times are sums of ticks
