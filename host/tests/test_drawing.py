@@ -20,7 +20,6 @@ from matplotlib.figure import Figure
 import boebot
 from boebot.arenas.description import Charger, Light
 from boebot.arenas.floor_plan import FloorPlan, Moving, Patch, Solid
-from boebot.boards import Truth
 from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.record.result import RunResult
@@ -159,9 +158,7 @@ def run_of(robot: str, monkeypatch: pytest.MonkeyPatch, plan: FloorPlan | None =
     monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
     result = boebot.run(lambda it: it.drive(0.5, 0.45), robot=robot, seconds=seconds)
     if plan is not None:
-        assert result.truth is not None
-        series = {name: getattr(result.truth, name) for name in ("time", "x", "y", "heading", "contact")}
-        result.truth = Truth(**series, plan=plan)
+        result.plan = plan
     return result
 
 
@@ -216,7 +213,7 @@ def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypa
     }
     result = run_of("shieldbot-basic", monkeypatch)
     result.robot = msgspec.structs.replace(whole, device=fewer)
-    result.truth = None
+    result.world = None
     table = result.table()
     assert [
         table[name]

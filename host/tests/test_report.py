@@ -196,8 +196,9 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
 
 
 def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(replay, "FRAMES_AT_MOST", 1000)
-    data = replay.run_data(result, scene.view(result))
+    monkeypatch.setattr("boebot.record.overview.POINTS", 1000)
+    long = dataclasses.replace(result)
+    data = replay.run_data(long, scene.view(long))
     count = len(base64.b64decode(data["time"])) // 4
     assert 700 < count <= 1001
     assert len(base64.b64decode(data["flags"])) == count

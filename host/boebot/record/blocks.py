@@ -44,6 +44,14 @@ class Block:
     def __len__(self) -> int:
         return len(self.times)
 
+    def part(self, begin: int, end: int) -> Block:
+        """Its rows from `begin` to before `end`."""
+        if len(self.sizes) == 1:
+            size = int(self.sizes[0])
+            return Block(self.times[begin:end], self.data[begin * size : end * size], self.sizes)
+        ends = np.concatenate(([0], np.cumsum(self.sizes, dtype=np.int64)))
+        return Block(self.times[begin:end], self.data[ends[begin] : ends[end]], self.sizes[begin:end])
+
     def rows(self) -> list[Row]:
         """Each row by itself."""
         ends = np.cumsum(np.broadcast_to(self.sizes, len(self.times)), dtype=np.int64).tolist()
@@ -62,6 +70,17 @@ Rows = Mapping[str, Sequence[Row] | Block]
 def group_of(rows: Rows) -> Group:
     """Its blocks."""
     return {name: some if isinstance(some, Block) else Block.of(some) for name, some in rows.items() if some}
+
+
+def joined(first: Block | None, second: Block) -> Block:
+    """One block after another."""
+    if first is None:
+        return second
+    sizes = first.sizes
+    if len(first.sizes) != 1 or len(second.sizes) != 1 or first.sizes[0] != second.sizes[0]:
+        each = [np.broadcast_to(block.sizes, len(block)) for block in (first, second)]
+        sizes = np.concatenate(each).astype(np.uint32)
+    return Block(np.concatenate((first.times, second.times)), first.data + second.data, sizes)
 
 
 def schema() -> bytes:

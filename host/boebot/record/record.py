@@ -150,10 +150,18 @@ class Record:
         blocks = [block.times for block in self._blocks(stream)]
         return np.concatenate(blocks) if blocks else np.empty(0)
 
+    def span(self, stream: str) -> tuple[float, float]:
+        """Times of the first and the last row of a stream (s); 0 where it has none."""
+        begin_s = end_s = None
+        for block in self._blocks(stream):
+            begin_s = float(block.times[0]) if begin_s is None else begin_s
+            end_s = float(block.times[-1])
+        return begin_s or 0.0, end_s or 0.0
+
     @property
     def ticks(self) -> int:
         """How many ticks or steps there are."""
-        return self.count(self._tick_stream)
+        return self.count(self.tick_stream)
 
     @property
     def clock_offset(self) -> float:
@@ -164,7 +172,7 @@ class Record:
     @property
     def times(self) -> list[float]:
         """The run's time (s) of each tick or step, by the board's clock."""
-        return self._each("times", self._tick_stream, lambda row: row[0])
+        return self._each("times", self.tick_stream, lambda row: row[0])
 
     @property
     def telemetry(self) -> list[bytes]:
@@ -196,7 +204,8 @@ class Record:
         return [(self._index(time_s), kind.unpack(data)) for time_s, data in self.rows(kind.NAME)]
 
     @property
-    def _tick_stream(self) -> str:
+    def tick_stream(self) -> str:
+        """That of the ticks: telemetry of a board, or readings of a robot without one."""
         return "telemetry" if self.count("telemetry") else "readings"
 
     def _blocks(self, stream: str) -> Iterator[Block]:

@@ -10,9 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from boebot.arenas import Arena
+from boebot.arenas.floor_plan import FloorPlan
 from boebot.boards import Truth, WatchdogReset
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
@@ -20,18 +19,17 @@ from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
 from boebot.former_names import CONTACTS, DISTANCE, Figures, FormerNames
 from boebot.link.fields import text
-from boebot.link.messages import DevicesTelemetry, EventKind, Identity, Status
+from boebot.link.messages import DevicesTelemetry, Identity
 from boebot.record import figures
 from boebot.record.brain_record import BrainRecord
 from boebot.record.figures import counted
+from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record
-from boebot.record.series import Pose, Series, onsets, touch_indices, truth_at
-from boebot.record.telemetry_series import TelemetrySeries
-from boebot.record.truth import truth_of
+from boebot.record.series import Pose, Series, truth_at
+from boebot.record.telemetry_series import Directions, TelemetrySeries
+from boebot.record.truth import plan_of, truth_of
 from boebot.running import hangs
-
-ODOMETRY_S = 0.1  # from place to place of a path by odometry
 
 
 @dataclass(kw_only=True, repr=False)
@@ -139,14 +137,28 @@ class RunResult(FormerNames):
     @cached_property
     def truth(self) -> Truth | None:
         """What really happened, where somebody knows (simulated runs); no brain saw it."""
-        return None if self.world is None else truth_of(self.record, self.world)
+        return truth_of(self.record, self.plan) if self.has_truth else None
+
+    @property
+    def has_truth(self) -> bool:
+        """A simulator knows what really happened."""
+        return self.world is not None and self.record.count("truth") > 0
+
+    @cached_property
+    def plan(self) -> FloorPlan:
+        """The arena from above, with its moving shapes where they were; an empty one where nobody knows it."""
+        return plan_of(self.record, self.world) if self.world is not None else FloorPlan()
 
     @cached_property
     def series(self) -> Series:
         """Telemetry or readings as arrays, one entry per control tick received."""
+        return self.telemetry if self.layout is None else self._series_of(self.record)
+
+    def _series_of(self, record: Record, directions: Directions | None = None) -> Series:
+        """Of a part of the record."""
         if self.layout is not None:
-            return ReadingsSeries(self.record, self.robot, self.tick, self.layout)
-        return self.telemetry
+            return ReadingsSeries(record, self.robot, self.tick, self.layout)
+        return TelemetrySeries(record, self.robot, self.tick, directions)
 
     @cached_property
     def telemetry(self) -> TelemetrySeries:
@@ -179,37 +191,40 @@ class RunResult(FormerNames):
     # ---- figures -------------------------------------------------------------------------------------------
 
     @cached_property
+    def overview(self) -> Overview:
+        """What tables, pictures and pages show of it; takes no more memory for a long run than for a short one."""
+        return overview(
+            self.record,
+            self._series_of,
+            clock_offset_s=self.clock_offset,
+            whiskers=self.whiskers,
+            slow=[name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)],
+            has_odometry=self.has_odometry,
+            has_truth=self.has_truth,
+        )
+
+    @property
     def true_distance(self) -> float | None:
         """True path length of the robot's centre (m); None: no simulator knows it."""
-        return None if self.true_pose is None else self.true_pose.length
+        return self.overview.true_distance
 
-    @cached_property
+    @property
     def odometry_distance(self) -> float | None:
         """Path length of the robot's centre by its encoders or odometer (m); None: it has neither.
 
         It goes through places 0.1 s apart: in closer ones each edge of one encoder counts as a move of the centre.
         """
-        pose, time = self.odometry, self.series.time
-        if pose is None or not len(time):
-            return None
-        at = np.append(np.searchsorted(time, np.arange(time[0], time[-1], ODOMETRY_S)), len(time) - 1)
-        return Pose(pose.x[at], pose.y[at], pose.heading[at]).length
+        return self.overview.odometry_distance
 
-    @cached_property
+    @property
     def true_contacts(self) -> int | None:
         """How many times the body came to touch something, 0.1 s apart at least; None: no simulator knows it."""
-        if self.truth is None or not len(self.series):
-            return None
-        begin, end = self.clock_offset, self.clock_offset + float(self.series.time[-1])
-        inside = (self.truth.time >= begin) & (self.truth.time <= end)
-        return len(touch_indices(self.truth.time[inside], self.truth.contact[inside]))
+        return self.overview.true_contacts
 
-    @cached_property
+    @property
     def whisker_touches(self) -> int | None:
         """How many times a whisker was pressed; None: the robot has none."""
-        if not self.whiskers:
-            return None
-        return sum(onsets(self.series.flag(whisker, "pressed")) for whisker in self.whiskers)
+        return self.overview.whisker_touches
 
     @property
     def ticks(self) -> int:
@@ -219,19 +234,17 @@ class RunResult(FormerNames):
     @property
     def overruns(self) -> int:
         """Control ticks whose work did not end in time."""
-        return self.series.overruns
+        return self.overview.overruns
 
-    @cached_property
+    @property
     def dead_man_stops(self) -> int:
         """Times the motors stopped because no fresh set-point came."""
-        events = sum(event.kind == EventKind.DEAD_MAN for event in self.record.events)
-        return max(self.series.rising(Status.DEAD_MAN), events)  # telemetry is not heard while a session is lost
+        return self.overview.dead_man_stops
 
-    @cached_property
+    @property
     def fallback_takeovers(self) -> int:
         """Times the board's own brain took over because the host was silent."""
-        events = sum(event.kind == EventKind.FALLBACK and event.value == 1 for event in self.record.events)
-        return max(self.series.rising(Status.FALLBACK), events)
+        return self.overview.fallback_takeovers
 
     @property
     def has_odometry(self) -> bool:
@@ -252,29 +265,22 @@ class RunResult(FormerNames):
             return None
         return self.odometry.placed(*self.true_pose.at(0))
 
-    @cached_property
+    @property
     def odometry_error(self) -> float | None:
         """Distance of the estimate from the true place at the end (m); None: there is no truth, or no odometry."""
-        if self.true_pose is None or self.placed_odometry is None:
-            return None
-        return math.dist(self.placed_odometry.at(-1)[:2], self.true_pose.at(-1)[:2])
+        pose, placed = self.overview.true_pose, self.overview.placed_odometry
+        return None if pose is None or placed is None else math.dist(placed.at(-1)[:2], pose.at(-1)[:2])
 
     @property
     def real_time_factor(self) -> float:
         """How many times faster than the wall clock the run was."""
         return self.run_time / self.wall_time if self.wall_time > 0 else 0.0
 
-    @cached_property
+    @property
     def slow_reading_age(self) -> float | None:
         """The greatest age (s) that a slow device's reading (light, compass, battery, ...) had at a step of the brain,
         once it had said something; None without such a device."""
-        if self.layout is not None or not self.record.rows(DevicesTelemetry.NAME):
-            return None
-        steps = np.array([index for index, *_ in self.record.steps], dtype=np.intp)
-        slow = [name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)]
-        ages = [values[steps[steps < len(values)]] for values in (self.series.number(name, "age") for name in slow)]
-        known = np.concatenate([values[~np.isnan(values)] for values in ages]) if ages else np.empty(0)
-        return float(known.max()) if len(known) else None
+        return self.overview.slow_reading_age
 
     def table(self) -> Figures:
         """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
@@ -287,7 +293,7 @@ class RunResult(FormerNames):
                 "brain": self.brain,
                 "robot": self.robot.name,
                 "board": self.board,
-                "arena": (self.truth.plan.name if self.truth is not None else self.arena),
+                "arena": self.plan.name if self.has_truth else self.arena,
                 "seed": self.seed,
                 "without": ", ".join(self.without) or None,
                 "run_time_s": round(self.run_time, 3),
@@ -306,7 +312,7 @@ class RunResult(FormerNames):
                 "behavior_switches": None if brain is None else len(brain.behavior_switches),
                 **{f"{name}_share": round(share, 4) for name, share in shares.items()},
                 "ticks": self.ticks,
-                "slow_readings": None if slow_age is None else len(self.record.rows(DevicesTelemetry.NAME)),
+                "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
                 "slow_reading_age_s": _rounded(slow_age, 6),
                 "lost_frames": self.lost_frames if on_board else None,
                 "bad_frames": self.bad_frames if on_board else None,

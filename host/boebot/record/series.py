@@ -41,6 +41,10 @@ class Pose:
         """x (m), y (m), heading (rad) of one of them."""
         return float(self.x[index]), float(self.y[index]), float(self.heading[index])
 
+    def part(self, which: slice | NDArray[np.intp]) -> Pose:
+        """Those of these indices."""
+        return Pose(self.x[which], self.y[which], self.heading[which])
+
     @property
     def length(self) -> float:
         """Of the path (m)."""

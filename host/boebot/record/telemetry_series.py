@@ -31,11 +31,23 @@ TELEMETRY_DTYPE = np.dtype(
 )
 
 
+class Directions:
+    """In which direction each wheel is thought to turn, where its encoder does not say it."""
+
+    def __init__(self) -> None:
+        self.encoder_left = WheelDirection()
+        self.encoder_right = WheelDirection()
+
+
 class TelemetrySeries(Series):
     """A board's telemetry, one entry per control tick received."""
 
-    def __init__(self, record: Record, robot: RobotDescription, tick_s: float) -> None:
+    def __init__(
+        self, record: Record, robot: RobotDescription, tick_s: float, directions: Directions | None = None
+    ) -> None:
+        """`directions`: of the wheels before, where these ticks are not a run's first; they go on with it."""
         super().__init__(record, robot, tick_s, None)
+        self._directions = directions or Directions()
         self._record = record
         self.raw: NDArray[np.void] = np.frombuffer(b"".join(record.telemetry), dtype=TELEMETRY_DTYPE)
         self.status = self.raw["status"]
@@ -127,7 +139,7 @@ class TelemetrySeries(Series):
         edges = np.diff(counts, prepend=counts[0]).astype(np.int32).astype(np.int64)
         edges[self._restarted] = 0  # counts began afresh
         if encoder.LINES == 1:
-            direction = WheelDirection()
+            direction = getattr(self._directions, name)
             steps = np.diff(self.time, prepend=self.time[0])
             edges *= np.array(
                 [direction.update(float(s), float(t)) for s, t in zip(signal, steps, strict=True)],

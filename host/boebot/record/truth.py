@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boebot.arenas.floor_plan import Lateness, floor_plan
+from boebot.arenas.floor_plan import FloorPlan, Lateness, floor_plan
 from boebot.boards import Truth
+from boebot.record.series import Bools, Floats, Pose
 
 if TYPE_CHECKING:
     from boebot.arenas import Arena
@@ -19,7 +21,48 @@ _ROW = np.dtype([(name, "<f8") for name in COLUMNS])
 _WAIT = np.dtype([("shape", "<f8"), ("waited", "<f8")])
 
 
-def truth_of(record: Record, arena: Arena) -> Truth | None:
+@dataclass(frozen=True)
+class Track:
+    """Where the robot was, and whether it touched something.
+
+    Attributes:
+        time: on the transport's clock, s.
+        pose: m, rad.
+        contact: it has touched something since the row before.
+    """
+
+    time: Floats
+    pose: Pose
+    contact: Bools
+
+    def at(self, times: Floats) -> Pose:
+        """The pose at these instants, between rows by interpolation."""
+        heading = np.interp(times, self.time, np.unwrap(self.pose.heading))
+        return Pose(
+            np.interp(times, self.time, self.pose.x),
+            np.interp(times, self.time, self.pose.y),
+            np.arctan2(np.sin(heading), np.cos(heading)),
+        )
+
+    def contact_at(self, times: Floats) -> Bools:
+        """Whether it touched something, in the row at or after each of these instants."""
+        moment = np.searchsorted(self.time, times)
+        return self.contact[np.minimum(moment, len(self.contact) - 1)]
+
+
+def track_of(record: Record) -> Track:
+    """All that is in the record; it may be empty."""
+    rows = record.table("truth", _ROW)
+    return Track(record.times_of("truth"), Pose(rows["x"], rows["y"], rows["heading"]), rows["contact"] > 0)
+
+
+def plan_of(record: Record, arena: Arena) -> FloorPlan:
+    """The arena, with its moving shapes where they were."""
+    begin, end = record.span("truth")
+    return floor_plan(arena, begin, end, lateness(record))
+
+
+def truth_of(record: Record, plan: FloorPlan) -> Truth | None:
     """All of it; None where none was recorded."""
     time, rows = record.times_of("truth"), record.table("truth", _ROW)
     if not len(time):
@@ -32,7 +75,7 @@ def truth_of(record: Record, arena: Arena) -> Truth | None:
         contact=rows["contact"] > 0,
         left_speed=rows["left"],
         right_speed=rows["right"],
-        plan=floor_plan(arena, float(time[0]), float(time[-1]), lateness(record)),
+        plan=plan,
     )
 
 

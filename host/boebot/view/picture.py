@@ -43,10 +43,10 @@ def write(result: RunResult, path: Path) -> Path:
     axes = sheet.axes
     draw_arena(axes, view.plan)
     if record is None:
-        _draw_path(axes, view.path, result.series.time)
+        _draw_path(axes, view.path, result.overview.series.time)
     else:
         assert sheet.panel is not None
-        _draw_behaviors(axes, view.path, result.series.time, record)
+        _draw_behaviors(axes, view.path, result.overview.series.time, record)
         with rc_context({"text.parse_math": False}):
             utility_panel.draw(sheet.panel, record, result.run_time)
     if view.estimate is not None:

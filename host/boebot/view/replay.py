@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from boebot.record.series import Floats, Pose
 
 FORMAT = 6
-FRAMES_AT_MOST = 20_000
 STEPS_AT_MOST = 6_000  # of a brain of processes
 _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
@@ -98,15 +97,14 @@ def _moving(moving: Moving) -> dict[str, Any]:
 
 def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
     """What the page shows of one robot."""
-    series = result.series
-    thin = slice(None, None, max(1, math.ceil(len(series) / FRAMES_AT_MOST)))
+    series = result.overview.series
     status = series.status
     flags = (
         series.flag("whisker_left", "pressed") * LEFT_WHISKER
         | series.flag("whisker_right", "pressed") * RIGHT_WHISKER
         | series.flag("infrared_left", "detected") * LEFT_IR
         | series.flag("infrared_right", "detected") * RIGHT_IR
-        | _contact(result) * CONTACT
+        | result.overview.contact * CONTACT
         | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
         | ((status & int(Status.FALLBACK)) != 0) * FALLBACK
@@ -121,16 +119,16 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "true_contacts": np.round(view.true_contacts, 4).tolist(),
         "touches": np.round(view.touches, 4).tolist(),
         "robot": _robot(result.robot),
-        "time": _array(series.time[thin]),
-        "path": _pose(view.path, thin),
-        "estimate": None if view.estimate is None else _pose(view.estimate, thin),
-        "turret": _array(view.turret[thin]),
-        "left": _array(series.signals[0][thin]),
-        "right": _array(series.signals[1][thin]),
-        "ping": _array(np.nan_to_num(series.number("ping", "distance")[thin], nan=-1.0)),
+        "time": _array(series.time),
+        "path": _pose(view.path),
+        "estimate": None if view.estimate is None else _pose(view.estimate),
+        "turret": _array(view.turret),
+        "left": _array(series.signals[0]),
+        "right": _array(series.signals[1]),
+        "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
         "mind": None if result.brain_record is None else _mind(result.brain_record),
-        "readings": [_reading(readout, thin) for readout in series.readouts()],
-        "flags": _flags(flags[thin]),
+        "readings": [_reading(readout) for readout in series.readouts()],
+        "flags": _flags(flags),
     }
 
 
@@ -160,13 +158,13 @@ def _flags(values: np.ndarray) -> str:
     return base64.b64encode(values.astype(np.uint8).tobytes()).decode("ascii")
 
 
-def _reading(readout: Readout, thin: slice) -> dict[str, Any]:
+def _reading(readout: Readout) -> dict[str, Any]:
     return {
         "name": readout.device.replace("_", " "),
         "unit": readout.unit,
         "digits": readout.digits,
-        "values": _array(readout.values[thin]),
-        "ages": _array(readout.ages[thin]),
+        "values": _array(readout.values),
+        "ages": _array(readout.ages),
     }
 
 
@@ -185,17 +183,8 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
     }
 
 
-def _contact(result: RunResult) -> np.ndarray:
-    """Whether the body touched something, at each tick."""
-    if result.truth is None or not len(result.truth.time):
-        return np.zeros(len(result.series), dtype=np.uint8)
-    moment = np.searchsorted(result.truth.time, result.series.time + result.clock_offset)
-    contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
-    return np.asarray(contact, dtype=np.uint8)
-
-
-def _pose(pose: Pose, thin: slice) -> list[str]:
-    return [_array(values[thin]) for values in (pose.x, pose.y, pose.heading)]
+def _pose(pose: Pose) -> list[str]:
+    return [_array(values) for values in (pose.x, pose.y, pose.heading)]
 
 
 def _points(points: Floats) -> list[list[float]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.record.series import Pose, touch_indices
+from boebot.record.series import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
     from boebot.devices.drawing import Shape
     from boebot.record.result import RunResult
-    from boebot.record.series import Bools, Floats
+    from boebot.record.series import Floats
 
 MARGIN = 0.03  # of the greater side
 OPEN_M = 0.3  # to see around a path in an open field, at least
@@ -51,26 +51,16 @@ class View:
 
 def view(result: RunResult) -> View:
     """The run as the pictures show it."""
-    truth, series = result.truth, result.series
-    known = truth is not None and result.true_pose is not None
-    seen = result.true_pose if result.true_pose is not None else result.odometry
-    path = seen if seen is not None else Pose(*np.zeros((3, len(series))))
-    contacts = np.empty((0, 2))
-    if truth is not None and known:
-        inside = truth.time >= result.clock_offset
-        begins = touch_indices(truth.time, truth.contact & inside)
-        contacts = np.column_stack((truth.x[begins], truth.y[begins]))
-    begins = _onset_indices(
-        np.any([series.flag(name, "pressed") for name in result.whiskers] or [series.time < 0], axis=0)
-    )
-    touches = np.column_stack((path.x[begins], path.y[begins]))
+    few = result.overview
+    series = few.series
+    seen = few.odometry if few.true_pose is None else few.true_pose
     return View(
-        known=known,
-        path=path,
-        estimate=result.placed_odometry,
-        plan=truth.plan if truth is not None else FloorPlan(),
-        true_contacts=contacts,
-        touches=touches,
+        known=few.true_pose is not None,
+        path=Pose(*np.zeros((3, len(series)))) if seen is None else seen,
+        estimate=few.placed_odometry,
+        plan=result.plan if result.has_truth else FloorPlan(),
+        true_contacts=few.contact_places,
+        touches=few.touch_places,
         turret=np.nan_to_num(series.number("turret", "angle"), nan=0.0),
         path_is_seen=seen is not None,
     )
@@ -118,7 +108,3 @@ def _stout(low: Floats, high: Floats) -> tuple[Floats, Floats]:
     size = high - low
     more = np.maximum(0.0, SLIMMEST * float(size.max()) - size) / 2
     return low - more, high + more
-
-
-def _onset_indices(flags: Bools) -> np.ndarray:
-    return np.flatnonzero(flags & ~np.concatenate(([False], flags[:-1])))

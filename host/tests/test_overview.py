@@ -1,0 +1,71 @@
+"""Tests of the overview of a run: by windows of any size it is the same as at once, and few ticks stand for many."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+import boebot
+from boebot.record import windows
+from boebot.record.result import RunResult
+from boebot.record.series import touch_indices, truth_at
+
+RUNS = ("shieldbot-basic", "shieldbot", "shieldbot-charging", "arsim")
+
+
+@cache
+def run_of(robot: str) -> RunResult:
+    result = boebot.run("wander", robot=robot, arena="showcase", seconds=40, seed=7)
+    assert result.overview.series.time[-1] == pytest.approx(40)
+    return result
+
+
+@pytest.mark.parametrize("robot", RUNS)
+@pytest.mark.parametrize("ticks", [1, 7, 1000])
+def test_windows_of_any_size_give_the_same(robot: str, ticks: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = run_of(robot)
+    parts = dataclasses.replace(whole)
+    monkeypatch.setattr(windows, "TICKS", ticks)
+    for name in ("true_contacts", "whisker_touches", "overruns", "dead_man_stops", "fallback_takeovers"):
+        assert getattr(parts.overview, name) == getattr(whole.overview, name), name
+    for name in ("true_distance", "odometry_distance", "slow_reading_age"):
+        assert getattr(parts.overview, name) == pytest.approx(getattr(whole.overview, name), abs=1e-9), name
+    for name in ("true_pose", "odometry"):
+        one, other = getattr(parts.overview, name), getattr(whole.overview, name)
+        assert (one is None) == (other is None)
+        if one is not None:
+            assert np.allclose(dataclasses.astuple(one), dataclasses.astuple(other), atol=1e-9, rtol=0), name
+    assert np.array_equal(parts.overview.contact_places, whole.overview.contact_places)
+    assert np.array_equal(parts.overview.contact, whole.overview.contact)
+
+
+@pytest.mark.parametrize("robot", RUNS)
+def test_figures_are_those_of_the_whole_arrays(robot: str) -> None:
+    result = run_of(robot)
+    few, truth = result.overview, result.truth
+    assert truth is not None and result.true_pose is not None
+    begin, end = result.clock_offset, result.clock_offset + float(result.series.time[-1])
+    inside = (truth.time >= begin) & (truth.time <= end)
+    assert few.true_contacts == len(touch_indices(truth.time[inside], truth.contact[inside]))
+    assert few.true_distance == pytest.approx(truth_at(truth, result.series.time + begin).length)
+    assert few.true_pose is not None and np.array_equal(few.true_pose.x, result.true_pose.x)
+
+
+@pytest.mark.parametrize("robot", RUNS)
+def test_few_ticks_stand_for_many(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = run_of(robot)
+    few = dataclasses.replace(whole)
+    monkeypatch.setattr("boebot.record.overview.POINTS", 300)
+    monkeypatch.setattr(windows, "TICKS", 900)
+    stride = -(-whole.ticks // 300)
+    kept = np.unique(np.append(np.arange(0, whole.ticks, stride), whole.ticks - 1))
+    thin, every = few.overview.series, whole.series
+    assert len(thin) == len(kept) <= 301 and few.table() == pytest.approx(whole.table(), nan_ok=True)
+    assert np.array_equal(thin.time, every.time[kept]) and np.array_equal(thin.raw["tick"], every.raw["tick"][kept])
+    assert thin.commands == [every.commands[index] for index in kept]
+    for mine, theirs in zip(thin.readouts(), every.readouts(), strict=True):
+        assert np.array_equal(mine.values, theirs.values[kept], equal_nan=True), mine.device
+        assert np.allclose(mine.ages, theirs.ages[kept], equal_nan=True, atol=1e-9), mine.device
