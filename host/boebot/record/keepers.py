@@ -10,6 +10,8 @@ from typing import IO, Protocol
 from boebot.record.blocks import Group, Rows, group_of
 from boebot.record.record_file import RecordReader, RecordWriter
 
+WAITING = 4  # groups at most that wait for a disk
+PAUSE_S = 0.005  # between two looks whether it is done
 IN_MEMORY_S = 2.0  # of the wall clock, that a run without a folder writes to no disk
 
 
@@ -49,13 +51,16 @@ class OnDisk:
         writer: for attachments.
     """
 
-    def __init__(self, file: IO[bytes], name: str, *, sync: bool = True) -> None:
-        """Into an empty file that is open for reading and writing; `name`: as errors call it."""
-        self._file, self._name = file, name
+    def __init__(self, file: IO[bytes], name: str, *, waits: bool, sync: bool = True) -> None:
+        """Into an empty file that is open for reading and writing; `name`: as errors call it. `waits`: for a slow disk;
+        else rows wait for it in memory, as on a robot that must not wait."""
+        self._file, self._name, self._waits = file, name, waits
         self.writer = RecordWriter(file, name, sync=sync)
 
     def write(self, rows: Rows, time_s: float) -> None:
         """See `Keeper`."""
+        while self._waits and self.writer.waiting >= WAITING:
+            wall.sleep(PAUSE_S)
         self.writer.write(rows, time_s)
 
     def finish(self) -> None:
@@ -85,7 +90,9 @@ class Finished:
 class Temporary:
     """In memory for the first seconds, then in a temporary file that vanishes with this object, however it ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, waits: bool = True) -> None:
+        """`waits`: as of `OnDisk`."""
+        self._waits = waits
         self._first: list[tuple[Group, float]] = []
         self._until_s = wall.perf_counter() + IN_MEMORY_S
         self._disk: OnDisk | None = None
@@ -97,7 +104,7 @@ class Temporary:
             return
         if self._disk is None:
             file = tempfile.TemporaryFile(prefix="boebot-", buffering=0)  # noqa: SIM115 (closed with this object)
-            self._disk = OnDisk(file, "a temporary file", sync=False)
+            self._disk = OnDisk(file, "a temporary file", waits=self._waits, sync=False)
             for group, at_s in self._first:
                 self._disk.write(group, at_s)
             self._first.clear()

@@ -39,6 +39,7 @@ Append = Callable[[str, float, bytes], None]
 Decoded = TypeVar("Decoded")
 
 EACH_S = 1.0  # wall time that a group spans at most
+STEPS_AT_MOST = 5_000  # steps of the brain in a group: a fast run takes no more memory than a slow one
 KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
 _COMMAND = Struct("<Bdd")
@@ -79,8 +80,8 @@ class Record:
         self._keeper = keeper
 
     def is_due(self) -> bool:
-        """A second of the wall clock has passed since rows were last handed over to be kept."""
-        return wall.perf_counter() >= self._due_s
+        """A second of the wall clock has passed since rows were last handed over to be kept, or there are many."""
+        return wall.perf_counter() >= self._due_s or len(self._rows["command"]) >= STEPS_AT_MOST
 
     def keep(self, time_s: float, more: Group | None = None) -> None:
         """Hands over the rows so far to be kept, as a group; `time_s`: of the run; `more`: of other streams.

@@ -36,19 +36,22 @@ class Recording:
         self._disk: OnDisk | None = None
         self.records: list[Record] = [Record() if recorded else Unrecorded() for _ in range(robots)]
 
-    def begin(self, folder: RunFolder | None, results: Sequence[RunResult], sources: Mapping[str, bytes]) -> None:
+    def begin(
+        self, folder: RunFolder | None, results: Sequence[RunResult], sources: Mapping[str, bytes], *, waits: bool
+    ) -> None:
         """From now on rows go into that folder; None: into a temporary file, once a second of the wall clock is over.
 
         Args:
             results: what is known of the run as it begins.
-            sources: of brains, robots and arena, by file name.
+            sources: of brains, by file name.
+            waits: for a slow disk; False: time does not stand still meanwhile.
 
         Raises:
             BoebotError: the folder cannot be written to.
         """
-        keeper: Keeper = Temporary()
+        keeper: Keeper = Temporary(waits=waits)
         if folder is not None:
-            keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD))
+            keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
                 self._disk.writer.attach(name, data)
             self._disk.writer.attach(BEGIN, say(results), JSON)

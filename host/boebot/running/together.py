@@ -260,7 +260,8 @@ class _Run:
     def _begin_record(self) -> None:
         self._is_recorded = True
         results = [robot.driver.result(None, 0.0) for robot in self._robots if robot.driver is not None]
-        self._recording.begin(self._folder, results, sources([robot.task for robot in self._robots]))
+        waits = not self._robots[0].task.request.realtime
+        self._recording.begin(self._folder, results, sources([robot.task for robot in self._robots]), waits=waits)
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:
