@@ -27,8 +27,8 @@ from boebot.arenas import (
     reference,
 )
 from boebot.arenas.floor_plan import floor_plan, poses_of
-from boebot.arenas.picture import draw
 from boebot.errors import ArenaError
+from boebot.view import arena_picture
 from sim_bridge._core import ffi, lib
 
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs" / "reference").is_dir())
@@ -237,7 +237,7 @@ def test_page_shows_every_arena_and_an_example_that_loads(tmp_path: Path) -> Non
 @pytest.mark.unsanitized
 @pytest.mark.parametrize("name", ["showcase", "empty"])
 def test_picture_is_written(tmp_path: Path, name: str) -> None:
-    assert draw(load_arena(name), tmp_path / "it.png").read_bytes().startswith(b"\x89PNG")
+    assert arena_picture.write(load_arena(name), tmp_path / "it.png").read_bytes().startswith(b"\x89PNG")
 
 
 NUMBERS = [

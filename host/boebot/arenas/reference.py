@@ -119,12 +119,12 @@ def main() -> None:
     if sys.argv[1:] == ["--schema"]:
         (resources.folder("arenas") / "schema.json").write_text(schema(), encoding="utf-8")
     elif sys.argv[1:] == ["--pictures"] and (root := resources.checkout()) is not None:
-        from boebot.arenas.picture import draw
+        from boebot.view import arena_picture
 
         document = root / "docs" / "reference" / "arenas.md"
         document.write_text(page(document.read_text(encoding="utf-8")), encoding="utf-8")
         for name in arena_names():
-            draw(load_arena(name), root / "docs" / "images" / f"arena-{name}.png")
+            arena_picture.write(load_arena(name), root / "docs" / "images" / f"arena-{name}.png")
     else:
         sys.exit(__doc__)
 

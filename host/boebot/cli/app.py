@@ -9,6 +9,7 @@ import typer
 
 import boebot
 from boebot.cli import (
+    arena,
     doctor,
     experiment,
     info,
@@ -39,6 +40,7 @@ app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
 app.command("report")(report.report)
 app.command("list")(names.list_names)
+app.command("arena")(arena.arena)
 app.command("info")(info.info)
 app.command("doctor")(doctor.doctor)
 app.command("teleop", cls=options.Command)(teleop.teleop)

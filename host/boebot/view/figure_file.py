@@ -1,0 +1,56 @@
+"""A drawing as a file, PNG or SVG by its ending: whole or not at all, and the same bytes each time."""
+
+from __future__ import annotations
+
+import contextlib
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from boebot.errors import BoebotError
+from boebot.view import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = (".png", ".svg")
+
+
+def check(path: Path) -> None:
+    """Refuses a file that cannot become a picture, before anything is drawn.
+
+    Raises:
+        BoebotError: its ending is neither .png nor .svg, or its folder does not exist.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise BoebotError(f"{path} is no name of a picture; expected one that ends in {' or '.join(FORMATS)}")
+    if path.is_dir():
+        raise BoebotError(f"{path} is a folder; expected the name of a picture")
+    if not path.parent.is_dir():
+        raise BoebotError(f"there is no folder {path.parent}; expected one that the picture can be written to")
+
+
+def save(figure: Figure, path: Path, title: str) -> Path:
+    """Writes the figure with its title; in an SVG, texts stay texts.
+
+    Raises:
+        BoebotError: see `check`; or the file cannot be written.
+    """
+    check(path)
+    FigureCanvasAgg(figure)
+    kind = path.suffix.lower().removeprefix(".")
+    metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes
+    part = path.with_name(f".part-{path.name}")
+    try:
+        with mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}):
+            figure.savefig(part, format=kind, facecolor=style.PAPER, metadata=metadata)
+        part.replace(path)
+    except OSError as error:
+        raise BoebotError(f"the picture cannot be written to {path}: {error.strerror or error}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
