@@ -93,6 +93,7 @@ pictures:
 	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures
 	@cp build/pictures/run.png docs/images/demo.png
 	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
+	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(PYTHON_VENV) -m tools.experiment_pages

@@ -1,4 +1,4 @@
-"""Tests of `boebot arena`: picture, table, JSON, and what is wrong in one sentence."""
+"""Tests of `boebot arena` and `boebot robot`: picture, table, JSON, and what is wrong in one sentence."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ import pytest
 from PIL import Image
 
 from boebot.arenas import load_arena
+from boebot.description.robots import load_robot, robot_names
+from boebot.description.wiring import connections
+from boebot.devices.battery import BatteryDivider
+from boebot.devices.device import kinds
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, PACK, SERVO_POWER
 from command import boebot
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -57,6 +62,7 @@ def test_arena_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path, monke
             "it.jpg is no name of a picture; expected one that ends in .png",
         ),
         (("arena", "room", "--out", "no/it.png"), "there is no folder no; expected one that the picture"),
+        (("robot", "shieldbott"), "did you mean 'shieldbot'?"),
         (("arena", "room", "--out", "/dev/full/it.png"), "there is no folder /dev/full"),
     ],
 )
@@ -65,3 +71,65 @@ def test_wrong_request_is_one_sentence(
 ) -> None:
     code, out, err = boebot(capsys, *arguments)
     assert (code, out) == (1, "") and sentence in err and err.count("\n") == 1
+
+
+def test_robot_is_shown_with_its_wiring(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = boebot(capsys, "robot", "boebot")
+    assert (code, err) == (0, "") and "A3" in out and "servo port 13" in out
+    written, wires = texts(Path("robot-boebot.svg")), connections(load_robot("boebot"))
+    assert all({wire.device, wire.to, wire.part, wire.connector} - {""} <= written for wire in wires)
+    assert {wire.pin for wire in wires} - {GROUND} <= written  # ground is a sign
+    monkeypatch.setenv("COLUMNS", "120")
+    code, out, err = boebot(capsys, "robot", "shieldbot", "--out", "it.svg")
+    assert (code, err) == (0, "") and "buzzer (off)" in out
+    assert "ping" in texts(Path("it.svg")) and "buzzer" not in texts(Path("it.svg"))
+
+
+def test_robot_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, "robot", "shieldbot-basic", "--json")
+    assert (code, err) == (0, "")
+    shown, robot = json.loads(out), load_robot("shieldbot-basic")
+    assert shown["free_pins"] == ["A1", "A2", "A3"]
+    assert {row["name"]: row["on"] for row in shown["devices"]} == {name: one.on for name, one in robot.device.items()}
+    assert {"device": "light_left", "on": True, "pin": "8", "colour": "", "part": "1 kΩ", "to": "collector",
+            "connector": "breadboard"} in shown["wiring"]  # fmt: skip
+
+
+def test_robot_without_a_board_is_shown_without_wiring(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sensors = "".join(
+        f"[device.eye_{number}]\ntype = 'sonar'\nposition_m = [0, 0.1]\nheading_rad = 1\n" for number in range(20)
+    )
+    (tmp_path / "many.toml").write_text(f"extends = 'arsim'\nname = '$x_1$ & <b>'\ntitle = '{'long ' * 30}'\n{sensors}")
+    monkeypatch.chdir(tmp_path)
+    code, out, err = boebot(capsys, "robot", "many.toml")
+    assert (code, err) == (0, "") and "eye_19" in out and "pin" not in out
+    assert {"eye_0, up to 3 m", "eye_19, up to 3 m"} <= texts(Path("robot-many.svg"))
+    assert any(text.startswith("$x_1$ & <b>: long") for text in texts(Path("robot-many.svg")))
+
+
+def test_every_pin_of_every_kind_of_device_has_its_wire() -> None:
+    supplies = {FIVE_VOLTS, GROUND, PACK, SERVO_POWER}
+    seen = set()
+    for name in robot_names():
+        for device in load_robot(name).device.values():
+            pins = [wire.pin for wire in device.wires() if wire.pin not in supplies]
+            assert sorted(pins) == sorted(device.PINS)
+            seen.add(type(device))
+    assert {kind for kind in kinds() if kind.PINS} <= seen
+
+
+def test_servos_are_powered_as_the_supply_says() -> None:
+    for name, power in (("shieldbot", FIVE_VOLTS), ("boebot", PACK)):
+        assert [wire.pin for wire in connections(load_robot(name)) if wire.to == "power" and wire.on][:2] == [power] * 2
+
+
+@pytest.mark.parametrize("ratio", [1.5, 2.0, 3.0])
+def test_battery_is_divided_by_its_ratio(ratio: float) -> None:
+    wires = {wire.pin: wire.part for wire in BatteryDivider(pin="A0", ratio=ratio).wires()}
+    upper, lower = (float(wires[pin].removesuffix(" kΩ")) for pin in (PACK, GROUND))
+    assert (upper + lower) / lower == ratio

@@ -20,6 +20,7 @@ from boebot.cli import (
     output,
     parameters,
     report,
+    robot,
     run,
     serve,
     teleop,
@@ -41,6 +42,7 @@ app.command("serve", cls=options.Command)(serve.serve)
 app.command("report")(report.report)
 app.command("list")(names.list_names)
 app.command("arena")(arena.arena)
+app.command("robot")(robot.robot)
 app.command("info")(info.info)
 app.command("doctor")(doctor.doctor)
 app.command("teleop", cls=options.Command)(teleop.teleop)

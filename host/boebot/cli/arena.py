@@ -60,7 +60,7 @@ def arena(
         return
     output.print_table(
         {
-            "arena": loaded.name,
+            "name": loaded.name,
             "title": plan.title or None,
             "size": "open field" if size is None else f"{size[0]:g} m x {size[1]:g} m",
             "start": f"x {x:g} m, y {y:g} m, heading {math.degrees(heading):.0f}°",

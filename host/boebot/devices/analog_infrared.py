@@ -3,8 +3,6 @@
 V ≈ 33.9 / (d + 4.74)   with d in cm, from 10 to 80 cm; so   d = 33.9 / V - 4.74.
 Nearer than 10 cm the voltage falls again: things there look farther away than they are.
 
-Wiring: 5 V, ground, the output to an analog pin.
-
     [device.analog_infrared]
     type = "analog_infrared"
     pin = "A2"
@@ -23,6 +21,7 @@ from boebot.devices.analog import READ_TICKS, voltage
 from boebot.devices.device import ANALOG_PINS, Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Ray, Shape
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import DevicesTelemetry
 
 SCALE_V_M = 0.339
@@ -62,6 +61,11 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
     READING: ClassVar = AnalogInfrared
     NAMES: ClassVar[tuple[str, ...]] = ("analog_infrared",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("pin", "1 output"),
+        Wire(GROUND, "2 ground"),
+        Wire(FIVE_VOLTS, "3 supply"),
+    )
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     COLUMNS: ClassVar = (("distance", "m", 4),)

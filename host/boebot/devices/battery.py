@@ -4,8 +4,6 @@ voltage = ratio · result / 1024 · supply
 
 In a robot without a board the notes' energy (section 1.9), read as a voltage.
 
-Wiring: two equal resistors from the pack to ground, their middle to an analog pin.
-
     [device.battery]
     type = "battery"
     pin = "A0"
@@ -34,8 +32,10 @@ from boebot.devices.device import (
 )
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import GROUND, PACK, Wire
 from boebot.link.messages import DevicesTelemetry
 
+LOWER_KOHM = 10.0  # of the divider: the converter wants a source of 10 kΩ or less (data sheet, 24.6.1)
 LEAST_V = 4.5  # of the pack; with less the servos hardly turn
 
 
@@ -63,6 +63,14 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     COLUMNS: ClassVar = (("voltage", "v", 3),)
     SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
+
+    def wires(self) -> tuple[Wire, ...]:
+        """Two resistors from the pack to ground, and their middle to the pin: two equal ones halve the voltage."""
+        pin = Wire("pin", "middle")
+        if self.ratio == 1:
+            return pin, Wire(PACK, "middle")
+        upper_kohm = (self.ratio - 1) * LOWER_KOHM
+        return pin, Wire(PACK, "middle", part=f"{upper_kohm:g} kΩ"), Wire(GROUND, "middle", part=f"{LOWER_KOHM:g} kΩ")
 
     def checkup(self, readings: Sequence[Battery]) -> Checkup:
         """See `Device`."""

@@ -2,8 +2,6 @@
 
 A message may be lost: it is sent again, unchanged, until devices_telemetry brings its token back.
 
-Wiring: a piezo speaker from the pin to ground.
-
     [device.buzzer]
     type = "buzzer"
     pin = 4
@@ -18,6 +16,7 @@ from typing import ClassVar, NamedTuple
 
 from boebot.devices.device import Checkup, Place, Reader, SlowDevice
 from boebot.devices.latest import Latest, fresh_ticks
+from boebot.devices.wiring import GROUND, Wire
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import DevicesTelemetry
 
@@ -64,6 +63,7 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
     READING: ClassVar = Buzzer
     NAMES: ClassVar[tuple[str, ...]] = ("buzzer",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "+"), Wire(GROUND, "-"))
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
     COLUMNS: ClassVar = (("token", "", 0),)
     SHOWN: ClassVar = ("token", "tones", 1.0, 0)

@@ -4,8 +4,6 @@ With the sensor level the field's horizontal part points to magnetic north, so t
 counter-clockwise, is   heading = atan2(-(y - y0), x - x0)   with (x0, y0) the field of the robot itself (hard iron).
 In a robot without a board it is the notes' compass (section 1.8), with the heading from the x axis.
 
-Wiring: SDA to A4, SCL to A5.
-
     [device.compass]
     type = "compass"
     sda_pin = "A4"
@@ -25,6 +23,7 @@ import msgspec
 from boebot.devices.device import Checkup, NotNegative, Place, Reader, Sensor, SlowDevice
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import CompassStatus, DevicesTelemetry
 
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
@@ -59,6 +58,12 @@ class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
     READING: ClassVar = Compass
     NAMES: ClassVar[tuple[str, ...]] = ("compass",)
     PINS: ClassVar[dict[str, str]] = {"sda_pin": "sda", "scl_pin": "scl"}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("sda_pin", "SDA"),
+        Wire("scl_pin", "SCL"),
+        Wire(FIVE_VOLTS, "VIN"),
+        Wire(GROUND, "GND"),
+    )
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
     COLUMNS: ClassVar = (("heading", "rad", 5),)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.devices.latest import Latest
+from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
 
 if TYPE_CHECKING:
@@ -156,6 +157,8 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     PINS: ClassVar[dict[str, str]] = {}  # key of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that can do it
+    WIRES: ClassVar[tuple[Wire, ...]] = ()  # of a board's device: between board and device
+    CONNECTOR: ClassVar[str] = BREADBOARD  # where they are plugged in
     COLUMNS: ClassVar[tuple[tuple[str, str, int | None], ...]] = ()
     """Field of the reading, unit and digits of its column in run.csv."""
     SHOWN: ClassVar[tuple[str, str, float, int] | None] = None
@@ -168,6 +171,15 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     def pins(self) -> dict[str, int]:
         """Role of each pin ("" for a device with one pin) and its Arduino number."""
         return {role: pin_number(getattr(self, key)) for key, role in self.PINS.items()}
+
+    def wires(self) -> tuple[Wire, ...]:
+        """Its wires; none without a board."""
+        return self.WIRES
+
+    @property
+    def connector(self) -> str:
+        """Where its wires are plugged in on the board."""
+        return self.CONNECTOR
 
     def reader(self, place: Place) -> Reader:
         """What makes its reading; for kinds that have one."""

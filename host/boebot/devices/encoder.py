@@ -3,7 +3,7 @@
     distance = 2 pi r n / N,   speed = 2 pi r / (N t_edge)
 A single-channel encoder knows no direction: its count only grows, its speed is never negative.
 
-Wiring: each output to a pin of port C (A0 to A5), whose interrupt stamps the edges.
+The pins are of port C (A0 to A5), whose interrupt stamps the edges.
 
     [device.encoder_left]
     type = "encoder"
@@ -22,9 +22,11 @@ from typing import Annotated, ClassVar, NamedTuple
 import msgspec
 
 from boebot.devices.device import ANALOG_PINS, Checkup, Column, Device, Place, Reader, Run
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import Status, Telemetry
 
 EDGE_PERIOD_SCALE = 16e-6  # seconds per count of the edge periods on the wire
+_POWER = (Wire(FIVE_VOLTS, "supply"), Wire(GROUND, "ground"))
 
 
 class Encoder(NamedTuple):
@@ -101,6 +103,7 @@ class SingleEncoder(WheelEncoder, tag="encoder", frozen=True, kw_only=True):
 
     LINES: ClassVar[int] = 1
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "output"), *_POWER)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
 
 
@@ -112,6 +115,7 @@ class QuadratureEncoder(WheelEncoder, tag="quadrature_encoder", frozen=True, kw_
 
     LINES: ClassVar[int] = 2
     PINS: ClassVar[dict[str, str]] = {"pin_a": "a", "pin_b": "b"}
+    WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin_a", "output A"), Wire("pin_b", "output B"), *_POWER)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin_a": ANALOG_PINS, "pin_b": ANALOG_PINS}
 
     def fault(self) -> tuple[str, str] | None:

@@ -6,8 +6,6 @@ every few ticks; between two readings the last one stands, with its age. With `s
 show it (zones of a few centimetres: Parallax, "Robotics with the Board of Education Shield for Arduino", chapter 8).
 A robot without a board has the notes' IR proximity sensor, (3.9) to (3.14): a number from 0 to 1.
 
-Wiring: LED with 2 kOhm from `led_pin` to ground, the receiver's output to `receiver_pin`.
-
     [device.infrared_left]
     type = "infrared_pair"
     led_pin = 9
@@ -48,6 +46,7 @@ from boebot.devices.device import (
 from boebot.devices.drawing import Cone, Shape
 from boebot.devices.latest import NEVER, STALE_PERIODS, Latest
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import DevicesTelemetry, Telemetry
 from boebot.link.messages import Infrared as Bits
 
@@ -86,6 +85,13 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "infrared"
     NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
     PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("led_pin", "LED +", part="2 kΩ"),  # less: it reaches farther
+        Wire(GROUND, "LED -"),
+        Wire("receiver_pin", "receiver output", part="220 Ω"),
+        Wire(FIVE_VOLTS, "receiver supply"),
+        Wire(GROUND, "receiver ground"),
+    )
     NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
 
     def checkup(self, readings: Sequence[Infrared]) -> Checkup:

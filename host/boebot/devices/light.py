@@ -4,8 +4,7 @@ On a board a phototransistor discharges a capacitor; the time that it takes is t
 current of the phototransistor is proportional to the light, so   brightness ∝ 1 / decay time.
 In a robot without a board the irradiance itself is read, by section 1.9 of the notes.
 
-Wiring (Robotics with the Board of Education Shield, chapter 6): the phototransistor and 0.1 uF side by side from the
-pin to ground, 220 Ohm before the pin.
+Capacitor and phototransistor stand side by side (Robotics with the Board of Education Shield, chapter 6).
 
     [device.light_left]
     type = "light_sensor"
@@ -36,6 +35,7 @@ from boebot.devices.device import (
 from boebot.devices.drawing import Shape, Spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import GROUND, Wire
 from boebot.link.messages import DevicesTelemetry
 
 LONGEST_US = 14_000  # on the wire: this time or longer
@@ -69,6 +69,11 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "lights"
     NAMES: ClassVar[tuple[str, ...]] = ("light_left", "light_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("pin", "collector", part="1 kΩ"),
+        Wire(GROUND, "collector", part="0.1 µF"),
+        Wire(GROUND, "emitter"),
+    )
     # Port D has its own pin-change interrupt; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
     COLUMNS: ClassVar = (("decay_time", "s", 6),)

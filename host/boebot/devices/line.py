@@ -3,8 +3,6 @@
 The phototransistor discharges a capacitor; over a bright floor soon, over a dark line late. So a decay time above the
 sensor's threshold is a dark floor. In a robot without a board the floor's reflectance itself is read.
 
-Wiring: white to 5 V, black to ground, red to the pin (Parallax, "QTI Sensor", document 555-27401).
-
     [device.line_left]
     type = "line_sensor"
     pin = 7
@@ -24,6 +22,7 @@ from boebot.devices.device import Checkup, NotNegative, Place, Point, Reader, Se
 from boebot.devices.drawing import Shape, Spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -55,6 +54,11 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "lines"
     NAMES: ClassVar[tuple[str, ...]] = ("line_left", "line_middle", "line_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (  # Parallax, "QTI Sensor", document 555-27401
+        Wire("pin", "R", "red"),
+        Wire(FIVE_VOLTS, "W", "white"),
+        Wire(GROUND, "B", "black"),
+    )
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port D": "line sensors"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": tuple(range(8))}
     MESSAGE: ClassVar[type] = LineTelemetry

@@ -4,7 +4,7 @@ distance = c · echo / 2,   c = 331.5 m/s + 0.6 m/(s K) · temperature
 
 A robot without a board has the notes' sonar (section 1.6): a distance, or nothing heard.
 
-Wiring: 5 V, ground, and the signal on pin 8, the timer's capture input.
+Its signal is on pin 8, the timer's capture input.
 
     [device.ping]
     type = "ping"
@@ -45,6 +45,7 @@ from boebot.devices.device import (
 from boebot.devices.drawing import Cone, Shape
 from boebot.devices.latest import NEVER, STALE_PERIODS
 from boebot.devices.readings import Readings
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import PingStatus, Telemetry
 
 TEMPERATURE_C = 20.0
@@ -91,6 +92,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     READING: ClassVar = Ping
     NAMES: ClassVar[tuple[str, ...]] = ("ping",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "SIG"), Wire(FIVE_VOLTS, "5 V"), Wire(GROUND, "GND"))
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
 

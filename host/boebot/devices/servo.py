@@ -2,7 +2,7 @@
 
 pulse = centre + gain · signal,   signal = (pulse - centre) / gain
 
-What a brain reads is the pulse that the firmware sends now. Wiring: the signal to one of the pins 8 to 13.
+What a brain reads is the pulse that the firmware sends now. Pins 8 to 13 can do it.
 
     [device.servo_left]
     type = "continuous_servo"
@@ -21,6 +21,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import msgspec
 
 from boebot.devices.device import Checkup, Column, Device, Place, Reader, Run
+from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire
@@ -50,8 +51,14 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     GROUP: ClassVar[str] = "servos"
     NAMES: ClassVar[tuple[str, ...]] = ("servo_left", "servo_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+
+    @property
+    def connector(self) -> str:
+        """See `Device`."""
+        return servo_socket(self.pins()[""])
 
     def checkup(self, readings: Sequence[Servo]) -> Checkup:
         """See `Device`."""

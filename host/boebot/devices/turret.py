@@ -2,7 +2,7 @@
 
 pulse = centre + gain · angle,   angle = (pulse - centre) / gain
 
-Wiring: the signal to one of the pins 8 to 13. A Ping is mounted on it, where there is one.
+Pins 8 to 13 can do it. A Ping is mounted on it, where there is one.
 
     [device.turret]
     type = "position_servo"
@@ -25,6 +25,7 @@ from boebot.devices.device import Checkup, Place, Point, Reader, SlowDevice
 from boebot.devices.drawing import Axis, Shape
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
+from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
 from boebot.link.messages import DevicesTelemetry
 from boebot.link.messages import Turret as TurretMessage
 
@@ -70,6 +71,7 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
     READING: ClassVar = Turret
     NAMES: ClassVar[tuple[str, ...]] = ("turret",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
     COLUMNS: ClassVar = (("angle", "rad", 4),)
@@ -81,6 +83,11 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
             return 0
         pulse_us = self.centre_us + self.gain_us_per_rad * message.angle * ANGLE_SCALE
         return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
+
+    @property
+    def connector(self) -> str:
+        """See `Device`."""
+        return servo_socket(self.pins()[""])
 
     def checkup(self, readings: Sequence[Turret]) -> Checkup:
         """See `Device`."""

@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar
 import msgspec
 
 from boebot.devices.device import Device
+from boebot.devices.wiring import Wire
 
 
 class Uart(Device, tag="uart", frozen=True, kw_only=True):
@@ -25,5 +26,10 @@ class Uart(Device, tag="uart", frozen=True, kw_only=True):
 
     NAMES: ClassVar[tuple[str, ...]] = ("uart",)
     PINS: ClassVar[dict[str, str]] = {"receive_pin": "receive", "transmit_pin": "transmit"}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("receive_pin", "from the host", part="USB chip"),
+        Wire("transmit_pin", "to the host", part="USB chip"),
+    )
+    CONNECTOR: ClassVar[str] = "USB socket"
     NEEDS: ClassVar[dict[str, str]] = {"USART0": ""}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"receive_pin": (0,), "transmit_pin": (1,)}

@@ -1,7 +1,8 @@
 """Whiskers: wires that touch something or not.
 
-On a board each closes a switch to ground when it is bent (its pin pulled up, 10 kOhm to the contact); the firmware
-debounces it and samples it in every tick. In a robot without a board it is a segment that touches something.
+On a board each closes a switch to ground when it is bent: the wire, grounded by its screw, meets a post that a resistor
+pulls up (Robotics with the Board of Education Shield, chapter 5). The firmware debounces it and samples it in every
+tick. In a robot without a board it is a segment that touches something.
 
     [device.whisker_left]
     type = "whisker"
@@ -19,6 +20,7 @@ from typing import ClassVar, Final, NamedTuple
 
 from boebot.devices.device import Checkup, Column, Device, Place, Point, Reader, Run, VehicleDevice
 from boebot.devices.drawing import Shape, Stroke
+from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import Whiskers
 
 
@@ -48,6 +50,11 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "whiskers"
     NAMES: ClassVar[tuple[str, ...]] = ("whisker_left", "whisker_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("pin", "post", part="220 Ω"),
+        Wire(FIVE_VOLTS, "post", part="10 kΩ"),
+        Wire(GROUND, "whisker", part="its screw"),
+    )
 
     def checkup(self, readings: Sequence[Whisker]) -> Checkup:
         """See `Device`."""

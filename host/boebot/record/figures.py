@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-_UNIT = re.compile(r"_(m_s|ms|m|s|us|hz|bytes|v|ppm|cycles|percent)$")
+_UNIT = re.compile(r"_(m_s|ms|m|s|kg|us|hz|bytes|v|ppm|cycles|percent)$")
 _UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs", "percent": "%"}
 
 
