@@ -98,18 +98,21 @@ def test_robot_as_json(capsys: pytest.CaptureFixture[str]) -> None:
             "connector": "breadboard"} in shown["wiring"]  # fmt: skip
 
 
+@pytest.mark.filterwarnings("error:Glyph")
 def test_robot_without_a_board_is_shown_without_wiring(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sensors = "".join(
         f"[device.eye_{number}]\ntype = 'sonar'\nposition_m = [0, 0.1]\nheading_rad = 1\n" for number in range(20)
     )
-    (tmp_path / "many.toml").write_text(f"extends = 'arsim'\nname = '$x_1$ & <b>'\ntitle = '{'long ' * 30}'\n{sensors}")
+    (tmp_path / "many.toml").write_text(
+        f"extends = 'arsim'\nname = '$x_1$ & <b>'\ntitle = '房 {'long ' * 30}'\n{sensors}"
+    )
     monkeypatch.chdir(tmp_path)
     code, out, err = boebot(capsys, "robot", "many.toml")
     assert (code, err) == (0, "") and "eye_19" in out and "pin" not in out
     assert {"eye_0, up to 3 m", "eye_19, up to 3 m"} <= texts(Path("robot-many.svg"))
-    assert any(text.startswith("$x_1$ & <b>: long") for text in texts(Path("robot-many.svg")))
+    assert any(text.startswith("$x_1$ & <b>: 房 long") for text in texts(Path("robot-many.svg")))
 
 
 def test_every_pin_of_every_kind_of_device_has_its_wire() -> None:

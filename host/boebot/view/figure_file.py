@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -45,7 +46,11 @@ def save(figure: Figure, path: Path, title: str) -> Path:
     metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes
     part = path.with_name(f".part-{path.name}")
     try:
-        with mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}):
+        with (
+            warnings.catch_warnings(),
+            mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}),
+        ):
+            warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
             figure.savefig(part, format=kind, facecolor=style.PAPER, metadata=metadata)
         part.replace(path)
     except OSError as error:
