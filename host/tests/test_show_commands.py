@@ -15,6 +15,7 @@ from boebot.description.wiring import connections
 from boebot.devices.battery import BatteryDivider
 from boebot.devices.device import kinds
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, PACK, SERVO_POWER
+from boebot.view import robot_picture
 from command import boebot
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -136,3 +137,9 @@ def test_battery_is_divided_by_its_ratio(ratio: float) -> None:
     wires = {wire.pin: wire.part for wire in BatteryDivider(pin="A0", ratio=ratio).wires()}
     upper, lower = (float(wires[pin].removesuffix(" kΩ")) for pin in (PACK, GROUND))
     assert (upper + lower) / lower == ratio
+
+
+def test_picture_in_the_docs_is_of_this_kit(tmp_path: Path) -> None:
+    """`make pictures` renews it."""
+    shown = Path(__file__).parents[2] / "docs" / "images" / "robot-shieldbot.svg"
+    assert texts(shown) == texts(robot_picture.write(load_robot("shieldbot"), tmp_path / "now.svg"))
