@@ -50,7 +50,8 @@ def write(result: RunResult, path: Path) -> Path:
         with rc_context({"text.parse_math": False}):
             utility_panel.draw(sheet.panel, record, result.run_time)
     if view.estimate is not None:
-        axes.plot(view.estimate.x, view.estimate.y, color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
+        thin = slice(None, None, max(1, len(view.estimate.x) // SEGMENTS_MAXIMUM))  # each dash takes memory
+        axes.plot(view.estimate.x[thin], view.estimate.y[thin], color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
         _draw_ghost(axes, result.robot.body, view.estimate)
     draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
