@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import time as wall
 from collections.abc import Iterator
 from typing import IO, Protocol
 
 from boebot.record.blocks import Group, Rows, group_of
-from boebot.record.record_file import RecordReader, RecordWriter
+from boebot.record.record_file import RecordError, RecordReader, RecordWriter
 
 WAITING = 4  # groups at most that wait for a disk
 PAUSE_S = 0.005  # between two looks whether it is done
@@ -114,7 +115,8 @@ class Temporary:
         """See `Keeper`."""
         if self._disk is None:
             return iter([group for group, _ in self._first])
-        self._disk.finish()
+        with contextlib.suppress(RecordError):  # the run has ended by it; what is there can be read
+            self._disk.finish()
         return self._disk.groups()
 
 
