@@ -19,6 +19,7 @@ from boebot.cli import (
     options,
     output,
     parameters,
+    plot,
     report,
     robot,
     run,
@@ -40,6 +41,7 @@ app = typer.Typer(
 app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
 app.command("report")(report.report)
+app.command("plot")(plot.plot)
 app.command("list")(names.list_names)
 app.command("arena")(arena.arena)
 app.command("robot")(robot.robot)
