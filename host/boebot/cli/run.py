@@ -11,6 +11,7 @@ import typer
 
 from boebot.brains import bundled
 from boebot.cli import options, output, quantity
+from boebot.cli.again import run_again
 from boebot.cli.ending import end, end_together
 from boebot.errors import BoebotError
 from boebot.record import run_folder
@@ -40,14 +41,15 @@ from top to bottom; with --brain, one of several behaviors."""
 
 
 def run(
+    context: typer.Context,
     brain: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="BRAIN",
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
             "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
         ),
-    ],
+    ] = None,
     on: options.RunOn = None,
     robot: Annotated[
         list[str] | None,
@@ -92,9 +94,23 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),
     ] = None,
+    repeated: Annotated[
+        Path | None,
+        typer.Option(
+            "--again",
+            metavar="DIR",
+            help="In place of a brain: repeat the simulated run in that folder, and say where it differs.",
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """See `_HELP`."""
+    if repeated is not None:
+        _check_alone(context)
+        run_again(repeated, json)
+        return
+    if not brain:
+        raise typer.BadParameter("expected a BRAIN, or --again DIR", context)
     ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
@@ -144,6 +160,17 @@ def _end(result: RunResult | TogetherResult, out: Path | None, json: bool) -> No
         end_together(result, out, json)
     else:
         end(result, out, json)
+
+
+def _check_alone(context: typer.Context) -> None:
+    """Raises a usage error where --again has other arguments beside it than --json."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    others = sorted(given - {"repeated", "json"})
+    if others:
+        raise typer.BadParameter(
+            f"--again repeats a run as it was; expected no {others[0].replace('_', '-')} beside it", context
+        )
 
 
 def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:

@@ -8,15 +8,20 @@ before (experiment E68); `replayed` goes further and asks a brain anew what it w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from boebot import brains
 from boebot.errors import BoebotError
 from boebot.link.messages import DevicesTelemetry, Telemetry
+from boebot.record.blocks import Row
 from boebot.record.result import RunResult
 from boebot.robot import Command, Equipment, Observation, Robot
 
 NOT_SEEN = frozenset(("setpoint_sequence",))
 """Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
+
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "waits")
+"""Streams whose times are of the transport's clock, or near it."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,50 @@ def command_difference(one: RunResult, other: RunResult) -> Difference | None:
         if a[1:] != b[1:]:
             return Difference(step, a[0], "command", Command(*a[1:]), Command(*b[1:]))
     return None
+
+
+@dataclass(frozen=True)
+class RowDifference:
+    """Where the records of two runs differ first."""
+
+    stream: str
+    time: float
+    """of the run, in s"""
+    row: int
+    """of the stream, from 0"""
+    what: str
+    """what differs there, in words: of the first record, and of the second"""
+
+    def __str__(self) -> str:
+        return f"stream {self.stream}, {self.time:.4f} s, row {self.row}: {self.what}"
+
+
+def record_difference(one: RunResult, other: RunResult, *, is_cut: bool = False) -> RowDifference | None:
+    """The first row, in time, that two records do not have in common, bit for bit. `is_cut`: the first record is; what
+    the second one has beyond its end is no difference."""
+    found = []
+    for stream in sorted(one.record.streams() | other.record.streams()):
+        offset_s = one.clock_offset if stream in _OTHER_CLOCKS else 0.0
+        rows = zip_longest(one.record.each_row(stream), other.record.each_row(stream))
+        for index, (a, b) in enumerate(rows):
+            if a is None and is_cut:
+                break
+            if a != b:
+                time_s = min(row[0] for row in (a, b) if row is not None) - offset_s
+                found.append(RowDifference(stream, time_s, index, _in_words(a, b)))
+                break
+    return min(found, key=lambda difference: difference.time, default=None)
+
+
+def _in_words(one: Row | None, other: Row | None) -> str:
+    if one is None or other is None:
+        return f"only the {'second' if one is None else 'first'} has it"
+    if one[0] != other[0]:
+        return f"its time is {one[0]!r} s and {other[0]!r} s"
+    if len(one[1]) != len(other[1]):
+        return f"it has {len(one[1])} B and {len(other[1])} B"
+    index = next(index for index, (a, b) in enumerate(zip(one[1], other[1], strict=True)) if a != b)
+    return f"its byte {index} is 0x{one[1][index]:02X} and 0x{other[1][index]:02X}"
 
 
 def replayed(result: RunResult, brain: object) -> list[Command]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import json
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import msgspec
 
@@ -31,12 +31,7 @@ def read_run(path: str | Path) -> RunResult | TogetherResult:
     Raises:
         BoebotError: there is no record, or it is none of a run, or too short to say whose it is.
     """
-    file = Path(path) / RECORD if Path(path).is_dir() else Path(path)
-    try:
-        opened = file.open("rb")
-    except OSError as error:
-        what = "there is no record of a run" if error.errno == errno.ENOENT else error.strerror or error
-        raise RecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
+    file, opened = _opened(path)
     reader = RecordReader(opened, str(file)).read()
     said = _said(reader, file)
     keeper = Finished(opened, str(file))
@@ -57,6 +52,22 @@ def read_run(path: str | Path) -> RunResult | TogetherResult:
         return results[0]
     ended = next((result.error for result in results if result.error is not None), None)
     return TogetherResult(robots=results, error=ended)
+
+
+def attachments_of(path: str | Path) -> dict[str, bytes]:
+    """What is attached to a record, by name. Raises as `read_run`."""
+    file, opened = _opened(path)
+    with opened:
+        return dict(RecordReader(opened, str(file)).read().attachments)
+
+
+def _opened(path: str | Path) -> tuple[Path, IO[bytes]]:
+    file = Path(path) / RECORD if Path(path).is_dir() else Path(path)
+    try:
+        return file, file.open("rb")
+    except OSError as error:
+        what = "there is no record of a run" if error.errno == errno.ENOENT else error.strerror or error
+        raise RecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
 
 
 def _said(reader: RecordReader, file: Path) -> dict[str, Any]:

@@ -140,7 +140,16 @@ class Record:
 
     def rows(self, stream: str) -> list[Row]:
         """The rows of a stream, oldest first."""
-        return [row for block in self._blocks(stream) for row in block.rows()]
+        return list(self.each_row(stream))
+
+    def each_row(self, stream: str) -> Iterator[Row]:
+        """The same one by one: never all of them in memory."""
+        for block in self._blocks(stream):
+            yield from block.rows()
+
+    def streams(self) -> set[str]:
+        """Names of those that have rows."""
+        return {name for group in self.groups() for name in group}
 
     def table(self, stream: str, dtype: np.dtype[Any]) -> NDArray[Any]:
         """The rows of a stream whose rows all have this form, shape (rows,)."""

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -37,13 +37,20 @@ class Recording:
         self.records: list[Record] = [Record() if recorded else Unrecorded() for _ in range(robots)]
 
     def begin(
-        self, folder: RunFolder | None, results: Sequence[RunResult], sources: Mapping[str, bytes], *, waits: bool
+        self,
+        folder: RunFolder | None,
+        results: Sequence[RunResult],
+        sources: Mapping[str, bytes],
+        requested: Mapping[str, Any],
+        *,
+        waits: bool,
     ) -> None:
         """From now on rows go into that folder; None: into a temporary file, once a second of the wall clock is over.
 
         Args:
             results: what is known of the run as it begins.
             sources: of brains, by file name.
+            requested: what was asked for, as values of JSON.
             waits: for a slow disk; False: time does not stand still meanwhile.
 
         Raises:
@@ -54,7 +61,7 @@ class Recording:
             keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
                 self._disk.writer.attach(name, data)
-            self._disk.writer.attach(BEGIN, say(results), JSON)
+            self._disk.writer.attach(BEGIN, say(results, requested), JSON)
         for number, record in enumerate(self.records, 1):
             record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
 
@@ -70,11 +77,11 @@ class Recording:
         return None
 
 
-def say(results: Sequence[RunResult]) -> bytes:
-    """What a record says of a run, as JSON."""
+def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None) -> bytes:
+    """What a record says of a run, as JSON; as it begins, also what was requested."""
     from boebot.record.facts import facts_of
 
-    said = {
+    said: dict[str, Any] = {
         "format": FORMAT,
         "versions": {"boebot": version("boebot"), "python": platform.python_version()},
         "command_line": sys.argv,
@@ -82,4 +89,6 @@ def say(results: Sequence[RunResult]) -> bytes:
         "arena": next((result.world.description for result in results if result.world is not None), None),
         "robots": [facts_of(result) for result in results],
     }
+    if requested is not None:
+        said["request"] = requested
     return json.dumps(msgspec.to_builtins(said), indent=1).encode()

@@ -112,7 +112,8 @@ def execute(
         try:
             driver = driver_of(session, task)
             waits = session.arena is not None and not request.realtime
-            recording.begin(folder, [driver.result(None, 0.0)], sources([task]), waits=waits)
+            begun = [driver.result(None, 0.0)]
+            recording.begin(folder, begun, sources([task]), request.said([task]), waits=waits)
             result = _drive(driver, task, unended)
             result.error = recording.end([result]) or result.error
             return result

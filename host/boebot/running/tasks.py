@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
@@ -108,6 +109,29 @@ class Request:
         for member in self.members:
             expect("members", member, "a list of boebot.Member", Member)
 
+    def said(self, tasks: Sequence[Task]) -> dict[str, Any]:
+        """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
+        those of its robots."""
+        arena = None if self.arena is None else str(self.arena)
+        return {
+            "arena": str(Path(arena).resolve()) if arena is not None and Path(arena).is_file() else arena,
+            "on": self.on,
+            "seconds": self.seconds if math.isfinite(self.seconds) else None,
+            "seed": self.seed,
+            "realtime": self.realtime,
+            "force_timing": self.force_timing,
+            "members": [
+                {
+                    "brain": _brain_file(task.brain),
+                    "pose": task.request.start_pose,
+                    "seed": task.brain_seed,
+                    "period": task.period_s,
+                    "without": list(task.request.without),
+                }
+                for task in tasks
+            ],
+        }
+
     def tasks(self) -> list[Task]:
         """The runs of its robots, checked.
 
@@ -125,6 +149,13 @@ class Request:
         if len(tasks) == 1:
             return [replace(tasks[0], on=kind)]
         return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+
+
+def _brain_file(loaded: LoadedBrain) -> str | None:
+    """A bundled brain's name, or the path of the file that it came from; None: it came from no file."""
+    if loaded.path is None:
+        return None
+    return next((name for name, path in brains.bundled_files().items() if path == loaded.path), str(loaded.path))
 
 
 def of_robot(error: BaseException, number: int, count: int) -> BaseException:

@@ -101,7 +101,7 @@ def execute_together(
         kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
         world = open_together(kind, [task.request for task in tasks])
         try:
-            return _Run(world, tasks, progress, recording, folder).run(put_away)
+            return _Run(world, request, tasks, progress, recording, folder).run(put_away)
         finally:
             world.close()
 
@@ -186,12 +186,13 @@ class _Run:
     def __init__(
         self,
         world: SharedWorld,
+        request: Request,
         tasks: Sequence[Task],
         progress: Progress | None,
         recording: Recording,
         folder: RunFolder | None,
     ) -> None:
-        self._world = world
+        self._world, self._request = world, request
         self._recording, self._folder, self._is_recorded = recording, folder, False
         self._robots = [
             _Robot(session, task, number)
@@ -261,7 +262,8 @@ class _Run:
         self._is_recorded = True
         results = [robot.driver.result(None, 0.0) for robot in self._robots if robot.driver is not None]
         waits = not self._robots[0].task.request.realtime
-        self._recording.begin(self._folder, results, sources([robot.task for robot in self._robots]), waits=waits)
+        tasks = [robot.task for robot in self._robots]
+        self._recording.begin(self._folder, results, sources(tasks), self._request.said(tasks), waits=waits)
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:
