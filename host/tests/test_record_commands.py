@@ -1,4 +1,4 @@
-"""Commands on the record of a run: `boebot plot` and `boebot run --again`."""
+"""Commands on the record of a run: `boebot plot`, `boebot run --again` and `boebot replay`."""
 
 from __future__ import annotations
 
@@ -114,3 +114,17 @@ def test_what_cannot_be_repeated_is_refused(
     code, _, err = boebot(capsys, "run", "--again", str(folder), "--seed", "2")
     assert code == 2 and "expected no seed beside it" in err
     assert boebot(capsys, "run", "--again", "nowhere")[0] == 2
+
+
+@pytest.mark.parametrize("robot", ["shieldbot", "shieldbot-quad", "arsim"])
+def test_brain_is_replayed_on_what_was_sensed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str
+) -> None:
+    """Of a robot with slow devices, one with other sensors, and one without a board."""
+    monkeypatch.chdir(tmp_path)
+    Path("other.py").write_text("def step(robot):\n    robot.drive(0.01, 0.01)\n")
+    assert boebot(capsys, "run", "wander", "--robot", robot, "--seconds", "2", "--out", "run")[0] == 0
+    code, out, err = boebot(capsys, "replay", "run", "--brain", "wander")
+    assert (code, err) == (0, "") and "all 40 commands are the same" in out
+    code, out, _ = boebot(capsys, "replay", "run", "--brain", "other.py")
+    assert code == 1 and out.startswith("step 0 (0.00 s) differs: ")

@@ -20,6 +20,7 @@ from boebot.cli import (
     output,
     parameters,
     plot,
+    replay,
     report,
     robot,
     run,
@@ -42,6 +43,7 @@ app.command("run", cls=options.Command)(run.run)
 app.command("serve", cls=options.Command)(serve.serve)
 app.command("report")(report.report)
 app.command("plot")(plot.plot)
+app.command("replay")(replay.replay)
 app.command("list")(names.list_names)
 app.command("arena")(arena.arena)
 app.command("robot")(robot.robot)

@@ -7,12 +7,17 @@ before (experiment E68); `replayed` goes further and asks a brain anew what it w
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Any
 
 from boebot import brains
-from boebot.errors import BoebotError
-from boebot.link.messages import DevicesTelemetry, Telemetry
+from boebot.devices.device import SlowDevice
+from boebot.devices.latest import Latest
+from boebot.devices.readings import Readings
+from boebot.errors import BoebotError, BrainError
+from boebot.link.messages import Telemetry
 from boebot.record.blocks import Row
 from boebot.record.result import RunResult
 from boebot.robot import Command, Equipment, Observation, Robot
@@ -114,22 +119,64 @@ def _in_words(one: Row | None, other: Row | None) -> str:
 
 
 def replayed(result: RunResult, brain: object) -> list[Command]:
-    """What a fresh brain commands, step by step, on the telemetry of a run: without board, link and world.
+    """What a fresh brain commands, step by step, on what was sensed in a run: without board, link and world. A brain
+    that is over before the run was gives fewer commands.
 
     Raises:
-        BoebotError: a run without a board, or of a board with slow devices, whose messages belong to no step.
+        BrainError: the brain cannot be loaded, or fails.
     """
-    if result.record.rows(DevicesTelemetry.NAME):
-        raise BoebotError(f"robot {result.robot.name!r} has slow devices; only telemetry can be replayed")
     loaded = brains.load_brain(brain)
-    robot = Robot(result.robot.name, result.period, result.seed)
-    equipment = Equipment(result.robot, result.tick)
+    description = result.robot
+    fastest = () if result.layout is None else (description.body.wheel_speed_maximum_m_s,)
+    robot = Robot(description.name, result.period, result.seed, *fastest)
     commands = []
-    for sample, (index, *_) in zip(_seen(result), result.record.steps, strict=True):
-        robot.observation = Observation(sample, equipment, time=result.record.times[index])
-        loaded.step(robot)
-        commands.append(robot.command)
+    try:
+        for observation in _observations(result):
+            if loaded.is_over:
+                break
+            robot.observation = observation
+            try:
+                loaded.step(robot)
+            except Exception as error:
+                raise BrainError(brains.explain(error, loaded.path)) from error
+            robot.slow_command = None
+            commands.append(robot.command)
+    finally:
+        loaded.end()
     return commands
+
+
+def _observations(result: RunResult) -> Iterator[Observation]:
+    """What the brain saw at each of its steps."""
+    record = result.record
+    times = record.times
+    if result.layout is not None:
+        equipment = Equipment(result.robot, result.tick, result.layout)
+        count = max((part.stop for part in result.layout.values()), default=0)
+        rows = record.readings(count)
+        for index, *_ in record.steps:
+            row = rows[index]
+            ages, values = tuple(row["ages"].tolist()), tuple(row["values"].tolist())
+            sample = Readings(int(row["tick"]), int(row["status"]), ages, values)
+            time_s = times[index]
+            yield Observation(sample, equipment, time_s, time_s, time_s, 0.0, sample)
+        return
+    equipment = Equipment(result.robot, result.tick)
+    kinds: set[Any] = {device.MESSAGE for device in result.robot.device.values() if isinstance(device, SlowDevice)}
+    slow = [(time_s, kind, data) for kind in kinds for time_s, data in record.rows(kind.NAME)]
+    slow.sort(key=lambda row: row[0])
+    newest: dict[type, Any] = {}
+    seen = 0
+    payloads, stamps = record.telemetry, record.stamps
+    for index, *_ in record.steps:
+        while seen < len(slow) and slow[seen][0] <= times[index]:
+            _, kind, data = slow[seen]
+            newest = {**newest, kind: kind.unpack(data)}
+            seen += 1
+        telemetry = Telemetry.unpack(payloads[index])
+        board_s = telemetry.tick * result.tick
+        latest = Latest(newest, telemetry.tick)
+        yield Observation(telemetry, equipment, times[index], board_s, *stamps[index], latest)
 
 
 def _seen(run: RunResult) -> list[Telemetry]:
