@@ -116,15 +116,25 @@ def test_what_cannot_be_repeated_is_refused(
     assert boebot(capsys, "run", "--again", "nowhere")[0] == 2
 
 
-@pytest.mark.parametrize("robot", ["shieldbot", "shieldbot-quad", "arsim"])
+BATTERY = """
+def step(robot):
+    battery = robot.battery
+    robot.drive(0.1 * (battery.voltage * 100 % 1 if battery.valid else 0.0), 0.05)
+"""
+
+
+@pytest.mark.parametrize(
+    ("robot", "brain"), [("shieldbot-charging", "battery.py"), ("boebot", "battery.py"), ("arsim", "wander")]
+)
 def test_brain_is_replayed_on_what_was_sensed(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str, brain: str
 ) -> None:
-    """Of a robot with slow devices, one with other sensors, and one without a board."""
+    """By slow devices on boards, and without a board."""
     monkeypatch.chdir(tmp_path)
+    Path("battery.py").write_text(BATTERY)
     Path("other.py").write_text("def step(robot):\n    robot.drive(0.01, 0.01)\n")
-    assert boebot(capsys, "run", "wander", "--robot", robot, "--seconds", "2", "--out", "run")[0] == 0
-    code, out, err = boebot(capsys, "replay", "run", "--brain", "wander")
+    assert boebot(capsys, "run", brain, "--robot", robot, "--seconds", "2", "--out", "run")[0] == 0
+    code, out, err = boebot(capsys, "replay", "run", "--brain", brain)
     assert (code, err) == (0, "") and "all 40 commands are the same" in out
     code, out, _ = boebot(capsys, "replay", "run", "--brain", "other.py")
     assert code == 1 and out.startswith("step 0 (0.00 s) differs: ")
