@@ -507,6 +507,18 @@ def test_files_are_written_even_if_nobody_reads_the_table(
     assert code == 1 and (tmp_path / "replay.html").is_file()
 
 
+@pytest.mark.parametrize("robots", ["1", "2"])
+def test_json_stands_alone_whatever_a_brain_prints(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, robots: str
+) -> None:
+    brain = tmp_path / "loud.py"
+    brain.write_text("print('loaded')\ndef step(robot):\n    print('{')\n")
+    code, out, err = boebot(capsys, "run", str(brain), "--robots", robots, "--seconds", "0.2", "--json")
+    assert code == 0 and json.loads(out)["ended"] == "complete"
+    assert err.startswith("loaded\n") and "{" in err
+    assert "loaded" in boebot(capsys, "run", str(brain), "--seconds", "0.2")[1]
+
+
 def ticks_in(folder: Path) -> int:
     """Of the run whose record is there."""
     result = read_run(folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -136,6 +137,8 @@ def run(
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
+            if json:  # it stands alone on standard output, whatever a brain prints
+                shown.enter_context(contextlib.redirect_stdout(sys.stderr))
             bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds))
             progress = shown.enter_context(output.step_watch(bar))
 
