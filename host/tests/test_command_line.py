@@ -346,6 +346,27 @@ def test_interrupt_while_the_command_starts_is_no_traceback(after_s: float) -> N
     assert (process.returncode, err) == (130, "boebot: interrupted\n")
 
 
+def test_import_that_ctrl_c_cut_ends_as_interrupted() -> None:
+    """Libraries may make another error of it."""
+    code = """
+import signal
+import boebot.cli as cli
+
+def run():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise AttributeError("half of a module")
+
+cli._run = run
+cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, preexec_fn=heed_signals
+    )
+    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
+
+
 def test_interrupt_that_python_drops_comes_again() -> None:
     """One that falls into a callback, as of a weak reference, is "ignored" by Python."""
     code = """

@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from typing import NoReturn
 
 from boebot.cli import streams
@@ -26,6 +27,7 @@ _ASK_AGAIN_S = 0.02
 def main() -> NoReturn:
     """Runs the command; every error that people can make ends as one sentence."""
     code: object
+    begun_s = time.monotonic()
     others = set(threading.enumerate())
     try:
         for number in SIGNALS:  # motors are stopped and the record is written at each of them
@@ -38,6 +40,10 @@ def main() -> NoReturn:
             _await(others)
     except KeyboardInterrupt as error:
         code = _interrupted("interrupted", error)
+    except Exception as error:
+        if interrupts.wishes.signal_s < begun_s:
+            raise
+        code = _interrupted("interrupted", error)  # an import that Ctrl-C cut may end as any other error
     if _is_interrupted(code) and not others.issuperset(threading.enumerate()):
         interrupts.leave(interrupts.exit_code())  # a brain's thread may never end
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
