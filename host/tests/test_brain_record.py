@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import struct
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,10 +14,11 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.brain import Brain, BrainStep, CognitiveProcess, MotorBehavior, StateVariable, Switch, Utility
+from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.errors import BrainError
-from boebot.record.brain_record import BrainRecord
+from boebot.record.brain_record import BrainNames, BrainRecord, append_brain, read_brain
 from boebot.record.reading import read_run
+from boebot.record.record import Record
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.view import style, utility_panel
@@ -174,26 +176,45 @@ def test_figures_are_those_of_the_files(result: RunResult, folder: Path) -> None
     assert "spin_share" in result.table()
 
 
-def test_share_is_of_time_and_not_of_steps() -> None:
+@pytest.mark.parametrize("most", [None, 2])
+def test_share_is_of_time_and_not_of_steps(most: int | None) -> None:
     """Steps at 0, 1 and 3 s of a run of 4 s: each lasts until the next."""
-    steps = [BrainStep(time, motor, (), (0.0, 0.0), (0.0, 0.0)) for time, motor in ((0, "a"), (1, "b"), (3, "a"))]
-    switches = [Switch(0, "", "a", ""), Switch(1, "a", "b", ""), Switch(2, "", "c", ""), Switch(3, "b", "a", "")]
-    record = BrainRecord(("a", "b"), ("a", "b"), (), tuple(steps), tuple(switches))
-    assert record.shares(4.0) == {"a": 0.5, "b": 0.5}
-    assert record.shares(8.0) == {"a": 0.75, "b": 0.25}
-    assert len(record.behavior_switches) == 2
-    assert utility_panel.segments(record, 4.0) == [(0, 0.0, 1.0), (1, 1.0, 3.0), (0, 3.0, 4.0)]
+    record = Record()
+    for time, motor in ((0.0, 0), (1.0, 1), (3.0, 0)):
+        record.append("brain_step", time, struct.pack("<5d", motor, 0.0, 0.0, 0.0, 0.0))
+    for time, off, on in ((0.0, "", "a"), (1.0, "a", "b"), (2.0, "", "c"), (3.0, "b", "a")):
+        record.append("switch", time, json.dumps([off, on, ""]).encode())
+    kept = read_brain(record, BrainNames(("a", "b"), ("a", "b"), ()), most)
+    assert kept.shares(4.0) == {"a": 0.5, "b": 0.5}
+    assert kept.shares(8.0) == {"a": 0.75, "b": 0.25}
+    assert kept.behavior_switches == 2
+    assert len(kept) == (most or 3) and kept.time[-1] == 3.0
+    if most is None:
+        assert utility_panel.segments(kept, 4.0) == [(0, 0.0, 1.0), (1, 1.0, 3.0), (0, 3.0, 4.0)]
+
+
+def test_few_of_the_steps_are_shown_with_all_shares(result: RunResult) -> None:
+    assert result.brain_names is not None
+    few, whole = read_brain(result.record, result.brain_names, 50), record_of(result)
+    assert len(few) == 51 and few.time[-1] == whole.time[-1]
+    assert few.shares(10.0) == whole.shares(10.0) and few.behavior_switches == whole.behavior_switches
+    assert set(few.switches) <= set(whole.switches)
+    last = [[one.on for one in record.switches if one.on in whole.names.behaviors][-1] for record in (few, whole)]
+    assert last[0] == last[1]
 
 
 def test_run_of_another_robot_is_not_confused_with_this_one() -> None:
     """A run that ends before its brain steps must not show the steps of the run before."""
     brain, first, second = Brain([Ahead()]), Stepped(), Stepped()
+    names = BrainNames.of(brain)
+    assert names is not None
     first.step(brain)
-    kept, none = BrainRecord.of(brain, first.robot), BrainRecord.of(brain, second.robot)
-    assert kept is not None and none is not None
-    assert (len(kept.steps), len(none.steps), none.shares()) == (1, 0, {"ahead": 0.0})
-    first.step(brain)
-    assert len(kept.steps) == 1, "it changes no more"
+    none, kept = Record(), Record()
+    append_brain(none, brain, second.robot)
+    append_brain(kept, brain, first.robot)
+    append_brain(kept, brain, first.robot)
+    assert (len(read_brain(kept, names)), len(read_brain(none, names))) == (1, 0), "each step once"
+    assert read_brain(none, names).shares() == {"ahead": 0.0}
 
 
 def test_brain_that_fails_leaves_its_steps_up_to_there(tmp_path: Path) -> None:
@@ -225,7 +246,7 @@ def test_each_of_several_robots_has_its_own(tmp_path: Path) -> None:
     ]
     together = boebot.run_together(members, arena="empty", seconds=3)
     together.save(tmp_path, csv=True)
-    assert [len(record_of(robot).behaviors) for robot in together.robots] == [2, 1]
+    assert [len(record_of(robot).names.behaviors) for robot in together.robots] == [2, 1]
     assert {row["active"] for row in rows_of(tmp_path / "robot-1" / "brain.csv")} == {"ahead", "spin"}
     assert {row["active"] for row in rows_of(tmp_path / "robot-2" / "brain.csv")} == {"ahead"}
 

@@ -24,7 +24,7 @@ def record(result: RunResult) -> BrainRecord:
 
 
 def variable(record: BrainRecord, name: str) -> np.ndarray:
-    return np.asarray(record.values[:, record.variables.index(name)])
+    return np.asarray(record.values[:, record.names.variables.index(name)])
 
 
 @pytest.mark.parametrize(
@@ -57,17 +57,18 @@ def test_it_charges_on_the_station_and_leaves_it_full(result: RunResult, record:
     for the utility lags behind, and E grows meanwhile."""
     assert result.true_pose is not None and result.truth is not None and result.truth.plan.charger is not None
     charger, low = result.truth.plan.charger, variable(record, "low")
+    behavior = [record.names.behaviors[index] for index in record.motor]
     on = np.flatnonzero(variable(record, "charging") > 0)
     assert len(on)
-    arrived, left = int(on[0]), next(k for k in range(on[0], len(low)) if record.steps[k].motor != "charge")
-    tick = int(np.searchsorted(result.series.time, record.steps[arrived].time))
+    arrived, left = int(on[0]), next(k for k in range(on[0], len(low)) if behavior[k] != "charge")
+    tick = int(np.searchsorted(result.series.time, record.time[arrived]))
     x, y = result.true_pose.x[tick], result.true_pose.y[tick]
     assert np.hypot(x - charger.x_m, y - charger.y_m) <= charger.radius_m
     assert low[arrived] > 1 - 1 / 3.2, "it came because 1.5 - 3.2 E exceeds 0.5"
     assert 1 - low[left] >= 2.9 / 3.2
-    assert record.steps[left].motor == "wander"
+    assert behavior[left] == "wander"
 
 
 def test_every_switch_has_the_greater_utility(record: BrainRecord) -> None:
-    chosen = record.utilities[:, : len(record.behaviors)]
+    chosen = record.utilities[:, : len(record.names.behaviors)]
     assert np.array_equal(record.motor, chosen.argmax(axis=1))

@@ -164,9 +164,9 @@ def test_page_says_which_behavior_is_active_and_why(
     """At steps that the page keeps, also where it keeps one in three."""
     monkeypatch.setattr(replay, "STEPS_AT_MOST", most)
     record = composed_run.brain_record
-    assert record is not None and len(record.steps) == 120
+    assert record is not None and len(record) == 120
     every = 1 if most > 120 else 3
-    times = [record.steps[index].time for index in range(0, 120, 3 * every)]
+    times = [float(record.time[index]) for index in range(0, 120, 3 * every)]
     for time, moment in zip(times, moments(composed_run, tmp_path, *times), strict=True):
         last = [switch for switch in record.switches if switch.time <= time + 1e-9][-1]
         texts = moment["texts"]
@@ -203,10 +203,10 @@ def test_page_shows_the_brain_of_the_chosen_robot(composed_run: RunResult, tmp_p
 def test_page_stays_small(composed_run: RunResult, tmp_path: Path) -> None:
     """A step adds a time and a utility for each process, four bytes each, in four characters for three bytes."""
     with_brain = replay.write([composed_run], tmp_path / "with.html").stat().st_size
-    assert composed_run.brain_record is not None
-    record, composed_run.brain_record = composed_run.brain_record, None
+    record, composed_run.overview.brain = composed_run.overview.brain, None
     try:
         without = replay.write([composed_run], tmp_path / "without.html").stat().st_size
     finally:
-        composed_run.brain_record = record
+        composed_run.overview.brain = record
+    assert record is not None
     assert with_brain - without < 120 * 13 * 4 / 3 + 200 * len(record.switches) + 500

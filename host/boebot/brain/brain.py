@@ -56,8 +56,10 @@ class Brain:
     Attributes:
         processes: all of them, with those that others brought along.
         variables: the state variables.
-        steps: one BrainStep for each step of the present or last run.
-        switches: one Switch for each change of the active behavior.
+        steps: one BrainStep for each step of the present run that `take` has not given yet. A run takes them into its
+            record as it goes on: they are in the result's `brain_record`.
+        switches: one Switch for each change of the active behavior, as long.
+        begun: names of the processes that have been active in the present or last run.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Brain:
         self.variables = tuple(_checked(variables, StateVariable, "state variables"))
         self.steps: list[BrainStep] = []
         self.switches: list[Switch] = []
+        self.begun: set[str] = set()
         self.PERIOD = period
         self._margin = margin
         self._check()
@@ -149,9 +152,13 @@ class Brain:
         """Name of the active motor behavior."""
         return self.processes[self._driving].name if self._driving >= 0 else ""
 
-    def has_stepped(self, robot: Robot) -> bool:
-        """Whether `steps` and `switches` are those of that robot's run."""
-        return robot is self._robot
+    def take(self, robot: Robot) -> tuple[list[BrainStep], list[Switch]]:
+        """The steps and switches of that robot's run since this was last asked; they are forgotten here."""
+        if robot is not self._robot:
+            return [], []
+        taken = self.steps, self.switches
+        self.steps, self.switches = [], []
+        return taken
 
     def is_active(self, process: Process) -> bool:
         """Whether one of the brain's processes is active."""
@@ -167,7 +174,7 @@ class Brain:
 
     def _begin(self, robot: Robot) -> None:
         self._robot = robot
-        self.steps, self.switches = [], []
+        self.steps, self.switches, self.begun = [], [], set()
         count = len(self.processes)
         self._active, self._every, self._wait = [False] * count, [], [0] * count
         self._driving = -1
@@ -221,6 +228,7 @@ class Brain:
         self._active[index] = on
         if on:
             self._wait[index] = 0
+            self.begun.add(self.processes[index].name)
             self.processes[index].enter(robot)
         else:
             self.processes[index].exit(robot)

@@ -81,8 +81,7 @@ class LoadedBrain:
         has neither; None: nothing in it kept a pose."""
         if self.brain is None:
             return None if self.main is None else self.main.odometry_source
-        begun = {switch.on for switch in self.brain.switches}
-        poses = [one for one in self.brain.processes if isinstance(one, Odometry) and one.name in begun]
+        poses = [one for one in self.brain.processes if isinstance(one, Odometry) and one.name in self.brain.begun]
         return ", ".join(dict.fromkeys(one.source for one in poses)) or None
 
 

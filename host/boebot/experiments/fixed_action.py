@@ -19,7 +19,7 @@ from boebot.behaviors import Stop
 from boebot.brain import Action, Brain, FixedActionPattern
 from boebot.description.robots import load_robot
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
-from boebot.experiments.trials import true_pose
+from boebot.experiments.trials import decisions, true_pose
 from boebot.experiments.variants import arena_file
 
 if TYPE_CHECKING:
@@ -90,10 +90,11 @@ def run_escape(robot: str, at: tuple[float, float, float], stays: bool, seed: in
     brain = Brain([Stop(), pattern], period=PERIOD)
     with arena_file("stimulus", _arena(*at, stays)) as arena:
         result = run(brain, robot=description, arena=arena, seconds=4.0, seed=seed, pose=(0.0, 0.0, 0.0))
-    begin = [switch.time for switch in brain.switches if switch.on == "escape"]
-    end = [switch.time for switch in brain.switches if switch.off == "escape"]
+    record = decisions(result)
+    begin = [switch.time for switch in record.switches if switch.on == "escape"]
+    end = [switch.time for switch in record.switches if switch.off == "escape"]
     released, ended = (begin[0], end[0]) if begin and end else (math.nan, math.nan)
-    during = [index for index, step in enumerate(brain.steps) if released - 1e-9 <= step.time < ended - 1e-9]
+    during = np.flatnonzero((released - 1e-9 <= record.time) & (record.time < ended - 1e-9))
     commands = [result.record.steps[index][2:] for index in during]
     return Escape(result, released, ended, np.array(commands).reshape(-1, 2))
 

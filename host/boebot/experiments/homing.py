@@ -18,7 +18,7 @@ from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, 
 from boebot.cognition import Odometry, PathIntegration
 from boebot.devices.compass import TESLA_PER_COUNT
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, experiment, with_progress
-from boebot.experiments.trials import PER_SEED, true_pose
+from boebot.experiments.trials import PER_SEED, decisions, true_pose
 from boebot.experiments.variants import varied
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def journey(robot: RobotDescription, way: float, seconds: float, seed: int) -> J
     result = run(brain, robot=robot, arena="empty", seconds=seconds, seed=seed)
     rows = np.array(log.rows)
     pose = true_pose(result, rows[:, 0])
-    began = [switch.time for switch in brain.switches if switch.on == homing.name]
+    began = [switch.time for switch in decisions(result).switches if switch.on == homing.name]
     left = int(np.searchsorted(rows[:, 0], began[0] - 1e-9)) if began else len(rows) - 1
     arrived = None if homing.arrived is None else int(np.searchsorted(rows[:, 0], homing.arrived - 1e-9))
     return Journey(pose.x - pose.x[0], pose.y - pose.y[0], rows[:, 1:], left, arrived)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from boebot.arenas.floor_plan import FloorPlan
     from boebot.brain import Brain
     from boebot.description.robots import RobotDescription
+    from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
 
 PER_SEED = 1000
@@ -92,13 +93,14 @@ class Trial:
 
     def times_on(self, process: str) -> int:
         """How often a motor behavior became active."""
-        return sum(switch.on == process for switch in self.brain.switches)
+        return sum(switch.on == process for switch in decisions(self.result).switches)
 
     def when_active(self, process: str) -> NDArray[np.bool_]:
         """At which samples of the path that motor behavior was active."""
-        at = np.array([step.time for step in self.brain.steps])
-        active = np.array([step.motor == process for step in self.brain.steps])
-        return np.asarray(active[np.clip(np.searchsorted(at, self.time, side="right") - 1, 0, len(at) - 1)])
+        record = decisions(self.result)
+        active = record.motor == record.names.behaviors.index(process)
+        last = np.searchsorted(record.time, self.time, side="right") - 1
+        return np.asarray(active[np.clip(last, 0, len(record) - 1)])
 
 
 def trial_seeds(seed: int, count: int) -> range:
@@ -113,6 +115,12 @@ def try_once(brain: Brain, robot: str | RobotDescription, arena: str | Path, sec
         BoebotError: the run did not come to its end.
     """
     return Trial(run(brain, robot=robot, arena=arena, seconds=seconds, **terms), brain)
+
+
+def decisions(result: RunResult) -> BrainRecord:
+    """What the run's brain of processes did."""
+    assert result.brain_record is not None, "a brain of processes"
+    return result.brain_record
 
 
 def true_pose(result: RunResult, times: Sequence[float] | Floats) -> Pose:

@@ -18,6 +18,7 @@ import boebot
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brain.utility import Utilities
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot.experiments.trials import decisions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -219,8 +220,8 @@ def activation(seed: int, progress: Progress) -> Outcome:
     z = StateVariable("z", lambda robot: float(RISE - 1e-9 <= robot.time < FALL - 1e-9))
     brain = Brain([*motor, *notes], [z], period=0.01)
     result = boebot.run(brain, robot="arsim", arena="empty", seconds=6, seed=seed)
-    times = np.array([step.time for step in brain.steps])
-    utilities = np.array([step.utilities for step in brain.steps])
+    record = decisions(result)
+    times, utilities = record.time, record.utilities
     best = utilities[:, :3].argmax(axis=1)
     driving = np.array([round(left * 10) for _, _, left, _ in result.record.steps])
     stepped = np.stack([np.isin(times, note.times) for note in notes], axis=1)

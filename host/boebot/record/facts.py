@@ -12,7 +12,7 @@ from boebot.boards import WatchdogReset
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
 from boebot.link.messages import Identity
-from boebot.record.brain_record import BrainRecord
+from boebot.record.brain_record import BrainNames
 from boebot.record.record import Record
 from boebot.record.result import RunResult, why
 
@@ -72,7 +72,7 @@ _SAME = [name for name in Facts.__struct_fields__ if name not in _CHANGED]
 
 def facts_of(result: RunResult) -> Facts:
     """Of a result."""
-    brain, layout = result.brain_record, result.layout
+    brain, layout = result.brain_names, result.layout
     same: dict[str, Any] = {name: getattr(result, name) for name in _SAME}
     return Facts(
         **same | {name: list(same[name]) for name in ("notices", "watchdog_resets", "without")},
@@ -104,7 +104,7 @@ def result_of(data: Mapping[str, Any], record: Record, world: Arena | None) -> R
         error=error,
         identity=None if facts.identity is None else Identity.unpack(bytes.fromhex(facts.identity)),
         layout=None if facts.layout is None else {name: slice(*part) for name, part in facts.layout.items()},
-        brain_record=None
+        brain_names=None
         if processes is None
-        else BrainRecord.read(record, tuple(processes), tuple(facts.behaviors), tuple(facts.variables)),
+        else BrainNames(tuple(processes), tuple(facts.behaviors), tuple(facts.variables)),
     )

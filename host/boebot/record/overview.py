@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.link.messages import DevicesTelemetry, EventKind, Status
+from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
 from boebot.record.record import Record
 from boebot.record.series import APART_S, Bools, Floats, Pose, Series
 from boebot.record.telemetry_series import Directions
@@ -39,6 +40,7 @@ class Overview:
         contact_places, touch_places: where the robot was at them, shape (n, 2).
         overruns, dead_man_stops, fallback_takeovers: counted.
         slow_reading_age: the greatest that a slow device's reading had at a step of the brain; None: none had one.
+        brain: of a brain of processes, at most `POINTS` of its steps; None: a brain of another kind.
     """
 
     record: Record
@@ -56,6 +58,7 @@ class Overview:
     dead_man_stops: int
     fallback_takeovers: int
     slow_reading_age: float | None
+    brain: BrainRecord | None
 
     @property
     def placed_odometry(self) -> Pose | None:
@@ -206,6 +209,7 @@ def overview(
     slow: list[str],
     has_odometry: bool,
     has_truth: bool,
+    brain_names: BrainNames | None,
 ) -> Overview:
     """Of a run.
 
@@ -214,6 +218,7 @@ def overview(
         clock_offset_s: the transport's clock at the run's time 0.
         whiskers, slow: names of these devices.
         has_odometry: the robot has what it takes. has_truth: a simulator knows what happened.
+        brain_names: of a brain of processes.
     """
     ticks = record.ticks
     thinned, counts = _Thinned(record), _Counts()
@@ -267,6 +272,7 @@ def overview(
         dead_man_stops=max(counts.dead_man, sum(kind == EventKind.DEAD_MAN for kind, _ in events)),
         fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))),
         slow_reading_age=counts.oldest,
+        brain=None if brain_names is None else read_brain(record, brain_names, POINTS),
     )
 
 

@@ -144,7 +144,7 @@ class Record:
 
     def each_row(self, stream: str) -> Iterator[Row]:
         """The same one by one: never all of them in memory."""
-        for block in self._blocks(stream):
+        for block in self.blocks(stream):
             yield from block.rows()
 
     def streams(self) -> set[str]:
@@ -153,17 +153,17 @@ class Record:
 
     def table(self, stream: str, dtype: np.dtype[Any]) -> NDArray[Any]:
         """The rows of a stream whose rows all have this form, shape (rows,)."""
-        return np.frombuffer(b"".join(block.data for block in self._blocks(stream)), dtype=dtype)
+        return np.frombuffer(b"".join(block.data for block in self.blocks(stream)), dtype=dtype)
 
     def times_of(self, stream: str) -> NDArray[np.float64]:
         """Of each row of a stream (s), shape (rows,)."""
-        blocks = [block.times for block in self._blocks(stream)]
+        blocks = [block.times for block in self.blocks(stream)]
         return np.concatenate(blocks) if blocks else np.empty(0)
 
     def span(self, stream: str) -> tuple[float, float]:
         """Times of the first and the last row of a stream (s); 0 where it has none."""
         begin_s = end_s = None
-        for block in self._blocks(stream):
+        for block in self.blocks(stream):
             begin_s = float(block.times[0]) if begin_s is None else begin_s
             end_s = float(block.times[-1])
         return begin_s or 0.0, end_s or 0.0
@@ -218,7 +218,8 @@ class Record:
         """That of the ticks: telemetry of a board, or readings of a robot without one."""
         return "telemetry" if self.count("telemetry") else "readings"
 
-    def _blocks(self, stream: str) -> Iterator[Block]:
+    def blocks(self, stream: str) -> Iterator[Block]:
+        """The rows of a stream in blocks, each small."""
         return chain(self.groups(), stream)
 
     def _index(self, time_s: float) -> int:
@@ -245,12 +246,9 @@ class Unrecorded(Record):
     def append(self, stream: str, time_s: float, data: bytes) -> None:
         """Nothing is kept."""
 
-    def is_due(self) -> bool:
-        """Never."""
-        return False
-
     def keep(self, time_s: float, more: Group | None = None) -> None:
         """Nothing is kept."""
+        self._due_s = wall.perf_counter() + EACH_S
 
     def keep_in(self, keeper: Keeper) -> None:
         """Nothing is kept there."""

@@ -21,7 +21,7 @@ from boebot.former_names import CONTACTS, DISTANCE, Figures, FormerNames
 from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, Identity
 from boebot.record import figures
-from boebot.record.brain_record import BrainRecord
+from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
 from boebot.record.figures import counted
 from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
@@ -59,7 +59,7 @@ class RunResult(FormerNames):
         watchdog_resets: where the watchdog of an emulated board found the program, oldest first.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
-        brain_record: of a brain of processes: its steps and switches; None: a brain of another kind.
+        brain_names: of a brain of processes: what it is made of; None: a brain of another kind.
     """
 
     FORMER: ClassVar = {"distance": DISTANCE, "contacts": CONTACTS}
@@ -91,7 +91,7 @@ class RunResult(FormerNames):
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
-    brain_record: BrainRecord | None = None
+    brain_names: BrainNames | None = None
     odometry_source: str | None = None
     long_steps: int = 0
     longest_step: float = 0.0
@@ -178,6 +178,11 @@ class RunResult(FormerNames):
         is at 0, 0 and heads along x. None: it has neither."""
         return self.series.odometry() if self.has_odometry else None
 
+    @cached_property
+    def brain_record(self) -> BrainRecord | None:
+        """Steps and switches of a brain of processes; None: a brain of another kind."""
+        return None if self.brain_names is None else read_brain(self.record, self.brain_names)
+
     @property
     def bytes_from_board(self) -> bytes:
         """Every byte that came from the board."""
@@ -201,6 +206,7 @@ class RunResult(FormerNames):
             slow=[name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)],
             has_odometry=self.has_odometry,
             has_truth=self.has_truth,
+            brain_names=self.brain_names,
         )
 
     @property
@@ -286,7 +292,7 @@ class RunResult(FormerNames):
         """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
         has."""
         on_board = self.layout is None
-        slow_age, identity, brain = self.slow_reading_age, self.identity, self.brain_record
+        slow_age, identity, brain = self.slow_reading_age, self.identity, self.overview.brain
         shares = {} if brain is None else brain.shares(self.run_time)
         return Figures(
             {
@@ -309,7 +315,7 @@ class RunResult(FormerNames):
                 "long_steps": self.long_steps,
                 "longest_step_s": round(self.longest_step, 6),
                 "unrealisable": self.unrealisable,
-                "behavior_switches": None if brain is None else len(brain.behavior_switches),
+                "behavior_switches": None if brain is None else brain.behavior_switches,
                 **{f"{name}_share": round(share, 4) for name, share in shares.items()},
                 "ticks": self.ticks,
                 "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),

@@ -29,7 +29,7 @@ from boebot.link.fields import reader, text
 from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.link import Link
 from boebot.link.telemetry import StampedTelemetry as Received
-from boebot.record.brain_record import BrainRecord
+from boebot.record.brain_record import BrainNames
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import hangs
@@ -421,5 +421,5 @@ class BoardDriver:
             watchdog_resets=watchdog_resets,
             counters=dict(self.session.counters()),
             without=self.task.request.without,
-            brain_record=BrainRecord.of(self.task.brain.brain, self.robot),
+            brain_names=BrainNames.of(self.task.brain.brain),
         )

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from boebot.boards import VehicleSession
 from boebot.errors import BoardError
-from boebot.record.brain_record import BrainRecord
+from boebot.record.brain_record import BrainNames
 from boebot.record.result import RunResult
 from boebot.running.direct_robot import DirectRobot
 from boebot.running.driver import PROGRESS_S, Task, step_limit, whole_ticks
@@ -105,5 +105,5 @@ class DirectDriver:
             counters=dict(self.session.counters()),
             layout=self.session.layout,
             without=request.without,
-            brain_record=BrainRecord.of(self.task.brain.brain, self.robot),
+            brain_names=BrainNames.of(self.task.brain.brain),
         )

@@ -67,7 +67,7 @@ def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
     from boebot.view import tables
 
     make_folder(folder)
-    brain = result.brain_record
+    names = result.brain_names
     wanted: dict[str, Write] = {"summary.json": partial(tables.write_summary, result)}
     if csv:
         wanted |= {
@@ -76,10 +76,10 @@ def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
             "to_host.bin": lambda path: path.write_bytes(result.bytes_from_board),
             "wire.csv": partial(tables.write_wire, result),
         }
-        if brain is not None:
+        if names is not None:
             wanted |= {
-                "brain.csv": partial(tables.write_steps, brain),
-                "switches.csv": partial(tables.write_switches, brain),
+                "brain.csv": partial(tables.write_steps, result.record, names),
+                "switches.csv": partial(tables.write_switches, result.record),
             }
     paths = [_write(folder / name, write) for name, write in wanted.items()]
     if not result.ticks:

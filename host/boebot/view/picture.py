@@ -37,7 +37,7 @@ def write(result: RunResult, path: Path) -> Path:
     """Draws the run into a PNG file."""
     view = scene.view(result)
     low, high = scene.bounds(view)
-    record = result.brain_record if result.brain_record is not None and result.brain_record.steps else None
+    record = result.overview.brain if result.overview.brain else None
     rows = utility_panel.legend_rows(record) if record is not None else 0
     sheet = Sheet(low, high, _title(result, view), _caption(result), _legend(result, view), rows)
     axes = sheet.axes
@@ -130,7 +130,7 @@ def _caption(result: RunResult) -> list[str]:
 
 
 def _legend(result: RunResult, view: scene.View) -> list[Artist]:
-    composed = result.brain_record is not None and result.brain_record.steps
+    composed = bool(result.overview.brain)
     colours = "coloured by behavior" if composed else "dark to light in time"
     said = f"true path, {colours}" if view.known else f"path by odometry, {colours}"
     entries: list[Artist] = []

@@ -126,7 +126,7 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "left": _array(series.signals[0]),
         "right": _array(series.signals[1]),
         "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
-        "mind": None if result.brain_record is None else _mind(result.brain_record),
+        "mind": None if result.overview.brain is None else _mind(result.overview.brain),
         "readings": [_reading(readout) for readout in series.readouts()],
         "flags": _flags(flags),
     }
@@ -134,16 +134,16 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
 
 def _mind(record: BrainRecord) -> dict[str, Any] | None:
     """A brain of processes: of each kept step its utilities, the active behavior, and why it was switched to."""
-    if not record.steps:
+    if not len(record):
         return None
-    thin = slice(None, None, max(1, math.ceil(len(record.steps) / STEPS_AT_MOST)))
-    time, chosen = record.time[thin], [switch for switch in record.switches if switch.on in record.behaviors]
+    thin = slice(None, None, max(1, math.ceil(len(record) / STEPS_AT_MOST)))
+    time, chosen = record.time[thin], [switch for switch in record.switches if switch.on in record.names.behaviors]
     last = np.searchsorted([switch.time for switch in chosen], time, side="right") - 1
     kept = np.unique(last)  # switches between kept steps are left out
     return {
         "behaviors": [
             {"name": name, "colour": style.behavior(index), "utility": _array(record.utility_of(name)[thin])}
-            for index, name in enumerate(record.behaviors)
+            for index, name in enumerate(record.names.behaviors)
         ],
         "cognitive": [
             {"name": name, "utility": _array(record.utility_of(name)[thin])} for name in shown_cognitive(record)

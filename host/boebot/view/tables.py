@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boebot.record.brain_record import each_part, each_switch
 from boebot.record.run_folder import FORMAT
 
 if TYPE_CHECKING:
-    from boebot.record.brain_record import BrainRecord
+    from boebot.record.brain_record import BrainNames, BrainRecord
+    from boebot.record.record import Record
     from boebot.record.result import RunResult
 
 
@@ -58,31 +60,34 @@ def write_run(result: RunResult, path: Path) -> None:
         writer.writerows(zip(*table.values(), strict=True))
 
 
-def brain_columns(record: BrainRecord) -> dict[str, list[str]]:
+def brain_columns(part: BrainRecord) -> dict[str, list[str]]:
     """The columns of brain.csv: heading -> cells, one per step of the brain."""
-    table = {"time_s": _cells(record.time, 4), "active": [step.motor for step in record.steps]}
-    table |= {f"z_{name}": _cells(record.values[:, k], 6) for k, name in enumerate(record.variables)}
-    table |= {f"u_{name}": _cells(record.utilities[:, i], 6) for i, name in enumerate(record.processes)}
-    table |= {f"gamma_{name}": _cells(record.gammas[:, i], 6) for i, name in enumerate(record.processes)}
-    table |= {f"active_{name}": _cells(record.active[:, record.processes.index(name)]) for name in record.cognitive}
+    names = part.names
+    table = {"time_s": _cells(part.time, 4), "active": [names.behaviors[index] for index in part.motor]}
+    table |= {f"z_{name}": _cells(part.values[:, k], 6) for k, name in enumerate(names.variables)}
+    table |= {f"u_{name}": _cells(part.utilities[:, i], 6) for i, name in enumerate(names.processes)}
+    table |= {f"gamma_{name}": _cells(part.gammas[:, i], 6) for i, name in enumerate(names.processes)}
+    table |= {f"active_{name}": _cells(part.active[:, names.processes.index(name)]) for name in names.cognitive}
     return table
 
 
-def write_steps(record: BrainRecord, path: Path) -> None:
+def write_steps(record: Record, names: BrainNames, path: Path) -> None:
     """brain.csv"""
-    table = brain_columns(record)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(table)
-        writer.writerows(zip(*table.values(), strict=True))
+        for number, part in enumerate(each_part(record, names)):
+            table = brain_columns(part)
+            if number == 0:
+                writer.writerow(table)
+            writer.writerows(zip(*table.values(), strict=True))
 
 
-def write_switches(record: BrainRecord, path: Path) -> None:
+def write_switches(record: Record, path: Path) -> None:
     """switches.csv"""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time_s", "off", "on", "reason"))
-        writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in record.switches)
+        writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in each_switch(record))
 
 
 def write_summary(result: RunResult, path: Path) -> None:

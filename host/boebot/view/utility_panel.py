@@ -43,7 +43,7 @@ def draw(axes: Axes, record: BrainRecord, end: float) -> None:
         axes.axvspan(begun, until, ymin=(-1.05 - LOW) / (HIGH - LOW), color=colour, alpha=0.07, lw=0, zorder=0)
     for name in shown_cognitive(record):
         axes.plot(record.time, record.utility_of(name), color=style.FAINT, lw=0.8, ls=_dashes(record, name), zorder=4)
-    for index, name in enumerate(record.behaviors):
+    for index, name in enumerate(record.names.behaviors):
         axes.plot(record.time, record.utility_of(name), color=style.behavior(index), lw=1.7, zorder=5)
     axes.set_xlim(0.0, max(end, 1e-3))
     axes.set_ylim(LOW, HIGH)
@@ -64,24 +64,24 @@ def draw(axes: Axes, record: BrainRecord, end: float) -> None:
 
 def legend_rows(record: BrainRecord) -> int:
     """Of the legend above the panel."""
-    return -(-(len(record.behaviors) + len(shown_cognitive(record))) // LEGEND_COLUMNS)
+    return -(-(len(record.names.behaviors) + len(shown_cognitive(record))) // LEGEND_COLUMNS)
 
 
 def shown_cognitive(record: BrainRecord) -> Sequence[str]:
     """The cognitive processes that are drawn: those whose utility changes, where they are few."""
-    changing = [name for name in record.cognitive if len(record.steps) and np.ptp(record.utility_of(name)) > 0]
+    changing = [name for name in record.names.cognitive if len(record) and np.ptp(record.utility_of(name)) > 0]
     return changing if len(changing) <= COGNITIVE_AT_MOST else []
 
 
 def _dashes(record: BrainRecord, name: str) -> tuple[int, tuple[float, ...]]:
-    return style.DASHES[record.cognitive.index(name) % len(style.DASHES)]
+    return style.DASHES[record.names.cognitive.index(name) % len(style.DASHES)]
 
 
 def _legend(record: BrainRecord, end: float) -> list[Artist]:
     shares = record.shares(end)
     entries: list[Artist] = [
         Line2D([], [], color=style.behavior(index), lw=2.4, label=f"{name} {100 * shares[name]:.0f} %")
-        for index, name in enumerate(record.behaviors)
+        for index, name in enumerate(record.names.behaviors)
     ]
     entries += [
         Line2D([], [], color=style.FAINT, lw=0.8, ls=_dashes(record, name), label=name)
