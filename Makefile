@@ -90,8 +90,12 @@ fuzz:
 
 pictures:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures
-	@cp build/pictures/run.png docs/images/demo.png
+	@mkdir -p build/pictures
+	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures/demo
+	@cp build/pictures/demo/run.png docs/images/demo.png
+	@sed -n '/^# first.py/,/^```$$/{/^```$$/!p}' README.md >build/pictures/first.py
+	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run first.py --seconds 120 --out first
+	@cp build/pictures/first/run.png docs/images/first.png
 	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
 	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py

@@ -83,12 +83,15 @@ def test_make_target_exists(page: Path, target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"{page.name}: make {target}"
 
 
-def test_picture_is_of_this_kit(tmp_path: Path) -> None:
-    """The README's picture says what the same run gives now; `make pictures` renews it."""
-    recipe = next(line for line in (ROOT / "Makefile").read_text().splitlines() if "--out build/pictures" in line)
-    command = shlex.split(recipe.split("boebot", 1)[1].replace("build/pictures", str(tmp_path)))
-    assert copied_process.command(command, ROOT).returncode == 0
-    shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / "demo.png", tmp_path / "run.png"))
+@pytest.mark.parametrize("name", ["demo", "first"])
+def test_picture_is_of_this_kit(name: str, workspace: Path, tmp_path: Path) -> None:
+    """A picture of the README says what the same run gives now; `make pictures` renews it."""
+    recipe = next(
+        line for line in (ROOT / "Makefile").read_text().splitlines() if re.search(rf"--out \S*\b{name}$", line)
+    )
+    command = [*shlex.split(recipe.split("boebot", 1)[1])[:-1], str(tmp_path)]
+    assert copied_process.command(command, workspace).returncode == 0
+    shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / f"{name}.png", tmp_path / "run.png"))
     assert (shown["Title"], shown["Description"]) == (now["Title"], now["Description"])
 
 

@@ -23,12 +23,14 @@ if TYPE_CHECKING:
     from boebot.running.runner import run
     from boebot.running.tasks import Member
     from boebot.running.together import run_together
+    from boebot.showing import Grid
 
     __version__: str
 
 __all__ = [
     "BoebotError",
     "Command",
+    "Grid",
     "MainRobot",
     "Member",
     "Observation",
@@ -45,6 +47,7 @@ __all__ = [
 _HOMES = {
     "BoebotError": "errors",
     "Command": "robot",
+    "Grid": "showing",
     "MainRobot": "brain.main_brain",
     "Member": "running.tasks",
     "Observation": "robot",

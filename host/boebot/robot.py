@@ -14,6 +14,7 @@ way to the simulated world, to the board or to the link.
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from boebot.devices import buzzer, turret
@@ -26,6 +27,10 @@ from boebot.errors import BrainError
 from boebot.link.messages import Buzzer as BuzzerMessage
 from boebot.link.messages import Status, Telemetry
 from boebot.link.messages import Turret as TurretMessage
+from boebot.showing import Grid, Showing
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol carries
 
@@ -116,6 +121,7 @@ class Robot(Attributes):
         "name",
         "observation",
         "random",
+        "showing",
         "slow_command",
     )
 
@@ -132,6 +138,8 @@ class Robot(Attributes):
         """The motors are latched off by `emergency_stop`, until `arm`."""
         self.random = random.Random(f"brain {seed}")
         """A `random.Random` of the brain's own: the same run gives the same numbers."""
+        self.showing: Final = Showing()
+        """What the brain shows."""
         self._chances: dict[tuple[float, float], float] = {}
 
     # ---- clock ---------------------------------------------------------------------------------------------
@@ -272,6 +280,46 @@ class Robot(Attributes):
     def _need(self, device: str, call: str) -> None:
         if not self.observation.equipment.has(device):
             raise BrainError(f"{call}(): robot {self.name!r} has no {device}")
+
+    # ---- what the brain shows --------------------------------------------------------------------------------
+
+    def show(self, name: str, value: float | str | None) -> None:
+        """Shows a value: a column `shown_NAME` of run.csv, a curve on the replay page. It holds until the next one.
+
+        Args:
+            name: up to 32 of them; with its unit, as in "goal_distance_m".
+            value: a number, a truth value, or a text of 100 characters at most; None: it is shown no longer.
+
+        Raises:
+            BrainError: name or value is none of these.
+        """
+        self.showing.show(self.observation.time, name, value)
+
+    def sketch(
+        self,
+        layer: str,
+        *,
+        lines: Sequence[ArrayLike] = (),
+        points: ArrayLike = (),
+        grid: Grid | None = None,
+        frame: str = "start",
+    ) -> None:
+        """Draws on the arena, in picture and replay: a layer that holds until the next sketch of the same name. Without
+        lines, points and grid it is empty again. A layer changes ten times a second at most, and what a brain shows
+        comes to 50 kB a second in the long run; what is more is left out, and the run says so.
+
+        Args:
+            layer: its name, up to 32 of them.
+            lines: each a list of points (x, y) in m.
+            points: pairs (x, y) in m, shape (n, 2); with those of the lines up to 20,000.
+            grid: a table of cells, up to 250,000 of them.
+            frame: "start": from where the robot stood when the run began, x ahead, as odometry counts; "arena": the
+                arena's coordinates; "robot": from where the robot is, x ahead, as its sensors see.
+
+        Raises:
+            BrainError: they are none of these.
+        """
+        self.showing.sketch(self.observation.time, layer, lines, points, grid, frame)
 
     # ---- chance --------------------------------------------------------------------------------------------
 

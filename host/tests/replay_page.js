@@ -13,6 +13,9 @@ function canvasContext() {
     moveTo(x, y) { path.push([x, y]); },
     lineTo(x, y) { path.push([x, y]); },
     fill() { drawn.push({ fill: this.fillStyle, alpha: this.globalAlpha ?? 1, path }); },
+    stroke() { if (path.length < 40) drawn.push({ stroke: this.strokeStyle, path }); },
+    createImageData(width, height) { return { data: new Uint8ClampedArray(4 * width * height) }; },
+    drawImage(image, ...box) { if (box.length === 4) drawn.push({ image: box }); },
     fillText(text) { drawn.push({ text }); },
     fillRect(x, y, width, height) { drawn.push({ bar: this.fillStyle, x, width }); },
   };
@@ -46,6 +49,7 @@ for (const time of process.argv.slice(3)) {
   const texts = Object.fromEntries(Object.entries(byId).map(([id, it]) => [id, it.textContent]));
   const readings = (byId.readings?.table?.children ?? []).map(row => row.cells.map(cell => cell.textContent));
   const hidden = Object.keys(byId).filter(id => byId[id].style.display === "none");
-  const shown = lamps.filter(lamp => lamp.style.display !== "none").map(lamp => [lamp.dataset.device, lamp.on]);
-  console.log(JSON.stringify({ texts, readings, hidden, lamps: shown, still, drawn, scale: vm.runInThisContext("[scale, shiftX, shiftY]") }));
+  const lit = lamps.filter(lamp => lamp.style.display !== "none").map(lamp => [lamp.dataset.device, lamp.on]);
+  const values = (byId.shown?.children ?? []).filter(row => row.children.length === 2).map(row => row.children.map(cell => cell.textContent));
+  console.log(JSON.stringify({ texts, shown: values, readings, hidden, lamps: lit, still, drawn, scale: vm.runInThisContext("[scale, shiftX, shiftY]") }));
 }

@@ -28,7 +28,7 @@ LAG_S = 0.065  # with which a wheel's speed follows a command (docs/decisions/00
 
 @dataclass(kw_only=True)
 class Odometry(CognitiveProcess):
-    """Keeps the pose.
+    """Keeps the pose: a process of a `Brain`, or called by a brain of another kind, `step(robot)` in each of its steps.
 
     Attributes:
         pose: x, y (m) and heading (rad in (-pi, pi]), from where the run began or the odometer's origin.
@@ -79,6 +79,8 @@ class Odometry(CognitiveProcess):
         self._speeds = (0.0, 0.0)
 
     def step(self, robot: Robot) -> None:
+        if math.isnan(self._time):  # in no Brain, which would have entered it
+            self.enter(robot)
         elapsed = robot.time - self._time
         if elapsed <= 0:
             return

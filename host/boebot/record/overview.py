@@ -16,6 +16,7 @@ from boebot.link.messages import DevicesTelemetry, EventKind, Status
 from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
 from boebot.record.record import Record
 from boebot.record.series import APART_S, Bools, Floats, Pose, Series
+from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions
 from boebot.record.truth import Track, track_of
 from boebot.record.windows import windows
@@ -40,6 +41,7 @@ class Overview:
         contact_places, touch_places: where the robot was at them, shape (n, 2).
         overruns, dead_man_stops, fallback_takeovers: counted.
         slow_reading_age: the greatest that a slow device's reading had at a step of the brain; None: none had one.
+        shown, layers: what the brain showed, and its sketches.
         brain: of a brain of processes, at most `POINTS` of its steps; None: a brain of another kind.
     """
 
@@ -58,6 +60,8 @@ class Overview:
     dead_man_stops: int
     fallback_takeovers: int
     slow_reading_age: float | None
+    shown: Shown
+    layers: list[Layer]
     brain: BrainRecord | None
 
     @property
@@ -272,6 +276,8 @@ def overview(
         dead_man_stops=max(counts.dead_man, sum(kind == EventKind.DEAD_MAN for kind, _ in events)),
         fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))),
         slow_reading_age=counts.oldest,
+        shown=read_shown(record, POINTS),
+        layers=read_layers(record),
         brain=None if brain_names is None else read_brain(record, brain_names, POINTS),
     )
 

@@ -15,6 +15,8 @@ waits               the world's                 a moving shape has begun or ende
 brain_step          the run's, of the step      of a brain of processes, doubles: index of the active motor behavior,
                                                 state variables, utilities, gammas
 switch              the run's, of the step      of a brain of processes, JSON: what became inactive, active, and why
+shown               the run's, of the step      JSON: what the brain shows from then on, by name
+sketch              the run's, of the step      JSON: what a layer of its sketches shows (`boebot.showing.Sketch`)
 vehicle, movers     the run's, of the step      of a vehicle stepped by hand (sim_bridge.recorder)
 """
 

@@ -27,6 +27,7 @@ from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record
 from boebot.record.series import Pose, Series, truth_at
+from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
 from boebot.record.truth import plan_of, truth_of
 from boebot.running import hangs
@@ -182,6 +183,16 @@ class RunResult(FormerNames):
     def brain_record(self) -> BrainRecord | None:
         """Steps and switches of a brain of processes; None: a brain of another kind."""
         return None if self.brain_names is None else read_brain(self.record, self.brain_names)
+
+    @cached_property
+    def shown(self) -> Shown:
+        """The values that the brain showed (`robot.show`)."""
+        return read_shown(self.record)
+
+    @cached_property
+    def layers(self) -> list[Layer]:
+        """What the brain sketched (`robot.sketch`), layer by layer."""
+        return read_layers(self.record, None)
 
     @property
     def bytes_from_board(self) -> bytes:

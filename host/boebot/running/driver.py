@@ -95,6 +95,8 @@ def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False)
         BoebotError: it cannot be kept.
     """
     append_brain(task.record, task.brain.brain, driver.robot)
+    if ended:
+        driver.robot.showing.end()
     task.record.keep(time_s, driver.session.drain(ended=ended))
 
 

@@ -169,14 +169,20 @@ def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
         BoebotError: it cannot be driven so.
     """
     if task.request.robot.has_board:
-        board = cast(BoardSession, session)
-        try:
-            return BoardDriver(board, task)
-        except BoebotError as error:
-            for sentence in hangs.sentences(board.watchdog_resets()):
-                error.add_note(sentence)
-            raise
-    return DirectDriver(cast(VehicleSession, session), task)
+        driver: Driver = _board_driver(cast(BoardSession, session), task)
+    else:
+        driver = DirectDriver(cast(VehicleSession, session), task)
+    driver.robot.showing.append = task.record.append
+    return driver
+
+
+def _board_driver(session: BoardSession, task: Task) -> Driver:
+    try:
+        return BoardDriver(session, task)
+    except BoebotError as error:
+        for sentence in hangs.sentences(session.watchdog_resets()):
+            error.add_note(sentence)
+        raise
 
 
 def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> RunResult:
@@ -188,7 +194,7 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> 
     def take_over() -> None:
         driver.end()
         end_rows(driver, task)
-        unended(with_times(driver.result(KeyboardInterrupt(), wall.perf_counter() - started), task, times))
+        unended(result_of(driver, task, times, KeyboardInterrupt(), wall.perf_counter() - started))
 
     try:
         driver.begin()
@@ -209,13 +215,14 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> 
             unkept = end_rows(driver, task)
             task.brain.end()
     error = error or unkept
-    return with_times(driver.result(error, elapsed_s), task, times)
+    return result_of(driver, task, times, error, elapsed_s)
 
 
-def with_times(result: RunResult, task: Task, times: StepTimes) -> RunResult:
-    """Its timing, into the record: how long its brain's steps took, and what of it was forced; and what a user should
-    know of its brain."""
-    result.notices += task.brain.notices
+def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException | None, elapsed_s: float) -> RunResult:
+    """The driver's result, with how long the brain's steps took, what of the run was forced, and what a user should
+    know of the brain."""
+    result = driver.result(error, elapsed_s)
+    result.notices += [*task.brain.notices, *driver.robot.showing.notices]
     result.longest_step, result.long_steps = times.longest, times.long
     result.unrealisable = task.unrealisable
     if task.unrealisable is not None:

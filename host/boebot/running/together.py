@@ -24,7 +24,7 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.runner import UNENDED, driver_of, keep, sources, with_times
+from boebot.running.runner import UNENDED, driver_of, keep, result_of, sources
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot
 
@@ -155,7 +155,7 @@ class _Robot:
             unkept = end_rows(driver, self.task)
             self.error = self.error or unkept
             self.task.brain.end()
-            self.result = with_times(driver.result(None, 0.0), self.task, self._times)  # now: later is the others' time
+            self.result = result_of(driver, self.task, self._times, None, 0.0)  # now: later is the others' time
 
     def turn(self, watch: StepWatch, error: BaseException | None = None) -> None:
         """Goes on until it waits for time to pass, or is done; the brain steps meanwhile.

@@ -17,6 +17,7 @@ from boebot.view import scene, style, utility_panel
 from boebot.view.arena_drawing import draw_arena, legend_entries
 from boebot.view.robot_drawing import body_patch, draw_robot
 from boebot.view.sheet import Sheet
+from boebot.view.sketch_drawing import draw_layers, layer_entries
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,6 +54,7 @@ def write(result: RunResult, path: Path) -> Path:
         thin = slice(None, None, max(1, len(view.estimate.x) // SEGMENTS_MAXIMUM))  # each dash takes memory
         axes.plot(view.estimate.x[thin], view.estimate.y[thin], color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
         _draw_ghost(axes, result.robot.body, view.estimate)
+    draw_layers(axes, view)
     draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
@@ -146,4 +148,4 @@ def _legend(result: RunResult, view: scene.View) -> list[Artist]:
         )
     if len(view.true_contacts):
         entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="true contact"))
-    return entries + legend_entries(view.plan)
+    return entries + layer_entries(view) + legend_entries(view.plan)

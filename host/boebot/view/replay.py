@@ -6,6 +6,8 @@ plan     what stands and moves in the arena (boebot.arenas.floor_plan)
 runs     one per robot: title, table, paths, flags, readings, what the robot looks like; `mind`, what a brain of
          processes did, or null: processes, utilities, the active motor behavior, the last switch to it
 
+         `shown` and `layers`: what the brain showed and sketched
+
 Arrays are little-endian float32 (`flags` and `motor`: uint8), one entry per frame; those of `mind` one per step of the
 brain, fewer where there are very many.
 """
@@ -19,6 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 
 from boebot.description import robots
@@ -32,8 +35,9 @@ if TYPE_CHECKING:
     from boebot.record.brain_record import BrainRecord
     from boebot.record.result import RunResult
     from boebot.record.series import Floats, Pose
+    from boebot.record.shown import Layer, Shown
 
-FORMAT = 6
+FORMAT = 7
 STEPS_AT_MOST = 6_000  # of a brain of processes
 _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
@@ -127,9 +131,33 @@ def run_data(result: RunResult, view: scene.View) -> dict[str, Any]:
         "right": _array(series.signals[1]),
         "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
         "mind": None if result.overview.brain is None else _mind(result.overview.brain),
+        "shown": _shown(result.overview.shown),
+        "layers": [_layer(layer, view, index) for index, layer in enumerate(view.layers)],
+        "cell": style.CELL,
         "readings": [_reading(readout) for readout in series.readouts()],
         "flags": _flags(flags),
     }
+
+
+def _shown(shown: Shown) -> dict[str, Any]:
+    """What the brain showed: numbers as arrays, texts as indices into the list of all their words."""
+    texts = []
+    for name, values in shown.texts.items():
+        words = sorted(set(values))
+        place = {word: index for index, word in enumerate(words)}
+        texts.append({"name": name, "words": words, "index": [place[value] for value in values]})
+    numbers = [{"name": name, "values": _array(values)} for name, values in shown.numbers.items()]
+    return {"time": _array(shown.time), "numbers": numbers, "texts": texts}
+
+
+def _layer(layer: Layer, view: scene.View, index: int) -> dict[str, Any]:
+    """What the brain sketched: arrays of points are x and y in turn (m)."""
+    sketches = []
+    for sketch in layer.sketches:
+        origin = None if sketch.frame == "robot" else view.origin(sketch)  # None: where the robot is
+        whole = msgspec.to_builtins(sketch)
+        sketches.append({key: whole[key] for key in ("lines", "points", "grid")} | {"origin": origin})
+    return {"name": layer.name, "colour": style.layer(index), "time": _array(layer.time), "sketches": sketches}
 
 
 def _mind(record: BrainRecord) -> dict[str, Any] | None:

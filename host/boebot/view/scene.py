@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from boebot.devices.drawing import Shape
     from boebot.record.result import RunResult
     from boebot.record.series import Floats
+    from boebot.record.shown import Layer
+    from boebot.showing import Sketch
 
 MARGIN = 0.03  # of the greater side
 OPEN_M = 0.3  # to see around a path in an open field, at least
@@ -43,6 +45,14 @@ class View:
     """Its angle (rad) at each tick; 0 without one, or while it is free."""
     path_is_seen: bool
     """Somebody knows where the robot went: the simulator, or its odometry."""
+    layers: list[Layer]
+    """What the brain sketched."""
+
+    def origin(self, sketch: Sketch) -> tuple[float, float, float]:
+        """Of the frame of a sketch, as it lies in the picture at the run's end: m, m, rad."""
+        if sketch.frame == "robot":
+            return self.pose(-1)
+        return self.pose(0) if sketch.frame == "start" and self.known else (0.0, 0.0, 0.0)
 
     def pose(self, index: int) -> tuple[float, float, float]:
         """Of the path at a tick."""
@@ -63,6 +73,7 @@ def view(result: RunResult) -> View:
         touches=few.touch_places,
         turret=np.nan_to_num(series.number("turret", "angle"), nan=0.0),
         path_is_seen=seen is not None,
+        layers=few.layers,
     )
 
 

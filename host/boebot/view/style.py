@@ -41,6 +41,11 @@ DASHES = ((0, ()), (0, (6, 2)), (0, (2, 1.5)), (0, (6, 2, 1.5, 2)))
 BEHAVIORS = ("#0072b2", "#cc79a7", "#009e73", "#e69f00", "#56b4e9", "#4b3f99", "#8a6d00", "#6b7280")
 """Of the motor behaviors of a brain, in its order, over and over."""
 
+LAYERS = ("#7b4fa3", "#8a6d00", "#c2185b", "#3b8a8c", "#56b4e9", "#6b7280")
+"""Of the layers that a brain sketches, in their order, over and over."""
+
+CELL = (0.05, 0.75)  # how opaque a cell of a sketched grid is: free, occupied
+
 WIDTH_IN = 8.4  # of a picture of a run; 1092 pixels
 DPI = 130
 
@@ -85,6 +90,11 @@ def colour(number: int) -> str:
 def behavior(index: int) -> str:
     """Colour of the motor behavior of that index, from 0."""
     return BEHAVIORS[index % len(BEHAVIORS)]
+
+
+def layer(index: int) -> str:
+    """Colour of the layer of a brain's sketches of that index, from 0."""
+    return LAYERS[index % len(LAYERS)]
 
 
 def dashes(number: int) -> tuple[int, tuple[float, ...]]:

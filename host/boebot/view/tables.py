@@ -32,6 +32,9 @@ def columns(result: RunResult) -> dict[str, list[str]]:
         "command_left": [f"{value:.4f}" for value in left],
         "command_right": [f"{value:.4f}" for value in right],
     }
+    shown = result.shown.at(series.time)
+    table |= {f"shown_{name}": _cells(values, 6) for name, values in shown.numbers.items()}
+    table |= {f"shown_{name}": texts for name, texts in shown.texts.items()}
     if estimate is not None:
         table |= {
             "odometry_x_m": _cells(estimate.x, 5),

@@ -12,6 +12,7 @@ from boebot.view.arena_drawing import draw_arena, legend_entries
 from boebot.view.picture import draw_marks
 from boebot.view.robot_drawing import draw_robot
 from boebot.view.sheet import Sheet
+from boebot.view.sketch_drawing import draw_layers
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,6 +36,7 @@ def write(result: TogetherResult, path: Path) -> Path:
         colour = style.colour(number)
         axes.plot(view.path.x, view.path.y, color=colour, lw=1.9, ls=style.dashes(number), zorder=7)
         axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
+        draw_layers(axes, view, colour)
         draw_marks(axes, view)
         draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
         axes.annotate(
