@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
+from boebot.record.reading import CutError, read_run
+from boebot.record.result import RunResult
 from command import heed_signals
 
 pytestmark = [
@@ -29,6 +31,7 @@ def step(robot):
         open("begun", "w").close()
         {deed}
 """
+SLOW = STEP.replace("def step(robot):", "def step(robot):\n    time.sleep(0.3)")  # longer than a chunk of the record
 MAIN = """import re, time
 def main(robot):
     robot.drive(0.5, 0.5)
@@ -75,7 +78,7 @@ CASES = {
     "sigterm": Case(STEP.format(deed=CATCHES), ("--robots", "2", "--json"), (signal.SIGTERM,)),
     "waits in C": Case(STEP.format(deed=LOCKS.format(kind="CDLL"))),
     "leaves a thread": Case(STEP.format(deed=THREAD)),
-    "keeps the interpreter": Case(STEP.format(deed=LOCKS.format(kind="PyDLL"))),
+    "keeps the interpreter": Case(SLOW.format(deed=LOCKS.format(kind="PyDLL")), ("--out", "out")),
     "twice": Case(MAIN.format(deed=BACKTRACKS), signals=(signal.SIGINT, signal.SIGTERM)),
     "script": Case(STEP.format(deed=CATCHES) + SCRIPT, command=("mine.py",)),
     "returns": Case(STEP.format(deed=RETURNS)),
@@ -145,6 +148,12 @@ def test_sigterm_has_its_own_exit_code_also_among_several_robots(ended: dict[str
 def test_a_brain_that_does_not_heed_it(ended: dict[str, Ended], name: str, sentence: str, limit_s: float) -> None:
     code, _, err, took_s, _ = ended[name]
     assert (code, err) == (130, f"{sentence}\n") and took_s < limit_s
+
+
+def test_record_is_kept_up_to_the_last_second_though_python_gets_no_turn(ended: dict[str, Ended]) -> None:
+    record = read_run(ended["keeps the interpreter"].folder / "out")
+    assert isinstance(record, RunResult) and isinstance(record.error, CutError)
+    assert record.run_time >= 0.1 and record.steps >= 2 and record.whisker_touches == 0
 
 
 def test_a_script_ends_too(ended: dict[str, Ended]) -> None:
