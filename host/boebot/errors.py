@@ -37,6 +37,10 @@ class BoebotError(Exception):
     """Something the user can mend. Its text is one sentence: the error, where it is, and what was expected."""
 
 
+class InterruptedRunError(BoebotError):
+    """Ctrl-C ended a run; its figures are printed and its files written."""
+
+
 class RobotError(BoebotError):
     """A robot description is wrong."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import os
@@ -17,8 +18,8 @@ from pathlib import Path
 import pytest
 
 from boebot import cli
-from boebot.boards import BoardRequest, board_kinds, imperfections
-from boebot.cli import board_link, teleop
+from boebot.boards import BoardRequest, board_kinds
+from boebot.cli import board_link, run_table, teleop
 from boebot.cli import link as link_command
 from boebot.link import messages, mismatch
 from boebot.link.link import Link
@@ -26,6 +27,7 @@ from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner
+from boebot.running.runner import run
 from boebot.running.tasks import Request
 from command import boebot, heed_signals
 from peer import InProcess, Peer, Pty, pty
@@ -38,20 +40,31 @@ def peer(monkeypatch: pytest.MonkeyPatch) -> Peer:
     return peer
 
 
-def test_run_prints_a_table(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = boebot(capsys, "run", "wander", "--seconds", "3")
+def test_run_prints_five_rows_all_figures_or_nothing(
+    peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    code, out, err = boebot(capsys, "run", "wander", "--seconds", "3", "--out", str(folder))
+    rows = re.findall(r"^ ?(\w+)(?:   | in )", out, re.MULTILINE)
+    assert (code, err) == (0, "") and rows == ["run", "time", "way", "brain", "ended", "files"]
+    assert "wander on shieldbot" in out and "60 steps, 0.05 s apart" in out and "complete" in out
+    code, out, err = boebot(capsys, "report", str(folder), "--verbose")
     assert (code, err) == (0, "")
-    for name in (
-        "true distance",
-        "odometry distance",
-        "true contacts",
-        "ticks",
-        "lost frames",
-        "overruns",
-        "dead man stops",
-        "real time factor",
-    ):
+    for name in ("true distance", "lost frames", "overruns", "dead man stops", "real time factor"):
         assert name in out
+    assert boebot(capsys, "run", "wander", "--robot", "arsim", "--seconds", "1", "-q") == (0, "", "")
+    assert boebot(capsys, "report", str(folder), "-q") == (0, "", "")
+    code, _, err = boebot(capsys, "run", "wander", "--seconds", "1", "-q", "--json")
+    assert code == 2 and "expected one of --json, --verbose and --quiet" in err
+
+
+def test_run_names_what_should_be_zero_and_is_not(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
+    result = run(seconds=1)
+    assert run_table.not_zero(result) == []
+    shown = dataclasses.replace(result, late_steps=3, lost_frames=1200, resets=1)
+    assert run_table.not_zero(shown) == ["late steps 3", "lost frames 1,200", "resets 1"]
+    run_table.print_run(shown, run_table.Detail.FEW)
+    assert "expected none: late steps 3, lost frames 1,200, resets 1" in capsys.readouterr().out
 
 
 def test_run_prints_json_and_writes_files(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -206,14 +219,6 @@ def test_imperfections_are_switched_off_by_name(capsys: pytest.CaptureFixture[st
     code, _, err = boebot(capsys, *arguments, "slip,bouncy")
     assert code == 1 and "no imperfection 'bouncy' to switch off; expected some of" in err
     assert len(err.splitlines()) == 1
-
-
-def test_help_names_the_imperfections(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = boebot(capsys, "run", "--help")
-    lines = [line.strip() for line in out.splitlines()]
-    for name, what in imperfections().items():
-        assert any(re.match(rf"{name} +{re.escape(what[:30])}", line) for line in lines), name
-    assert code == 0 and len(imperfections()) > 20
 
 
 def test_error_in_a_brain_comes_after_the_table(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -522,7 +527,7 @@ def test_files_are_written_even_if_nobody_reads_the_table(
     def gone(*_: object) -> None:
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("boebot.cli.output.print_table", gone)
+    monkeypatch.setattr("boebot.cli.ending.print_run", gone)
     monkeypatch.setattr("sys.stderr", io.StringIO())
     code, _, _ = boebot(capsys, "run", "wander", "--seconds", "1", "--out", str(tmp_path))
     assert code == 1 and (tmp_path / "replay.html").is_file()

@@ -8,6 +8,7 @@ import pytest
 
 from boebot import behaviors
 from boebot.arenas import arena_names
+from boebot.boards import imperfections
 from boebot.brains import bundled
 from boebot.description.robots import robot_names
 from boebot.errors import did_you_mean
@@ -18,9 +19,10 @@ def test_every_list_has_all_names_and_a_line_of_each(capsys: pytest.CaptureFixtu
     code, out, err = boebot(capsys, "list", "--json")
     assert (code, err) == (0, "")
     listed = json.loads(out)
-    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "experiments"]
+    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "experiments", "imperfections"]
     names = {kind: [row["name"] for row in rows] for kind, rows in listed.items()}
     assert (names["robots"], names["arenas"], names["brains"]) == (robot_names(), arena_names(), bundled())
+    assert names["imperfections"] == list(imperfections()) and len(imperfections()) > 20
     assert set(names["behaviors"]) < set(behaviors.__all__) and "Avoid" in names["behaviors"]
     assert all(row["title"] for rows in listed.values() for row in rows)
 

@@ -16,7 +16,7 @@ import time
 from typing import NoReturn
 
 from boebot.cli import streams
-from boebot.errors import BoebotError, printable
+from boebot.errors import BoebotError, InterruptedRunError, printable
 from boebot.running import interrupts
 from boebot.running.interrupts import SIGNALS
 
@@ -68,11 +68,10 @@ def _run() -> object:
     import typer
 
     from boebot.cli.app import app
-    from boebot.cli.ending import InterruptedRunError
 
     try:
         try:
-            code = app(standalone_mode=False)
+            code = app(standalone_mode=False, prog_name="boebot")
         finally:
             streams.finish()
     except InterruptedRunError as error:

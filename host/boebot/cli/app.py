@@ -1,64 +1,90 @@
-"""What the `boebot` command consists of."""
+"""What the `boebot` command consists of. A sub-command's module is imported when it is asked for, so that the list
+of all is there at once."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-import boebot
-from boebot.cli import (
-    arena,
-    doctor,
-    experiment,
-    info,
-    link,
-    names,
-    new,
-    options,
-    output,
-    parameters,
-    plot,
-    replay,
-    report,
-    robot,
-    run,
-    serve,
-    teleop,
-    timing,
-)
-from boebot.link import messages, mismatch
+from boebot.cli.options import SETTINGS
+
+COMMANDS = {
+    "run": ("run.run", "Let a brain drive a robot, and say what happened."),
+    "report": ("report.report", "Print a run's figures and write its files anew, from its record."),
+    "plot": ("plot.plot", "Draw columns of a run over time, a panel for each."),
+    "replay": ("replay.replay", "Run a brain on what was sensed in a run, and name the first command that differs."),
+    "new": ("new.new", "Write a brain, NAME.py, to start from."),
+    "list": ("names.list_names", "List what is bundled, by the names that other commands and Python understand."),
+    "arena": ("arena.arena", "Show an arena: a picture, its size, where a robot starts, and its shapes."),
+    "robot": (
+        "robot.robot",
+        "Show a robot: a picture from above with its wiring, its measures, and a table of its wires.",
+    ),
+    "experiment": ("experiment.experiment", "Run experiments of the notes: figures, measured against expected."),
+    "serve": ("serve.serve", "Offer the emulated robot to other programs, until Ctrl-C."),
+    "doctor": (
+        "doctor.doctor",
+        "Examine port, firmware and each device of a robot that stands still; say what is not as it should be.",
+    ),
+    "info": ("info.info", "Say who is at a port: firmware, compiler, image, devices."),
+    "teleop": ("teleop.teleop", "Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."),
+    "link": ("link.link", "Watch the link: counters of both ends, round trips, the board's clock."),
+    "parameters": ("parameters.app", "List, read, set, save and reset the board's parameters."),
+    "timing": ("timing.timing", "What the firmware may take, what it took, and whether that fits its budgets."),
+}
+"""Module and function in boebot.cli of each sub-command, and what the list of them says."""
+
+
+class Commands(TyperGroup):
+    """The sub-commands: only their lines, until one is asked for."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = {name: TyperCommand(name, help=line) for name, (_, line) in COMMANDS.items()}
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """All of them, with their lines."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Of these arguments the command, as it is."""
+        if args[0] in COMMANDS:
+            self.commands[args[0]] = command(args[0])
+        return super().resolve_command(ctx, args)
+
+
+def command(name: str) -> Any:
+    """A sub-command with its options, imported."""
+    module, _, attribute = COMMANDS[name][0].partition(".")
+    work = getattr(import_module(f"boebot.cli.{module}"), attribute)
+    if not isinstance(work, typer.Typer):
+        function, work = work, typer.Typer(add_completion=False, **SETTINGS)
+        work.command()(function)
+    made = typer.main.get_command(work)
+    made.name = name
+    return made
+
 
 app = typer.Typer(
     name="boebot",
+    cls=Commands,
     help="Drive a Boe-Bot class robot, or its emulated twin, by a brain written in Python.",
     no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    **SETTINGS,
 )
-app.command("run", cls=options.Command)(run.run)
-app.command("serve", cls=options.Command)(serve.serve)
-app.command("report")(report.report)
-app.command("plot")(plot.plot)
-app.command("replay")(replay.replay)
-app.command("list")(names.list_names)
-app.command("arena")(arena.arena)
-app.command("robot")(robot.robot)
-app.command("info")(info.info)
-app.command("doctor")(doctor.doctor)
-app.command("teleop", cls=options.Command)(teleop.teleop)
-app.command("link")(link.link)
-app.add_typer(parameters.app, name="parameters")
-app.command("new")(new.new)
-app.command("experiment")(experiment.experiment)
-app.command("timing")(timing.timing)
 
 
 def _version(wanted: bool) -> None:
     if wanted:
+        import boebot
+        from boebot.cli import output
+        from boebot.link import messages, mismatch
+
         output.line(
             f"boebot {boebot.__version__} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
             f"Python {sys.version.split()[0]})"

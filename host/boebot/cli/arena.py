@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from boebot.cli import options, output
+from boebot.cli import completion, options, output
 
 if TYPE_CHECKING:
     from boebot.arenas.description import Moving
@@ -21,7 +21,12 @@ _DIGITS = 6  # of lengths in JSON: micrometres
 
 def arena(
     arena: Annotated[
-        str, typer.Argument(metavar="ARENA", help="Bundled arena, as `boebot list arenas` names them, or .toml file.")
+        str,
+        typer.Argument(
+            metavar="ARENA",
+            autocompletion=completion.arenas,
+            help="Bundled arena, as `boebot list arenas` names them, or .toml file.",
+        ),
     ],
     out: Annotated[
         Path | None,

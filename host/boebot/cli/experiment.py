@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from boebot import resources
-from boebot.cli import options, output
+from boebot.cli import completion, options, output
 from boebot.errors import BoebotError
 
 if TYPE_CHECKING:
@@ -38,7 +38,12 @@ a page of all of them. The exit code is 1 when one is outside its criterion."""
 def experiment(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="NAME", help="Of an experiment, or a pattern with * and ?.", show_default=False),
+        typer.Argument(
+            metavar="NAME",
+            autocompletion=completion.experiments,
+            help="Of an experiment, or a pattern with * and ?.",
+            show_default=False,
+        ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Run all of them.")] = False,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of all that is left to chance.")] = 1,

@@ -1,4 +1,6 @@
-"""`boebot list WHAT`: what is bundled, each with a line: robots, arenas, brains, behaviors, experiments."""
+"""`boebot list WHAT`: what there is, with a line for each: robots, arenas, brains, behaviors,
+experiments, imperfections.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,25 @@ import typer
 
 from boebot import behaviors
 from boebot.arenas import arena_names, load_arena
+from boebot.boards import imperfections
 from boebot.brain.process import MotorBehavior
 from boebot.brains import bundled_files
-from boebot.cli import options, output
+from boebot.cli import completion, options, output
 from boebot.description.robots import load_robot, robot_names
 from boebot.errors import did_you_mean
 
 Row = dict[str, Any]
-KINDS = ("robots", "arenas", "brains", "behaviors", "experiments")
+KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections")
 
 
 def list_names(
     what: Annotated[
-        str | None, typer.Argument(metavar="WHAT", help=f"One of {', '.join(KINDS)}; without it all of them.")
+        str | None,
+        typer.Argument(
+            metavar="WHAT",
+            autocompletion=completion.one_of(*KINDS),
+            help=f"One of {', '.join(KINDS)}; without it all of them.",
+        ),
     ] = None,
     json: options.Json = False,
 ) -> None:
@@ -89,10 +97,15 @@ def _experiments() -> list[Row]:
     return [{field: getattr(one, field) for field in fields} for one in all_experiments().values()]
 
 
+def _imperfections() -> list[Row]:
+    return [{"name": name, "title": what} for name, what in imperfections().items()]
+
+
 _ROWS: dict[str, Callable[[], list[Row]]] = {
     "robots": _robots,
     "arenas": _arenas,
     "brains": _brains,
     "behaviors": _behaviors,
     "experiments": _experiments,
+    "imperfections": _imperfections,
 }

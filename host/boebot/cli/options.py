@@ -5,15 +5,23 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
-from boebot.boards import imperfections
-from boebot.cli import quantity
+from boebot.cli import completion, quantity
+
+SETTINGS: dict[str, Any] = {
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+}
+"""Of everything that typer makes."""
 
 On = Annotated[
     str,
     typer.Option(
-        "--on", metavar="BOARD", help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT."
+        "--on",
+        metavar="BOARD",
+        autocompletion=completion.boards,
+        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT.",
     ),
 ]
 RunOn = Annotated[
@@ -21,13 +29,22 @@ RunOn = Annotated[
     typer.Option(
         "--on",
         metavar="BOARD",
+        autocompletion=completion.boards,
         help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT; direct for a robot without a "
         "board. Else native, or direct.",
     ),
 ]
-RobotName = Annotated[str, typer.Option("--robot", metavar="R", help="Bundled robot or .toml file.")]
+RobotName = Annotated[
+    str, typer.Option("--robot", metavar="R", autocompletion=completion.robots, help="Bundled robot or .toml file.")
+]
 ArenaName = Annotated[
-    str | None, typer.Option("--arena", metavar="A", help="Bundled arena or .toml file (simulated runs).")
+    str | None,
+    typer.Option(
+        "--arena",
+        metavar="A",
+        autocompletion=completion.arenas,
+        help="Bundled arena or .toml file (simulated runs).",
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the brain's chance and of the world's noise.")]
 Period = Annotated[
@@ -41,20 +58,17 @@ Period = Annotated[
 ]
 Without = Annotated[
     str | None,
-    typer.Option("--without", metavar="NAME,...", help="Switch off imperfections of simulated robots, named below."),
+    typer.Option(
+        "--without",
+        metavar="NAME,...",
+        help="Switch off imperfections of simulated robots; `boebot list imperfections` names them.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures of the run.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def names(text: str | None) -> tuple[str, ...]:
     """Of "NAME,NAME"."""
     return () if text is None else tuple(name.strip() for name in text.split(","))
-
-
-class Command(TyperCommand):
-    """A sub-command with `--without`, whose help ends with the imperfections that can be switched off."""
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """Name and line of each; they are the simulator's to say."""
-        with formatter.section("Imperfections, and how it is --without them"):
-            formatter.write_dl(list(imperfections().items()))

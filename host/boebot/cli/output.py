@@ -128,9 +128,9 @@ def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 @contextlib.contextmanager
-def progress_bar(title: str, seconds: float) -> Iterator[Progress]:
+def progress_bar(title: str, seconds: float, quiet: bool = False) -> Iterator[Progress]:
     """Gives a function to call with the seconds that have passed; shows a bar once 2 s of wall time have gone by."""
-    if not sys.stderr.isatty():
+    if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -17,7 +17,12 @@ from boebot.link import messages
 from boebot.link.link import Link
 from boebot.link.parameter_requests import parameter_counts, parameter_spec
 
-app = typer.Typer(help="List, read, set, save and reset the board's parameters.", no_args_is_help=True)
+app = typer.Typer(
+    help="List, read, set, save and reset the board's parameters.",
+    no_args_is_help=True,
+    add_completion=False,
+    **options.SETTINGS,
+)
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="As `boebot parameters list` names it.")]
 

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import output
+from boebot.cli import completion, output
 from boebot.errors import BoebotError
 from boebot.record.compare import replayed
 from boebot.record.reading import read_run
@@ -23,10 +23,16 @@ EXIT_DIFFERS, EXIT_USAGE = 1, 2
 def replay(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run of one robot, with its record.mcap.")],
     brain: Annotated[
-        str, typer.Option("--brain", metavar="BRAIN", help="Bundled brain, or a Python or TOML file, as of boebot run.")
+        str,
+        typer.Option(
+            "--brain",
+            metavar="BRAIN",
+            autocompletion=completion.brains,
+            help="Bundled brain, or a Python or TOML file, as of boebot run.",
+        ),
     ],
 ) -> None:
-    """Run a brain on what was sensed in a run, and name the first command that differs from the run's."""
+    """Run a brain on what was sensed in a run, and name the first command that differs."""
     try:
         result = read_run(run)
         if not isinstance(result, RunResult):

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from boebot.cli import ending, options, output
+from boebot.cli.run_table import Detail, detail, print_run
 from boebot.record.mending import mend
 from boebot.record.reading import CutError, read_run
-from boebot.record.result import RunResult
 from boebot.record.run_folder import RECORD, RunFolder
 
 
@@ -23,8 +23,11 @@ def report(
         bool, typer.Option("--mend", help="Of a record that is cut: a whole one beside it, record-mended.mcap.")
     ] = False,
     json: options.Json = False,
+    verbose: options.Verbose = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there."""
+    wanted = detail(json=json, verbose=verbose, quiet=quiet)
     folder = run if run.is_dir() else run.parent
     result = read_run(run)
     with RunFolder(folder):
@@ -33,11 +36,8 @@ def report(
             files.append(mend(folder / RECORD, result))
     if isinstance(result.error, CutError):
         output.say(str(result.error))
-    if json:
+    if wanted is Detail.JSON:
         output.print_json(result.table() | {"files": [str(path) for path in files]})
-        return
-    if isinstance(result, RunResult):
-        output.print_table(result.table())
-    else:
-        output.print_rows(ending.HEADER, ending.rows(result))
-    output.line(ending.files_in(folder, files))
+    elif wanted is not Detail.NOTHING:
+        print_run(result, wanted)
+        output.line(ending.files_in(folder, files))

@@ -7,14 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.cli import options, output
+from boebot.cli import completion, options, output
 
 HEADER = ("device", "pin", "wire", "through", "to", "plugged into")
 
 
 def robot(
     robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Bundled robot, as `boebot list robots` names them, or .toml file.")
+        str,
+        typer.Argument(
+            metavar="ROBOT",
+            autocompletion=completion.robots,
+            help="Bundled robot, as `boebot list robots` names them, or .toml file.",
+        ),
     ],
     out: Annotated[
         Path | None,

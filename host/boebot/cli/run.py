@@ -11,9 +11,10 @@ from typing import Annotated
 import typer
 
 from boebot.brains import bundled
-from boebot.cli import options, output, quantity
+from boebot.cli import completion, options, output, quantity
 from boebot.cli.again import run_again
-from boebot.cli.ending import end, end_together
+from boebot.cli.ending import end
+from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.record.result import RunResult, TogetherResult
@@ -47,6 +48,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="BRAIN",
+            autocompletion=completion.brains,
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
             "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
         ),
@@ -54,7 +56,12 @@ def run(
     on: options.RunOn = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option("--robot", metavar="R", help="Bundled robot or .toml file; again for each further robot."),
+        typer.Option(
+            "--robot",
+            metavar="R",
+            autocompletion=completion.robots,
+            help="Bundled robot or .toml file; again for each further robot.",
+        ),
     ] = None,
     robots: Annotated[
         int | None, typer.Option("--robots", metavar="N", min=1, help="How many robots share the world.")
@@ -104,8 +111,11 @@ def run(
         ),
     ] = None,
     json: options.Json = False,
+    verbose: options.Verbose = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """See `_HELP`."""
+    wanted = detail(json=json, verbose=verbose, quiet=quiet)
     if repeated is not None:
         _check_alone(context)
         run_again(repeated, json)
@@ -139,30 +149,23 @@ def run(
         with contextlib.ExitStack() as shown:
             if json:  # it stands alone on standard output, whatever a brain prints
                 shown.enter_context(contextlib.redirect_stdout(sys.stderr))
-            bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds))
+            bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds, quiet))
             progress = shown.enter_context(output.step_watch(bar))
 
             def put_away(result: RunResult | TogetherResult) -> None:
                 """What this function cannot do itself: a brain goes on after Ctrl-C."""
                 shown.close()
                 try:
-                    _end(result, out, json)
+                    end(result, out, wanted)
                 except BoebotError as error:
                     output.say(str(error))
 
             run_all = execute if count == 1 else execute_together
             result = run_all(request, progress, folder, put_away)
-        _end(result, out, json)
+        end(result, out, wanted)
 
 
 run.__doc__ = _HELP
-
-
-def _end(result: RunResult | TogetherResult, out: Path | None, json: bool) -> None:
-    if isinstance(result, TogetherResult):
-        end_together(result, out, json)
-    else:
-        end(result, out, json)
 
 
 def _check_alone(context: typer.Context) -> None:

@@ -17,6 +17,7 @@ import typer
 
 from boebot.cli import options, output, quantity
 from boebot.cli.ending import end
+from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.robot import Robot
@@ -112,8 +113,10 @@ def teleop(
     ] = float("inf"),
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
     json: options.Json = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."""
+    wanted = detail(json=json, verbose=verbose, quiet=False)
     if not sys.stdin.isatty():
         raise BoebotError("teleop needs a keyboard, but its input is not a terminal")
     screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
@@ -134,7 +137,7 @@ def teleop(
             result = execute(request, folder=folder)
         with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
             output.line(file=screen)
-        end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, json)
+        end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, wanted)
 
 
 def _show(screen: TextIO, line: str) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import options, output, quantity, timing_board
+from boebot.cli import completion, options, output, quantity, timing_board
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -72,7 +72,13 @@ def timing(
         ),
     ] = None,
     brain: Annotated[
-        str | None, typer.Option("--brain", metavar="B", help="Measure the steps of this brain in a simulated run.")
+        str | None,
+        typer.Option(
+            "--brain",
+            metavar="B",
+            autocompletion=completion.brains,
+            help="Measure the steps of this brain in a simulated run.",
+        ),
     ] = None,
     step: Annotated[
         float | None,

@@ -1,0 +1,112 @@
+"""A run as a terminal shows it: five rows of what matters, and below them what should be zero and is not."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+import typer
+
+from boebot.cli import output
+from boebot.record import figures
+from boebot.record.result import RunResult, TogetherResult
+
+ZERO = (
+    "late_steps",
+    "long_steps",
+    "lost_frames",
+    "bad_frames",
+    "overruns",
+    "dead_man_stops",
+    "fallback_takeovers",
+    "resets",
+    "sessions_lost",
+    "hung_at",
+    "unrealisable",
+)
+"""Figures that should be zero, or nothing."""
+
+HEADER = ("robot", "true distance (m)", "true contacts", "whisker touches", "brain")
+
+
+class Detail(Enum):
+    """How much is printed of a run."""
+
+    FEW = "what matters"
+    ALL = "all figures"
+    NOTHING = "nothing but errors"
+    JSON = "all figures as JSON"
+
+
+def detail(*, json: bool, verbose: bool, quiet: bool) -> Detail:
+    """By the options of that name; one of them at most."""
+    chosen = [kind for kind, wanted in ((Detail.JSON, json), (Detail.ALL, verbose), (Detail.NOTHING, quiet)) if wanted]
+    if len(chosen) > 1:
+        raise typer.BadParameter("expected one of --json, --verbose and --quiet")
+    return chosen[0] if chosen else Detail.FEW
+
+
+def print_run(result: RunResult | TogetherResult, wanted: Detail) -> None:
+    """The table of a run. JSON is for the caller, who knows its files."""
+    robots = [result] if isinstance(result, RunResult) else result.robots
+    several = len(robots) > 1
+    if wanted is Detail.ALL:
+        for number, robot in enumerate(robots, 1):
+            if several:
+                output.line(f"robot {number}")
+            output.print_table(robot.table())
+    elif wanted is Detail.FEW:
+        if several:
+            output.print_rows(HEADER, [_row(number, robot) for number, robot in enumerate(robots, 1)])
+        else:
+            table = output.empty_table(show_header=False)
+            table.add_column(style="dim")
+            table.add_column(overflow="fold")
+            for row in five_rows(robots[0]):
+                table.add_row(*row)
+            output.console().print(table)
+        for number, robot in enumerate(robots, 1):
+            if wrong := not_zero(robot):
+                output.line(f"{f'robot {number}: ' if several else ''}expected none: {', '.join(wrong)}")
+
+
+def five_rows(result: RunResult) -> list[tuple[str, str]]:
+    """Name and words of each."""
+    table = result.table()
+    where = f" in {table['arena']}" if table["arena"] else ""
+    without = f", without {table['without']}" if table["without"] else ""
+    way = result.way_in_words()
+    if (error_m := result.odometry_error) is not None:
+        way.append(f"odometry off by {error_m:.2f} m at the end")
+    return [
+        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{without}"),
+        ("time", f"{result.run_time:g} s, {result.real_time_factor:.3g} times real time"),
+        ("way", ", ".join(way)),
+        ("brain", _brain(result, table)),
+        ("ended", table["ended"]),
+    ]
+
+
+def not_zero(result: RunResult) -> list[str]:
+    """What should be zero and is not, in words."""
+    table = result.table()
+    wrong = {name: table[name] for name in ZERO if table[name]}
+    return [f"{name} {value}" for name, value, _ in figures.rows(wrong)]
+
+
+def _brain(result: RunResult, table: dict[str, Any]) -> str:
+    parts = [f"{figures.counted(result.steps, 'step', 'steps')}, {result.period:g} s apart"]
+    record = result.overview.brain
+    if record is not None:
+        shares = record.shares(result.run_time)
+        parts.append(figures.counted(record.behavior_switches, "switch", "switches"))
+        parts.append(", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share > 0))
+    return "; ".join(parts)
+
+
+def _row(number: int, robot: RunResult) -> tuple[str, ...]:
+    """Of one of several, under `HEADER`."""
+    table = robot.table()
+    ended = "complete" if robot.error is None else "ended early"
+    cells = (figures.text(table[name]) for name in ("true_distance_m", "true_contacts", "whisker_touches"))
+    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}"

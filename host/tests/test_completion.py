@@ -1,0 +1,78 @@
+"""The list of commands comes at once, and the shell completes commands, options and names."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from boebot.arenas import arena_names
+from boebot.brains import bundled
+from boebot.cli import app
+from command import boebot
+
+
+def test_list_of_commands_needs_none_of_them() -> None:
+    script = (
+        "import sys; sys.argv = ['boebot', '--help']\n"
+        "from boebot import cli\n"
+        "try: cli.main()\n"
+        "finally: print(sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert all(name in done.stdout for name in app.COMMANDS)
+    for heavy in ("numpy", "matplotlib", "mcap", "msgspec", "serial", "rich", "sim_bridge"):
+        assert f"'{heavy}'" not in done.stderr, heavy
+
+
+@pytest.mark.parametrize("name", app.COMMANDS)
+def test_command_says_of_itself_what_the_list_says(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, name, "--help")
+    assert (code, err) == (0, "")
+    assert app.COMMANDS[name][1].rstrip(".") in " ".join(out.split())
+
+
+def completed(folder: Path, *words: str) -> list[str]:
+    """What bash is told of the last word."""
+    environment = os.environ | {
+        "_BOEBOT_COMPLETE": "complete_bash",
+        "COMP_WORDS": "\n".join(["boebot", *words]),
+        "COMP_CWORD": str(len(words)),
+    }
+    command = [sys.executable, "-m", "boebot"]
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, timeout=60)
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+def test_shell_completes_commands_options_names_and_files(tmp_path: Path) -> None:
+    (tmp_path / "worm.py").touch()
+    (tmp_path / "words.txt").touch()
+    (tmp_path / "wood").mkdir()
+    assert completed(tmp_path, "re") == ["report", "replay"]
+    assert completed(tmp_path, "run", "--ro") == ["--robot", "--robots"]
+    assert completed(tmp_path, "run", "w") == ["wander", "wood/", "worm.py"]
+    assert completed(tmp_path, "run", "--arena", "") == [*arena_names(), "wood/"]
+    assert completed(tmp_path, "parameters", "s") == ["set", "save"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_script_for_each_shell(shell: str, tmp_path: Path) -> None:
+    environment = os.environ | {"_BOEBOT_COMPLETE": f"source_{shell}"}
+    done = subprocess.run([sys.executable, "-m", "boebot"], env=environment, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "") and f"complete_{shell}" in done.stdout
+    if (found := shutil.which(shell)) is not None:
+        script = tmp_path / "script"
+        script.write_text(done.stdout)
+        read = subprocess.run([found, "-n", str(script)], capture_output=True, text=True, timeout=60)
+        assert (read.returncode, read.stderr) == (0, "")
+
+
+def test_bundled_brains_are_completed_without_being_read() -> None:
+    from boebot.cli.completion import brains
+
+    assert set(bundled()) <= set(brains(""))
