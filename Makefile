@@ -162,7 +162,7 @@ check-generated:
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
-ready-bench: ready-test build/.done-system-bench build/avr8js/.done
+ready-bench: ready-test build/.done-system-bench build/avr8js/.done build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
@@ -217,6 +217,12 @@ build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
 
 build/avr8js/.done: tools/fetch_avr8js.py hil_tests/calibration/avr8js.py $(VENV)/.done-bench
 	@$(PYTHON_VENV) -m tools.fetch_avr8js
+	@touch $@
+
+# Another program's reader of records (host/tests/test_record_elsewhere.py), with the hashes of its lock file.
+build/mcap-core/.done: $(addprefix host/tests/mcap_core/,package.json package-lock.json) $(VENV)/.done-bench
+	@mkdir -p $(@D) && cp $(filter %.json,$^) $(@D)
+	@PATH="$(VENV)/bin:$$PATH" npm ci --prefix $(@D) --ignore-scripts --no-audit --no-fund --silent
 	@touch $@
 
 build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) build/simavr/.done $(VENV)/.done-firmware
