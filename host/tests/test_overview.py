@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import boebot
 from boebot.record import windows
 from boebot.record.result import RunResult
 from boebot.record.series import touch_indices, truth_at
+from boebot.view import tables
 
 RUNS = ("shieldbot-basic", "shieldbot", "shieldbot-charging", "arsim")
 
@@ -40,6 +43,29 @@ def test_windows_of_any_size_give_the_same(robot: str, ticks: int, monkeypatch: 
             assert np.allclose(dataclasses.astuple(one), dataclasses.astuple(other), atol=1e-9, rtol=0), name
     assert np.array_equal(parts.overview.contact_places, whole.overview.contact_places)
     assert np.array_equal(parts.overview.contact, whole.overview.contact)
+
+
+def columns_of(path: Path) -> dict[str, list[str]]:
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    return {name: list(cells) for name, *cells in zip(header, *rows, strict=True)}
+
+
+@pytest.mark.parametrize("robot", RUNS)
+def test_run_csv_by_windows_is_the_same(robot: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    whole, at_once, by_windows = run_of(robot), tmp_path / "at_once.csv", tmp_path / "by_windows.csv"
+    tables.write_run(whole, at_once)
+    monkeypatch.setattr(windows, "TICKS", 130)
+    tables.write_run(whole, by_windows)
+    expected = tables.columns(whole)
+    assert columns_of(at_once) == expected and len(expected["tick"]) == whole.ticks
+    found = columns_of(by_windows)
+    assert list(found) == list(expected)
+    for name, cells in found.items():
+        if name.startswith("odometry_"):  # put together of pieces: the last digit may differ
+            assert np.allclose(np.array(cells, float), np.array(expected[name], float), atol=1.1e-5, rtol=0), name
+        else:
+            assert cells == expected[name], name
 
 
 @pytest.mark.parametrize("robot", RUNS)

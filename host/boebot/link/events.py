@@ -27,9 +27,10 @@ class BoardEvent:
 
     def __str__(self) -> str:
         """As in "12.340 s: motors stopped by the dead-man"."""
-        return f"{self.time:.3f} s: {self._what()}"
+        return f"{self.time:.3f} s: {self.what()}"
 
-    def _what(self) -> str:
+    def what(self) -> str:
+        """What happened, in words."""
         match self.kind:
             case messages.EventKind.WHISKERS:
                 pressed = [one.name.lower() for one in messages.Whiskers if self.value & one and one.name]

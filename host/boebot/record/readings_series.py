@@ -50,7 +50,7 @@ class ReadingsSeries(Series):
         start = float(heading[0])
         return Pose(x - x[0], y - y[0], heading).placed(0.0, 0.0, -start)
 
-    def _own_columns(self) -> list[Column]:
+    def own_columns(self) -> list[Column]:
         """See `Series`."""
         left, right = self.signals
         return [

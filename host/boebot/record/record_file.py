@@ -198,31 +198,38 @@ class RecordReader:
         from mcap.records import Attachment, Chunk
         from mcap.stream_reader import StreamReader
 
-        self._file.seek(0)
         self.is_cut, self.attachments = False, {}
-        whole = cast(IO[bytes], _Whole(self._file))
+        whole = _Whole(self._file)
+        file = cast(IO[bytes], whole)
         try:
-            for record in StreamReader(whole, emit_chunks=True, record_size_limit=2 * LARGEST_CHUNK).records:
+            for record in StreamReader(file, emit_chunks=True, record_size_limit=2 * LARGEST_CHUNK).records:
                 if isinstance(record, Attachment):
                     self.attachments[record.name] = record.data
                 if isinstance(record, Attachment | Chunk):
-                    self.whole_bytes = self._file.tell()
+                    self.whole_bytes = whole.read_bytes
                 yield record
         except _damages():
             self.is_cut = True
 
 
 class _Whole:
-    """A file of which nothing is read in part: a shorter rest is its end."""
+    """A file of which nothing is read in part: a shorter rest is its end. Several can read the same file in turns.
+
+    Attributes:
+        read_bytes: from its beginning.
+    """
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
+        self.read_bytes = 0
 
     def read(self, size: int) -> bytes:
         """Raises EOFError."""
+        self._file.seek(self.read_bytes)
         data = self._file.read(size)
         if len(data) < size:
             raise EOFError
+        self.read_bytes += size
         return data
 
 

@@ -153,9 +153,9 @@ class RunResult(FormerNames):
     @cached_property
     def series(self) -> Series:
         """Telemetry or readings as arrays, one entry per control tick received."""
-        return self.telemetry if self.layout is None else self._series_of(self.record)
+        return self.telemetry if self.layout is None else self.series_of(self.record)
 
-    def _series_of(self, record: Record, directions: Directions | None = None) -> Series:
+    def series_of(self, record: Record, directions: Directions | None = None) -> Series:
         """Of a part of the record."""
         if self.layout is not None:
             return ReadingsSeries(record, self.robot, self.tick, self.layout)
@@ -211,7 +211,7 @@ class RunResult(FormerNames):
         """What tables, pictures and pages show of it; takes no more memory for a long run than for a short one."""
         return overview(
             self.record,
-            self._series_of,
+            self.series_of,
             clock_offset_s=self.clock_offset,
             whiskers=self.whiskers,
             slow=[name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)],

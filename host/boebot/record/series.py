@@ -97,7 +97,7 @@ class Series(Run, ABC):
         """The pose estimate at each tick, as seen from the first: there it is 0, 0, 0."""
 
     @abstractmethod
-    def _own_columns(self) -> list[Column]:
+    def own_columns(self) -> list[Column]:
         """Columns of run.csv besides those of the devices."""
 
     @cached_property
@@ -134,7 +134,7 @@ class Series(Run, ABC):
         for device in self._places:
             for column in self.device_columns(device).values():
                 found[_heading(device, column)] = (column.values, column.digits)
-        return found | {_heading("", column): (column.values, column.digits) for column in self._own_columns()}
+        return found | {_heading("", column): (column.values, column.digits) for column in self.own_columns()}
 
     def readouts(self) -> list[Readout]:
         """The devices' readings that pages show as a number."""

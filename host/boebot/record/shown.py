@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -42,20 +43,27 @@ class Shown:
         )
 
 
-def read_shown(record: Record, most: int | None = None) -> Shown:
-    """All of it. `most`: how many rows at most, the first and the last among them."""
+def shown_names(record: Record) -> dict[str, bool]:
+    """Of all that was shown, and whether it was ever a text."""
+    names: dict[str, bool] = {}
+    for _, data in record.each_row(VALUES):
+        for name, value in msgspec.json.decode(data).items():
+            names[name] = names.get(name, False) or isinstance(value, str)
+    return names
+
+
+def read_shown(record: Record, most: int | None = None, names: Mapping[str, bool] | None = None) -> Shown:
+    """All of it. `most`: how many rows at most, the first and the last among them. `names`: of the whole run, where
+    this is a part of its record (`shown_names`)."""
+    names = shown_names(record) if names is None else names
     count = record.count(VALUES)
     stride = 1 if most is None else max(1, math.ceil(count / most))
     times: list[float] = []
     rows: list[dict[str, float | str | None]] = []
-    names: dict[str, bool] = {}  # whether it has texts
     for index, (time_s, data) in enumerate(record.each_row(VALUES)):
-        row = msgspec.json.decode(data)
-        for name, value in row.items():
-            names[name] = names.get(name, False) or isinstance(value, str)
         if index % stride == 0 or index == count - 1:
             times.append(time_s)
-            rows.append(row)
+            rows.append(msgspec.json.decode(data))
     return Shown(
         np.array(times),
         {name: np.array([_number(row.get(name)) for row in rows]) for name, is_text in names.items() if not is_text},

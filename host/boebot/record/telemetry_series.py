@@ -82,7 +82,7 @@ class TelemetrySeries(Series):
 
     ages = values
 
-    def _own_columns(self) -> list[Column]:
+    def own_columns(self) -> list[Column]:
         """See `Series`."""
         raw = self.raw
         return [

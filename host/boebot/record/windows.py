@@ -15,11 +15,12 @@ from boebot.link.messages import DevicesTelemetry
 from boebot.record.blocks import Block, Group, joined
 from boebot.record.keepers import InMemory
 from boebot.record.record import Record
+from boebot.showing import VALUES
 
 TICKS = 20_000
 TRUTH_BEFORE_S = 0.5  # of the truth, before a window's first tick
 LATE_TICKS = 100  # after a window's last one: a message of a slow device may come so much later than its reading
-OF_TICKS = ("telemetry", "readings", "command", DevicesTelemetry.NAME)  # streams on the run's clock
+OF_TICKS = ("telemetry", "readings", "command", VALUES, DevicesTelemetry.NAME)  # streams on the run's clock
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Window:
 
     Attributes:
         record: the rows of its ticks; the first tick is also the last one of the window before, if there was one. Of
-            other streams than those of ticks, commands, slow devices and the truth it has none.
+            other streams than those of ticks, commands, slow devices, shown values and the truth it has none.
         first: index of the first tick that no window before has had: 0 or 1.
     """
 

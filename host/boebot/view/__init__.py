@@ -72,8 +72,8 @@ def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
     if csv:
         wanted |= {
             "run.csv": partial(tables.write_run, result),
-            "to_board.bin": lambda path: path.write_bytes(result.bytes_to_board),
-            "to_host.bin": lambda path: path.write_bytes(result.bytes_from_board),
+            "to_board.bin": partial(tables.write_bytes, result, "to_board"),
+            "to_host.bin": partial(tables.write_bytes, result, "to_host"),
             "wire.csv": partial(tables.write_wire, result),
         }
         if names is not None:

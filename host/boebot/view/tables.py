@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
+import heapq
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from boebot.record.brain_record import each_part, each_switch
+from boebot.record.parts import Part, parts
 from boebot.record.run_folder import FORMAT
 
 if TYPE_CHECKING:
@@ -21,8 +25,15 @@ if TYPE_CHECKING:
 
 def columns(result: RunResult) -> dict[str, list[str]]:
     """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
-    series = result.series
-    estimate = result.odometry
+    contact = None
+    if result.true_pose is not None and result.truth is not None:
+        moment = np.searchsorted(result.truth.time, result.series.time + result.clock_offset)
+        contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
+    return _columns(Part(result.record, 0, result.series, result.odometry, result.true_pose, contact, result.shown))
+
+
+def _columns(part: Part) -> dict[str, list[str]]:
+    series, estimate, true = part.series, part.odometry, part.true_pose
     kinds, left, right = zip(*series.commands, strict=True) if len(series) else ((), (), ())
     table: dict[str, list[str]] = {
         "time_s": _cells(series.time, 4),
@@ -32,7 +43,7 @@ def columns(result: RunResult) -> dict[str, list[str]]:
         "command_left": [f"{value:.4f}" for value in left],
         "command_right": [f"{value:.4f}" for value in right],
     }
-    shown = result.shown.at(series.time)
+    shown = part.shown.at(series.time)
     table |= {f"shown_{name}": _cells(values, 6) for name, values in shown.numbers.items()}
     table |= {f"shown_{name}": texts for name, texts in shown.texts.items()}
     if estimate is not None:
@@ -41,26 +52,34 @@ def columns(result: RunResult) -> dict[str, list[str]]:
             "odometry_y_m": _cells(estimate.y, 5),
             "odometry_heading_rad": _cells(estimate.heading, 5),
         }
-    true = result.true_pose
-    if true is not None and result.truth is not None:
-        moment = np.searchsorted(result.truth.time, series.time + result.clock_offset)
-        contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
+    if true is not None:
         table |= {
             "true_x_m": _cells(true.x, 5),
             "true_y_m": _cells(true.y, 5),
             "true_heading_rad": _cells(true.heading, 5),
-            "true_contact": _cells(contact),
         }
+    if part.contact is not None:
+        table["true_contact"] = _cells(part.contact)
     return table
 
 
 def write_run(result: RunResult, path: Path) -> None:
-    """run.csv"""
-    table = columns(result)
+    """run.csv, part by part."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(table)
-        writer.writerows(zip(*table.values(), strict=True))
+        if not result.ticks:
+            writer.writerow(columns(result))
+        for part in parts(result):
+            table = _columns(part)
+            if not part.first:
+                writer.writerow(table)
+            writer.writerows(islice(zip(*table.values(), strict=True), part.first, None))
+
+
+def write_bytes(result: RunResult, stream: str, path: Path) -> None:
+    """to_board.bin and to_host.bin: every byte of that stream."""
+    with path.open("wb") as file:
+        file.writelines(data for _, data in result.record.each_row(stream))
 
 
 def brain_columns(part: BrainRecord) -> dict[str, list[str]]:
@@ -104,17 +123,19 @@ def write_summary(result: RunResult, path: Path) -> None:
 
 def write_wire(result: RunResult, path: Path) -> None:
     """wire.csv: when which bytes of to_board.bin and to_host.bin were sent or read (transport's clock)."""
-    rows: list[tuple[float, str, int, int]] = []
-    for name in ("to_board", "to_host"):
-        first = 0
-        for stamp, data in result.record.rows(name):
-            rows.append((stamp, name, first, len(data)))
-            first += len(data)
-    rows.sort(key=lambda row: row[0])
+    rows = heapq.merge(*(_crossings(result, name) for name in ("to_board", "to_host")), key=lambda row: row[0])
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time_s", "file", "first_byte", "bytes"))
         writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
+
+
+def _crossings(result: RunResult, stream: str) -> Iterator[tuple[float, str, int, int]]:
+    """Stamp, stream, first byte and bytes of each of its rows."""
+    first = 0
+    for stamp, data in result.record.each_row(stream):
+        yield stamp, stream, first, len(data)
+        first += len(data)
 
 
 def _cells(values: Any, digits: int | None = None) -> list[str]:
