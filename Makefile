@@ -136,7 +136,7 @@ clean:
 lock:
 	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
 	@build/lock-venv/bin/pip install --quiet \
-		$$(build/lock-venv/bin/python tools/requirements.py build run firmware test bench check)
+		$$(build/lock-venv/bin/python tools/requirements.py build run firmware foxglove test bench check)
 	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
 	@mv build/requirements.lock requirements.lock
 
@@ -193,7 +193,7 @@ $(VENV)/.done-run: $(VENV)/.done-firmware $(DECLARED)
 	@$(call INSTALL,run)
 $(VENV)/.done-test: $(DECLARED) | $(VENV)/.done-boebot
 	@echo "Installing Python packages for tests"
-	@$(call INSTALL,test)
+	@$(call INSTALL,foxglove test)
 $(VENV)/.done-bench: $(DECLARED) | $(VENV)/.done-test
 	@echo "Installing what the bench compares with"
 	@$(call INSTALL,bench)

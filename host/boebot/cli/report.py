@@ -19,6 +19,9 @@ def report(
     csv: Annotated[
         bool, typer.Option("--csv", help="Also run.csv, the bytes of the line, and a brain's steps.")
     ] = False,
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Also foxglove.mcap, which Foxglove draws without set-up.")
+    ] = False,
     mended: Annotated[
         bool, typer.Option("--mend", help="Of a record that is cut: a whole one beside it, record-mended.mcap.")
     ] = False,
@@ -32,6 +35,10 @@ def report(
     result = read_run(run)
     with RunFolder(folder):
         files = result.save(folder, csv=csv)
+        if foxglove:
+            from boebot.view import save_for_foxglove
+
+            files.append(save_for_foxglove(result, folder))
         if mended and isinstance(result.error, CutError):
             files.append(mend(folder / RECORD, result))
     if isinstance(result.error, CutError):

@@ -6,14 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from boebot.record.record import Record
 from boebot.record.series import Bools, Pose, Series
 from boebot.record.shown import Shown, read_shown, shown_names
-from boebot.record.telemetry_series import Directions
+from boebot.record.telemetry_series import TELEMETRY_DTYPE, Directions
 from boebot.record.truth import track_of
-from boebot.record.windows import windows
+from boebot.record.windows import record_of, windows
 
 if TYPE_CHECKING:
+    from boebot.link.events import BoardEvent
     from boebot.record.result import RunResult
 
 
@@ -63,3 +66,16 @@ def parts(result: RunResult) -> Iterator[Part]:
             track.contact_at(time_s) if track is not None and is_known else None,
             read_shown(window.record, names=names),
         )
+
+
+def events(result: RunResult) -> Iterator[tuple[float, BoardEvent]]:
+    """The board's events with their times of the run (s): by the board's clock, as telemetry near them has both."""
+    times, board = np.zeros(1), np.zeros(1)
+    for group in result.record.groups():
+        if "telemetry" in group:
+            record = record_of(group)
+            ticks = np.frombuffer(b"".join(record.telemetry), dtype=TELEMETRY_DTYPE)["tick"]
+            times, board = np.array(record.times), ticks * result.tick
+        for event in record_of(group).events if "event" in group else ():
+            near = int(np.abs(board - event.time).argmin())
+            yield max(0.0, float(times[near] + event.time - board[near])), event

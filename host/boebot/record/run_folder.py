@@ -28,6 +28,7 @@ FILES = (
     "to_board.bin",
     "to_host.bin",
     "wire.csv",
+    "foxglove.mcap",
 )
 """What is made from a record; of a run of several robots also in a folder for each, `robot-1` and so on."""
 _ROBOT = re.compile(r"robot-[1-9]\d*\Z")

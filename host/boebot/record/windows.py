@@ -50,10 +50,10 @@ def windows(record: Record, clock_offset_s: float) -> Iterator[Window]:
             last = first + TICKS - 1
             end_s, late_s = waiting[stream].times[[last, last + LATE_TICKS]].tolist()
             window, waiting = _cut(waiting, end_s, late_s, clock_offset_s)
-            yield Window(_record(window), first)
+            yield Window(record_of(window), first)
             first = 1
     if stream in waiting and len(waiting[stream]) > first:
-        yield Window(_record(waiting), first)
+        yield Window(record_of(waiting), first)
 
 
 def _cut(waiting: Group, end_s: float, late_s: float, clock_offset_s: float) -> tuple[Group, dict[str, Block]]:
@@ -78,7 +78,8 @@ def _filled(blocks: Group) -> dict[str, Block]:
     return {name: block for name, block in blocks.items() if len(block)}
 
 
-def _record(group: Group) -> Record:
+def record_of(group: Group) -> Record:
+    """A record of this group alone."""
     keeper = InMemory()
     keeper.write(group, 0.0)
     return Record(keeper, is_new=False)

@@ -10,8 +10,10 @@ run.csv        one row per control tick: sensors, commands, odometry and, where 
 brain.csv      of a brain of processes: one row per step of it; switches.csv: what it switched, and why
 to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
 wire.csv       when which stretch of those two files crossed the wire
+foxglove.mcap  the run in the schemas of Foxglove, which draws it
 
-A run of several robots leaves picture and page with all of them, and a folder of all files for each.
+A run of several robots leaves picture, page and foxglove.mcap with all of them, and a folder of all other files for
+each.
 """
 
 from __future__ import annotations
@@ -117,6 +119,26 @@ def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) ->
     if failed:
         raise IncompleteError("; ".join(failed), paths)
     return paths
+
+
+def save_for_foxglove(result: RunResult | TogetherResult, folder: Path) -> Path:
+    """Writes foxglove.mcap into `folder`, which is there; returns its path.
+
+    Raises:
+        BoebotError: Foxglove's schemas are not installed, or the folder cannot be written to.
+    """
+    from boebot.record.result import RunResult
+
+    try:
+        from boebot.view import foxglove
+    except ImportError as error:
+        if "foxglove" not in str(error):
+            raise
+        raise BoebotError(
+            "Foxglove's schemas are not installed; expected the extra of that name: pip install 'boebot[foxglove]'"
+        ) from None
+    results = [result] if isinstance(result, RunResult) else result.robots
+    return _write(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 
 def _write(path: Path, write: Write) -> Path:

@@ -1,0 +1,321 @@
+"""foxglove.mcap: a run in the schemas of Foxglove (foxglove.dev), which draws and plots it without set-up.
+
+topic             what is in it
+/tf               frames in `world`: `robot` by its true pose, else by odometry; `odometry`, where the odometry thinks
+                  that it is, laid on the true start; `mover-1` and so on, the shapes that move
+/scene            arena, moving shapes and robots
+/pose, /odometry  the same poses by themselves; /path, /odometry_path: all of them at once, thinned
+/laser            each sweep of a laser range finder
+/ping and so on   numbers of a device, as in run.csv; /board: numbers of the board, or of a robot without one
+/command          what the brain asked for: kind (0 stop, 1 signal, 2 speed), left, right
+/log              events of the board, switches of a brain, notices, how the run ended
+
+Times are the run's, from 0 on. Of several robots, topics and frames begin with robot-1, robot-2 and so on, but for
+`world`, movers, /tf, /scene and /log. It is made part by part: memory does not grow with the run.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import msgspec
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from boebot.arenas.floor_plan import floor_plan, moving_solids
+from boebot.devices.laser import Laser
+from boebot.record.brain_record import SWITCHES
+from boebot.record.parts import Part, events, parts
+from boebot.record.record import KINDS
+from boebot.record.result import why
+from boebot.record.truth import lateness
+from boebot.view import foxglove_numbers, foxglove_scene, style
+
+if TYPE_CHECKING:
+    from boebot.devices.device import Column
+    from boebot.record.result import RunResult
+    from boebot.record.series import Pose
+
+WORLD = "world"
+MOVERS_AT_ONCE_S = 100.0  # of the moving shapes' ways
+SAME_S = 1e-6  # sweeps nearer in time than this are one
+
+
+class Entry(NamedTuple):
+    """A message, on its way into the file."""
+
+    time_ns: int
+    topic: str
+    schema: Any
+    """descriptor of the message"""
+    data: bytes
+
+
+def write(results: Sequence[RunResult], path: Path) -> None:
+    """Writes the robots of one run."""
+    prefixes = [""] if len(results) == 1 else [f"robot-{number}/" for number in range(1, len(results) + 1)]
+    colours = [style.colour(number) for number in range(1, len(results) + 1)]
+    streams = [_scene(results, prefixes, colours), _movers(results[0])]
+    for result, prefix in zip(results, prefixes, strict=True):
+        streams += [_ticks(result, prefix), _log(result, prefix)]
+    with path.open("wb") as file:
+        out = _File(file)
+        for entry in heapq.merge(*streams, key=lambda entry: entry.time_ns):
+            out.add(entry)
+        out.finish()
+
+
+class _File:
+    """The file, and what it has said of its topics so far."""
+
+    def __init__(self, file: Any) -> None:
+        from mcap.writer import Writer
+
+        self._writer: Any = Writer(file)
+        self._writer.start(library="boebot")
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[tuple[str, bytes], int] = {}
+
+    def add(self, entry: Entry) -> None:
+        """A message; those before it are older, or as old."""
+        if entry.topic not in self._channels:
+            name, files = entry.schema.full_name, _files_of(entry.schema.file)
+            if (name, files) not in self._schemas:
+                self._schemas[name, files] = self._writer.register_schema(name, "protobuf", files)
+            self._channels[entry.topic] = self._writer.register_channel(
+                entry.topic, "protobuf", self._schemas[name, files]
+            )
+        self._writer.add_message(self._channels[entry.topic], entry.time_ns, entry.data, entry.time_ns)
+
+    def finish(self) -> None:
+        """The end of the file."""
+        self._writer.finish()
+
+
+def _files_of(file: Any) -> bytes:
+    """A descriptor's file and those that it needs, before it: a FileDescriptorSet."""
+    found: dict[str, FileDescriptorProto] = {}
+
+    def add(one: Any) -> None:
+        for needed in one.dependencies:
+            add(needed)
+        if one.name not in found:
+            found[one.name] = FileDescriptorProto()
+            one.CopyToProto(found[one.name])
+
+    add(file)
+    return FileDescriptorSet(file=found.values()).SerializeToString()
+
+
+def _entry(time_s: float, topic: str, message: Any) -> Entry:
+    return Entry(_ns(time_s), topic, message.DESCRIPTOR, message.SerializeToString())
+
+
+def _ns(time_s: float) -> int:
+    return max(0, round(time_s * 1e9))
+
+
+def _stamp(time_s: float) -> Timestamp:
+    seconds, nanoseconds = divmod(_ns(time_s), 10**9)
+    return Timestamp(seconds=seconds, nanos=nanoseconds)
+
+
+def _transform(time_s: float, frame: str, x: float, y: float, heading: float) -> FrameTransform:
+    return FrameTransform(
+        timestamp=_stamp(time_s),
+        parent_frame_id=WORLD,
+        child_frame_id=frame,
+        translation=Vector3(x=x, y=y),
+        rotation=foxglove_scene.rotation(heading),
+    )
+
+
+# ---- what stands there -----------------------------------------------------------------------------------------------
+
+
+def _scene(results: Sequence[RunResult], prefixes: Sequence[str], colours: Sequence[str]) -> Iterator[Entry]:
+    """Arena, movers, robots and whole paths: once, at the beginning."""
+    entities = []
+    if results[0].has_truth:
+        assert results[0].world is not None
+        entities.append(foxglove_scene.arena(results[0].plan, WORLD))
+        solids = moving_solids(results[0].world)
+        entities += [foxglove_scene.mover(solid, _mover(number)) for number, solid in enumerate(solids)]
+    for result, prefix, colour in zip(results, prefixes, colours, strict=True):
+        entities.append(foxglove_scene.robot(result.robot, f"{prefix}robot", colour))
+        if result.has_odometry:
+            entities.append(foxglove_scene.ghost(result.robot, f"{prefix}odometry"))
+    yield _entry(0.0, "/scene", SceneUpdate(entities=entities))
+    for result, prefix in zip(results, prefixes, strict=True):
+        few = result.overview
+        if few.true_pose is None and few.odometry is None:  # it stays at the middle, for all that is known
+            yield _entry(0.0, "/tf", FrameTransforms(transforms=[_transform(0.0, f"{prefix}robot", 0.0, 0.0, 0.0)]))
+        for topic, path in (
+            ("path", few.true_pose if few.true_pose is not None else few.odometry),
+            ("odometry_path", few.placed_odometry),
+        ):
+            if path is not None:
+                yield _entry(0.0, f"/{prefix}{topic}", _path(path))
+
+
+def _path(path: Pose) -> PosesInFrame:
+    poses = zip(path.x.tolist(), path.y.tolist(), path.heading.tolist(), strict=True)
+    return PosesInFrame(
+        timestamp=_stamp(0.0), frame_id=WORLD, poses=[foxglove_scene.pose(x, y, heading) for x, y, heading in poses]
+    )
+
+
+def _mover(number: int) -> str:
+    return f"mover-{number + 1}"
+
+
+def _movers(result: RunResult) -> Iterator[Entry]:
+    """Where moving shapes are, over time."""
+    if not result.has_truth or result.world is None or not result.world.description.moving:
+        return
+    late, offset_s = lateness(result.record), result.clock_offset
+    _, end_s = result.record.span("truth")
+    begin_s = offset_s
+    while begin_s < end_s:
+        until_s = min(begin_s + MOVERS_AT_ONCE_S, end_s)
+        moving = floor_plan(result.world, begin_s, until_s, late).moving
+        for index, time_s in enumerate(moving[0].time[:-1].tolist()):
+            poses = [(float(one.x[index]), float(one.y[index]), float(one.heading[index])) for one in moving]
+            transforms = [_transform(time_s - offset_s, _mover(k), *pose) for k, pose in enumerate(poses)]
+            yield _entry(time_s - offset_s, "/tf", FrameTransforms(transforms=transforms))
+        begin_s = until_s
+
+
+# ---- what happens at each tick ---------------------------------------------------------------------------------------
+
+
+def _ticks(result: RunResult, prefix: str) -> Iterator[Entry]:
+    """Poses, sweeps, numbers and commands of a robot."""
+    kinds: dict[str, Any] = {}
+    start: tuple[float, float, float] | None = None
+    for part in parts(result):
+        if start is None:
+            start = (0.0, 0.0, 0.0) if part.true_pose is None else part.true_pose.at(0)
+        estimate = None if part.odometry is None else part.odometry.placed(*start)
+        yield from heapq.merge(
+            _poses(part, estimate, prefix),
+            _sweeps(result, part, prefix),
+            *(
+                _numbers(part, f"/{prefix}{name}", name, columns, kinds)
+                for name, columns in _columns(result, part).items()
+            ),
+            _commands(part, prefix, kinds),
+            key=lambda entry: entry.time_ns,
+        )
+
+
+def _poses(part: Part, estimate: Pose | None, prefix: str) -> Iterator[Entry]:
+    seen = part.true_pose if part.true_pose is not None else estimate
+    if seen is None:
+        return
+    placed = [("robot", "pose", seen)] + ([] if estimate is None else [("odometry", "odometry", estimate)])
+    for index, time_s in itertools.islice(enumerate(part.series.time.tolist()), part.first, None):
+        transforms = []
+        for frame, topic, path in placed:
+            x, y, heading = path.at(index)
+            transforms.append(_transform(time_s, f"{prefix}{frame}", x, y, heading))
+            pose = foxglove_scene.pose(x, y, heading)
+            yield _entry(time_s, f"/{prefix}{topic}", PoseInFrame(timestamp=_stamp(time_s), frame_id=WORLD, pose=pose))
+        yield _entry(time_s, "/tf", FrameTransforms(transforms=transforms))
+
+
+def _sweeps(result: RunResult, part: Part, prefix: str) -> Iterator[Entry]:
+    """Of each laser range finder, when it was read anew."""
+    for name, laser in result.robot.device.items():
+        if not isinstance(laser, Laser) or not part.series.device_columns(name):
+            continue
+        distances = part.series.values(name)
+        sampled = part.series.time - part.series.ages(name)
+        is_new = np.diff(sampled, prepend=-np.inf) > SAME_S
+        half = laser.step_rad * (laser.rays - 1) / 2
+        place = foxglove_scene.pose(*laser.position_m, laser.heading_rad, height=laser.height_m)
+        for index in np.flatnonzero(is_new[part.first :]) + part.first:
+            row = distances[index]
+            sweep = LaserScan(
+                timestamp=_stamp(sampled[index]),
+                frame_id=f"{prefix}robot",
+                pose=place,
+                start_angle=-half,
+                end_angle=half,
+                ranges=np.where(row < 0, np.inf, row).tolist(),
+            )
+            yield _entry(part.series.time[index], f"/{prefix}{name}", sweep)
+
+
+def _columns(result: RunResult, part: Part) -> dict[str, Sequence[Column]]:
+    """Of each device that has no topic of another kind, and of the board."""
+    devices = {
+        name: list(part.series.device_columns(name).values())
+        for name, device in result.robot.device.items()
+        if not isinstance(device, Laser)
+    }
+    return {name: columns for name, columns in devices.items() if columns} | {"board": part.series.own_columns()}
+
+
+def _numbers(part: Part, topic: str, name: str, columns: Sequence[Column], kinds: dict[str, Any]) -> Iterator[Entry]:
+    table = {"_".join(filter(None, (column.name, column.unit))): column.values for column in columns}
+    if name not in kinds:
+        kinds[name] = foxglove_numbers.descriptor(name, list(table))
+    rows = zip(part.series.time.tolist(), foxglove_numbers.packed(table), strict=True)
+    for time_s, data in itertools.islice(rows, part.first, None):
+        yield Entry(_ns(time_s), topic, kinds[name], data)
+
+
+def _commands(part: Part, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]:
+    steps = [step for step in part.record.steps if step[0] >= part.first]
+    table = {
+        "kind": np.array([KINDS.index(kind) for _, kind, _, _ in steps]),
+        "left": np.array([left for *_, left, _ in steps]),
+        "right": np.array([right for *_, right in steps]),
+    }
+    if "command" not in kinds:
+        kinds["command"] = foxglove_numbers.descriptor("command", list(table))
+    for (index, *_), data in zip(steps, foxglove_numbers.packed(table), strict=True):
+        yield Entry(_ns(float(part.series.time[index])), f"/{prefix}command", kinds["command"], data)
+
+
+# ---- what is said ----------------------------------------------------------------------------------------------------
+
+
+def _log(result: RunResult, prefix: str) -> Iterator[Entry]:
+    """Events and switches when they happened; at the end notices, and why it ended early."""
+    yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=lambda entry: entry.time_ns)
+    said = [(Log.WARNING, notice) for notice in result.notices]
+    if result.error is not None:
+        said.append((Log.ERROR, f"ended early: {why(result.error)}"))
+    for level, sentence in said:
+        yield _line(result.run_time, level, f"{prefix}run", sentence)
+
+
+def _line(time_s: float, level: Any, name: str, sentence: str) -> Entry:
+    return _entry(time_s, "/log", Log(timestamp=_stamp(time_s), level=level, message=sentence, name=name))
+
+
+def _events(result: RunResult, prefix: str) -> Iterator[Entry]:
+    for time_s, event in events(result):
+        yield _line(time_s, Log.INFO, f"{prefix}board", event.what())
+
+
+def _switches(result: RunResult, prefix: str) -> Iterator[Entry]:
+    for time_s, data in result.record.each_row(SWITCHES):
+        off, on, reason = msgspec.json.decode(data)
+        sentence = f"{off or 'nothing'} -> {on or 'nothing'}" + (f": {reason}" if reason else "")
+        yield _line(time_s, Log.INFO, f"{prefix}brain", sentence)
