@@ -24,9 +24,6 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from mcap.reader import make_reader
 
 import boebot
-from boebot.behaviors import Avoid, Wander
-from boebot.brain import Brain, Utility
-from boebot.cognition import near
 from boebot.record import windows
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.series import Pose
@@ -221,8 +218,7 @@ def test_log_has_events_switches_notices_and_the_end(tmp_path: Path) -> None:
 
 
 def test_log_has_a_brains_switches(tmp_path: Path) -> None:
-    brain = Brain([Wander(utility=Utility(b=0.5)), Avoid(utility=Utility(b=-1, w={"near": 8}))], [near()])
-    result = boebot.run(brain, seconds=20)
+    result = boebot.run("clearway", seconds=10)
     assert result.brain_record is not None
     said = [(time, line.message) for time, line in saved(result, tmp_path)["/log"] if line.name == "brain"]
     assert [time for time, _ in said] == pytest.approx([switch.time for switch in result.brain_record.switches])
