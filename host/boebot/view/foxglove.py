@@ -22,7 +22,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import msgspec
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -37,7 +36,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
-from boebot.record.brain_record import SWITCHES
+from boebot.record.brain_record import each_switch
 from boebot.record.parts import Part, events, parts
 from boebot.record.record import KINDS
 from boebot.record.result import why
@@ -315,7 +314,6 @@ def _events(result: RunResult, prefix: str) -> Iterator[Entry]:
 
 
 def _switches(result: RunResult, prefix: str) -> Iterator[Entry]:
-    for time_s, data in result.record.each_row(SWITCHES):
-        off, on, reason = msgspec.json.decode(data)
-        sentence = f"{off or 'nothing'} -> {on or 'nothing'}" + (f": {reason}" if reason else "")
-        yield _line(time_s, Log.INFO, f"{prefix}brain", sentence)
+    for switch in each_switch(result.record):
+        sentence = f"{switch.off or 'nothing'} -> {switch.on or 'nothing'}"
+        yield _line(switch.time, Log.INFO, f"{prefix}brain", f"{sentence}: {switch.reason}")
