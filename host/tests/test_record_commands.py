@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
+import boebot as library
+from boebot import resources
+from boebot.record.reading import attachments_of
+from boebot.running.again import again, recorded
 from command import boebot
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of two seconds on the native board."""
-    import boebot as library
-
     folder = tmp_path_factory.mktemp("runs") / "run"
     library.run("wander", seconds=2, out=folder)
     return folder
@@ -63,16 +66,64 @@ def test_runs_are_repeated_bit_by_bit(
     two = ("--robot", "shieldbot", "--pose", "0.5,0.5,0", "--without", "slip")
     assert boebot(capsys, "run", "wander", *asked, *two, "--out", "two")[0] == 0
     assert boebot(capsys, "run", "--again", "two")[0] == 0
+    avr = ("--on", "avr", "--period", "100ms", "--seconds", "0.5")
+    assert boebot(capsys, "run", "wander", *avr, "--out", "avr")[0] == 0
+    assert boebot(capsys, "run", "--again", "avr")[1].endswith(": 5 steps\n")
 
 
-def test_repetition_uses_the_recorded_brain(
+def test_repetition_uses_the_recorded_files(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Brains of one name, what one of them imports, and an arena: all of them changed or gone since."""
+    monkeypatch.chdir(tmp_path)
+    brains = {
+        "one/brain.py": "from one_speed import SPEED\ndef step(robot):\n    robot.drive(SPEED, 0.1)\n",
+        "one/one_speed.py": "SPEED = 0.2\n",
+        "two/brain.py": "def step(robot):\n    robot.drive(-0.1, 1 / (robot.time < 0.5))\n",
+    }
+    for name, source in brains.items():
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(source)
+    Path("mine.toml").write_bytes((resources.folder("arenas") / "room.toml").read_bytes())
+    Path("bot.toml").write_bytes((resources.folder("robots") / "shieldbot.toml").read_bytes())
+    asked = ("one/brain.py", "two/brain.py", "--robot", "bot.toml", "--arena", "mine.toml", "--seconds", "1")
+    assert boebot(capsys, "run", *asked, "--out", "run")[0] == 1
+    attached = attachments_of("run")
+    assert {
+        name: data.decode() for name, data in attached.items() if name.startswith("robot-") and "brain/" in name
+    } == {
+        f"robot-{number}/brain/{name.partition('/')[2]}": source
+        for name, source in brains.items()
+        for number in (1 if name.startswith("one") else 2,)
+    }
+    assert attached["arena/mine.toml"] == Path("mine.toml").read_bytes()
+    assert attached["robot-2/robot/bot.toml"] == Path("bot.toml").read_bytes()
+    for name in ("one/brain.py", "mine.toml", "bot.toml"):
+        Path(name).unlink()
+    Path("one/one_speed.py").write_text("SPEED = 0.3\n")
+    Path("two/brain.py").write_text("# another one\n" + brains["two/brain.py"])
+    sys.modules.pop("one_speed")  # as in a new process
+    code, out, err = boebot(capsys, "run", "--again", "run")
+    assert (code, err) == (0, "") and "bit-equal to run: " in out
+    sys.modules.pop("one_speed")
+
+
+def test_run_that_ctrl_c_ended_is_repeated_up_to_there(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("fast.py").write_text("def step(robot):\n    robot.drive(0.2, 0.2)\n")
-    assert boebot(capsys, "run", "fast.py", "--seconds", "1", "--out", "run")[0] == 0
-    Path("fast.py").unlink()
-    assert boebot(capsys, "run", "--again", "run")[0] == 0
+    source = "from pathlib import Path\ndef step(robot):\n    robot.drive(0.1, robot.time / 5)\n"
+    source += "    if robot.time > 0.7 and Path('interrupt').exists():\n        raise KeyboardInterrupt\n"
+    Path("brain.py").write_text(source)
+    Path("interrupt").touch()
+    with pytest.raises(KeyboardInterrupt):
+        library.run("brain.py", out="run")
+    Path("interrupt").unlink()
+    code, out, err = boebot(capsys, "run", "--again", "run")
+    assert code == 0 and "bit-equal to run, as far as it goes" in out and "ended by Ctrl-C after 0.75 s" in err
+    Path("interrupt").touch()
+    with pytest.raises(KeyboardInterrupt):
+        again(recorded(Path("run")))
 
 
 def test_repetition_says_where_it_differs(

@@ -130,6 +130,11 @@ def load_brain(source: object) -> LoadedBrain:
     )
 
 
+def is_users(file: str) -> bool:
+    """A file of code is the user's own: not the kit's, Python's, or a package's."""
+    return not file.startswith(_NOBODYS)
+
+
 def place(error: BaseException, path: Path | None) -> str:
     """Where in the user's own files the error arose: "wander.py, line 12", or "" if that is not known.
 
@@ -140,7 +145,7 @@ def place(error: BaseException, path: Path | None) -> str:
         return f"{path}, line {error.lineno}"
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     names = [name for name, _ in frames]
-    outside = [name for name in names if not name.startswith(_NOBODYS)]
+    outside = [name for name in names if is_users(name)]
     theirs = str(path) if str(path) in names else next(iter(outside), None)
     lines = [line for name, line in frames if name == theirs]
     return f"{theirs}, line {lines[-1]}" if lines else ""

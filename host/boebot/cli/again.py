@@ -5,13 +5,15 @@ Exit codes: 0 it is bit-equal; 1 it differs; 2 it cannot be repeated.
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from pathlib import Path
 
 import typer
 
 from boebot.cli import output
 from boebot.errors import BoebotError
-from boebot.running.again import Repetition, again
+from boebot.running.again import Repetition, again, recorded
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
@@ -19,12 +21,18 @@ EXIT_DIFFERS, EXIT_USAGE = 1, 2
 def run_again(folder: Path, as_json: bool) -> None:
     """Repeats the run, prints what came of it, and ends the command with its exit code."""
     try:
-        repetition = again(folder)
+        run = recorded(folder)
+        with (
+            contextlib.redirect_stdout(sys.stderr),  # the brain may print; the answer stands alone
+            output.progress_bar(f"{folder} again", run.seconds) as bar,
+            output.step_watch(bar) as progress,
+        ):
+            repetition = again(run, progress)
     except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_USAGE) from None
-    if repetition.cut is not None:
-        output.say(repetition.cut)
+    if repetition.part is not None:
+        output.say(repetition.part)
     if as_json:
         output.print_json(_values(repetition))
     else:
@@ -39,7 +47,7 @@ def _sentence(folder: Path, repetition: Repetition) -> str:
         return f"differs from {folder} first at {where}"
     if repetition.ends is not None:
         return f"differs from {folder}: robot {repetition.robot} ended by {' and by '.join(map(repr, repetition.ends))}"
-    part = "" if repetition.cut is None else ", as far as it goes"
+    part = "" if repetition.part is None else ", as far as it goes"
     return f"bit-equal to {folder}{part}: {repetition.steps} steps"
 
 
@@ -47,7 +55,7 @@ def _values(repetition: Repetition) -> dict[str, object]:
     first = repetition.difference
     return {
         "equal": repetition.is_equal,
-        "whole": repetition.cut is None,
+        "whole": repetition.part is None,
         "steps": repetition.steps,
         "robot": None if repetition.is_equal else repetition.robot,
         "stream": None if first is None else first.stream,

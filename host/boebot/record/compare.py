@@ -7,6 +7,7 @@ before (experiment E68); `replayed` goes further and asks a brain anew what it w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -90,9 +91,11 @@ class RowDifference:
         return f"stream {self.stream}, {self.time:.4f} s, row {self.row}: {self.what}"
 
 
-def record_difference(one: RunResult, other: RunResult, *, is_cut: bool = False) -> RowDifference | None:
+def record_difference(
+    one: RunResult, other: RunResult, *, is_cut: bool = False, until_s: float = math.inf
+) -> RowDifference | None:
     """The first row, in time, that two records do not have in common, bit for bit. `is_cut`: the first record is; what
-    the second one has beyond its end is no difference."""
+    the second one has beyond its end is no difference. `until_s`: of the run; rows from then on do not count."""
     found = []
     for stream in sorted(one.record.streams() | other.record.streams()):
         offset_s = one.clock_offset if stream in _OTHER_CLOCKS else 0.0
@@ -102,6 +105,8 @@ def record_difference(one: RunResult, other: RunResult, *, is_cut: bool = False)
                 break
             if a != b:
                 time_s = min(row[0] for row in (a, b) if row is not None) - offset_s
+                if time_s >= until_s:
+                    break
                 found.append(RowDifference(stream, time_s, index, _in_words(a, b)))
                 break
     return min(found, key=lambda difference: difference.time, default=None)

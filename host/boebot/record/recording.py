@@ -49,7 +49,7 @@ class Recording:
 
         Args:
             results: what is known of the run as it begins.
-            sources: of brains, by file name.
+            sources: files that it came from, by name.
             requested: what was asked for, as values of JSON.
             waits: for a slow disk; False: time does not stand still meanwhile.
 

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from boebot.arenas import load_arena
 from boebot.errors import BoebotError
@@ -18,6 +18,7 @@ from boebot.record.recording import BEGIN
 from boebot.record.result import RunResult, TogetherResult, why
 from boebot.running.driver import Progress
 from boebot.running.runner import execute
+from boebot.running.sources import arena_file, brain_file
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
 
@@ -33,14 +34,14 @@ class Repetition:
         robot: where it differs: number of the robot, from 1.
         difference: where it differs; None: nowhere.
         ends: how both ended, where that differs.
-        cut: why only the beginning could be compared; None: all was.
+        part: why only the beginning was compared: the record is cut, or Ctrl-C ended the run; None: all was.
     """
 
     steps: int
     robot: int = 1
     difference: RowDifference | None = None
     ends: tuple[str, str] | None = None
-    cut: str | None = None
+    part: str | None = None
 
     @property
     def is_equal(self) -> bool:
@@ -48,63 +49,103 @@ class Repetition:
         return self.difference is None and self.ends is None
 
 
-def again(path: Path, progress: Progress | None = None) -> Repetition:
-    """Repeats the run in a folder.
+@dataclass(frozen=True)
+class Recorded:
+    """A run to repeat.
+
+    Attributes:
+        results: of its robots.
+        asked: the request, as `Request.said` has it.
+        attached: to its record, by name.
+    """
+
+    results: Sequence[RunResult]
+    asked: Mapping[str, Any]
+    attached: Mapping[str, bytes]
+
+    @property
+    def seconds(self) -> float:
+        """How long it was."""
+        return max(result.run_time for result in self.results)
+
+    @property
+    def part(self) -> str | None:
+        """Why only its beginning can be repeated; None: all can be."""
+        for result in self.results:
+            if isinstance(result.error, CutError):
+                return str(result.error)
+            if isinstance(result.error, KeyboardInterrupt):
+                return f"the run was ended by Ctrl-C after {result.run_time:.2f} s; it is repeated up to its last step"
+        return None
+
+
+def recorded(path: Path) -> Recorded:
+    """The run in a folder.
 
     Raises:
-        BoebotError: it cannot be read or repeated: a real or paced run, one that Ctrl-C ended, a brain from no file, an
-            arena that has changed.
+        BoebotError: it cannot be read or repeated: a real or paced run, or a brain from no file.
     """
     attached = attachments_of(path)
-    recorded = _robots(read_run(path))
+    results = _robots(read_run(path))
     asked = json.loads(attached.get(BEGIN, b"{}")).get("request")
     if asked is None:
         raise BoebotError(f"{path} does not say what was asked for; expected a record of this boebot")
-    _check(path, recorded, asked)
+    if results[0].world is None:
+        raise BoebotError(f"{path} is of a real robot, whose run cannot be repeated; expected a simulated run")
+    if asked["realtime"]:
+        raise BoebotError(f"{path} was run in real time, which no run repeats bit by bit; expected one that was not")
+    for result, said in zip(results, asked["members"], strict=True):
+        if said["brain"] is None:
+            raise BoebotError(
+                f"brain {result.brain!r} came from no file; expected a run of a bundled brain or of a file"
+            )
+    return Recorded(results, asked, attached)
+
+
+def again(run: Recorded, progress: Progress | None = None) -> Repetition:
+    """Repeats a run.
+
+    Raises:
+        BoebotError: it cannot be repeated, as a bundled arena has changed.
+        KeyboardInterrupt: Ctrl-C.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        request = _request(recorded, asked, attached, Path(folder))
-        new = _robots((execute if len(recorded) == 1 else execute_together)(request, progress))
-    return _compared(recorded, new)
+        files = {
+            said["brain"]: str(brain_file(run.attached, Path(said["brain"]), number, len(run.results), Path(folder)))
+            for number, said in enumerate(run.asked["members"], 1)
+        }
+        request = _request(run, files, Path(folder))
+        new = _robots((execute if len(run.results) == 1 else execute_together)(request, progress))
+    for result in new:
+        if isinstance(result.error, KeyboardInterrupt):
+            raise result.error
+    return _compared(run, new, {copy: original for original, copy in files.items()})
 
 
 def _robots(result: RunResult | TogetherResult) -> Sequence[RunResult]:
     return [result] if isinstance(result, RunResult) else result.robots
 
 
-def _check(path: Path, recorded: Sequence[RunResult], asked: Mapping[str, Any]) -> None:
-    """Raises BoebotError where the run is no function of its record."""
-    world = recorded[0].world
-    if world is None:
-        raise BoebotError(f"{path} is of a real robot, whose run cannot be repeated; expected a simulated run")
-    if asked["realtime"]:
-        raise BoebotError(f"{path} was run in real time, which no run repeats bit by bit; expected one that was not")
-    if any(isinstance(result.error, KeyboardInterrupt) for result in recorded):
-        raise BoebotError(f"{path} was ended by Ctrl-C, at a moment that cannot be repeated; expected a whole run")
-    if asked["arena"] is not None and load_arena(asked["arena"]).description != world.description:
-        raise BoebotError(f"arena {asked['arena']} has changed since the run in {path}; expected the same one")
-
-
-def _request(
-    recorded: Sequence[RunResult], asked: Mapping[str, Any], attached: Mapping[str, bytes], folder: Path
-) -> Request:
-    """The same request; brains that have changed since come from the record, by way of the folder."""
+def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
+    """The same request. `brains`: the files to take for those that it names; files of the record come to `folder`."""
+    asked = run.asked
     seconds = math.inf if asked["seconds"] is None else asked["seconds"]
-    if any(isinstance(result.error, CutError) for result in recorded):
-        seconds = min(seconds, max(result.run_time for result in recorded) + BEYOND_S)
+    if run.part is not None:
+        seconds = min(seconds, run.seconds + BEYOND_S)
     members = [
         Member(
-            brain=_brain(result, said["brain"], attached, folder),
+            brain=brains[said["brain"]],
             robot=result.robot,
             pose=None if said["pose"] is None else tuple(said["pose"]),
             seed=said["seed"],
             period=said["period"],
             without=said["without"],
         )
-        for result, said in zip(recorded, asked["members"], strict=True)
+        for result, said in zip(run.results, asked["members"], strict=True)
     ]
     return Request(
         members=members,
-        arena=asked["arena"],
+        arena=_arena(run, folder),
         on=asked["on"],
         seconds=seconds,
         seed=asked["seed"],
@@ -113,39 +154,49 @@ def _request(
     )
 
 
-def _brain(result: RunResult, source: str | None, attached: Mapping[str, bytes], folder: Path) -> str | Path:
-    """A bundled name, the brain's file, or, where that has changed, its source in the record as a file.
+def _arena(run: Recorded, folder: Path) -> str | Path | None:
+    """The same arena: a bundled one, its file, or, where that has changed, the record's.
 
     Raises:
-        BoebotError: the brain came from no file.
+        BoebotError: it is another one now.
     """
-    if source is None:
-        raise BoebotError(f"brain {result.brain!r} came from no file; expected a run of a bundled brain or of a file")
-    path = Path(source)
-    recorded = attached.get(path.name)
-    if recorded is None or (path.is_file() and path.read_bytes() == recorded):
-        return source
-    copy = folder / path.name
-    copy.write_bytes(recorded)
-    return copy
+    name = run.asked["arena"]
+    if name is None:
+        return None
+    arena = arena_file(run.attached, Path(name), folder) if Path(name).suffix else name
+    world = run.results[0].world
+    if world is None or load_arena(arena).description != world.description:
+        raise BoebotError(f"arena {name} has changed since the run; expected the same one")
+    return cast(str | Path, arena)
 
 
-def _compared(recorded: Sequence[RunResult], new: Sequence[RunResult]) -> Repetition:
-    steps = sum(result.steps for result in new)
-    cut = next((str(result.error) for result in recorded if isinstance(result.error, CutError)), None)
+def _compared(run: Recorded, new: Sequence[RunResult], originals: Mapping[str, str]) -> Repetition:
+    """`originals`: for the copy of a brain's file its own place, which errors name."""
+    steps, part = sum(result.steps for result in new), run.part
+    pairs = list(enumerate(zip(run.results, new, strict=True), 1))
     found = []
-    for number, (one, other) in enumerate(zip(recorded, new, strict=True), 1):
-        difference = record_difference(one, other, is_cut=cut is not None)
+    for number, (one, other) in pairs:
+        is_cut = isinstance(one.error, CutError)
+        difference = record_difference(one, other, is_cut=is_cut, until_s=_comparable_s(one))
         if difference is not None:
             found.append((difference.time, number, difference))
     if found:
         _, number, first = min(found, key=lambda each: each[:2])
-        return Repetition(steps=steps, robot=number, difference=first, cut=cut)
-    for number, (one, other) in enumerate(zip(recorded, new, strict=True), 1):
-        ends = _end(one), _end(other)
-        if cut is None and ends[0] != ends[1]:
-            return Repetition(steps=steps, robot=number, ends=ends)
-    return Repetition(steps=steps, cut=cut)
+        return Repetition(steps=steps, robot=number, difference=first, part=part)
+    for number, (one, other) in pairs:
+        end = _end(other)
+        for copy, original in originals.items():
+            end = end.replace(copy, original)
+        if part is None and _end(one) != end:
+            return Repetition(steps=steps, robot=number, ends=(_end(one), end))
+    return Repetition(steps=steps, part=part)
+
+
+def _comparable_s(result: RunResult) -> float:
+    """Up to when a run is a function of its record: all of it, or up to the last step before Ctrl-C."""
+    if not isinstance(result.error, KeyboardInterrupt):
+        return math.inf
+    return result.record.span("command")[1]
 
 
 def _end(result: RunResult) -> str:

@@ -26,6 +26,7 @@ from boebot.running import hangs, interrupts
 from boebot.running.board_driver import BoardDriver
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
+from boebot.running.sources import sources
 from boebot.running.stepping import StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, check_progress, expect
 
@@ -113,18 +114,12 @@ def execute(
             driver = driver_of(session, task)
             waits = session.arena is not None and not request.realtime
             begun = [driver.result(None, 0.0)]
-            recording.begin(folder, begun, sources([task]), request.said([task]), waits=waits)
+            recording.begin(folder, begun, sources(request, [task]), request.said([task]), waits=waits)
             result = _drive(driver, task, unended)
             result.error = recording.end([result]) or result.error
             return result
         finally:
             session.close()
-
-
-def sources(tasks: Sequence[Task]) -> dict[str, bytes]:
-    """The files of the brains, by name."""
-    paths = {task.brain.path for task in tasks if task.brain.path is not None}
-    return {path.name: path.read_bytes() for path in sorted(paths) if path.is_file()}
 
 
 def keep(work: Callable[[RunFolder | None, Callable[[Result], None]], Result], out: str | Path | None) -> Result:

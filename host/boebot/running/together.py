@@ -24,7 +24,8 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.runner import UNENDED, driver_of, keep, result_of, sources
+from boebot.running.runner import UNENDED, driver_of, keep, result_of
+from boebot.running.sources import sources
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot
 
@@ -263,7 +264,9 @@ class _Run:
         results = [robot.driver.result(None, 0.0) for robot in self._robots if robot.driver is not None]
         waits = not self._robots[0].task.request.realtime
         tasks = [robot.task for robot in self._robots]
-        self._recording.begin(self._folder, results, sources(tasks), self._request.said(tasks), waits=waits)
+        self._recording.begin(
+            self._folder, results, sources(self._request, tasks), self._request.said(tasks), waits=waits
+        )
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:

@@ -1,0 +1,93 @@
+"""The files that a run came from, as they are attached to its record, and taken from there to repeat it.
+
+brain/NAME.py   the brain's file; beside it those that it had imported from its own folder when the run began
+robot/NAME.toml, arena/NAME.toml   where they were given as files
+
+Of several robots, names of brain and robot begin with robot-1/, robot-2/ and so on.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from boebot import brains
+from boebot.running.driver import Task
+from boebot.running.tasks import Request
+
+
+def sources(request: Request, tasks: Sequence[Task]) -> dict[str, bytes]:
+    """The files of a request and its tasks, by name."""
+    found: dict[str, bytes] = {}
+    if request.arena is not None:
+        found |= _description("arena/", request.arena)
+    for number, (member, task) in enumerate(zip(request.members, tasks, strict=True), 1):
+        prefix = _prefix(number, len(tasks))
+        if task.brain.path is not None and task.brain.path.is_file():
+            found |= {f"{prefix}brain/{name}": data for name, data in _brain(task.brain.path).items()}
+        if isinstance(member.robot, str | Path):
+            found |= _description(f"{prefix}robot/", member.robot)
+    return found
+
+
+def brain_file(attached: Mapping[str, bytes], path: Path, number: int, count: int, folder: Path) -> Path:
+    """The file of a brain as it was: it itself where nothing of it has changed, else a copy from the record.
+
+    Args:
+        attached: to the record of the run.
+        path: of the brain's file then.
+        number: of the robot, from 1, of `count`.
+        folder: for copies.
+    """
+    prefix = f"{_prefix(number, count)}brain/"
+    files = {name.removeprefix(prefix): data for name, data in attached.items() if name.startswith(prefix)}
+    if path.name not in files or all(_is_same(path.parent / name, data) for name, data in files.items()):
+        return path
+    copies = folder / f"robot-{number}"
+    for name, data in files.items():
+        copy = copies / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(data)
+    return copies / path.name
+
+
+def arena_file(attached: Mapping[str, bytes], path: Path, folder: Path) -> Path:
+    """The file of an arena as it was, as of `brain_file`."""
+    data = attached.get(f"arena/{path.name}")
+    if data is None or _is_same(path, data):
+        return path
+    copy = folder / path.name
+    copy.write_bytes(data)
+    return copy
+
+
+def _prefix(number: int, count: int) -> str:
+    return "" if count == 1 else f"robot-{number}/"
+
+
+def _description(prefix: str, name: str | Path) -> dict[str, bytes]:
+    """Of a robot or arena; a bundled one came from no file of the user's."""
+    path = Path(name)
+    return {prefix + path.name: path.read_bytes()} if path.suffix == ".toml" and path.is_file() else {}
+
+
+def _brain(path: Path) -> dict[str, bytes]:
+    """A brain's file, and what it has imported from its folder, by their names there."""
+    files = {path, *_imported(path.parent)}
+    return {file.relative_to(path.parent).as_posix(): file.read_bytes() for file in sorted(files)}
+
+
+def _imported(folder: Path) -> Iterator[Path]:
+    """Python files of the user's own below a folder that have been imported."""
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if name == "__main__" or not isinstance(file, str) or not brains.is_users(file):
+            continue
+        path = Path(file).resolve()
+        if path.suffix == brains.PYTHON and path.is_relative_to(folder) and path.is_file():
+            yield path
+
+
+def _is_same(path: Path, data: bytes) -> bool:
+    return path.is_file() and path.read_bytes() == data
