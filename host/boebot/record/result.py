@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -31,6 +31,10 @@ from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
 from boebot.record.truth import plan_of, truth_of
 from boebot.running import hangs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 
 @dataclass(kw_only=True, repr=False)
@@ -103,8 +107,13 @@ class RunResult(FormerNames):
         return f"<RunResult: {self.summary()}>"
 
     def _repr_html_(self) -> str:
-        """The figures as a table, for notebooks."""
-        return figures.html_table(self.table())
+        """The figures as a table and the picture below it, for notebooks."""
+        table = figures.html_table(self.table())
+        if not self.ticks:
+            return table
+        from boebot.view import on_screen
+
+        return table + on_screen.html_image(on_screen.drawn(self))
 
     def summary(self) -> str:
         """The run in one line: who, where, how long, how far, how it ended."""
@@ -347,6 +356,40 @@ class RunResult(FormerNames):
             }
         )
 
+    # ---- to look at ----------------------------------------------------------------------------------------
+
+    def plot(self) -> Figure:
+        """The run from above, as in run.png: a figure of matplotlib, to be shown or saved (`.savefig("mine.pdf")`).
+
+        Raises:
+            BoebotError: no control tick of the run was recorded.
+        """
+        from boebot.view import on_screen
+
+        return on_screen.drawn(self).figure
+
+    def replay(self) -> Path:
+        """Opens the run in the browser, to play and scrub, where there is a display. Returns the page's path, a
+        temporary file.
+
+        Raises:
+            BoebotError: no control tick of the run was recorded.
+        """
+        from boebot.view import on_screen
+
+        return on_screen.play([self])
+
+    def to_pandas(self) -> DataFrame:
+        """The columns of run.csv, by the same names (units are in them), one row per control tick; the index is
+        `time_s`, the run's time in s. Empty cells are NaN.
+
+        Raises:
+            BoebotError: pandas, an extra of the kit, is not installed.
+        """
+        from boebot.view import data_frame
+
+        return data_frame.of_run(self)
+
     # ---- files ---------------------------------------------------------------------------------------------
 
     def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
@@ -375,13 +418,38 @@ class TogetherResult:
         return f"<TogetherResult of {len(self.robots)}:{robots}>"
 
     def _repr_html_(self) -> str:
-        """A table for each robot, for notebooks."""
-        return "".join(f"<h4>robot {n}</h4>{robot._repr_html_()}" for n, robot in enumerate(self.robots, 1))
+        """A table for each robot and the picture of them all, for notebooks."""
+        tables = "".join(
+            f"<h4>robot {n}</h4>{figures.html_table(robot.table())}" for n, robot in enumerate(self.robots, 1)
+        )
+        if not any(robot.ticks for robot in self.robots):
+            return tables
+        from boebot.view import on_screen
+
+        return tables + on_screen.html_image(on_screen.drawn_together(self))
 
     def table(self) -> dict[str, Any]:
         """The figures by name: of each robot, and how the run ended."""
         ended = "complete" if self.error is None else why(self.error)
         return {"robots": [result.table() for result in self.robots], "ended": ended}
+
+    def plot(self) -> Figure:
+        """All robots from above, as in run.png. See `RunResult.plot`."""
+        from boebot.view import on_screen
+
+        return on_screen.drawn_together(self).figure
+
+    def replay(self) -> Path:
+        """Opens the run of all robots in the browser. See `RunResult.replay`."""
+        from boebot.view import on_screen
+
+        return on_screen.play(self.robots)
+
+    def to_pandas(self) -> DataFrame:
+        """The rows of all robots; the index is `robot`, its number from 1, and `time_s`. See `RunResult.to_pandas`."""
+        from boebot.view import data_frame
+
+        return data_frame.of_together(self)
 
     def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
         """Writes run.png and replay.html with all robots, and the files of each into robot-1, robot-2 and so on;

@@ -36,6 +36,11 @@ SPOT_M = 0.03  # a shorter stretch would hardly be seen
 
 def write(result: RunResult, path: Path) -> Path:
     """Draws the run into a PNG file."""
+    return draw(result).save(path)
+
+
+def draw(result: RunResult) -> Sheet:
+    """Draws the run."""
     view = scene.view(result)
     low, high = scene.bounds(view)
     record = result.overview.brain if result.overview.brain else None
@@ -59,7 +64,7 @@ def write(result: RunResult, path: Path) -> Path:
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
         draw_robot(axes, result.robot, view.pose(index), colour, plan=view.plan, turret=turret)
-    return sheet.save(path)
+    return sheet
 
 
 def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:

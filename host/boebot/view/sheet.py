@@ -3,6 +3,7 @@ if wished a panel below the field."""
 
 from __future__ import annotations
 
+import io
 import textwrap
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,7 @@ class Sheet:
     """A picture under way.
 
     Attributes:
+        figure: the whole.
         axes: of the field, to draw on.
         panel: the axes below the field, where they were asked for.
     """
@@ -63,10 +65,10 @@ class Sheet:
         panel_in = PANEL_IN + ROW_IN * panel_rows + 0.15 + PANEL_BELOW_IN if panel_rows else 0.0
         below = 0.5 + panel_in + foot
         tall = height * scale + above + below
-        self._figure = Figure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
-        FigureCanvasAgg(self._figure)
+        self.figure = Figure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
+        FigureCanvasAgg(self.figure)
         inset = (across - width * scale) / 2
-        self.axes = self._figure.add_axes(
+        self.axes = self.figure.add_axes(
             (
                 (LEFT_IN + inset) / style.WIDTH_IN,
                 below / tall,
@@ -82,7 +84,7 @@ class Sheet:
 
     def _panel(self, foot: float, across: float, tall: float) -> Axes:
         """Axes as wide as the sheet, `foot` above its lower edge."""
-        return self._figure.add_axes(
+        return self.figure.add_axes(
             (LEFT_IN / style.WIDTH_IN, (foot + PANEL_BELOW_IN) / tall, across / style.WIDTH_IN, PANEL_IN / tall)
         )
 
@@ -90,21 +92,32 @@ class Sheet:
         """Title, caption and legend on a sheet of this height, inches."""
         left = 0.18 / style.WIDTH_IN
         shown = textwrap.shorten(self.title, TITLE_COLUMNS, placeholder="…")
-        self._figure.text(left, 1 - 0.32 / tall, shown, fontsize=15, weight="bold", color=style.INK, va="center")
+        self.figure.text(left, 1 - 0.32 / tall, shown, fontsize=15, weight="bold", color=style.INK, va="center")
         for number, line in enumerate(lines):
             y = 1 - (0.64 + LINE_IN * number) / tall
-            self._figure.text(left, y, line, fontsize=9.5, color=style.FAINT, va="center")
+            self.figure.text(left, y, line, fontsize=9.5, color=style.FAINT, va="center")
         if legend:
-            self._figure.legend(
+            self.figure.legend(
                 handles=list(legend), loc="lower center", ncols=columns, frameon=False, fontsize=8.5,
                 labelcolor=style.INK, bbox_to_anchor=(0.5, 0.06 / tall), handletextpad=0.5, columnspacing=1.6,
             )  # fmt: skip
 
+    @property
+    def width(self) -> int:
+        """Of the picture, in pixels of a page."""
+        return round(float(self.figure.get_figwidth()) * 96)
+
     def save(self, path: Path) -> Path:
         """Writes it as PNG, with title and caption in its text."""
-        metadata = {"Title": self.title, "Description": self.caption}
-        self._figure.savefig(path, facecolor=style.PAPER, metadata=metadata)
+        path.write_bytes(self.png())
         return path
+
+    def png(self) -> bytes:
+        """As the bytes of a PNG file, with title and caption in its text."""
+        metadata = {"Title": self.title, "Description": self.caption}
+        file = io.BytesIO()
+        self.figure.savefig(file, format="png", facecolor=style.PAPER, metadata=metadata)
+        return file.getvalue()
 
 
 def _wrapped(parts: Sequence[str]) -> list[str]:

@@ -26,6 +26,11 @@ Shown = tuple[int, "RunResult", scene.View]
 
 def write(result: TogetherResult, path: Path) -> Path:
     """Draws all robots of a run into a PNG file."""
+    return draw(result).save(path)
+
+
+def draw(result: TogetherResult) -> Sheet:
+    """Draws all robots of a run."""
     shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(result.robots, 1) if robot.ticks]
     plan = shown[0][2].plan
     low, high = scene.bounds(*(view for _, _, view in shown))
@@ -43,7 +48,7 @@ def write(result: TogetherResult, path: Path) -> Path:
             str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
             zorder=13,
         )  # fmt: skip
-    return sheet.save(path)
+    return sheet
 
 
 def _title(result: TogetherResult) -> str:

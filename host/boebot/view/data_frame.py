@@ -1,0 +1,45 @@
+"""A run as a pandas DataFrame: run.csv, read by pandas. pandas is an extra of the kit."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from boebot.errors import BoebotError
+from boebot.view import tables
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from boebot.record.result import RunResult, TogetherResult
+
+
+def of_run(result: RunResult) -> DataFrame:
+    """One row per control tick; the index is the time.
+
+    Raises:
+        BoebotError: pandas is not installed.
+    """
+    try:
+        import pandas
+    except ImportError:
+        raise BoebotError(
+            "to_pandas() needs the package pandas, which is not installed; pip install pandas gets it"
+        ) from None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.csv"
+        tables.write_run(result, path)
+        return pandas.read_csv(path, index_col="time_s", keep_default_na=False, na_values=[""])
+
+
+def of_together(result: TogetherResult) -> DataFrame:
+    """The rows of each robot below those of the one before; the index is the robot's number, from 1, and the time.
+
+    Raises:
+        BoebotError: pandas is not installed.
+    """
+    frames = {number: of_run(robot) for number, robot in enumerate(result.robots, 1)}
+    import pandas
+
+    return pandas.concat(frames, names=["robot"])
