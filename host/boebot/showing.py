@@ -8,7 +8,7 @@ record. What is beyond the bounds is left out, and the run says so once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,7 +32,8 @@ OCCUPIED, UNKNOWN = 254, 255  # values of a cell as it is kept; 0: free
 
 _ON_TIME = 1e-9  # s; times are sums of ticks
 
-Append = Callable[[str, float, bytes], None]
+ShownRow = tuple[str, float, bytes]
+"""Of the record: stream, time (s), bytes."""
 
 
 class Grid(NamedTuple):
@@ -84,12 +85,13 @@ class Showing:
 
     Attributes:
         values: what is shown now, by name.
-        append: puts a row into the record: stream, time (s), bytes; None: nothing is kept.
+        is_kept: somebody takes what was shown, with `take`.
     """
 
     def __init__(self) -> None:
         self.values: dict[str, float | str] = {}
-        self.append: Append | None = None
+        self.is_kept = False
+        self._rows: list[ShownRow] = []  # that nobody has taken yet
         self._notices: dict[str, str] = {}  # by what each is about
         self._shown_s = -math.inf  # when the values were shown
         self._kept_values = b"{}"
@@ -145,8 +147,14 @@ class Showing:
         if layer.waiting is not None and time_s >= layer.due_s - _ON_TIME:
             self._keep_sketch(layer)
 
+    def take(self) -> list[ShownRow]:
+        """What is to be kept, since this was last asked. It is taken from here, for a brain reaches its robot, and no
+        way may lead from there to the record, which has the world's truth."""
+        taken, self._rows = self._rows, []
+        return taken
+
     def end(self) -> None:
-        """The run is over: what was shown last is kept."""
+        """The run is over: what was shown last is to be kept."""
         self._keep_values()
         self._room = math.inf
         for layer in self._layers.values():
@@ -175,8 +183,8 @@ class Showing:
             self._tell("bytes", f"the brain shows more than {BYTES_S // 1000} kB in a second: some of it is left out")
             return False
         self._room -= len(data)
-        if self.append is not None:
-            self.append(stream, time_s, data)
+        if self.is_kept:
+            self._rows.append((stream, time_s, data))
         return True
 
     def _tell(self, about: str, sentence: str) -> None:

@@ -156,9 +156,14 @@ class Kept:
     """What goes to the record."""
 
     def __init__(self) -> None:
-        self.rows: list[tuple[str, float, bytes]] = []
         self.showing = Showing()
-        self.showing.append = lambda *row: self.rows.append(row)
+        self.showing.is_kept = True
+
+    @property
+    def rows(self) -> list[tuple[str, float, bytes]]:
+        """All so far."""
+        self._rows = [*getattr(self, "_rows", []), *self.showing.take()]
+        return self._rows
 
     def sketch(self, time_s: float, layer: str = "a", **what: Any) -> None:
         terms: dict[str, Any] = {"lines": (), "points": (), "grid": None, "frame": "start"} | what

@@ -54,12 +54,13 @@ ALLOWED = (
     "types",
     "functools",
     "boebot.robot",
+    "boebot.showing",
     "boebot.devices.equipment",
     "boebot.devices.readings",
     "boebot.devices",
     "boebot.link.messages",
 )
-"""Where the classes come from whose objects a brain may meet: readings, lengths, commands or chance."""
+"""Where the classes come from whose objects a brain may meet: readings, lengths, commands, chance, or what it shows itself."""
 LIMIT = 200_000  # objects
 
 

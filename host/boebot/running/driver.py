@@ -97,6 +97,8 @@ def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False)
     append_brain(task.record, task.brain.brain, driver.robot)
     if ended:
         driver.robot.showing.end()
+    for row in driver.robot.showing.take():
+        task.record.append(*row)
     task.record.keep(time_s, driver.session.drain(ended=ended))
 
 

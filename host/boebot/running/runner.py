@@ -167,7 +167,7 @@ def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
         driver: Driver = _board_driver(cast(BoardSession, session), task)
     else:
         driver = DirectDriver(cast(VehicleSession, session), task)
-    driver.robot.showing.append = task.record.append
+    driver.robot.showing.is_kept = True
     return driver
 
 
