@@ -60,7 +60,7 @@ ALLOWED = (
     "boebot.devices",
     "boebot.link.messages",
 )
-"""Where the classes come from whose objects a brain may meet: readings, lengths, commands, chance, or what it shows itself."""
+"""Where the classes come from whose objects a brain may meet: readings, lengths, commands, chance, what it shows."""
 LIMIT = 200_000  # objects
 
 
