@@ -56,16 +56,45 @@ def test_unknown_column_is_refused(
     assert not picture.exists()
 
 
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of two robots, one of them without a board; two seconds."""
+    folder = tmp_path_factory.mktemp("runs") / "two"
+    first = library.Member(robot="arsim", seed=7, pose=(1.0, 0.8, 0.5))
+    library.run_together([first, library.Member(pose=(0.5, 0.5, 0.0), without=["slip"])], seconds=2, out=folder)
+    return folder
+
+
+def test_one_of_several_robots_is_chosen(capsys: pytest.CaptureFixture[str], tmp_path: Path, two: Path) -> None:
+    """Else all of them are drawn, those that have the column."""
+    titles = {(): "wander on arsim; wander on shieldbot", ("--robot", "2"): "wander on shieldbot"}
+    for number, (asked, title) in enumerate(titles.items()):
+        picture = tmp_path / f"{number}.png"
+        columns = ("true_x_m", "ping_distance_m")
+        assert boebot(capsys, "plot", str(two), *columns, *asked, "--out", str(picture))[0] == 0
+        with Image.open(picture) as opened:
+            assert opened.info["Title"] == title
+    for robot in ("1", "2"):
+        code, out, _ = boebot(capsys, "replay", str(two), "--brain", "wander", "--robot", robot)
+        assert code == 0 and "all 40 commands are the same" in out
+    refused = {
+        ("plot", str(two), "tick", "--robot", "3"): "there is no robot 3 in the run; expected 1 to 2",
+        ("plot", str(two), "ping_distance_m", "--robot", "1"): "the run has no column 'ping_distance_m'",
+        ("replay", str(two), "--brain", "wander", "--robot", "3"): "there is no robot 3 in the run; expected 1 to 2",
+        ("replay", str(two), "--brain", "wander"): "is a run of 2 robots; expected --robot 1 to 2",
+    }
+    for asked, sentence in refused.items():
+        code, out, err = boebot(capsys, *asked)
+        assert code != 0 and out == "" and sentence in " ".join(err.split()) and "Traceback" not in err
+
+
 def test_runs_are_repeated_bit_by_bit(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path, two: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
     code, out, err = boebot(capsys, "run", "--again", str(folder))
     assert (code, err) == (0, "") and " ".join(out.split()).endswith(": 40 steps") and "bit-equal to" in out
-    asked = ("--robot", "arsim", "--seed", "7", "--pose", "1,0.8,30deg", "--seconds", "2")
-    two = ("--robot", "shieldbot", "--pose", "0.5,0.5,0", "--without", "slip")
-    assert boebot(capsys, "run", "wander", *asked, *two, "--out", "two")[0] == 0
-    assert boebot(capsys, "run", "--again", "two")[0] == 0
+    assert boebot(capsys, "run", "--again", str(two))[0] == 0
     avr = ("--on", "avr", "--period", "100ms", "--seconds", "0.5")
     assert boebot(capsys, "run", "wander", *avr, "--out", "avr")[0] == 0
     assert boebot(capsys, "run", "--again", "avr")[1].endswith(": 5 steps\n")

@@ -64,6 +64,9 @@ Without = Annotated[
         help="Switch off imperfections of simulated robots; `boebot list imperfections` names them.",
     ),
 ]
+RobotNumber = Annotated[
+    int | None, typer.Option("--robot", metavar="N", min=1, help="Which robot of a run of several, from 1.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures of the run.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]

@@ -10,18 +10,17 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import completion, output
+from boebot.cli import completion, options, output
 from boebot.errors import BoebotError
 from boebot.record.compare import replayed
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.record.reading import read_run, robots_of
 from boebot.robot import Command
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run of one robot, with its record.mcap.")],
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, with its record.mcap.")],
     brain: Annotated[
         str,
         typer.Option(
@@ -31,12 +30,14 @@ def replay(
             help="Bundled brain, or a Python or TOML file, as of boebot run.",
         ),
     ],
+    robot: options.RobotNumber = None,
 ) -> None:
     """Run a brain on what was sensed in a run, and name the first command that differs."""
     try:
-        result = read_run(run)
-        if not isinstance(result, RunResult):
-            raise BoebotError(f"{run} is a run of {len(result.robots)} robots; expected one of a single robot")
+        robots = robots_of(read_run(run), robot)
+        if len(robots) > 1:
+            raise BoebotError(f"{run} is a run of {len(robots)} robots; expected --robot 1 to {len(robots)}")
+        (result,) = robots.values()
         commands = replayed(result, brain)
     except BoebotError as error:
         output.say(str(error))

@@ -54,6 +54,21 @@ def read_run(path: str | Path) -> RunResult | TogetherResult:
     return TogetherResult(robots=results, error=ended)
 
 
+def robots_of(result: RunResult | TogetherResult, number: int | None = None) -> dict[int, RunResult]:
+    """A run's robots by their numbers, from 1: all of them, or one.
+
+    Raises:
+        RecordError: there is no robot of that number.
+    """
+    robots = dict(enumerate([result] if isinstance(result, RunResult) else result.robots, 1))
+    if number is None:
+        return robots
+    if number not in robots:
+        expected = "1, or none" if len(robots) == 1 else f"1 to {len(robots)}"
+        raise RecordError(f"there is no robot {number} in the run; expected {expected}")
+    return {number: robots[number]}
+
+
 def attachments_of(path: str | Path) -> dict[str, bytes]:
     """What is attached to a record, by name. Raises as `read_run`."""
     file, opened = _opened(path)
