@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from boebot.arguments import number, shown
 from boebot.errors import ArenaError, BoardError
+from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
 from sim_bridge.sim import SimRobot, checked_pose
@@ -177,3 +178,32 @@ class BoardPins(BoardMemory):
     def _check(status: int, what: str) -> None:
         if status != lib.SIM_OK:
             raise BoardError(f"{what}: the robot has no such thing")
+
+
+class PinRecorder:
+    """The stream "pins" of a record: the output edges of a board."""
+
+    def __init__(self, pins: BoardPins) -> None:
+        self._pins = pins
+        self._seen = pins.edge_count
+        self._kept: list[NDArray[Any]] = []
+
+    def collect(self) -> None:
+        """Called now and then, before the simulator forgets edges, of which it keeps `EDGES_KEPT`."""
+        if self._pins.edge_count - self._seen > EDGES_KEPT // 4:
+            self._take()
+
+    def drain(self) -> Group:
+        """The stream since it was last drained: rows of the pin's Arduino number and its level (u8 each)."""
+        self._take()
+        edges = np.concatenate(self._kept)
+        self._kept.clear()
+        if not len(edges):
+            return {}
+        rows = np.column_stack((edges["pin"], edges["level"]))
+        return {"pins": Block(edges["cycle"] / CLOCK_HZ, rows.tobytes(), np.array([2], dtype=np.uint32))}
+
+    def _take(self) -> None:
+        new = self._pins.edge_count - self._seen
+        self._seen += new
+        self._kept.append(self._pins.pin_log(new))

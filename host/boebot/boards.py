@@ -49,6 +49,7 @@ class BoardRequest:
     start_pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own
     image: str | None = None  # firmware to load in place of the bundled one
     record: bool = True  # keep the truth for the pictures
+    pins: bool = False  # record the edges of an emulated board's pins
     saveable: bool = True  # the simulation can be saved
     noise: bool = True
     without: Sequence[str] = ()  # imperfections of this robot that are switched off; names: `imperfections`

@@ -19,7 +19,7 @@ from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
-from sim_bridge.pins import BoardPins
+from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.robots.switches import switches
 from sim_bridge.sessions.opening import Wait, alone, drain, new_sim, truth_of
 from sim_bridge.sessions.together import SimWorld
@@ -36,13 +36,14 @@ class SimTransport:
     realtime = False
     baud_given = False
 
-    def __init__(self, robot: SimRobot, name: str, wait: Wait | None = None) -> None:
-        """`wait` lets time pass; None: for this robot alone."""
+    def __init__(self, robot: SimRobot, name: str, wait: Wait | None = None, pins: PinRecorder | None = None) -> None:
+        """`wait` lets time pass; None: for this robot alone. `pins`: collects edges meanwhile."""
         self.name = name
         self.baud = _baud(robot.description)
         self._robot = robot
         self._sim = robot.sim
         self._wait = wait or alone(robot.sim)
+        self._pins = pins
         self._closed = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
@@ -57,6 +58,8 @@ class SimTransport:
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
         self._wait(self._robot, cycles, quiet)
+        if self._pins is not None:
+            self._pins.collect()
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
 
@@ -88,21 +91,24 @@ class SimTransport:
 class SimSession:
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
-    def __init__(self, robot: SimRobot, kind: str, wait: Wait, *, shared: bool = False) -> None:
-        """`shared`: the world is not this robot's alone, and is closed by somebody else."""
+    def __init__(self, robot: SimRobot, kind: str, wait: Wait, *, pins: bool = False, shared: bool = False) -> None:
+        """`pins`: the board's edges are recorded. `shared`: the world is not this robot's alone, and is closed by
+        somebody else."""
         self.robot = robot
         self.sim = robot.sim
         self.arena = robot.sim.arena
         self.description = f"{robot.board.description} in arena {self.arena.name}"
-        self.transport = SimTransport(robot, kind, wait)
-        self.transport.set_baud(self.transport.baud)
         self.board = BoardPins(robot)
+        self._pins = PinRecorder(self.board) if pins else None
+        self.transport = SimTransport(robot, kind, wait, self._pins)
+        self.transport.set_baud(self.transport.baud)
         self._shared = shared
         self._closed = False
 
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.BoardSession`."""
-        return drain(self.robot, ended=ended)
+        edges = {} if self._pins is None else self._pins.drain()
+        return {**drain(self.robot, ended=ended), **edges}
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""
@@ -157,16 +163,17 @@ class BoardKind:
         except Exception:
             sim.close()
             raise
-        return SimSession(robot, self.name, alone(sim, paced=request.realtime))
+        return SimSession(robot, self.name, alone(sim, paced=request.realtime), pins=request.pins)
 
     def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
         """Opens several robots in one world; those whose description has no board get none."""
-        return SimWorld(new_sim(requests[0], STEP_S), requests, self.add, self._open_shared)
 
-    def _open_shared(self, robot: SimRobot, wait: Wait) -> BoardSession | VehicleSession:
-        if robot.description.has_board:
-            return SimSession(robot, self.name, wait, shared=True)
-        return DirectSession(robot, wait, shared=True)
+        def open_shared(robot: SimRobot, wait: Wait) -> BoardSession | VehicleSession:
+            if robot.description.has_board:
+                return SimSession(robot, self.name, wait, pins=requests[0].pins, shared=True)
+            return DirectSession(robot, wait, shared=True)
+
+        return SimWorld(new_sim(requests[0], STEP_S), requests, self.add, open_shared)
 
     def add(self, sim: Sim, request: BoardRequest) -> SimRobot:
         """Puts the request's robot into a world, with its board if it has one."""

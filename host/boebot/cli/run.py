@@ -98,6 +98,9 @@ def run(
             "--force-timing", help="Run it even if its sensors, period and line are not realisable; the record says so."
         ),
     ] = False,
+    pins: Annotated[
+        bool, typer.Option("--pins", help="Record the output edges of emulated boards, too: stream pins of the record.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),
@@ -143,6 +146,7 @@ def run(
         realtime=realtime,
         step_timeout=step_timeout,
         force_timing=force_timing,
+        pins=pins,
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:

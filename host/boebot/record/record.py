@@ -11,6 +11,7 @@ readings            the run's, of the step      of a robot without a board: tick
 command             that of the observation     kind (index of KINDS), left, right: what the brain asked for in one step
 clock               0                           the transport's clock at the run's time 0 (s)
 truth               the world's                 of a simulated robot: doubles, `boebot.boards.TRUTH` without the time
+pins                transport's clock           of an emulated board, if asked for: a pin's Arduino number and its level
 waits               the world's                 a moving shape has begun or ended to wait for a robot: shape, waited (s)
 brain_step          the run's, of the step      of a brain of processes, doubles: index of the active motor behavior,
                                                 state variables, utilities, gammas

@@ -151,6 +151,7 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         seed=asked["seed"],
         step_timeout=math.inf,
         force_timing=asked["force_timing"],
+        pins=asked.get("pins", False),
     )
 
 

@@ -50,12 +50,13 @@ def run(
     step_timeout: float | None = None,
     force_timing: bool = False,
     record: bool = True,
+    pins: bool = False,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
     Args:
         brain, robot, pose, period, without: as of `boebot.Member`.
-        arena, on, seconds, seed, realtime, step_timeout, force_timing: as of `boebot.running.tasks.Request`.
+        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.running.tasks.Request`.
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
         progress: called with the seconds that have passed, about ten times a second.
@@ -79,6 +80,7 @@ def run(
         step_timeout=step_timeout,
         force_timing=force_timing,
         record=record,
+        pins=pins,
     )
     return keep(lambda folder, put_away: execute(request, progress, folder, put_away), out)
 

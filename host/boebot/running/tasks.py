@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from boebot import brains
-from boebot.boards import DIRECT, BoardRequest, default_board
+from boebot.boards import DIRECT, BoardRequest, default_board, is_live
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
@@ -62,7 +62,7 @@ class Request:
             the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after
             which its dead-man stops the motors.
         force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
-        record: what happens is recorded.
+        record: what happens is recorded. pins: the output edges of emulated boards, too.
     """
 
     members: Sequence[Member]
@@ -74,6 +74,7 @@ class Request:
     step_timeout: float | None = None
     force_timing: bool = False
     record: bool = True
+    pins: bool = False
 
     @classmethod
     def single(
@@ -100,7 +101,8 @@ class Request:
         expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
         if self.step_timeout is not None and not self.step_timeout > 0:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
-        for name, switch in (("realtime", self.realtime), ("force_timing", self.force_timing), ("record", self.record)):
+        for name in ("realtime", "force_timing", "record", "pins"):
+            switch = getattr(self, name)
             if not isinstance(switch, bool):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
@@ -120,6 +122,7 @@ class Request:
             "seed": self.seed,
             "realtime": self.realtime,
             "force_timing": self.force_timing,
+            "pins": self.pins,
             "members": [
                 {
                     "brain": _brain_file(task.brain),
@@ -146,6 +149,8 @@ class Request:
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
         kind = default_board([task.request.robot for task in tasks]) if self.on is None else self.on
+        if self.pins and (is_live(kind) or not any(task.request.robot.has_board for task in tasks)):
+            raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
         if len(tasks) == 1:
             return [replace(tasks[0], on=kind)]
         return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
@@ -182,6 +187,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         realtime=request.realtime,
         saveable=False,
         record=request.record,
+        pins=request.pins,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
     )

@@ -49,13 +49,15 @@ def run_together(
     progress: Progress | None = None,
     step_timeout: float | None = None,
     force_timing: bool = False,
+    pins: bool = False,
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
         boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
 
     Args:
-        members, arena, seconds, on, seed, realtime, step_timeout, force_timing: as of `boebot.running.tasks.Request`.
+        members, arena, seconds, on, seed, realtime, step_timeout, force_timing, pins: as of
+            `boebot.running.tasks.Request`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the seconds that have passed, about ten times a second.
 
@@ -76,6 +78,7 @@ def run_together(
         realtime=realtime,
         step_timeout=step_timeout,
         force_timing=force_timing,
+        pins=pins,
     )
     return keep(lambda folder, put_away: execute_together(request, progress, folder, put_away), out)
 
