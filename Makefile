@@ -148,6 +148,7 @@ check-python:
 	@$(PYTHON_VENV) -m ruff format --check --quiet . || { echo "run: make format"; exit 1; }
 check-types:
 	@$(PYTHON_VENV) -m mypy --no-error-summary
+	@$(PYTHON_VENV) -m tools.examples
 check-format:
 	@$(VENV)/bin/clang-format --dry-run -Werror $$(tools/c_sources.sh)
 check-static:

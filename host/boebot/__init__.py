@@ -1,13 +1,30 @@
-"""boebot: drive a Boe-Bot class robot, or its emulated twin, from Python.
+"""Drive a Boe-Bot class robot, or its emulated twin, from Python.
 
-import boebot
+    import boebot
 
+    def step(robot: boebot.Robot) -> None:
+        robot.drive(0.5, 0.5)
 
-def step(robot):
-    robot.drive(0.5, 0.5)
+    result = boebot.run(step, on="native", seconds=10)
 
+What to call for what:
 
-result = boebot.run(step, on="native", seconds=10)
+    boebot.run(brain)              one robot; gives a RunResult: figures, arrays, plot(), replay(), save(folder)
+    boebot.run_together(members)   several Members in one world; gives a TogetherResult
+    boebot.Robot                   what `step(robot)` is given: sensors, motors, clock, chance, show, sketch
+    boebot.MainRobot               what `main(robot)` is given: the same, and wait, forward, turn
+    boebot.Grid                    a map to sketch on the arena
+    boebot.load_robot(name)        a robot's description: devices, geometry, pins
+    boebot.boards                  boards and vehicles to step by hand
+    boebot.BoebotError             what went wrong, in a sentence
+
+    boebot.brain                   Brain: processes chosen by utility, state machines, fixed action patterns
+    boebot.behaviors               motor behaviors for it: Wander, Avoid, FollowWall, Homing, ...
+    boebot.cognition               what it works out: Odometry, near(), contact(), ...
+    boebot.link                    a board's messages, parameters and time
+    boebot.record.reading          read_run(folder): the result of a run that was recorded
+
+Units are SI: m, s, rad, V; motor signals go from -1 (full backward) to 1 (full forward).
 """
 
 from importlib import import_module

@@ -1,7 +1,7 @@
 """What a brain touches: an immutable `Observation` of the sensors, a `Command` for the motors, and `Robot`,
 the friendly face of both.
 
-    def step(robot):
+    def step(robot: Robot) -> None:
         if robot.whisker_left.pressed:
             robot.drive(-0.5, -0.2)
         else:
@@ -36,15 +36,18 @@ SPEED_LIMIT: Final = 0.5  # m/s; the widest set-point in speed that the protocol
 
 
 class Command(NamedTuple):
-    """What the brain wants of the motors; it never changes."""
+    """What the brain wants of the motors; it never changes.
+
+    Attributes:
+        kind: "signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (no pulses: the
+            wheels turn freely).
+        left: of the left wheel: motor signal, -1 to 1, or m/s, as `kind` says; 0 with "stop".
+        right: of the right wheel, the same.
+    """
 
     kind: str
-    """"signal" (-1 full backward .. 1 full forward), "speed" (m/s along the ground) or "stop" (no pulses: the wheels
-    turn freely)."""
     left: float
-    """Of the left wheel: motor signal, -1 to 1, or m/s, as `kind` says; 0 with "stop"."""
     right: float
-    """Of the right wheel, the same."""
 
 
 STOP: Final = Command("stop", 0.0, 0.0)

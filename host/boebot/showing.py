@@ -37,16 +37,20 @@ ShownRow = tuple[str, float, bytes]
 
 
 class Grid(NamedTuple):
-    """A regular grid on the arena, for `robot.sketch`: a map of what is occupied, or where something is likely."""
+    """A regular grid on the arena, for `robot.sketch`: a map of what is occupied, or where something is likely.
+
+    Args:
+        values: shape (rows, columns), 0 (free) to 1 (occupied), NaN: unknown; the first row is that of the smallest
+            y.
+        cell: length of a cell's side (m).
+        x: of the lower left corner (m).
+        y: of the lower left corner (m).
+    """
 
     values: ArrayLike
-    """shape (rows, columns), 0 (free) to 1 (occupied), NaN: unknown; the first row is that of the smallest y"""
     cell: float
-    """length of a cell's side (m)"""
     x: float = 0.0
-    """of the lower left corner (m)"""
     y: float = 0.0
-    """of the lower left corner (m)"""
 
 
 class GridCells(msgspec.Struct, frozen=True):

@@ -34,16 +34,20 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Avoid(MotorBehavior):
-    """Turns on the spot away from the side that is nearer, until both are clear and a little longer."""
+    """Turns on the spot away from the side that is nearer, until both are clear and a little longer.
+
+    Args:
+        turn: motor signal of one wheel, and the other's reversed.
+        clear: nearness below which a side is clear.
+        after: s to turn on once both are clear.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("infrared",)
 
     turn: float = 0.5
-    """motor signal of one wheel, and the other's reversed"""
     clear: float = 0.08
-    """nearness below which a side is clear"""
     after: float = 0.4
-    """seconds to turn on once both are clear"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

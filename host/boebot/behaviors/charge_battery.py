@@ -31,6 +31,16 @@ if TYPE_CHECKING:
 class ChargeBattery(MotorBehavior):
     """Drives to the light and stands still where it charges.
 
+    Args:
+        signal: motor signal straight on, and s_0 of phototaxis.
+        gain: k of phototaxis, a motor signal. None: 0.6 s_0.
+        creep: motor signal on the last bit, under the lamp.
+        passed: share of the greatest brightness of this approach below which the lamp has been passed.
+        patience: s to stand and wait for the voltage to rise.
+        dark: brightness of both sensors together up to which it is dark.
+        straight: s straight on between two rounds in the dark.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         charging: it stands on a charger, as BatteryLevel has it.
     """
@@ -38,19 +48,12 @@ class ChargeBattery(MotorBehavior):
     NEEDS = ("lights", "battery")
 
     signal: float = 0.4
-    """s_0 of phototaxis, and motor signal straight on"""
     gain: float | None = None
-    """k of phototaxis; None: 0.6 s_0"""
     creep: float = 0.15
-    """motor signal on the last bit, under the lamp"""
     passed: float = 0.6
-    """share of the greatest brightness of this approach below which the lamp has been passed"""
     patience: float = 3.0
-    """seconds to stand and wait for the voltage to rise"""
     dark: float = 0.0
-    """brightness of both sensors together up to which it is dark"""
     straight: float = 1.0
-    """seconds straight on between two rounds in the dark"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -89,6 +89,16 @@ class Escalate(MotorBehavior):
     It brings along a cognitive process, which always feels touches, and calls it. A robot without a buzzer calls by
     turning on the spot, as one that waves.
 
+    Args:
+        links: (a_i, b_i) (1/s) of the four answers, mildest first.
+        rest: C: what an answer's utility must exceed.
+        rise: k_1 (1/s) and X_1 (1/s) of (7.14), while a whisker is touched.
+        fade: k_2 and X_2 of (7.15).
+        signal: motor signal of turning and reversing.
+        tone: Hz, and seconds of each call.
+        every: s from call to call.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         answer: "" (at rest), "turn", "reverse", "stop" or "call".
     """
@@ -96,19 +106,12 @@ class Escalate(MotorBehavior):
     NEEDS = ("whiskers",)
 
     links: tuple[tuple[float, float], ...] = STENTOR
-    """(a_i, b_i) (1/s) of the four answers, mildest first"""
     rest: float = 0.46
-    """C: what an answer's utility must exceed"""
     rise: tuple[float, float] = (1.15, 2.6)
-    """k_1 (1/s) and X_1 (1/s) of (7.14), while a whisker is touched"""
     fade: tuple[float, float] = (0.9, 0.15)
-    """k_2 and X_2 of (7.15)"""
     signal: float = 0.5
-    """motor signal of turning and reversing"""
     tone: tuple[float, float] = (2000.0, 0.2)
-    """Hz, and seconds of each call"""
     every: float = 1.0
-    """seconds from call to call"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

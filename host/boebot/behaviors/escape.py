@@ -20,7 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Escape(FixedActionPattern):
-    """Backs off from what a whisker has touched, turns away and goes on."""
+    """Backs off from what a whisker has touched, turns away and goes on.
+
+    Args:
+        back: s of reversing.
+        angle: rad of turning away.
+        forward: s straight on.
+        signal: motor signal of all of it.
+        refractory: s after its end in which no touch begins it again.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("whiskers",)
 
@@ -28,13 +37,9 @@ class Escape(FixedActionPattern):
     releaser: Callable[[Robot], bool] = field(default=bool, init=False, repr=False)
 
     back: float = 0.4
-    """seconds of reversing"""
     angle: float = 2 * math.pi / 3
-    """rad of turning away"""
     forward: float = 0.3
-    """seconds straight on"""
     signal: float = 0.5
-    """motor signal of all of it"""
 
     def __post_init__(self) -> None:
         self.releaser = self._touched

@@ -33,28 +33,31 @@ class Evade(MotorBehavior):
     """Steers away from what is weak, and becomes unpredictable before what is strong.
 
     It brings along a cognitive process, which always listens, and calls it.
+
+    Args:
+        left: S_l, the signal on the left, 0 or more. None: nothing is known, 0.
+        right: S_r, on the right.
+        weak: max(S_l, S_r) above which it steers away.
+        strong: max(S_l, S_r) above which it is found.
+        signal: s_0, motor signal of steering away.
+        gain: k, motor signal for each unit of a.
+        erratic: s of turns by chance.
+        beat: s from one of them to the next.
+        spread: motor signals of each wheel are drawn from -spread to spread.
+        drop: s to lie still.
+        name, utility, period: as of every process (`boebot.brain.Process`).
     """
 
     left: Callable[[Robot], float | None] = left_nearness
-    """S_l, 0 or more; None: nothing is known, 0"""
     right: Callable[[Robot], float | None] = right_nearness
-    """S_r"""
     weak: float = 0.1
-    """max(S_l, S_r) above which it steers away"""
     strong: float = 0.5
-    """max(S_l, S_r) above which it is found"""
     signal: float = 0.5
-    """s_0 of steering away"""
     gain: float = 0.5
-    """k"""
     erratic: float = 1.0
-    """seconds of turns by chance"""
     beat: float = 0.2
-    """seconds from one of them to the next"""
     spread: float = 0.8
-    """motor signals of each wheel are drawn from -spread to spread"""
     drop: float = 1.0
-    """seconds to lie still"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -27,16 +27,20 @@ LOST = 2.0  # e of a line that is out of sight
 
 @dataclass(kw_only=True)
 class FollowLine(MotorBehavior):
-    """Keeps a dark line under the middle one of its three line sensors."""
+    """Keeps a dark line under the middle one of its three line sensors.
+
+    Args:
+        signal: s_0, motor signal straight on.
+        gain: k, motor signal for each unit of the line's place off the middle.
+        patience: s without a line after which it stops.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("lines",)
 
     signal: float = 0.35
-    """s_0"""
     gain: float = 0.3
-    """k"""
     patience: float = 2.0
-    """seconds without a line after which it stops"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -34,22 +34,26 @@ ECHOES = 3  # Ping misses some: the median of the last ones counts
 
 @dataclass(kw_only=True)
 class FollowWall(MotorBehavior):
-    """Keeps a wall at its side."""
+    """Keeps a wall at its side.
+
+    Args:
+        side: where the wall is.
+        signal: s_0, motor signal straight on.
+        gain: k, motor signal for each unit of nearness.
+        reference: S_ref: nearness of the wall that is kept; by Ping 0.25 stands for 0.30 m from it.
+        ahead: nearness of something ahead, or on the other side, from which on it turns on the spot.
+        turn: motor signal of turning on the spot.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("infrared",)
 
     side: Literal["left", "right"] = "right"
-    """where the wall is"""
     signal: float = 0.5
-    """s_0"""
     gain: float = 0.5
-    """k, for each unit of nearness"""
     reference: float = 0.25
-    """S_ref: nearness of the wall that is kept; by Ping 0.25 stands for 0.30 m from it"""
     ahead: float = 0.25
-    """nearness of something ahead, or on the other side, from which on it turns on the spot"""
     turn: float = 0.3
-    """motor signal of turning on the spot"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

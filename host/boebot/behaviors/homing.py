@@ -32,6 +32,17 @@ ON_THE_SPOT = math.pi / 4  # rad off the heading from which on it turns without 
 class Homing(MotorBehavior):
     """Goes home by the brain's PathIntegration, searches there, and stays once home is found.
 
+    Args:
+        found: what says that home is here, with 0.5 or more: a landmark, a whisker, a beacon. None: it searches on
+            and on.
+        signal: motor signal on the way home.
+        search_signal: motor signal in the search.
+        turn: largest motor signal of turning.
+        gain: motor signal of turning for each rad off the heading.
+        arrival: m from home by the home vector at which the search begins.
+        pitch: m between parallel legs of the spiral.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         arrived: time (s) at which the search began, or None.
         home: time (s) at which home was found, or None.
@@ -40,19 +51,12 @@ class Homing(MotorBehavior):
     NEEDS = ("compass",)
 
     found: Callable[[Robot], float | None] | None = None
-    """what says that home is here, with 0.5 or more: a landmark, a whisker, a beacon; None: it searches on and on"""
     signal: float = 0.5
-    """motor signal on the way home"""
     search_signal: float = 0.25
-    """motor signal in the search"""
     turn: float = 0.4
-    """largest motor signal of turning"""
     gain: float = 0.6
-    """motor signal of turning for each rad off the heading"""
     arrival: float = 0.1
-    """m from home by the home vector at which the search begins"""
     pitch: float = 0.1
-    """m between parallel legs of the spiral"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -23,16 +23,20 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Kinesis(MotorBehavior):
-    """Slow where the stimulus is strong."""
+    """Slow where the stimulus is strong.
+
+    Args:
+        stimulus: H, from 0 to 1. None: nothing is known, 0.
+        fast: motor signal without stimulus.
+        slow: motor signal at the full stimulus.
+        spread: σ (rad/√s) of the heading's random walk.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     stimulus: Callable[[Robot], float | None]
-    """H, from 0 to 1; None: nothing is known, 0"""
     fast: float = 0.5
-    """motor signal without stimulus"""
     slow: float = 0.1
-    """motor signal at the full stimulus"""
     spread: float = 0.5
-    """σ (rad/√s) of the heading's random walk"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -22,18 +22,22 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Phototaxis(MotorBehavior):
-    """To the light by two sensors, or away from it; in the dark it turns on the spot and looks for light."""
+    """To the light by two sensors, or away from it; in the dark it turns on the spot and looks for light.
+
+    Args:
+        signal: s_0, motor signal straight on.
+        gain: k, motor signal for each unit of a. None: 0.6 s_0.
+        flee: away from the light.
+        dark: brightness of both together up to which it is dark.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("lights",)
 
     signal: float = 0.5
-    """s_0"""
     gain: float | None = None
-    """k; None: 0.6 s_0"""
     flee: bool = False
-    """away from the light"""
     dark: float = 0.0
-    """brightness of both together up to which it is dark"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -54,18 +58,23 @@ class Phototaxis(MotorBehavior):
 
 @dataclass(kw_only=True)
 class Klinotaxis(MotorBehavior):
-    """To the light by one sensor, or away from it: swings left and right, and compares the last two swings."""
+    """To the light by one sensor, or away from it: swings left and right, and compares the last two swings.
+
+    Args:
+        signal: s_0, motor signal straight on.
+        swing: difference of the motor signals while it swings to a side.
+        seconds: s of one swing.
+        gain: difference of the motor signals for each unit of (I_left - I_right) / (I_left + I_right).
+        flee: away from the light.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     NEEDS = ("light_left",)
 
     signal: float = 0.4
-    """s_0"""
     swing: float = 0.25
-    """difference of the motor signals while it swings to a side"""
     seconds: float = 0.5
-    """of one swing"""
     gain: float = 3.0
-    """difference of the motor signals for each unit of (I_left - I_right) / (I_left + I_right)"""
     flee: bool = False
 
     def __post_init__(self) -> None:

@@ -25,24 +25,27 @@ if TYPE_CHECKING:
 class RunAndTumble(MotorBehavior):
     """Runs while things get better.
 
+    Args:
+        stimulus: X, what it follows: a function of the robot. None: as before.
+        a: of (4.1), 1/s: how fast it forgets.
+        b: of (4.1), 1/s: how much the stimulus counts.
+        threshold: T, which U must exceed for it to run on.
+        signal: motor signal of running.
+        turn: motor signal of turning on the spot.
+        run_on: s that it runs after each tumble, or it would never leave a place that has become bad.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         value: U of (4.1), of the last step.
     """
 
     stimulus: Callable[[Robot], float | None]
-    """X; None: as before"""
     a: float = 1.0
-    """1/s"""
     b: float = 1.0
-    """1/s"""
     threshold: float = 0.0
-    """T"""
     signal: float = 0.5
-    """motor signal of running"""
     turn: float = 0.5
-    """motor signal of turning on the spot"""
     run_on: float = 0.3
-    """seconds that it runs after each tumble, or it would never leave a place that has become bad"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

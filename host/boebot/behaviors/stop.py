@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Stop(MotorBehavior):
-    """Motors off."""
+    """Motors off.
+
+    Args:
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
     def step(self, robot: Robot) -> None:
         robot.stop()

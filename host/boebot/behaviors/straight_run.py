@@ -24,21 +24,24 @@ if TYPE_CHECKING:
 class StraightRun(MotorBehavior):
     """Drives a distance straight ahead by odometry, and stays there.
 
+    Args:
+        goal: D (m), the notes' desiredMovementDistance.
+        signal: a, motor signal; the notes' motorSignalConstant.
+        threshold: b, the notes' atDestinationThreshold: a share of D.
+        least: smallest motor signal: a servo does not turn within its dead band of about 0.05.
+        heading_gain: k (1/rad): s ∓ k times the heading error holds the heading; the notes' listing has none.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         distance: m from where it began, as odometry has it.
         arrived: it is within the threshold of its destination.
     """
 
     goal: float = 1.0
-    """D (m), desiredMovementDistance"""
     signal: float = 0.90
-    """a, motorSignalConstant"""
     threshold: float = 0.02
-    """b, atDestinationThreshold: a share of D"""
     least: float = 0.0
-    """smallest motor signal: a servo does not turn within its dead band of about 0.05"""
     heading_gain: float = 0.0
-    """k (1/rad): s ∓ k times the heading error holds the heading; the notes' listing has none"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -25,18 +25,22 @@ class Wander(MotorBehavior):
 
     The parameters are the notes'; where a robot is a fifth as fast, `turn_probability` 0.002 gives the same paths.
 
+    Args:
+        forward: motor signal of both wheels.
+        turn: motor signal of one wheel, and the other's reversed.
+        turn_probability: to begin to turn, in each 0.01 s.
+        stop_turn_probability: to stop turning, in each 0.01 s.
+        left_turn_probability: of a turn to the left rather than to the right.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         left: it turns, or turned last, to the left.
     """
 
     forward: float = 0.5
-    """motor signal of both wheels"""
     turn: float = 0.7
-    """motor signal of one wheel, and the other's reversed"""
     turn_probability: float = 0.01
-    """to begin to turn, in each 0.01 s"""
     stop_turn_probability: float = 0.03
-    """to stop turning, in each 0.01 s"""
     left_turn_probability: float = 0.5
 
     def __post_init__(self) -> None:

@@ -51,6 +51,15 @@ class ReflexIntensity:
 class Withdraw(MotorBehavior):
     """Backs off from a touch and turns away from its side, as strongly as the reflex is fresh.
 
+    Args:
+        back: s to back off.
+        turn: s to turn away.
+        signal: motor signal at full intensity.
+        warm_up: τ_w (s).
+        fatigue: τ_f (s), another than τ_w.
+        weight: g, of fatigue.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         intensity: ρ at the last touch.
     """
@@ -58,11 +67,8 @@ class Withdraw(MotorBehavior):
     NEEDS = ("whiskers",)
 
     back: float = 0.3
-    """seconds to back off"""
     turn: float = 0.5
-    """seconds to turn away"""
     signal: float = 0.7
-    """motor signal at full intensity"""
     warm_up: float = 0.3
     fatigue: float = 2.0
     weight: float = 0.9

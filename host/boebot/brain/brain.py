@@ -23,31 +23,37 @@ _ON_TIME = 1e-9  # s; times are sums of ticks
 
 
 class Switch(NamedTuple):
-    """A process became active in place of another (motor behaviors), or became active or inactive (cognitive ones)."""
+    """A process became active in place of another (motor behaviors), or became active or inactive (cognitive ones).
+
+    Attributes:
+        time: of the run (s).
+        off: what was active, or "".
+        on: the behavior that is active now, or "".
+        reason: utilities, and what drives them most.
+    """
 
     time: float
-    """s"""
     off: str
-    """what was active, or "" """
     on: str
-    """the behavior that is active now, or "" """
     reason: str
-    """utilities, and what drives them most"""
 
 
 class BrainStep(NamedTuple):
-    """What one step of the brain came to."""
+    """What one step of the brain came to.
+
+    Attributes:
+        time: of the run (s).
+        motor: the active motor behavior.
+        variables: in the order of `Brain.variables`.
+        utilities: in the order of `Brain.processes`.
+        gammas: in the same order.
+    """
 
     time: float
-    """s"""
     motor: str
-    """the active motor behavior"""
     variables: tuple[float, ...]
-    """in the order of `Brain.variables`"""
     utilities: tuple[float, ...]
-    """in the order of `Brain.processes`"""
     gammas: tuple[float, ...]
-    """in the same order"""
 
 
 class Brain:

@@ -21,10 +21,15 @@ if TYPE_CHECKING:
 
 
 class Action(NamedTuple):
-    """One part of a pattern."""
+    """One part of a pattern.
+
+    Args:
+        left: motor signal of the left wheel, -1 to 1.
+        right: of the right wheel.
+        seconds: how long (s).
+    """
 
     left: float
-    """motor signal, -1..1"""
     right: float
     seconds: float
 
@@ -33,15 +38,19 @@ class Action(NamedTuple):
 class FixedActionPattern(MotorBehavior):
     """Actions one after the other, without a look at any sensor.
 
+    Args:
+        actions: one after the other: motor signals of the left and the right wheel, -1 to 1, and seconds.
+        releaser: gives True as long as the sign stimulus is there, from a robot.
+        refractory: s after its end in which it cannot be released.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         running: it has been released and is not done.
     """
 
     actions: Sequence[Action | tuple[float, float, float]]
     releaser: Callable[[Robot], bool]
-    """true as long as the sign stimulus is there"""
     refractory: float = 0.0
-    """seconds after its end in which it cannot be released"""
     utility: Utility = field(default_factory=lambda: Utility(b=-1.0, tau=0.02, tau_gamma=0.05))
 
     def __post_init__(self) -> None:

@@ -1,16 +1,16 @@
 """A finite-state machine for behaviors: states are methods, a transition is what a method returns.
 
-    def enter(self, robot):
+    def enter(self, robot: Robot) -> None:
         self.machine = Machine(robot, self.straight)
 
-    def step(self, robot):
+    def step(self, robot: Robot) -> None:
         self.machine.step(robot)
 
-    def straight(self, robot):
+    def straight(self, robot: Robot) -> State | None:
         robot.drive(0.5, 0.5)
         return self.turn if self.chance(0.01, per=0.01) else None
 
-    def turn(self, robot):
+    def turn(self, robot: Robot) -> State | None:
         ...
 
 The notes' behaviors are such machines (sections 5.1 and 5.2): the state reached is carried out at the next step.
@@ -30,6 +30,10 @@ State = Callable[["Robot"], Any]
 
 class Machine:
     """A finite-state machine.
+
+    Args:
+        robot: as `enter` or `step` got it.
+        start: the first state: a method of the robot that does a step and returns the next state, or None to stay.
 
     Attributes:
         since: the time (s) at which the present state began.

@@ -1,6 +1,6 @@
 """A brain that runs from top to bottom: `def main(robot)`, with waits in between. A thin layer over `step`.
 
-    def main(robot):
+    def main(robot: MainRobot) -> None:
         for _ in range(4):
             robot.forward(0.3)
             robot.turn(90)

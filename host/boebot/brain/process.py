@@ -9,10 +9,10 @@ A process is a dataclass: its fields are *parameters*, which stay as they are th
 
         signal: float = 0.4
 
-        def enter(self, robot):
+        def enter(self, robot: Robot) -> None:
             self.turning = self.signal
 
-        def step(self, robot):
+        def step(self, robot: Robot) -> None:
             if self.chance(0.1, per=1.0):
                 self.turning = -self.turning
             robot.drive(-self.turning, self.turning)
@@ -41,6 +41,11 @@ P = TypeVar("P", bound="Process")
 class Process:
     """One process of a brain; see `MotorBehavior` and `CognitiveProcess`.
 
+    Args:
+        name: how others refer to it; by default that of its class: FollowWall is "follow_wall".
+        utility: how useful it is, as a function of the brain's state variables.
+        period: s from step to step while active, a multiple of the brain's; None: at each step of the brain.
+
     Attributes:
         random: its own `random.Random`: what others draw changes none of its numbers. Seeded by the run's seed and
             the process's name.
@@ -51,10 +56,8 @@ class Process:
     """Devices without which it cannot work, as `Robot.has` names them."""
 
     name: str = ""
-    """how others refer to it; by default that of its class: FollowWall is "follow_wall\""""
     utility: Utility = field(default_factory=Utility)
     period: float | None = None
-    """seconds from step to step while active, a multiple of the brain's; None: at each step of the brain"""
 
     def __post_init__(self) -> None:
         self.name = self.name or snake_case(type(self).__name__)
@@ -157,7 +160,11 @@ class Process:
 
 @dataclass(kw_only=True)
 class MotorBehavior(Process):
-    """A process that drives the motors. Exactly one of them is active: that of the highest utility."""
+    """A process that drives the motors. Exactly one of them is active: that of the highest utility.
+
+    Args:
+        name, utility, period: as of every process (`boebot.brain.Process`).
+    """
 
 
 @dataclass(kw_only=True)
@@ -165,6 +172,9 @@ class CognitiveProcess(Process):
     """A process that works out something and does not touch the motors. All with a utility above 0 are active.
 
     Its utility is by default tanh(1): it is always active.
+
+    Args:
+        name, utility, period: as of every process (`boebot.brain.Process`).
     """
 
     utility: Utility = field(default_factory=lambda: Utility(b=1.0))

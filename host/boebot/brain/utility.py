@@ -31,20 +31,22 @@ class Utility:
 
     Since only differences count, one motor behavior may do without weights: its utility then settles at tanh(c b).
 
+    Args:
+        b: bias.
+        w: weights, by the name of the state variable.
+        tau: time constant (s); the notes use 0.1 to 0.3.
+        c: steepness of the sigmoid.
+        tau_gamma: time constant (s) with which the gamma parameter decays.
+
     Raises:
         BrainError: a time constant or c is not above 0, or a number is not finite.
     """
 
     b: float = 0.0
-    """bias"""
     w: Mapping[str, float] = field(default_factory=dict)
-    """weights, by the name of the state variable"""
     tau: float = 0.2
-    """time constant (s); the notes use 0.1 to 0.3"""
     c: float = 1.0
-    """steepness of the sigmoid"""
     tau_gamma: float = 0.5
-    """time constant (s) with which the gamma parameter decays"""
 
     def __post_init__(self) -> None:
         if not isinstance(self.w, Mapping):

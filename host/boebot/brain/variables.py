@@ -25,13 +25,17 @@ Read = Callable[["Robot"], float | None]
 
 @dataclass(frozen=True)
 class StateVariable:
-    """One state variable."""
+    """One state variable.
+
+    Args:
+        name: by which the weights of utilities name it.
+        read: gives its value, from 0 to 1 (beyond that it is limited), from a robot. None: nothing is known, 0.
+        needs: devices without which it is not known, as `Robot.has` names them.
+    """
 
     name: str
     read: Read
-    """gives its value; beyond 0..1 it is limited, None: nothing is known, 0"""
     needs: tuple[str, ...] = ()
-    """devices without which it is not known, as `Robot.has` names them"""
 
     def value(self, robot: Robot) -> float:
         """z, from 0 to 1.

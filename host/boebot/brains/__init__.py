@@ -2,8 +2,8 @@
 
 A brain is a Python file with one of
 
-    def step(robot): ...                     # called every PERIOD
-    def main(robot): ...                     # runs once from top to bottom (boebot.brain.main_brain)
+    def step(robot: Robot) -> None: ...      # called every PERIOD
+    def main(robot: MainRobot) -> None: ...  # runs once from top to bottom (boebot.brain.main_brain)
     class Brain: ...                         # with a method step(self, robot); made afresh for each run
     brain = Brain([Wander(), Avoid()])       # a boebot.brain.Brain: processes chosen by utility
 

@@ -29,6 +29,17 @@ if TYPE_CHECKING:
 class BatteryLevel(CognitiveProcess):
     """Filters the pack's voltage, makes a level of it, and notices the charger.
 
+    Args:
+        empty: volts at which the robot should have stopped.
+        full: volts of the full pack at rest.
+        tau: time constant (s) of the filter: servos draw their current in pulses.
+        sag: volts that the pack sags while both motors run at full signal.
+        rise: volts of rise that show a charger; more than noise and than what `sag` leaves over.
+        fall: volts of fall that show its end.
+        lift: volts that the pack stands higher at once on a charger: the charging current times its internal
+            resistance.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         voltage: V, filtered, as if no motor ran; None before the first reading.
         level: 0 (empty) to 1 (full), or None before the first reading.
@@ -38,19 +49,12 @@ class BatteryLevel(CognitiveProcess):
     NEEDS = ("battery",)
 
     empty: float
-    """volts at which the robot should have stopped"""
     full: float
-    """volts of the full pack at rest"""
     tau: float = 2.0
-    """time constant (s) of the filter: servos draw their current in pulses"""
     sag: float = 0.0
-    """volts that the pack sags while both motors run at full signal"""
     rise: float = 0.1
-    """volts of rise that show a charger; more than noise and than what `sag` leaves over"""
     fall: float = 0.05
-    """volts of fall that show its end"""
     lift: float = 0.0
-    """volts that the pack stands higher at once on a charger: the charging current times its internal resistance"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

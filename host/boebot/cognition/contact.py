@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 class Contact(CognitiveProcess):
     """Counts touches.
 
+    Args:
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         touches: how often a whisker was touched since the run began.
         left: the left whisker is touched.

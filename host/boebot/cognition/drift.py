@@ -19,12 +19,15 @@ if TYPE_CHECKING:
 class Drift(CognitiveProcess):
     """Estimates how far odometry has drifted since it was last set right: z = 1 - e^(-s/s_0), s the way since then.
 
+    Args:
+        distance: s_0 (m).
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         value: the estimate, 0 to 1.
     """
 
     distance: float = 10.0
-    """s_0 (m)"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

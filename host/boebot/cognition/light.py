@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 class LightSense(CognitiveProcess):
     """Compares both light sensors.
 
+    Args:
+        scale: brightness that counts as half of full light in the state variable.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         left: brightness of the left one; None: not known.
         right: of the right one.
@@ -26,7 +30,6 @@ class LightSense(CognitiveProcess):
     NEEDS = ("lights",)
 
     scale: float = 1.0
-    """brightness that counts as half of full light in the state variable"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

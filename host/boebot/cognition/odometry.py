@@ -30,6 +30,12 @@ LAG_S = 0.065  # with which a wheel's speed follows a command (docs/decisions/00
 class Odometry(CognitiveProcess):
     """Keeps the pose: a process of a `Brain`, or called by a brain of another kind, `step(robot)` in each of its steps.
 
+    Args:
+        use: what to take; None: the best that the robot has.
+        start: pose at the beginning (m, m, rad); an odometer has its own.
+        factors: k_w: metres that the left and the right wheel really roll for each metre by encoders or commands.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         pose: x, y (m) and heading (rad in (-pi, pi]), from where the run began or the odometer's origin.
         speed: m/s ahead, over the last step.
@@ -39,11 +45,8 @@ class Odometry(CognitiveProcess):
     """
 
     use: Source | None = None
-    """what to take; None: the best that the robot has"""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """pose at the beginning (m, m, rad); an odometer has its own"""
     factors: tuple[float, float] = (1.0, 1.0)
-    """k_w: metres that the left and the right wheel really roll for each metre by encoders or commands"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

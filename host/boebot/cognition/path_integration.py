@@ -29,6 +29,11 @@ class PathIntegration(CognitiveProcess):
 
     Comes after the brain's Odometry, which gives it the way; its heading is used only while the compass says nothing.
 
+    Args:
+        scale: m of distance from home at which the state variable is 0.63.
+        sky: takes the heading from the brain's SunCompass.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         vector: h, from the robot to home (m east, m north: along the compass's 0 and π/2).
         travelled: m of way since then, both forward and backward.
@@ -38,9 +43,7 @@ class PathIntegration(CognitiveProcess):
     NEEDS = ("compass",)
 
     scale: float = 1.0
-    """m of distance from home at which the state variable is 0.63"""
     sky: bool = False
-    """takes the heading from the brain's SunCompass"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

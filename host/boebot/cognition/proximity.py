@@ -23,6 +23,10 @@ AHEAD_RAD = 0.35  # a turret that is turned farther looks aside: Ping's beam is 
 class Proximity(CognitiveProcess):
     """Remembers where something was seen last.
 
+    Args:
+        threshold: nearness from which on something is seen.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         left: nearness by the left IR sensor, 0 (nothing) to 1 (touching); None: nothing is known.
         right: by the right one.
@@ -32,7 +36,6 @@ class Proximity(CognitiveProcess):
     """
 
     threshold: float = 0.3
-    """nearness from which on something is seen"""
 
     def forget(self) -> None:
         self.left: float | None = None

@@ -22,14 +22,17 @@ class StuckDetector(CognitiveProcess):
     Wheels that spin without the robot moving are only seen where odometry comes from something else than wheels.
     Odometry that comes from commands (`Odometry.source`) believes what was asked: with it, nothing is ever missing.
 
+    Args:
+        window: s over which motion is compared.
+        least: share of the robot's full speed below which nothing is asked of it.
+        name, utility, period: as of every process (`boebot.brain.Process`).
+
     Attributes:
         share: how much of the asked motion is missing over the time, 0 (moves as commanded) to 1 (stands still).
     """
 
     window: float = 1.0
-    """seconds over which motion is compared"""
     least: float = 0.1
-    """share of the robot's full speed below which nothing is asked of it"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

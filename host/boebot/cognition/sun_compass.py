@@ -22,13 +22,23 @@ DAY_S = 86_400.0
 
 
 def sun_azimuth(time: float, at_start: float = 0.0) -> float:
-    """ψ(t) (rad in (-pi, pi]): the sun's azimuth a time (s) after it was `at_start` (rad)."""
+    """ψ(t): the sun's azimuth, rad in (-pi, pi].
+
+    Args:
+        time: s since it was `at_start`.
+        at_start: ψ_0 (rad).
+    """
     return wrapped(at_start + 2 * math.pi / DAY_S * time)
 
 
 @dataclass(kw_only=True)
 class SunCompass(CognitiveProcess):
     """Heading from the sky's pattern and the time of day.
+
+    Args:
+        azimuth_at_start: ψ_0 (rad).
+        turning: the compass shows a pattern that turns with the sun; False: it shows the heading itself.
+        name, utility, period: as of every process (`boebot.brain.Process`).
 
     Attributes:
         heading: rad in (-pi, pi], or None while the sky has not been seen.
@@ -37,9 +47,7 @@ class SunCompass(CognitiveProcess):
     NEEDS = ("compass",)
 
     azimuth_at_start: float = 0.0
-    """ψ_0 (rad)"""
     turning: bool = False
-    """the compass shows a pattern that turns with the sun; False: it shows the heading itself"""
 
     def forget(self) -> None:
         self.heading: float | None = None

@@ -55,11 +55,27 @@ def run(
     """Runs a brain and returns what happened.
 
     Args:
-        brain, robot, pose, period, without: as of `boebot.Member`.
-        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.running.tasks.Request`.
+        brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)` or
+            `main(robot)`, or object or class with `step(robot)`.
+        robot: bundled name, .toml file, or a description; with a board or without.
+        pose: where it starts: x (m), y (m), heading (rad). None: the arena's start.
+        period: s from step to step of the brain. None: the brain's PERIOD, or 0.05.
+        without: imperfections of the simulated robot that are switched off, such as ("slip", "bounce");
+            docs/reference/imperfections.md names them.
+        arena: bundled name or .toml file. None: the simulator's own choice. Of no meaning on a real robot.
+        on: what robots with boards run on: "native", "avr", or, for a single one, a port: "/dev/ttyACM0",
+            "serial:PORT", "socket://HOST:PORT"; "direct" where no robot has a board. None: native or direct.
+        seconds: length of the run by the robots' clocks (s); may be infinite.
+        seed: of the simulated world's noise, of the robots' imperfections, and of the first brain's chance.
+        realtime: slow a simulated run down to the wall clock.
+        step_timeout: s by the wall clock after which a step of a brain that has not ended is an error, which ends the
+            run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after which
+            its dead-man stops the motors.
+        force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
+        pins: the output edges of emulated boards are recorded, too.
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
-        progress: called with the seconds that have passed, about ten times a second.
+        progress: called with the run's time so far (s), about ten times a second.
 
     Raises:
         BoebotError: whatever the user can mend: bad input, an error in the brain (with its place), a board that is not

@@ -52,17 +52,8 @@ class Request:
 
     Attributes:
         members: the robots; several share one simulated world.
-        arena: bundled name or .toml file; None: the simulator's own choice. Of no meaning on a real robot.
-        on: what robots with boards run on: "native", "avr", or, for a single one, a port: "/dev/ttyACM0",
-            "serial:PORT", "socket://HOST:PORT"; "direct" where no robot has a board. None: native or direct.
-        seconds: length of the run by the robots' clocks; may be infinite.
-        seed: of the simulated world's noise, of the robots' imperfections, and of the first brain's chance.
-        realtime: slow a simulated run down to the wall clock.
-        step_timeout: seconds by the wall clock after which a step of a brain that has not ended is an error, which ends
-            the run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after
-            which its dead-man stops the motors.
-        force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
-        record: what happens is recorded. pins: the output edges of emulated boards, too.
+        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
+        record: what happens is recorded.
     """
 
     members: Sequence[Member]

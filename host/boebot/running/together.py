@@ -56,10 +56,10 @@ def run_together(
         boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
 
     Args:
-        members, arena, seconds, on, seed, realtime, step_timeout, force_timing, pins: as of
-            `boebot.running.tasks.Request`.
+        members: the robots.
+        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
-        progress: called with the seconds that have passed, about ten times a second.
+        progress: called with the run's time so far (s), about ten times a second.
 
     Returns:
         A result per robot, and the figures common to them.
