@@ -28,6 +28,7 @@ MODULES = (
     "busy",
     "clock",
     "speed",
+    "record",
     "demo_brain",
     "world",
     "precision",

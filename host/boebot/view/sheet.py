@@ -29,6 +29,7 @@ LINE_IN, ROW_IN = 0.22, 0.205  # of the caption, of the legend
 CAPTION_COLUMNS, TITLE_COLUMNS = 126, 68
 PANEL_IN, PANEL_BELOW_IN = 1.5, 0.5  # of the panel below the field, and for the words below it
 ENTRY_IN, LETTER_IN = 0.5, 0.062  # of the legend: handle and gaps, one letter
+POINTS_AT_ONCE = 500  # of a line: the dashes of a long one at once take 100 MB
 PARTING = "   ·   "
 
 
@@ -116,7 +117,8 @@ class Sheet:
         """As the bytes of a PNG file, with title and caption in its text."""
         metadata = {"Title": self.title, "Description": self.caption}
         file = io.BytesIO()
-        self.figure.savefig(file, format="png", facecolor=style.PAPER, metadata=metadata)
+        with rc_context({"agg.path.chunksize": POINTS_AT_ONCE}):
+            self.figure.savefig(file, format="png", facecolor=style.PAPER, metadata=metadata)
         return file.getvalue()
 
 

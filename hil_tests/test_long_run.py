@@ -1,0 +1,73 @@
+"""A day of a robot without a board, recorded into a folder: what it takes of memory, and whether its files are whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from PIL import Image
+
+from boebot.record.reading import read_run
+from boebot.record.result import RunResult
+
+SECONDS = 24 * 3600
+GROWTH_MB = 150
+COMMAND = ("run", "wander", "--robot", "arsim", "--arena", "arsim", "--period", "0.05", "--seed", "1", "--json")
+
+
+class Day(NamedTuple):
+    """How its process ended, and the memory that it took (MB)."""
+
+    figures: dict[str, object]
+    early_mb: float
+    """while it goes, after at least a minute of the run"""
+    peak_mb: float
+    """of all, with the files at the end"""
+
+
+def resident_mb(process: int) -> float:
+    status = Path(f"/proc/{process}/status").read_text(encoding="utf-8")
+    return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+
+def driven(folder: Path) -> Day:
+    command = [sys.executable, "-m", "boebot", *COMMAND, "--seconds", str(SECONDS), "--out", str(folder)]
+    with (folder.parent / "out.json").open("w+") as out, subprocess.Popen(command, stdout=out) as process:
+        record = folder / "record.mcap"
+        while process.poll() is None and (not record.exists() or record.stat().st_size < 1_000_000):  # 100 s
+            time.sleep(0.01)
+        early_mb = resident_mb(process.pid)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        assert process.returncode == 0
+        out.seek(0)
+        return Day(json.load(out), early_mb, usage.ru_maxrss / 1024)
+
+
+@pytest.mark.soak
+@pytest.mark.unsanitized
+@pytest.mark.skipif(sys.platform != "linux", reason="no /proc")
+def test_day_takes_little_memory_and_leaves_whole_files(tmp_path: Path) -> None:
+    folder = tmp_path / "day"
+    day = driven(folder)
+    print(f"{day.early_mb:.0f} MB after a minute, {day.peak_mb:.0f} MB at most")
+    assert day.peak_mb <= day.early_mb + GROWTH_MB
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["ended"] == day.figures["ended"] == "complete" and summary["run_time_s"] == SECONDS
+    with Image.open(folder / "run.png") as picture:
+        picture.load()
+        assert picture.width > 600 and picture.height > 600
+    page = (folder / "replay.html").read_text(encoding="utf-8")
+    data = re.search(r"const page = (\{.*\});\n", page)
+    assert data and len(json.loads(data[1])["runs"]) == 1 and page.rstrip().endswith("</html>")
+    result = read_run(folder)
+    assert isinstance(result, RunResult) and result.error is None
+    assert result.ticks == SECONDS * 100 + 1 and result.steps == SECONDS * 20
+    assert {name: value for name, value in summary.items() if name in result.table()} == result.table()
