@@ -1,4 +1,4 @@
-"""A day of a robot without a board, recorded into a folder: what it takes of memory, and whether its files are whole."""
+"""A day of a robot without a board, recorded into a folder: its memory, and whether its files are whole."""
 
 from __future__ import annotations
 
