@@ -84,6 +84,36 @@ def saved(result: RunResult | TogetherResult, folder: Path) -> Messages:
     return read(path)
 
 
+def test_what_the_brain_shows_is_there(tmp_path: Path) -> None:
+    """Numbers when they change, texts in the log, sketches in their frames."""
+
+    def step(robot: boebot.Robot) -> None:
+        robot.show("tenths of a second", round(robot.time * 10))
+        robot.show("half", "first" if robot.time < 0.25 else "second")
+        if robot.tick == 0:
+            robot.sketch("map", grid=boebot.Grid([[0.0, 1.0], [math.nan, 0.5]], 0.1, 1.0, 2.0), frame="arena")
+            robot.sketch("ahead", lines=[[(0, 0), (1, 0)]], points=[(0.5, 0.25)])
+            robot.sketch("near", points=[(0.1, 0)], frame="robot")
+
+    place = (1.0, -2.0, math.pi / 2)
+    result = boebot.run(step, robot="arsim", arena="empty", pose=place, seconds=0.5, period=0.1)
+    messages = saved(result, tmp_path)
+    assert [message.tenths_of_a_second_0 for _, message in messages["/shown"]] == [0, 1, 2, 3, 4]
+    assert [line.message for _, line in messages["/log"]] == ["half: first", "half: second"]
+    start = transforms(messages, "start")
+    assert start.at(0) == pytest.approx(place)
+    grid, ahead, near = (message.entities[0] for _, message in messages["/sketch"])
+    assert [entity.frame_id for entity in (grid, ahead, near)] == ["world", "start", "robot"]
+    squares = np.array([(point.x, point.y) for point in grid.triangles[0].points]).reshape(2, 6, 2)
+    assert squares.mean(axis=1) == pytest.approx(np.array([(0.15, 0.05), (0.15, 0.15)]))
+    assert (grid.triangles[0].pose.position.x, grid.triangles[0].pose.position.y) == (1.0, 2.0)
+    opacity = [colour.a for colour in grid.triangles[0].colors]
+    assert opacity[0] > opacity[-1] > 0
+    line, cross = ahead.lines
+    assert [(point.x, point.y) for point in line.points] == [(0, 0), (1, 0)]
+    assert np.mean([(point.x, point.y) for point in cross.points], axis=0) == pytest.approx((0.5, 0.25))
+
+
 def heading(rotation: Any) -> float:
     assert rotation.x == rotation.y == 0
     return 2 * math.atan2(rotation.z, rotation.w)

@@ -7,21 +7,25 @@ topic             what is in it
 /pose, /odometry  the same poses by themselves; /path, /odometry_path: all of them at once, thinned
 /laser            each sweep of a laser range finder
 /ping and so on   numbers of a device, as in run.csv; /board: numbers of the board, or of a robot without one
+/shown            numbers that the brain shows, when they change; its texts are in /log
+/sketch           its sketches: each layer is an entity of that name
 /command          what the brain asked for: kind (0 stop, 1 signal, 2 speed), left, right
 /log              events of the board, switches of a brain, notices, how the run ended
 
 Times are the run's, from 0 on. Of several robots, topics and frames begin with robot-1, robot-2 and so on, but for
-`world`, movers, /tf, /scene and /log. It is made part by part: memory does not grow with the run.
+`world`, movers, /tf, /scene, /sketch and /log. It is made part by part: memory does not grow with the run.
 """
 
 from __future__ import annotations
 
 import heapq
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import msgspec
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -40,7 +44,9 @@ from boebot.record.brain_record import each_switch
 from boebot.record.parts import Part, events, parts
 from boebot.record.record import KINDS
 from boebot.record.result import why
+from boebot.record.shown import shown_names
 from boebot.record.truth import lateness
+from boebot.showing import SKETCH, VALUES, Sketch
 from boebot.view import foxglove_numbers, foxglove_scene, style
 
 if TYPE_CHECKING:
@@ -49,6 +55,7 @@ if TYPE_CHECKING:
     from boebot.record.series import Pose
 
 WORLD = "world"
+FIELD = re.compile(r"\W|^(?=\d)", re.ASCII)  # what no name of a Protobuf field has
 MOVERS_AT_ONCE_S = 100.0  # of the moving shapes' ways
 SAME_S = 1e-6  # sweeps nearer in time than this are one
 
@@ -69,7 +76,7 @@ def write(results: Sequence[RunResult], path: Path) -> None:
     colours = [style.colour(number) for number in range(1, len(results) + 1)]
     streams = [_scene(results, prefixes, colours), _movers(results[0])]
     for result, prefix in zip(results, prefixes, strict=True):
-        streams += [_ticks(result, prefix), _log(result, prefix)]
+        streams += [_ticks(result, prefix), _shown(result, prefix), _sketches(result, prefix), _log(result, prefix)]
     with path.open("wb") as file:
         out = _File(file)
         for entry in heapq.merge(*streams, key=lambda entry: entry.time_ns):
@@ -289,6 +296,47 @@ def _commands(part: Part, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]
         kinds["command"] = foxglove_numbers.descriptor("command", list(table))
     for (index, *_), data in zip(steps, foxglove_numbers.packed(table), strict=True):
         yield Entry(_ns(float(part.series.time[index])), f"/{prefix}command", kinds["command"], data)
+
+
+# ---- what the brain shows ----------------------------------------------------------------------------------------
+
+
+def _shown(result: RunResult, prefix: str) -> Iterator[Entry]:
+    """Its numbers, a field for each; and a line where a text changes."""
+    names = shown_names(result.record)
+    numbers = [name for name, is_text in names.items() if not is_text]
+    fields = [f"{FIELD.sub('_', name)}_{place}" if FIELD.search(name) else name for place, name in enumerate(numbers)]
+    kind = foxglove_numbers.descriptor("shown", fields) if numbers else None
+    before: dict[str, Any] = {}
+    for time_s, data in result.record.each_row(VALUES):
+        row = msgspec.json.decode(data)
+        if kind is not None:
+            values = [row.get(name) for name in numbers]
+            table = {name: np.array([value], dtype=np.float64) for name, value in zip(fields, values, strict=True)}
+            yield Entry(_ns(time_s), f"/{prefix}shown", kind, foxglove_numbers.packed(table)[0])
+        for name, is_text in names.items():
+            if is_text and row.get(name, "") != before.get(name, ""):
+                yield _line(time_s, Log.INFO, f"{prefix}brain", f"{name}: {row.get(name, '')}")
+        before = row
+
+
+def _sketches(result: RunResult, prefix: str) -> Iterator[Entry]:
+    """Each sketch of each layer, in the frame that it is in."""
+    layers: list[str] = []
+    start = result.overview.true_pose
+    place = (0.0, 0.0, 0.0) if start is None or not len(start.x) else start.at(0)
+    for number, (time_s, data) in enumerate(result.record.each_row(SKETCH)):
+        if number == 0:
+            frame = FrameTransforms(transforms=[_transform(0.0, f"{prefix}start", *place)])
+            yield _entry(0.0, "/tf", frame)
+        drawn = msgspec.json.decode(data, type=Sketch)
+        if drawn.layer not in layers:
+            layers.append(drawn.layer)
+        colour = style.layer(layers.index(drawn.layer))
+        frame_id = WORLD if drawn.frame == "arena" else f"{prefix}{drawn.frame}"
+        entity = foxglove_scene.sketch(drawn, f"{prefix}{drawn.layer}", frame_id, colour)
+        entity.timestamp.CopyFrom(_stamp(time_s))
+        yield _entry(time_s, "/sketch", SceneUpdate(entities=[entity]))
 
 
 # ---- what is said ----------------------------------------------------------------------------------------------------

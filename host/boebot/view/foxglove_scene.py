@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -15,18 +15,21 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
 from boebot.devices.drawing import Stroke
-from boebot.view import scene, style
+from boebot.showing import UNKNOWN
+from boebot.view import scene, sketch_drawing, style
 
 if TYPE_CHECKING:
     from boebot.arenas.arena import Floats
     from boebot.arenas.floor_plan import FloorPlan, Solid
     from boebot.description.robots import RobotDescription
+    from boebot.showing import Sketch
 
 HIGH_M = 0.2  # what has no height is drawn this high
 BODY_M = 0.08  # height of a robot's body, as drawn: descriptions do not say it
 PAINT_M = 0.001  # above the floor
 LAMP_M = 0.04
 RIM_M = 0.012  # width of a wheel
+CROSS_M = 0.01  # half the arm of a cross at a point that a brain sketches
 EDGE_PX = 2.0
 CORNERS = 48  # of a circle's edge
 
@@ -87,6 +90,30 @@ def ghost(description: RobotDescription, frame: str) -> SceneEntity:
     return entity
 
 
+def sketch(drawn: Sketch, entity_id: str, frame: str, colour: str) -> SceneEntity:
+    """What a layer of a brain's sketches shows; cells of a grid as squares on the floor, free ones none."""
+    entity = SceneEntity(id=entity_id, frame_id=frame, frame_locked=True)
+    for line in drawn.lines:
+        _add_edge(entity, sketch_drawing.pairs(line), PAINT_M, colour, is_closed=False)
+    if drawn.points:
+        points = sketch_drawing.pairs(drawn.points)
+        arms = np.array(((-CROSS_M, 0.0), (CROSS_M, 0.0), (0.0, -CROSS_M), (0.0, CROSS_M)))
+        crosses = (points[:, None] + arms).reshape(-1, 2)
+        _add_edge(entity, crosses, PAINT_M, colour, kind=LinePrimitive.LINE_LIST)
+    if (grid := drawn.grid) is not None:
+        cells = np.frombuffer(grid.cells, dtype=np.uint8).reshape(grid.rows, grid.columns)
+        row, column = np.nonzero((cells > 0) & (cells != UNKNOWN))
+        corner = np.column_stack((column, row))
+        squares = (corner[:, None] + np.array(((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)))).reshape(-1, 2)
+        opacity = np.repeat(sketch_drawing.rgba(grid, colour)[row, column, 3], 6)
+        entity.triangles.add(
+            pose=pose(grid.x, grid.y, 0.0),
+            points=_points(squares * grid.cell, 0.0),
+            colors=[_colour(colour, alpha) for alpha in opacity.tolist()],
+        )
+    return entity
+
+
 def pose(x: float, y: float, heading: float, *, height: float = 0.0) -> Pose:
     """A pose on the floor, or so far above it."""
     return Pose(position=Vector3(x=x, y=y, z=height), orientation=rotation(heading))
@@ -126,11 +153,18 @@ def _add_sides(entity: SceneEntity, corners: Floats, height: float, colour: str,
 
 
 def _add_edge(
-    entity: SceneEntity, corners: Floats, height: float, colour: str, *, is_closed: bool = True, width_m: float = 0.0
+    entity: SceneEntity,
+    corners: Floats,
+    height: float,
+    colour: str,
+    *,
+    is_closed: bool = True,
+    width_m: float = 0.0,
+    kind: Any = None,
 ) -> None:
-    """A line of that width; 0: as thin everywhere on the screen."""
+    """A line of that width; 0: as thin everywhere on the screen. `kind`: one of LinePrimitive's; None: a line."""
     entity.lines.add(
-        type=LinePrimitive.LINE_LOOP if is_closed else LinePrimitive.LINE_STRIP,
+        type=kind or (LinePrimitive.LINE_LOOP if is_closed else LinePrimitive.LINE_STRIP),
         pose=pose(0.0, 0.0, 0.0),
         thickness=width_m or EDGE_PX,
         scale_invariant=not width_m,

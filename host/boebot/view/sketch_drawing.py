@@ -53,9 +53,9 @@ def _draw(axes: Axes, sketch: Sketch, origin: tuple[float, float, float], colour
         axes.set_xlim(*bounds[0])
         axes.set_ylim(*bounds[1])
     for line in sketch.lines:
-        axes.plot(*_pairs(line).T, color=colour, lw=1.5, transform=placed, zorder=7.5, solid_capstyle="round")
+        axes.plot(*pairs(line).T, color=colour, lw=1.5, transform=placed, zorder=7.5, solid_capstyle="round")
     if sketch.points:
-        axes.plot(*_pairs(sketch.points).T, ls="", marker=".", ms=4, color=colour, transform=placed, zorder=7.6)
+        axes.plot(*pairs(sketch.points).T, ls="", marker=".", ms=4, color=colour, transform=placed, zorder=7.6)
 
 
 def rgba(grid: GridCells, colour: str) -> NDArray[np.float64]:
@@ -68,5 +68,6 @@ def rgba(grid: GridCells, colour: str) -> NDArray[np.float64]:
     return picture
 
 
-def _pairs(points: bytes) -> NDArray[np.float32]:
-    return np.frombuffer(points, dtype="<f4").reshape(-1, 2)
+def pairs(points: bytes) -> NDArray[np.float64]:
+    """Points as they are kept, shape (n, 2), in m."""
+    return np.frombuffer(points, dtype="<f4").reshape(-1, 2).astype(np.float64)
