@@ -25,6 +25,7 @@ from mcap.reader import make_reader
 
 import boebot
 from boebot.record import windows
+from boebot.record.reading import robots_of
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.series import Pose
 from boebot.running.runner import execute
@@ -79,7 +80,7 @@ def decoder(name: str, schema: bytes) -> Any:
 
 def saved(result: RunResult | TogetherResult, folder: Path) -> Messages:
     folder.mkdir(exist_ok=True)
-    path = save_for_foxglove(result, folder)
+    path = save_for_foxglove([*robots_of(result).values()], folder)
     assert path == folder / "foxglove.mcap" and list(folder.iterdir()) == [path]
     return read(path)
 

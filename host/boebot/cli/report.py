@@ -10,7 +10,7 @@ import typer
 from boebot.cli import ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
 from boebot.record.mending import mend
-from boebot.record.reading import CutError, read_run
+from boebot.record.reading import CutError, read_run, robots_of
 from boebot.record.run_folder import RECORD, RunFolder
 
 
@@ -38,7 +38,7 @@ def report(
         if foxglove:
             from boebot.view import save_for_foxglove
 
-            files.append(save_for_foxglove(result, folder))
+            files.append(save_for_foxglove([*robots_of(result).values()], folder))
         if mended and isinstance(result.error, CutError):
             files.append(mend(folder / RECORD, result))
     if isinstance(result.error, CutError):

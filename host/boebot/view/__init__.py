@@ -121,14 +121,12 @@ def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) ->
     return paths
 
 
-def save_for_foxglove(result: RunResult | TogetherResult, folder: Path) -> Path:
-    """Writes foxglove.mcap into `folder`, which is there; returns its path.
+def save_for_foxglove(results: Sequence[RunResult], folder: Path) -> Path:
+    """Writes foxglove.mcap, with the robots of one run, into `folder`, which is there; returns its path.
 
     Raises:
         BoebotError: Foxglove's schemas are not installed, or the folder cannot be written to.
     """
-    from boebot.record.result import RunResult
-
     try:
         from boebot.view import foxglove
     except ImportError as error:
@@ -137,7 +135,6 @@ def save_for_foxglove(result: RunResult | TogetherResult, folder: Path) -> Path:
         raise BoebotError(
             "Foxglove's schemas are not installed; expected the extra of that name: pip install 'boebot[foxglove]'"
         ) from None
-    results = [result] if isinstance(result, RunResult) else result.robots
     return _write(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 

@@ -43,7 +43,6 @@ from boebot.devices.laser import Laser
 from boebot.record.brain_record import each_switch
 from boebot.record.parts import Part, events, parts
 from boebot.record.record import KINDS
-from boebot.record.result import why
 from boebot.record.shown import shown_names
 from boebot.record.truth import lateness
 from boebot.showing import SKETCH, VALUES, Sketch
@@ -347,7 +346,7 @@ def _log(result: RunResult, prefix: str) -> Iterator[Entry]:
     yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=lambda entry: entry.time_ns)
     said = [(Log.WARNING, notice) for notice in result.notices]
     if result.error is not None:
-        said.append((Log.ERROR, f"ended early: {why(result.error)}"))
+        said.append((Log.ERROR, f"ended early: {result.table()['ended']}"))
     for level, sentence in said:
         yield _line(result.run_time, level, f"{prefix}run", sentence)
 
