@@ -77,7 +77,7 @@ soak: experiments
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
 	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.other_emulators
-	@$(PYTHON_VENV) -m pytest -q -m soak
+	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh
 	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
 

@@ -1,13 +1,11 @@
-"""A day of a robot without a board, recorded into a folder: its memory, and whether its files are whole."""
+"""A recorded day of a robot without a board: what it takes of memory, and whether its files are whole."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +14,7 @@ from PIL import Image
 
 from boebot.record.reading import read_run
 from boebot.record.result import RunResult
+from tools import resident
 
 SECONDS = 24 * 3600
 GROWTH_MB = 150
@@ -32,23 +31,19 @@ class Day(NamedTuple):
     """of all, with the files at the end"""
 
 
-def resident_mb(process: int) -> float:
-    status = Path(f"/proc/{process}/status").read_text(encoding="utf-8")
-    return int(status.split("VmRSS:")[1].split()[0]) / 1024
-
-
 def driven(folder: Path) -> Day:
     command = [sys.executable, "-m", "boebot", *COMMAND, "--seconds", str(SECONDS), "--out", str(folder)]
-    with (folder.parent / "out.json").open("w+") as out, subprocess.Popen(command, stdout=out) as process:
-        record = folder / "record.mcap"
-        while process.poll() is None and (not record.exists() or record.stat().st_size < 1_000_000):  # 100 s
-            time.sleep(0.01)
-        early_mb = resident_mb(process.pid)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
+    record, early = folder / "record.mcap", list[float]()
+
+    def look(taken_mb: float) -> None:
+        if not early and record.exists() and record.stat().st_size > 1_000_000:  # 100 s
+            early.append(taken_mb)
+
+    with (folder.parent / "out.json").open("w+") as out, subprocess.Popen(command, stdout=out, text=True) as process:
+        peak_mb = resident.peak(process, look)
         assert process.returncode == 0
         out.seek(0)
-        return Day(json.load(out), early_mb, usage.ru_maxrss / 1024)
+        return Day(json.load(out), early[0], peak_mb)
 
 
 @pytest.mark.soak

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
+from tools import resident
 from tools.bench.figures import figure
 
 SECONDS = 300.0
@@ -37,12 +37,11 @@ def peak_mb(seconds: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
         run = ("run", "wander", "--robot", "arsim", "--arena", "arsim", "--seconds", f"{seconds}", "--out")
         command = [sys.executable, "-m", "boebot", *run, str(Path(folder) / "run")]
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, text=True) as process:
+            most = resident.peak(process)
         if process.returncode:
             raise RuntimeError(f"the run of {seconds:g} s ended with exit code {process.returncode}")
-        return usage.ru_maxrss / 1024
+        return most
 
 
 @figure("record: memory of a run of an hour with its files, beyond that of a minute", "MB", at_most=100)
