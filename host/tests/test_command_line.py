@@ -610,7 +610,7 @@ def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixtu
         "deferred",
         "late",
         "last reset",
-        "longest, us",
+        "longest (µs)",
         "storage",
     ):
         assert name in out

@@ -140,7 +140,7 @@ def _tasks(longest_s: Mapping[str, float | None]) -> Any:
     """The longest time of each task, if the board takes any."""
     tasks = output.empty_table()
     tasks.add_column("task", style="dim")
-    tasks.add_column("longest, us", justify="right")
+    tasks.add_column("longest (µs)", justify="right")
     for name, took_s in longest_s.items():
         tasks.add_row(name, "" if took_s is None else f"{1e6 * took_s:,.0f}")
     return tasks if any(longest_s.values()) else ""
