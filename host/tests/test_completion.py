@@ -72,6 +72,22 @@ def test_script_for_each_shell(shell: str, tmp_path: Path) -> None:
         assert (read.returncode, read.stderr) == (0, "")
 
 
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_completes_with_its_script() -> None:
+    script = (
+        'eval "$(_BOEBOT_COMPLETE=source_bash boebot)"\n'
+        "set -- $(complete -p boebot)\n"
+        "while [ $1 != -F ]; do shift; done\n"
+        "COMP_WORDS=(boebot re) COMP_CWORD=1\n"
+        "$2 boebot\n"
+        'echo "${COMPREPLY[@]}"\n'
+    )
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    environment = os.environ | {"PATH": path}
+    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, timeout=60)
+    assert (done.stdout.split(), done.stderr) == (["report", "replay"], "")
+
+
 def test_bundled_brains_are_completed_without_being_read() -> None:
     from boebot.cli.completion import brains
 
