@@ -36,28 +36,28 @@ def test_command_says_of_itself_what_the_list_says(name: str, capsys: pytest.Cap
     assert app.COMMANDS[name][1].rstrip(".") in " ".join(out.split())
 
 
-def completed(folder: Path, *words: str) -> list[str]:
-    """What bash is told of the last word."""
-    environment = os.environ | {
-        "_BOEBOT_COMPLETE": "complete_bash",
-        "COMP_WORDS": "\n".join(["boebot", *words]),
-        "COMP_CWORD": str(len(words)),
-    }
-    command = [sys.executable, "-m", "boebot"]
-    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, timeout=60)
-    assert done.stderr == ""
-    return done.stdout.split()
-
-
-def test_shell_completes_commands_options_names_and_files(tmp_path: Path) -> None:
+def test_shell_completes_commands_options_names_and_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "worm.py").touch()
     (tmp_path / "words.txt").touch()
     (tmp_path / "wood").mkdir()
-    assert completed(tmp_path, "re") == ["report", "replay"]
-    assert completed(tmp_path, "run", "--ro") == ["--robot", "--robots"]
-    assert completed(tmp_path, "run", "w") == ["wander", "wood/", "worm.py"]
-    assert completed(tmp_path, "run", "--arena", "") == [*arena_names(), "wood/"]
-    assert completed(tmp_path, "parameters", "s") == ["set", "save"]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("_BOEBOT_COMPLETE", "complete_bash")
+
+    def completed(*words: str) -> list[str]:
+        """What bash is told of the last word."""
+        monkeypatch.setenv("COMP_WORDS", "\n".join(["boebot", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        code, out, err = boebot(capsys)
+        assert (code, err) == (0, "")
+        return out.split()
+
+    assert completed("re") == ["report", "replay"]
+    assert completed("run", "--ro") == ["--robot", "--robots"]
+    assert completed("run", "w") == ["wander", "wood/", "worm.py"]
+    assert completed("run", "--arena", "") == [*arena_names(), "wood/"]
+    assert completed("parameters", "s") == ["set", "save"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
