@@ -1,0 +1,142 @@
+"""The nodes of an exploration by sensory area coverage (section 6.1 of the notes): where the robot has been, where it
+will go, and how it gets there.
+
+A node is pending, completed or unreachable. To each pending node leads a path of nodes from the active one, where the
+robot is. Rules: R1 to R11 of docs/reference/navigation.md.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from boebot.navigation.scan_error import Scan
+
+Status = Literal["pending", "completed", "unreachable"]
+Point = tuple[float, float]
+
+
+@dataclass
+class Node:
+    """One place.
+
+    Attributes:
+        number: from 0, in the order in which they were placed.
+        place: x, y (m).
+        status: "pending", "completed" or "unreachable".
+        path: numbers of nodes from the active one to this, both included; of what is not pending none.
+    """
+
+    number: int
+    place: Point
+    status: Status
+    path: list[int] = field(default_factory=list)
+
+
+class ExplorationGraph:
+    """All nodes of an exploration.
+
+    Attributes:
+        nodes: by number.
+        active: number of the node where the robot is.
+    """
+
+    def __init__(self, start: Point, least_distance: float) -> None:
+        """R1: a node at the start (m), completed and active. `least_distance`: d_min between nodes (m)."""
+        self.nodes = [Node(0, start, "completed")]
+        self.active = 0
+        self._least = least_distance
+
+    def place(self, place: Point) -> Node | None:
+        """R5, R6: a new pending node there (m); None: it would be too near to another that is not unreachable."""
+        if any(node.status != "unreachable" and math.dist(node.place, place) < self._least for node in self.nodes):
+            return None
+        node = Node(len(self.nodes), place, "pending", [self.active, len(self.nodes)])
+        self.nodes.append(node)
+        return node
+
+    def length(self, path: Sequence[int]) -> float:
+        """Of a path (m)."""
+        places = [self.nodes[number].place for number in path]
+        return sum(math.dist(one, other) for one, other in itertools.pairwise(places))
+
+    @property
+    def pending(self) -> list[Node]:
+        """Those that are left."""
+        return [node for node in self.nodes if node.status == "pending"]
+
+    def target(self) -> Node | None:
+        """R7: the pending node with the shortest path; of equals the one that was placed first; None: R13, all done."""
+        return min(self.pending, key=lambda node: (self.length(node.path), node.number), default=None)
+
+    def reached(self, number: int) -> None:
+        """R9: the robot is at a node."""
+        if self.nodes[number].status == "pending":
+            self.nodes[number].status = "completed"
+        self._activate(number)
+
+    def blocked(self, number: int) -> None:
+        """R11: the robot cannot come to a node; its paths begin there all the same, for it is on the leg before it."""
+        self._activate(number)
+        self.nodes[number].status = "unreachable"
+
+    def _activate(self, number: int) -> None:
+        """R10: all paths begin at that node from now on."""
+        way = self.nodes[number].path or [self.active, number]
+        for node in self.nodes:
+            if node.status == "pending" and node.number != number:
+                node.path = joined(way, node.path)
+        self.nodes[number].path = []
+        self.active = number
+
+
+def joined(way: Sequence[int], path: Sequence[int]) -> list[int]:
+    """R10: the path from where `way` ends to where `path` ends; both begin at the same node. Back to where they part,
+    and on from there."""
+    common = 0
+    while common < min(len(way), len(path)) and way[common] == path[common]:
+        common += 1
+    return [*reversed(way[common - 1 :]), *path[common:]]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How nodes are placed about the robot."""
+
+    distance: float = 1.0
+    """D (m)"""
+    margin: float = 0.3
+    """Δ: free way behind a node (m)"""
+    least_angle: float = 0.35
+    """γ_min: of an interval of free directions (rad)"""
+    least_distance: float = 0.75
+    """d_min: between nodes (m)"""
+
+    def bearings(self, scan: Scan) -> list[float]:
+        """R2 to R4: directions of new nodes, from the robot's heading (rad): in each interval of free directions, one
+        node in its middle, or several beside each other in a wide one."""
+        each = 2.0 * math.asin(min(1.0, self.least_distance / (2.0 * self.distance)))  # γ_s
+        found = []
+        for begin, end in self.intervals(scan):
+            if end - begin > self.least_angle:
+                count = max(1, math.floor((end - begin) / each))
+                found += [begin + (k + 0.5) * (end - begin) / count for k in range(count)]
+        return found
+
+    def intervals(self, scan: Scan) -> list[tuple[float, float]]:
+        """R2: directions in which nothing is nearer than D + Δ: first and last of each interval (rad)."""
+        count = len(scan.distances)
+        step = (scan.bearings[1] - scan.bearings[0]) / (count - 1)
+        free = [not 0.0 <= distance <= self.distance + self.margin for distance in scan.distances.tolist()]
+        found, begun = [], -1
+        for ray in range(count + 1):
+            is_free = ray < count and free[ray]
+            if is_free and begun < 0:
+                begun = ray
+            elif not is_free and begun >= 0:
+                found.append((scan.bearings[0] + begun * step, scan.bearings[0] + (ray - 1) * step))
+                begun = -1
+        return found

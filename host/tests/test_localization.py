@@ -1,0 +1,207 @@
+"""Localization by scans: (6.8), the notes' random search, the particle filter, and the behavior on a robot."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+import boebot
+from boebot.brain import Brain, Utility
+from boebot.cognition import Odometry
+from boebot.navigation import (
+    Estimator,
+    FollowPath,
+    Lattice,
+    LineMap,
+    Localization,
+    ParticleFilter,
+    RandomSearch,
+    Scan,
+    search,
+    tightened,
+)
+from boebot.navigation.frames import Pose, composed, inverse, placed
+from boebot.navigation.match import search_pose
+
+HALF_TURN = (-math.pi / 2, math.pi / 2)
+REACH, RAYS = 4.0, 120
+
+
+@pytest.fixture(scope="module")
+def office() -> LineMap:
+    return LineMap.of("office")
+
+
+@pytest.fixture(scope="module")
+def places(office: LineMap) -> list[Pose]:
+    """Poses that a robot of 0.15 m can have."""
+    lattice = Lattice.of(office, 0.15, 0.05, 0.05)
+    start = lattice.nearest_free(-2.5, -1.4, within=0.5)
+    assert start is not None
+    chance = np.random.default_rng(5)
+    cells = np.argwhere(lattice.reachable(start).free)
+    drawn = [lattice.centre((int(row), int(column))) for row, column in cells[chance.integers(len(cells), size=40)]]
+    return [(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in drawn]
+
+
+def scan_at(plan: LineMap, pose: Pose, noise: float = 0.01, seed: int = 1) -> Scan:
+    """Of a range finder with that noise, a share of the range."""
+    (exact,) = plan.scans([pose], HALF_TURN, RAYS, REACH)
+    factors = 1 + noise * np.random.default_rng(seed).standard_normal(RAYS)
+    return Scan(np.where(exact > 0, exact * factors, -1.0), HALF_TURN, REACH)
+
+
+def test_poses_are_composed_and_taken_apart() -> None:
+    frame, pose = (1.0, 2.0, math.pi / 2), (0.5, 0.0, math.pi)
+    assert composed(frame, pose) == pytest.approx((1.0, 2.5, -math.pi / 2))
+    assert composed(inverse(frame), composed(frame, pose))[:2] == pytest.approx(pose[:2])
+    assert placed(inverse(frame), [(1.0, 2.5)]) == [pytest.approx((0.5, 0.0))]
+
+
+def test_scan_error_is_that_of_the_equation(office: LineMap, places: list[Pose]) -> None:
+    """(6.8): none without noise; with 1 % noise the root mean square of 120 relative deviations is near 1 %."""
+    exact = [scan_at(office, pose, 0.0).errors(office, [pose])[0] for pose in places]
+    noisy = [scan_at(office, pose, 0.01, k).errors(office, [pose])[0] for k, pose in enumerate(places)]
+    assert max(exact) < 1e-12 and 0.008 < np.mean(noisy) < 0.012 and max(noisy) <= 0.015
+    scan, here = scan_at(office, places[0], 0.0), (0.05, 0.0, 0.0)
+    moved = composed(places[0], here)
+    (expected,) = office.scans([moved], HALF_TURN, RAYS, REACH)
+    both = (scan.distances > 0) & (expected > 0)
+    by_hand = math.sqrt(np.mean((1 - expected[both] / scan.distances[both]) ** 2))
+    assert scan.errors(office, [moved])[0] == pytest.approx(by_hand)
+
+
+def test_scan_of_nothing_fits_nowhere(office: LineMap, places: list[Pose]) -> None:
+    nothing = Scan(np.full(RAYS, -1.0), HALF_TURN, REACH)
+    assert nothing.errors(office, places).tolist() == [math.inf] * len(places)
+    estimator = RandomSearch()
+    estimator.begin(office, places[0], random.Random(1))
+    estimate = estimator.correct(nothing)
+    assert not estimate.found and estimate.pose == places[0]
+
+
+def test_range_finder_away_from_the_middle(office: LineMap, places: list[Pose]) -> None:
+    place = (0.1, -0.05)
+    scan = scan_at(office, composed(places[0], (*place, 0.0)), 0.0)
+    assert Scan(scan.distances, HALF_TURN, REACH, place).errors(office, [places[0]])[0] < 1e-12
+
+
+def test_few_rays_are_those_of_all(office: LineMap, places: list[Pose]) -> None:
+    whole = scan_at(office, places[0], 0.0)
+    few = whole.thinned(30)
+    assert len(few.distances) == 30 and few.errors(office, [places[0]], 8)[0] < 1e-12
+
+
+def test_random_search_finds_what_is_near(office: LineMap, places: list[Pose]) -> None:
+    """Fig. 6.18: 200 tries from 0.1 m, 0.1 m and 0.1 rad off; ε never grows, and the box goes with what is better."""
+    found = []
+    for number, pose in enumerate(places):
+        start = pose[0] + 0.1, pose[1] - 0.1, pose[2] + 0.1
+        match = search_pose(scan_at(office, pose, seed=number), office, start, random.Random(number))
+        errors = [error for _, error in match.steps]
+        assert errors == sorted(errors, reverse=True) and len(set(errors)) == len(errors)
+        for (one, _), (other, _) in zip(match.steps, match.steps[1:], strict=False):
+            assert np.abs(np.subtract(one, other)).max() <= 0.05 + 1e-12
+        found.append((math.dist(match.pose[:2], pose[:2]), abs(match.pose[2] - pose[2]), errors[0] / match.error))
+    way, turn, gain = np.median(found, axis=0)
+    assert way < 0.02 and turn < 0.01 and gain > 10
+
+
+@pytest.mark.parametrize("kind", [RandomSearch, ParticleFilter])
+def test_estimator_follows_and_says_when_it_is_lost(
+    kind: type[RandomSearch] | type[ParticleFilter], office: LineMap, places: list[Pose]
+) -> None:
+    """Ten robots are carried away: after two scans that fit nowhere they are lost; where the place is much like the
+    other, they may not notice."""
+    lost = 0
+    for number in range(10):
+        before, after = places[2 * number], places[2 * number + 1]
+        estimator: Estimator = kind()
+        estimator.begin(office, before, random.Random(number))
+        first = estimator.correct(scan_at(office, before, seed=number))
+        assert first.found and math.dist(first.pose[:2], before[:2]) < 0.06
+        estimator.move((0.0, 0.0, 0.1))
+        turned = composed(before, (0.0, 0.0, 0.1))
+        assert math.dist(estimator.pose[:2], turned[:2]) < 0.06
+        assert abs(math.remainder(estimator.pose[2] - turned[2], 2 * math.pi)) < 0.08
+        two = [estimator.correct(scan_at(office, after, seed=number)) for _ in range(2)]
+        lost += not any(one.found for one in two)
+    assert lost >= 8
+
+
+def test_particle_filter_finds_itself_again(office: LineMap, places: list[Pose]) -> None:
+    again = 0
+    for number in range(10):
+        estimator = ParticleFilter()
+        estimator.begin(office, places[2 * number], random.Random(number))
+        estimator.correct(scan_at(office, places[2 * number]))
+        after = places[2 * number + 1]
+        found = [estimator.correct(scan_at(office, after, seed=k)) for k in range(20)]
+        again += any(one.found and math.dist(one.pose[:2], after[:2]) < 0.1 for one in found)
+    assert again >= 6
+
+
+# ---- on a robot ------------------------------------------------------------------------------------------------------
+
+
+class Patrol(FollowPath):
+    """There and back along a path of the map, for as long as the run lasts."""
+
+    def __init__(self, path: list[tuple[float, float]], localization: Localization) -> None:
+        super().__init__(speed=0.25, turn_speed=0.1, reach=0.15, arrival=0.1, utility=Utility(b=0.5))
+        self.places, self.localization = path, localization
+
+    def forget(self) -> None:
+        super().forget()
+        self.left: list[tuple[float, float]] = []
+        self.scans = -1
+
+    def step(self, robot: boebot.Robot) -> None:
+        if self.arrived or not self.left:
+            self.places.reverse()
+            self.left, self.scans = list(self.places), -1
+        if self.scans != len(self.localization.estimates):
+            self.scans = len(self.localization.estimates)
+            self.left = self.left[-len(self.path) :] if self.path else self.left
+            self.follow(self.localization.to_odometry(self.left))
+        super().step(robot)
+
+
+def patrol(office: LineMap, every: float, seed: int, estimator: Estimator) -> tuple[float, list[float]]:
+    """The greatest error of the pose in the map (m), and how far it jumped at each scan (m)."""
+    start = (-2.45, -1.35, 0.0)
+    lattice = Lattice.of(office, 0.15, 0.05, 0.1)
+    cells = [lattice.nearest_free(*place, within=0.5) for place in (start[:2], (2.2, 1.0))]
+    assert cells[0] is not None and cells[1] is not None
+    path = tightened([lattice.centre(cell) for cell in search(lattice, cells[0], cells[1]).path], office, 0.2)
+    localization = Localization(
+        plan=office, start=start, every=every, estimator=estimator, utility=Utility(b=-1, w={"due": 3}, tau=0.05)
+    )
+    believed: list[tuple[float, Pose]] = []
+
+    class Log(boebot.brain.CognitiveProcess):
+        def step(self, robot: boebot.Robot) -> None:
+            believed.append((robot.time, localization.pose))
+
+    brain = Brain(
+        [Odometry(), localization, Patrol(path[::-1], localization), Log()], [localization.due_variable], period=0.05
+    )
+    result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=60, seed=seed)
+    assert result.true_pose is not None
+    times = np.array([time for time, _ in believed])
+    at = np.searchsorted(result.series.time, times)
+    x, y = result.true_pose.x[at], result.true_pose.y[at]
+    poses = np.array([pose for _, pose in believed])
+    jumps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    return float(np.hypot(poses[:, 0] - x, poses[:, 1] - y).max()), jumps[jumps > 0.03].tolist()
+
+
+@pytest.mark.parametrize("kind", [RandomSearch, ParticleFilter])
+def test_localization_keeps_the_error_small(kind: type[RandomSearch] | type[ParticleFilter], office: LineMap) -> None:
+    """Figs. 6.14 and 6.15: against odometry alone, whose error grows; the pose in the map jumps."""
+    alone, without = patrol(office, 1e6, 3, RandomSearch())
+    error, jumps = patrol(office, 5.0, 3, kind())
+    assert not without and error < alone / 2 and jumps
