@@ -141,7 +141,7 @@ class Robot(Attributes):
         """The motors are latched off by `emergency_stop`, until `arm`."""
         self.random = random.Random(f"brain {seed}")
         """A `random.Random` of the brain's own: the same run gives the same numbers."""
-        self.showing: Final = Showing()
+        self.showing = Showing()
         """What the brain shows."""
         self._chances: dict[tuple[float, float], float] = {}
 

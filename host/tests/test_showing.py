@@ -149,6 +149,23 @@ def test_each_of_several_robots_has_its_own(tmp_path: Path) -> None:
     assert [layer.name for layer in read.robots[1].layers] == ["ahead"]
 
 
+def test_main_and_processes_show_as_steps_do() -> None:
+    class Speak(boebot.brain.MotorBehavior):
+        def step(self, robot: boebot.Robot) -> None:
+            robot.show("n", robot.time)
+            robot.sketch("here", points=[(0, 0)])
+
+    def main(robot: boebot.MainRobot) -> None:
+        for leg in range(3):
+            robot.show("n", leg)
+            robot.sketch("here", points=[(leg, 0)])
+            robot.wait(0.1)
+
+    for brain in (boebot.brain.Brain([Speak()]), main):
+        result = boebot.run(brain, robot="arsim", arena="empty", seconds=0.5)
+        assert len(result.shown.numbers["n"]) >= 3 and [layer.name for layer in result.layers] == ["here"]
+
+
 # ---- bounds ----------------------------------------------------------------------------------------------------------
 
 

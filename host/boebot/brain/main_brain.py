@@ -48,6 +48,7 @@ class MainRobot(Robot):
     def __init__(self, robot: Robot, pause: Callable[[], object]) -> None:
         """`robot`: what the brain steps with; `pause`: returns at the next step."""
         super().__init__(robot.name, robot.period, robot._seed, robot.speed_limit)
+        self.showing = robot.showing
         self._pause = pause
         self._odometry = Odometry()
         self._moved = False

@@ -59,7 +59,7 @@ def write(results: Sequence[RunResult], path: Path) -> Path:
             for number, (result, view) in enumerate(zip(results, views, strict=True), 1)
         ],
     }
-    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     page = _PAGE.read_text(encoding="utf-8")
     path.write_text(page.replace(_PLACEHOLDER, data), encoding="utf-8")
     return path
