@@ -71,6 +71,8 @@ def test_report_is_that_of_the_run_and_its_folder_holds_no_other(tmp_path: Path)
     assert isinstance(reported(run), TogetherResult)
     (run / "robot-2" / "notes.txt").write_text("mine")
     (run / "notes.txt").write_text("mine, too")
+    for left in ("record-mended.mcap", ".part-run.png"):  # of a run that was killed
+        (run / left).touch()
     assert boebot("run", "wander", "--seconds", "0.5", "--out", str(run)).returncode == 0
     there = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
     assert there == {

@@ -7,8 +7,7 @@ from pathlib import Path
 from boebot.record.record_file import RecordReader, RecordWriter
 from boebot.record.recording import END, say
 from boebot.record.result import RunResult, TogetherResult
-
-MENDED = "record-mended.mcap"
+from boebot.record.run_folder import MENDED, unfinished
 
 
 def mend(path: Path, result: RunResult | TogetherResult) -> Path:
@@ -18,7 +17,8 @@ def mend(path: Path, result: RunResult | TogetherResult) -> Path:
         BoebotError: it cannot be written.
     """
     mended = path.with_name(MENDED)
-    with path.open("rb") as cut, mended.open("wb", buffering=0) as file:
+    part = unfinished(mended)
+    with path.open("rb") as cut, part.open("wb", buffering=0) as file:
         reader, writer = RecordReader(cut, str(path)), RecordWriter(file, str(mended))
         for name, data in reader.read().attachments.items():
             writer.attach(name, data)
@@ -26,4 +26,5 @@ def mend(path: Path, result: RunResult | TogetherResult) -> Path:
             writer.write(group, 0.0)
         writer.attach(END, say([result] if isinstance(result, RunResult) else result.robots))
         writer.finish()
+    part.replace(mended)
     return mended

@@ -16,7 +16,7 @@ from typing import IO
 
 from boebot.errors import BoebotError
 
-RECORD = "record.mcap"
+RECORD, MENDED = "record.mcap", "record-mended.mcap"
 FORMAT = 3  # of a record and of the files made from it; CHANGELOG.md says what is new in each
 FILES = (
     "summary.json",
@@ -29,6 +29,7 @@ FILES = (
     "to_host.bin",
     "wire.csv",
     "foxglove.mcap",
+    MENDED,
 )
 """What is made from a record; of a run of several robots also in a folder for each, `robot-1` and so on."""
 _ROBOT = re.compile(r"robot-[1-9]\d*\Z")
@@ -89,6 +90,7 @@ class RunFolder:
             for folder in (self.path, *sorted(path for path in self.path.iterdir() if _is_of_robot(path))):
                 for name in (*FILES, RECORD):
                     (folder / name).unlink(missing_ok=True)
+                    unfinished(folder / name).unlink(missing_ok=True)
                 if folder != self.path and not any(folder.iterdir()):
                     folder.rmdir()
             file = (self.path / RECORD).open("x+b", buffering=0)
@@ -101,6 +103,11 @@ class RunFolder:
 def locked(path: Path | None) -> AbstractContextManager[RunFolder | None]:
     """That folder, while a run writes to it; None: none. Raises as `RunFolder`."""
     return nullcontext() if path is None else RunFolder(path)
+
+
+def unfinished(path: Path) -> Path:
+    """Where a file is written, before it is whole and gets its name."""
+    return path.with_name(f".part-{path.name}")
 
 
 def unwritable(folder: Path, error: OSError) -> BoebotError:

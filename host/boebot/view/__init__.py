@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
-from boebot.record.run_folder import unwritable
+from boebot.record.run_folder import unfinished, unwritable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -144,7 +144,7 @@ def _write(path: Path, write: Write) -> Path:
     Raises:
         BoebotError: the folder cannot be written to.
     """
-    part = path.with_name(f".part-{path.name}")
+    part = unfinished(path)
     try:
         write(part)
         part.replace(path)
