@@ -11,6 +11,7 @@ import boebot
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
+from boebot.experiments.variants import varied
 from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
 from boebot.navigation.potential_field import check_goal, of_walls, waypoints
 
@@ -79,8 +80,9 @@ def test_walls_of_a_map_are_hills() -> None:
 
 
 def drive(behavior: FollowField, start: tuple[float, float], seconds: float, *others: LockDetector) -> boebot.RunResult:
-    pose = (start[0], start[1], 0.0)
-    return boebot.run(Brain([behavior, Odometry(), *others]), robot="roller", arena="empty", pose=pose, seconds=seconds)
+    """With an odometer that does not drift."""
+    robot, pose = varied("roller", "exact", odometer={"sigma_step_m": 0.0}), (start[0], start[1], 0.0)
+    return boebot.run(Brain([behavior, Odometry(), *others]), robot=robot, arena="empty", pose=pose, seconds=seconds)
 
 
 @pytest.mark.parametrize("start", [(1.3, -1.3), (1.3, 1.3), (-1.3, -1.3), (0.0, -1.2)])

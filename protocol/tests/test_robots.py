@@ -153,7 +153,7 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 def test_unknown_robot_names_the_known_ones() -> None:
     with pytest.raises(
-        RobotError, match="there is no robot 'dalek'; expected one of arsim, boebot, shieldbot, shieldbot-basic"
+        RobotError, match="there is no robot 'dalek'; expected one of arsim, boebot, roller, shieldbot, "
     ):
         load_robot("dalek")
 
