@@ -50,7 +50,7 @@ def test_nodes_are_apart_and_the_nearest_is_next() -> None:
     assert third is not None and graph.target() is third
     graph.blocked(third.number)
     assert (third.status, graph.active, second.path) == ("unreachable", 3, [3, 1, 0, 2])
-    assert graph.place((2.0, 0.1)) is not None, "what is unreachable keeps no other away"
+    assert graph.place((2.0, 0.2)) is None and graph.place((2.0, 0.3)) is not None, "nearer to what is unreachable"
     graph.reached(4)
     graph.reached(2)
     assert graph.target() is None

@@ -35,9 +35,12 @@ def periods(devices: Mapping[str, Any], layout: Layout, count: int) -> tuple[flo
 
 def ages(periods_s: tuple[float, ...], time_s: float, tick_s: float) -> tuple[float, ...]:
     """Age of each reading at a time: a sensor samples in the first step at or after each multiple of its period."""
-    return tuple(_age(period_s, time_s, tick_s) if period_s > tick_s else 0.0 for period_s in periods_s)
+    found = {period_s: _age(period_s, time_s, tick_s) for period_s in set(periods_s)}
+    return tuple(found[period_s] for period_s in periods_s)
 
 
 def _age(period_s: float, time_s: float, tick_s: float) -> float:
+    if period_s <= tick_s:
+        return 0.0
     samples = math.floor(time_s / period_s + 1e-9)
     return max(0.0, time_s - math.ceil(samples * period_s / tick_s - 1e-9) * tick_s)

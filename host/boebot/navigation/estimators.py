@@ -73,8 +73,6 @@ class RandomSearch:
     """N then"""
     enough: float = 0.02
     """T: twice the ε of a range finder with 1 % noise; below it the odometry is left as it is"""
-    least: int = 20
-    """rays that must be known on both sides"""
     growth: float = 0.05
     """of the uncertainty, for each m of way and rad of turning"""
     found_within: Pose = (0.02, 0.02, 0.01)
@@ -97,9 +95,7 @@ class RandomSearch:
         """See `Estimator`."""
         narrow = self._failures == 0
         box, tries = (self.box, self.tries) if narrow else (self.wide_box, self.wide_tries)
-        match = search_pose(
-            scan, self._plan, self.pose, self._source, box=box, tries=tries, enough=self.enough, least=self.least
-        )
+        match = search_pose(scan, self._plan, self.pose, self._source, box=box, tries=tries, enough=self.enough)
         found = match.error < 3 * self.enough
         self._failures = 0 if found else self._failures + 1
         if found:

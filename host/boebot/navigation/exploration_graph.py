@@ -9,11 +9,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
+from boebot.navigation.corridor import is_clear
 from boebot.navigation.scan_error import Scan
+from boebot.navigation.search import search
+
+TRIED = 8  # directions to each side of the middle of an interval
 
 Status = Literal["pending", "completed", "unreachable"]
 Point = tuple[float, float]
@@ -44,18 +50,30 @@ class ExplorationGraph:
         active: number of the node where the robot is.
     """
 
-    def __init__(self, start: Point, least_distance: float) -> None:
-        """R1: a node at the start (m), completed and active. `least_distance`: d_min between nodes (m)."""
+    def __init__(self, start: Point, least_distance: float, beside: float = 0.0) -> None:
+        """R1: a node at the start, completed and active.
+
+        Args:
+            start: x, y (m).
+            least_distance: d_min between nodes (m).
+            beside: m up to which a way around may lead from node to node, though none was driven there.
+        """
         self.nodes = [Node(0, start, "completed")]
         self.active = 0
-        self._least = least_distance
+        self._least, self._beside = least_distance, beside
+        self._legs: set[frozenset[int]] = set()  # along which nodes were placed
+        self._bad: set[frozenset[int]] = set()
 
     def place(self, place: Point) -> Node | None:
-        """R5, R6: a new pending node there (m); None: it would be too near to another that is not unreachable."""
-        if any(node.status != "unreachable" and math.dist(node.place, place) < self._least for node in self.nodes):
-            return None
+        """R5, R6: a new pending node there (m); None: it would be too near to another. To one that is unreachable it
+        may be nearer: it may be reached from another side."""
+        for node in self.nodes:
+            least = self._least / 3 if node.status == "unreachable" else self._least
+            if math.dist(node.place, place) < least:
+                return None
         node = Node(len(self.nodes), place, "pending", [self.active, len(self.nodes)])
         self.nodes.append(node)
+        self._legs.add(frozenset(node.path))
         return node
 
     def length(self, path: Sequence[int]) -> float:
@@ -82,6 +100,45 @@ class ExplorationGraph:
         """R11: the robot cannot come to a node; its paths begin there all the same, for it is on the leg before it."""
         self._activate(number)
         self.nodes[number].status = "unreachable"
+
+    def neighbours(self, number: int) -> Iterator[tuple[int, float]]:
+        """As of what `search` searches: completed nodes to which a straight way may lead, each with its length (m)."""
+        for node in self.nodes:
+            leg, length = frozenset((number, node.number)), self.distance(number, node.number)
+            if (
+                node.status == "completed"
+                and leg not in self._bad
+                and (leg in self._legs or 0 < length <= self._beside)
+            ):
+                yield node.number, length
+
+    def distance(self, number: int, other: int) -> float:
+        """Straight from node to node (m)."""
+        return math.dist(self.nodes[number].place, self.nodes[other].place)
+
+    def bad_leg(self, number: int, other: int) -> None:
+        """R14c: no way is there; paths that lead there go around over completed nodes, or become unreachable."""
+        self._bad.add(frozenset((number, other)))
+        for node in self.pending:
+            if any({one, two} == {number, other} for one, two in itertools.pairwise(node.path)):
+                self._find_path(node)
+
+    def retry(self, node: Node, last: int) -> bool:
+        """R14d: an unreachable node is pending again, to be reached from the completed node `last`.
+
+        Returns:
+            Whether a way leads there.
+        """
+        way = search(self, self.active, last, "dijkstra").path
+        if way:
+            node.status, node.path = "pending", [*way, node.number]
+            self._legs.add(frozenset((last, node.number)))
+        return bool(way)
+
+    def _find_path(self, node: Node) -> None:
+        node.status = "completed"  # so that its last leg counts as well
+        node.path = search(self, self.active, node.number, "dijkstra").path
+        node.status = "pending" if len(node.path) > 1 else "unreachable"
 
     def _activate(self, number: int) -> None:
         """R10: all paths begin at that node from now on."""
@@ -115,16 +172,29 @@ class Placement:
     least_distance: float = 0.75
     """d_min: between nodes (m)"""
 
-    def bearings(self, scan: Scan) -> list[float]:
+    def bearings(self, scan: Scan, half_width: float = 0.0) -> list[float]:
         """R2 to R4: directions of new nodes, from the robot's heading (rad): in each interval of free directions, one
-        node in its middle, or several beside each other in a wide one."""
+        node in its middle, or several beside each other in a wide one.
+
+        Args:
+            half_width: of the corridor to a node (m). Where something is in it, the node lies in the direction next to
+                the middle in which the corridor is free; nowhere, if there is none.
+        """
         each = 2.0 * math.asin(min(1.0, self.least_distance / (2.0 * self.distance)))  # γ_s
         found = []
         for begin, end in self.intervals(scan):
             if end - begin > self.least_angle:
                 count = max(1, math.floor((end - begin) / each))
-                found += [begin + (k + 0.5) * (end - begin) / count for k in range(count)]
-        return found
+                part = (end - begin) / count
+                middles = [begin + (k + 0.5) * part for k in range(count)]
+                found += [self._clear(scan, middle, part / 2, half_width) for middle in middles]
+        return [bearing for bearing in found if bearing is not None]
+
+    def _clear(self, scan: Scan, middle: float, most: float, half_width: float) -> float | None:
+        """The direction next to the middle, at most that far from it (rad), in which the corridor is free."""
+        aside = sorted(np.arange(-TRIED, TRIED + 1) / TRIED * most, key=abs)
+        length = self.distance + half_width
+        return next((middle + by for by in aside if is_clear(scan, middle + by, length, half_width)), None)
 
     def intervals(self, scan: Scan) -> list[tuple[float, float]]:
         """R2: directions in which nothing is nearer than D + Δ: first and last of each interval (rad)."""

@@ -77,7 +77,7 @@ class FollowField(SteeredBehavior):
         slope = PotentialField.of([self.goal, *self.hills, *self.way, *now]).gradient(np.array((x, y)))
         self.lost = bool(np.hypot(*slope) < FLAT)
         if self.arrived or self.lost:
-            robot.drive_speed(0.0, 0.0)
+            self.stand(robot)
         else:
             self.steer(robot, math.atan2(-slope[1], -slope[0]) - heading)
 

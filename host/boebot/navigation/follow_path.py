@@ -50,7 +50,7 @@ class FollowPath(SteeredBehavior):
             self.arrived = len(self.path) == 1
             del self.path[0]
         if not self.path:
-            robot.drive_speed(0.0, 0.0)
+            self.stand(robot)
             return
         to_x, to_y = self.path[0][0] - x, self.path[0][1] - y
         near = math.hypot(to_x, to_y) / (2 * self.reach) if len(self.path) == 1 else 1.0

@@ -7,11 +7,10 @@ other.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess, MotorBehavior
@@ -21,19 +20,12 @@ from boebot.navigation.estimators import Estimate, Estimator, RandomSearch
 from boebot.navigation.frames import Point, Pose, composed, inverse, placed
 from boebot.navigation.line_map import LineMap
 from boebot.navigation.scan_error import Scan
+from boebot.navigation.steering import stand
+from boebot.navigation.sweep import Sweep
 
 if TYPE_CHECKING:
     from boebot.brain.process import Process
     from boebot.robot import Robot
-
-
-def laser_scan(robot: Robot, device: str = "laser", place: Point = (0.0, 0.0), reach: float = 4.0) -> Scan | None:
-    """The newest sweep of a laser range finder; None: there is none yet."""
-    sweep = getattr(robot, device)
-    if not sweep.valid:
-        return None
-    distances = np.array(sweep.distances, dtype=np.float64)
-    return Scan(distances, (sweep.angles[0], sweep.angles[-1]), reach, place)
 
 
 @dataclass(kw_only=True)
@@ -55,8 +47,8 @@ class Localization(MotorBehavior):
     """s from stopping the motors to the scan; a sweep must be newer than the last movement"""
     estimator: Estimator = field(default_factory=RandomSearch)
     """who works out the pose"""
-    scan: Callable[[Robot], Scan | None] = laser_scan
-    """what takes a sweep"""
+    scan: Callable[[Robot], Scan | None] = field(default_factory=Sweep)
+    """what takes a sweep: the laser, or a sonar on a turret"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -99,13 +91,17 @@ class Localization(MotorBehavior):
         """ "due": 1 when the last scan is `every` seconds old, else 0."""
         return StateVariable("due", lambda robot: float(robot.time - self._last_s >= self.every))
 
+    def ask(self) -> None:
+        """A scan is due at once."""
+        self._last_s = -math.inf
+
     # ---- the scan ----------------------------------------------------------------------------------------------------
 
     def enter(self, robot: Robot) -> None:
         self._stopped_s = robot.time
 
     def step(self, robot: Robot) -> None:
-        robot.drive_speed(0.0, 0.0)
+        stand(robot, self._stopped_s)
         if robot.time - self._stopped_s > self.settle - 1e-9 and (sweep := self.scan(robot)) is not None:
             self._correct(robot, sweep)
 

@@ -44,7 +44,6 @@ def search_pose(
     box: Pose = (0.1, 0.1, 0.1),
     tries: int = 200,
     enough: float = 0.0,
-    least: int = 20,
 ) -> Match:
     """The notes' search.
 
@@ -54,9 +53,8 @@ def search_pose(
         box: full widths L_x (m), L_y (m), L_φ (rad).
         tries: N.
         enough: T: it does not begin where ε is below.
-        least: rays that must be known on both sides.
     """
-    best, error = start, float(scan.errors(plan, [start], least)[0])
+    best, error = start, float(scan.errors(plan, [start])[0])
     steps = [(best, error)]
     if error < enough:
         return Match(best, error, steps)
@@ -66,7 +64,7 @@ def search_pose(
             best[1] + source.uniform(-box[1], box[1]) / 2,
             best[2] + source.uniform(-box[2], box[2]) / 2,
         )
-        found = float(scan.errors(plan, [tried], least)[0])
+        found = float(scan.errors(plan, [tried])[0])
         if found < error:
             best, error = tried, found
             steps.append((best, error))

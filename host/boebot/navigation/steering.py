@@ -21,6 +21,17 @@ if TYPE_CHECKING:
     from boebot.robot import Robot
 
 
+BRAKING_S = 0.3
+
+
+def stand(robot: Robot, since_s: float) -> None:
+    """Stands still since a time (s): brakes, and then switches the motors off, for servos at rest may creep."""
+    if robot.time - since_s < BRAKING_S:
+        robot.drive_speed(0.0, 0.0)
+    else:
+        robot.stop()
+
+
 @dataclass(kw_only=True)
 class SteeredBehavior(MotorBehavior):
     """A motor behavior that drives under a heading; speeds are set-points of the wheels.
@@ -46,6 +57,11 @@ class SteeredBehavior(MotorBehavior):
 
     def forget(self) -> None:
         self.turning = False
+        self._driven_s = -math.inf
+
+    def stand(self, robot: Robot) -> None:
+        """Stays where it is."""
+        stand(robot, self._driven_s)
 
     def steer(self, robot: Robot, error: float, share: float = 1.0) -> None:
         """Drives on.
@@ -54,6 +70,7 @@ class SteeredBehavior(MotorBehavior):
             error: φ_ref - φ (rad).
             share: of the speed, 0 to 1.
         """
+        self._driven_s = robot.time
         error = wrapped(error)
         self.turning = abs(error) > (self.turn_below if self.turning else self.turn_above)
         if self.turning:

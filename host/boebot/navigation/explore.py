@@ -1,0 +1,340 @@
+"""Exploration by sensory area coverage (section 6.1 of the notes): the robot drives about until its range finder has
+seen every place.
+
+A finite-state machine with 17 states, as many as the notes' (which do not list them). There is no map, only odometry.
+Rules R1 to R15: docs/reference/navigation.md.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from boebot.brain import checks
+from boebot.cognition.odometry import Odometry, wrapped
+from boebot.navigation.corridor import is_clear
+from boebot.navigation.exploration_graph import ExplorationGraph, Placement
+from boebot.navigation.scan_error import Scan
+from boebot.navigation.steering import SteeredBehavior, stand
+from boebot.navigation.sweep import Sweep
+
+if TYPE_CHECKING:
+    from boebot.navigation.frames import Point
+    from boebot.robot import Robot
+
+QUARTER = math.pi / 2
+CLEARANCE = 0.05  # m that its body keeps to either side
+FACING = 0.03  # rad off, and it faces a point
+BACKWARD = 0.1  # m from what blocks the way, before it turns
+ATTEMPTS = 5  # of coming back to its nodes
+RETRIED_FROM = 4  # completed nodes from which an unreachable one is tried again
+
+
+class State(enum.Enum):
+    """What it is doing."""
+
+    INIT = enum.auto()
+    SCAN = enum.auto()
+    PLACE = enum.auto()
+    TURN_SCAN = enum.auto()
+    SELECT = enum.auto()
+    ROTATE = enum.auto()
+    CHECK_DIRECT = enum.auto()
+    DRIVE_DIRECT = enum.auto()
+    DRIVE_LEG = enum.auto()
+    NEXT_LEG = enum.auto()
+    ARRIVED = enum.auto()
+    UPDATE_PATHS = enum.auto()
+    BLOCKED = enum.auto()
+    BACKTRACK = enum.auto()
+    RETRY_SELECT = enum.auto()
+    DONE = enum.auto()
+    FAILED = enum.auto()
+
+
+@dataclass(kw_only=True)
+class Explore(SteeredBehavior):
+    """Drives from node to node until none is pending, and stops there.
+
+    Attributes:
+        graph: the nodes so far; None before the first step.
+        state: what it is doing; at the end DONE, or FAILED if it came away from its nodes and finds no way back.
+    """
+
+    placement: Placement = field(default_factory=Placement)
+    """where nodes are put"""
+    reach: float = 0.05
+    """a: m from a node at which it is reached"""
+    shortcut: float = 3.0
+    """L: m up to which it tries to drive straight to its target (R12)"""
+    near: float = 0.08
+    """m before a sonar at which something blocks the way (R11)"""
+    sonars: Sequence[str] = ("ping", "ping_left", "ping_right")
+    """names of those that look where it drives; whiskers are heeded as well"""
+    second_pass: bool = True
+    """R14: what is blocked is passed around, and unreachable nodes are tried again when all others are done"""
+    settle: float = 0.5
+    """s from stopping to the scan; a sweep must be newer than the last movement"""
+    scan: Callable[[Robot], Scan | None] = field(default_factory=Sweep)
+    """what takes a sweep: the laser, or a sonar on a turret"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.positive(self, "reach", "shortcut", "near", "settle")
+
+    def forget(self) -> None:
+        super().forget()
+        self.graph: ExplorationGraph | None = None
+        self.state = State.INIT
+
+    @property
+    def ended(self) -> bool:
+        """It explores no more."""
+        return self.state in (State.DONE, State.FAILED)
+
+    @property
+    def complete(self) -> bool:
+        """R13: no node is left; some may be unreachable."""
+        return self.state is State.DONE
+
+    def enter(self, robot: Robot) -> None:
+        self._stood_s = robot.time
+
+    def step(self, robot: Robot) -> None:
+        """Goes from state to state until one takes time."""
+        while True:
+            before, self.state = self.state, self._states[self.state](self, robot)
+            if self.state is before:
+                break
+            self._stood_s = robot.time
+
+    # ---- nodes -------------------------------------------------------------------------------------------------------
+
+    def _init(self, robot: Robot) -> State:
+        x, y = self.other(Odometry).position
+        self.graph = ExplorationGraph((x, y), self.placement.least_distance, 1.1 * self.placement.distance)
+        self._tried: set[tuple[int, int]] = set()  # R14d: unreachable node, completed node
+        self._retried = -1
+        self._not_direct: set[tuple[int, int]] = set()  # active node, target
+        self._blocked_at: Point | None = None
+        self._look_around()
+        return State.SCAN
+
+    def _look_around(self) -> None:
+        """R15: a range finder that sees half a turn only has to look in four directions."""
+        heading = self.other(Odometry).heading
+        self._headings = [heading + k * QUARTER for k in (1, 2, 3)]
+        self._has_looked = True
+
+    def _scan(self, robot: Robot) -> State:
+        self._sweep = self._swept(robot)
+        return State.SCAN if self._sweep is None else State.PLACE
+
+    def _swept(self, robot: Robot) -> Scan | None:
+        """A sweep of the robot at rest; None: not yet."""
+        stand(robot, self._stood_s)
+        return self.scan(robot) if robot.time - self._stood_s > self.settle - 1e-9 else None
+
+    def _place(self, robot: Robot) -> State:
+        assert self._sweep is not None
+        x, y, heading = self.other(Odometry).pose
+        way = self.placement.distance
+        for bearing in self.placement.bearings(self._sweep, half_width(robot)):
+            angle = heading + bearing
+            self._graph.place((x + way * math.cos(angle), y + way * math.sin(angle)))
+        self._draw(robot)
+        return State.TURN_SCAN if self._headings else State.SELECT
+
+    def _turn_scan(self, robot: Robot) -> State:
+        if not self._turn(robot, self._headings[0]):
+            return State.TURN_SCAN
+        del self._headings[0]
+        return State.SCAN
+
+    def _select(self, robot: Robot) -> State:
+        target = self._graph.target()
+        if target is None and not self._has_looked:
+            self._look_around()
+            return State.TURN_SCAN
+        if target is None:
+            return State.RETRY_SELECT if self.second_pass else State.DONE
+        self._target, self._has_looked, self._attempts = target, False, 0
+        away = math.dist(self.other(Odometry).position, target.place)
+        pair = self._graph.active, target.number
+        if len(target.path) > 2 and away <= self.shortcut and pair not in self._not_direct:
+            self._not_direct.add(pair)  # once
+            return State.CHECK_DIRECT
+        return State.NEXT_LEG
+
+    def _retry_select(self, robot: Robot) -> State:
+        """R14d: once from each of the completed nodes nearest to one that was unreachable."""
+        graph = self._graph
+        for node in graph.nodes:
+            if node.status == "unreachable":
+                completed = [one for one in graph.nodes if one.status == "completed"]
+                completed.sort(key=lambda one: graph.distance(one.number, node.number))
+                for last in completed[:RETRIED_FROM]:
+                    pair = node.number, last.number
+                    if pair not in self._tried:
+                        self._tried.add(pair)
+                        if graph.retry(node, last.number):
+                            self._retried = node.number
+                            return State.SELECT
+        return State.DONE
+
+    # ---- ways --------------------------------------------------------------------------------------------------------
+
+    def _check_direct(self, robot: Robot) -> State:
+        """R12: turn to the target; if nothing is in the way, drive there."""
+        if not self._face(robot, self._target.place):
+            self._stood_s = robot.time
+            return State.CHECK_DIRECT
+        if (sweep := self._swept(robot)) is None:
+            return State.CHECK_DIRECT
+        x, y, heading = self.other(Odometry).pose
+        to_x, to_y = self._target.place[0] - x, self._target.place[1] - y
+        bearing, length = wrapped(math.atan2(to_y, to_x) - heading), math.hypot(to_x, to_y) + robot.dimensions.radius
+        return State.DRIVE_DIRECT if is_clear(sweep, bearing, length, half_width(robot)) else State.NEXT_LEG
+
+    def _drive_direct(self, robot: Robot) -> State:
+        if self._blocked(robot):
+            self._blocked_at = self.other(Odometry).position
+            return State.BACKTRACK
+        return State.ARRIVED if self._drive(robot, self._target.place) else State.DRIVE_DIRECT
+
+    def _next_leg(self, robot: Robot) -> State:
+        self._next = self._graph.nodes[self._target.path[1]]
+        return State.ROTATE
+
+    def _rotate(self, robot: Robot) -> State:
+        return State.DRIVE_LEG if self._face(robot, self._next.place) else State.ROTATE
+
+    def _drive_leg(self, robot: Robot) -> State:
+        if self._blocked(robot):
+            return State.BLOCKED
+        if not self._drive(robot, self._next.place):
+            return State.DRIVE_LEG
+        if self._next is self._target:
+            return State.ARRIVED
+        self._graph.reached(self._next.number)  # it becomes active; the target's path begins there now
+        return State.NEXT_LEG
+
+    def _arrived(self, robot: Robot) -> State:
+        self._graph.reached(self._target.number)
+        return State.UPDATE_PATHS
+
+    def _update_paths(self, robot: Robot) -> State:
+        """R9; R14d: where it could not come before, it looks in all directions."""
+        if self._target.number == self._retried:
+            self._look_around()
+        self._draw(robot)
+        return State.SCAN
+
+    def _block(self, robot: Robot) -> State:
+        """R11 for a target; R14c for a node on the way there."""
+        self._blocked_at = self.other(Odometry).position
+        if self._next is self._target:
+            self._graph.blocked(self._target.number)
+        elif self.second_pass:
+            self._graph.bad_leg(self._graph.active, self._next.number)
+        self._draw(robot)
+        return State.BACKTRACK
+
+    def _backtrack(self, robot: Robot) -> State:
+        """Backward, until it can turn; then to the active node, unless that is the one that it cannot reach."""
+        if self._blocked_at is not None:
+            robot.drive_speed(-self.turn_speed, -self.turn_speed)
+            if math.dist(self.other(Odometry).position, self._blocked_at) >= BACKWARD:
+                self._blocked_at = None
+            return State.BACKTRACK
+        active = self._graph.nodes[self._graph.active]
+        if active.status != "completed":
+            return State.SELECT
+        if self._blocked(robot):
+            self._blocked_at = self.other(Odometry).position
+            self._attempts += 1
+            return State.BACKTRACK if self._attempts < ATTEMPTS else State.FAILED
+        return State.SELECT if self._drive(robot, active.place) else State.BACKTRACK
+
+    def _end(self, robot: Robot) -> State:
+        stand(robot, self._stood_s)
+        return self.state
+
+    # ---- movements ---------------------------------------------------------------------------------------------------
+
+    def _turn(self, robot: Robot, heading: float) -> bool:
+        """On the spot, to a heading (rad); True: it is there."""
+        error = wrapped(heading - self.other(Odometry).heading)
+        if abs(error) < FACING:
+            robot.drive_speed(0.0, 0.0)
+            return True
+        turn = math.copysign(min(self.turn_speed, 0.01 + 0.2 * abs(error)), error)
+        robot.drive_speed(-turn, turn)
+        return False
+
+    def _face(self, robot: Robot, place: Point) -> bool:
+        x, y = self.other(Odometry).position
+        return self._turn(robot, math.atan2(place[1] - y, place[0] - x))
+
+    def _drive(self, robot: Robot, place: Point) -> bool:
+        """To a place (m); True: it is there."""
+        x, y, heading = self.other(Odometry).pose
+        to_x, to_y = place[0] - x, place[1] - y
+        away = math.hypot(to_x, to_y)
+        if away < self.reach:
+            return True
+        self.steer(robot, math.atan2(to_y, to_x) - heading, min(1.0, max(0.3, away / (4 * self.reach))))
+        return False
+
+    def _ahead(self, place: Point) -> bool:
+        x, y, heading = self.other(Odometry).pose
+        return abs(wrapped(math.atan2(place[1] - y, place[0] - x) - heading)) < self.turn_below
+
+    def _blocked(self, robot: Robot) -> bool:
+        """Something is right before it, by its sonars or whiskers."""
+        if self.turning:
+            return False
+        if robot.has("whiskers") and (robot.whisker_left.pressed or robot.whisker_right.pressed):
+            return True
+        distances = (getattr(robot, name).distance for name in self.sonars if robot.has(name))
+        return any(distance is not None and distance < self.near for distance in distances)
+
+    @property
+    def _graph(self) -> ExplorationGraph:
+        assert self.graph is not None
+        return self.graph
+
+    def _draw(self, robot: Robot) -> None:
+        """The graph as it grows."""
+        nodes = self._graph.nodes
+        for status in ("pending", "completed", "unreachable"):
+            robot.sketch(status, points=[node.place for node in nodes if node.status == status])
+        robot.sketch("paths", lines=[[nodes[k].place for k in node.path] for node in self._graph.pending])
+
+    _states: ClassVar[dict[State, Callable[[Explore, Robot], State]]] = {
+        State.INIT: _init,
+        State.SCAN: _scan,
+        State.PLACE: _place,
+        State.TURN_SCAN: _turn_scan,
+        State.SELECT: _select,
+        State.ROTATE: _rotate,
+        State.CHECK_DIRECT: _check_direct,
+        State.DRIVE_DIRECT: _drive_direct,
+        State.DRIVE_LEG: _drive_leg,
+        State.NEXT_LEG: _next_leg,
+        State.ARRIVED: _arrived,
+        State.UPDATE_PATHS: _update_paths,
+        State.BLOCKED: _block,
+        State.BACKTRACK: _backtrack,
+        State.RETRY_SELECT: _retry_select,
+        State.DONE: _end,
+        State.FAILED: _end,
+    }
+
+
+def half_width(robot: Robot) -> float:
+    """Of the corridor that must be free (m)."""
+    return robot.dimensions.radius + CLEARANCE

@@ -1,0 +1,102 @@
+"""Going to a place on a map: the way there is searched for, followed, and searched for anew when a scan has corrected
+where the robot believes to be (sections 6.2 and 6.3 of the notes)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from boebot.brain import checks
+from boebot.navigation.follow_path import FollowPath
+from boebot.navigation.lattice import Lattice
+from boebot.navigation.line_map import LineMap
+from boebot.navigation.localization import Localization
+from boebot.navigation.search import search
+from boebot.navigation.tighten import tightened
+
+if TYPE_CHECKING:
+    from boebot.navigation.frames import Point
+    from boebot.robot import Robot
+
+
+@dataclass(kw_only=True)
+class GoTo(FollowPath):
+    """Drives to its goal, and stands there. It has arrived when a scan has said so. Where it finds no way, or is lost,
+    it stands still until it gets another goal or a scan fits again.
+
+    Attributes:
+        goal: where it goes to, in the map (m); None: it stands.
+        way: waypoints from where the last plan was made, in the map (m).
+        no_path: no way leads to the goal from where it believes to be.
+    """
+
+    localization: Localization
+    """where the robot is, and in which map"""
+    margin: float = 0.05
+    """m that the robot's body keeps from all lines"""
+    cell: float = 0.1
+    """m: side of the cells of the grid on which a way is searched for"""
+    slack: float = 0.3
+    """m within which a free cell stands for where the robot believes to be, or for the goal"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.positive(self, "cell", "slack")
+        checks.not_negative(self, "margin")
+        self._grids: dict[float, Lattice] = {}
+
+    def forget(self) -> None:
+        super().forget()
+        self.go(None)
+
+    def go(self, goal: Point | None) -> None:
+        """From now on to there (m, in the map); None: it stands."""
+        self.goal = goal
+        self.way: list[Point] = []
+        self.no_path = False
+        self._scans = -1  # at the last plan
+        self._is_at_end = False
+        self.follow([])
+
+    @property
+    def lost(self) -> bool:
+        """It does not know where it is."""
+        return self.localization.lost
+
+    def step(self, robot: Robot) -> None:
+        if self.goal is None or self.lost or self.arrived:
+            self.stand(robot)
+            return
+        estimates = self.localization.estimates
+        if self._scans != len(estimates):
+            self._scans = len(estimates)
+            if self._is_at_end and estimates[-1][1].found and self._is_there(self.goal):
+                self.arrived = True
+                return
+            self._plan(robot, self.goal)
+        super().step(robot)
+        if self.arrived:  # by odometry: a scan is to say so, too
+            self.arrived, self._is_at_end = False, True
+            self.localization.ask()
+
+    def _is_there(self, goal: Point) -> bool:
+        return math.dist(self.localization.pose[:2], goal) < 2 * self.arrival
+
+    def _plan(self, robot: Robot, goal: Point) -> None:
+        self._is_at_end = False
+        plan, radius = self.localization.plan, robot.dimensions.radius
+        grid = self._grid(plan, radius)
+        here = self.localization.pose[:2]
+        start, target = (grid.nearest_free(*place, within=self.slack) for place in (here, goal))
+        cells = [] if start is None or target is None else search(grid, start, target).path
+        self.no_path = not cells
+        between = [grid.centre(cell) for cell in cells[1:-1]]
+        self.way = tightened([here, *between, goal], plan, radius + self.margin) if cells else []
+        self.follow(self.localization.to_odometry(self.way[1:]))
+        robot.sketch(self.name, lines=[self.way], frame="arena")
+
+    def _grid(self, plan: LineMap, radius: float) -> Lattice:
+        if radius not in self._grids:
+            self._grids[radius] = Lattice.of(plan, radius, self.margin, self.cell)
+        return self._grids[radius]
