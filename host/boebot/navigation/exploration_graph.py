@@ -22,6 +22,7 @@ from boebot.navigation.search import search
 TRIED = 8  # directions to each side of the middle of an interval
 
 Status = Literal["pending", "completed", "unreachable"]
+STATUSES: tuple[Status, ...] = ("pending", "completed", "unreachable")
 Point = tuple[float, float]
 
 
@@ -48,6 +49,7 @@ class ExplorationGraph:
     Attributes:
         nodes: by number.
         active: number of the node where the robot is.
+        legs: pairs of numbers: from the first of them the second was placed.
     """
 
     def __init__(self, start: Point, least_distance: float, beside: float = 0.0) -> None:
@@ -61,7 +63,7 @@ class ExplorationGraph:
         self.nodes = [Node(0, start, "completed")]
         self.active = 0
         self._least, self._beside = least_distance, beside
-        self._legs: set[frozenset[int]] = set()  # along which nodes were placed
+        self.legs: set[frozenset[int]] = set()  # along which nodes were placed
         self._bad: set[frozenset[int]] = set()
 
     def place(self, place: Point) -> Node | None:
@@ -73,7 +75,7 @@ class ExplorationGraph:
                 return None
         node = Node(len(self.nodes), place, "pending", [self.active, len(self.nodes)])
         self.nodes.append(node)
-        self._legs.add(frozenset(node.path))
+        self.legs.add(frozenset(node.path))
         return node
 
     def length(self, path: Sequence[int]) -> float:
@@ -105,11 +107,7 @@ class ExplorationGraph:
         """As of what `search` searches: completed nodes to which a straight way may lead, each with its length (m)."""
         for node in self.nodes:
             leg, length = frozenset((number, node.number)), self.distance(number, node.number)
-            if (
-                node.status == "completed"
-                and leg not in self._bad
-                and (leg in self._legs or 0 < length <= self._beside)
-            ):
+            if node.status == "completed" and leg not in self._bad and (leg in self.legs or 0 < length <= self._beside):
                 yield node.number, length
 
     def distance(self, number: int, other: int) -> float:
@@ -132,7 +130,7 @@ class ExplorationGraph:
         way = search(self, self.active, last, "dijkstra").path
         if way:
             node.status, node.path = "pending", [*way, node.number]
-            self._legs.add(frozenset((last, node.number)))
+            self.legs.add(frozenset((last, node.number)))
         return bool(way)
 
     def _find_path(self, node: Node) -> None:
@@ -171,6 +169,12 @@ class Placement:
     """γ_min: of an interval of free directions (rad)"""
     least_distance: float = 0.75
     """d_min: between nodes (m)"""
+
+    @classmethod
+    def of(cls, radius: float) -> Placement:
+        """For rooms that are not large, by the robot's radius (m)."""
+        distance = max(0.4, 4 * radius)
+        return cls(distance, radius + 0.05, cls.least_angle, 0.7 * distance)
 
     def bearings(self, scan: Scan, half_width: float = 0.0) -> list[float]:
         """R2 to R4: directions of new nodes, from the robot's heading (rad): in each interval of free directions, one

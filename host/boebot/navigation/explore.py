@@ -16,13 +16,15 @@ from typing import TYPE_CHECKING, ClassVar
 from boebot.brain import checks
 from boebot.cognition.odometry import Odometry, wrapped
 from boebot.navigation.corridor import is_clear
-from boebot.navigation.exploration_graph import ExplorationGraph, Placement
+from boebot.navigation.exploration_graph import STATUSES, ExplorationGraph, Placement
+from boebot.navigation.obstacle import SONARS, is_blocked
 from boebot.navigation.scan_error import Scan
 from boebot.navigation.steering import SteeredBehavior, stand
 from boebot.navigation.sweep import Sweep
 
 if TYPE_CHECKING:
-    from boebot.navigation.frames import Point
+    from boebot.navigation.frames import Point, Pose
+    from boebot.navigation.localization import Localization
     from boebot.robot import Robot
 
 QUARTER = math.pi / 2
@@ -64,20 +66,22 @@ class Explore(SteeredBehavior):
         state: what it is doing; at the end DONE, or FAILED if it came away from its nodes and finds no way back.
     """
 
-    placement: Placement = field(default_factory=Placement)
-    """where nodes are put"""
+    placement: Placement | None = None
+    """where nodes are put; None: as fits the robot's size"""
     reach: float = 0.05
     """a: m from a node at which it is reached"""
     shortcut: float = 3.0
     """L: m up to which it tries to drive straight to its target (R12)"""
-    near: float = 0.08
+    near: float = 0.05
     """m before a sonar at which something blocks the way (R11)"""
-    sonars: Sequence[str] = ("ping", "ping_left", "ping_right")
+    sonars: Sequence[str] = SONARS
     """names of those that look where it drives; whiskers are heeded as well"""
     second_pass: bool = True
     """R14: what is blocked is passed around, and unreachable nodes are tried again when all others are done"""
     settle: float = 0.5
     """s from stopping to the scan; a sweep must be newer than the last movement"""
+    localization: Localization | None = None
+    """whose map nodes lie in; None: they lie in the frame of the odometry, and drift with it"""
     scan: Callable[[Robot], Scan | None] = field(default_factory=Sweep)
     """what takes a sweep: the laser, or a sonar on a turret"""
 
@@ -100,11 +104,19 @@ class Explore(SteeredBehavior):
         """R13: no node is left; some may be unreachable."""
         return self.state is State.DONE
 
+    @property
+    def pose(self) -> Pose:
+        """Where the robot is, in the frame of the nodes (m, m, rad)."""
+        return self.other(Odometry).pose if self.localization is None else self.localization.pose
+
     def enter(self, robot: Robot) -> None:
         self._stood_s = robot.time
 
     def step(self, robot: Robot) -> None:
-        """Goes from state to state until one takes time."""
+        """Goes from state to state until one takes time; stands where it is lost."""
+        if self.localization is not None and self.localization.lost:
+            stand(robot, self._stood_s)
+            return
         while True:
             before, self.state = self.state, self._states[self.state](self, robot)
             if self.state is before:
@@ -114,8 +126,9 @@ class Explore(SteeredBehavior):
     # ---- nodes -------------------------------------------------------------------------------------------------------
 
     def _init(self, robot: Robot) -> State:
-        x, y = self.other(Odometry).position
-        self.graph = ExplorationGraph((x, y), self.placement.least_distance, 1.1 * self.placement.distance)
+        x, y = self.pose[:2]
+        self._placement = self.placement or Placement.of(robot.dimensions.radius)
+        self.graph = ExplorationGraph((x, y), self._placement.least_distance, 1.1 * self._placement.distance)
         self._tried: set[tuple[int, int]] = set()  # R14d: unreachable node, completed node
         self._retried = -1
         self._not_direct: set[tuple[int, int]] = set()  # active node, target
@@ -125,7 +138,7 @@ class Explore(SteeredBehavior):
 
     def _look_around(self) -> None:
         """R15: a range finder that sees half a turn only has to look in four directions."""
-        heading = self.other(Odometry).heading
+        heading = self.pose[2]
         self._headings = [heading + k * QUARTER for k in (1, 2, 3)]
         self._has_looked = True
 
@@ -140,9 +153,9 @@ class Explore(SteeredBehavior):
 
     def _place(self, robot: Robot) -> State:
         assert self._sweep is not None
-        x, y, heading = self.other(Odometry).pose
-        way = self.placement.distance
-        for bearing in self.placement.bearings(self._sweep, half_width(robot)):
+        x, y, heading = self.pose
+        way = self._placement.distance
+        for bearing in self._placement.bearings(self._sweep, half_width(robot)):
             angle = heading + bearing
             self._graph.place((x + way * math.cos(angle), y + way * math.sin(angle)))
         self._draw(robot)
@@ -162,7 +175,7 @@ class Explore(SteeredBehavior):
         if target is None:
             return State.RETRY_SELECT if self.second_pass else State.DONE
         self._target, self._has_looked, self._attempts = target, False, 0
-        away = math.dist(self.other(Odometry).position, target.place)
+        away = math.dist(self.pose[:2], target.place)
         pair = self._graph.active, target.number
         if len(target.path) > 2 and away <= self.shortcut and pair not in self._not_direct:
             self._not_direct.add(pair)  # once
@@ -194,14 +207,14 @@ class Explore(SteeredBehavior):
             return State.CHECK_DIRECT
         if (sweep := self._swept(robot)) is None:
             return State.CHECK_DIRECT
-        x, y, heading = self.other(Odometry).pose
+        x, y, heading = self.pose
         to_x, to_y = self._target.place[0] - x, self._target.place[1] - y
         bearing, length = wrapped(math.atan2(to_y, to_x) - heading), math.hypot(to_x, to_y) + robot.dimensions.radius
         return State.DRIVE_DIRECT if is_clear(sweep, bearing, length, half_width(robot)) else State.NEXT_LEG
 
     def _drive_direct(self, robot: Robot) -> State:
         if self._blocked(robot):
-            self._blocked_at = self.other(Odometry).position
+            self._blocked_at = self.pose[:2]
             return State.BACKTRACK
         return State.ARRIVED if self._drive(robot, self._target.place) else State.DRIVE_DIRECT
 
@@ -235,7 +248,7 @@ class Explore(SteeredBehavior):
 
     def _block(self, robot: Robot) -> State:
         """R11 for a target; R14c for a node on the way there."""
-        self._blocked_at = self.other(Odometry).position
+        self._blocked_at = self.pose[:2]
         if self._next is self._target:
             self._graph.blocked(self._target.number)
         elif self.second_pass:
@@ -247,14 +260,14 @@ class Explore(SteeredBehavior):
         """Backward, until it can turn; then to the active node, unless that is the one that it cannot reach."""
         if self._blocked_at is not None:
             robot.drive_speed(-self.turn_speed, -self.turn_speed)
-            if math.dist(self.other(Odometry).position, self._blocked_at) >= BACKWARD:
+            if math.dist(self.pose[:2], self._blocked_at) >= BACKWARD:
                 self._blocked_at = None
             return State.BACKTRACK
         active = self._graph.nodes[self._graph.active]
         if active.status != "completed":
             return State.SELECT
         if self._blocked(robot):
-            self._blocked_at = self.other(Odometry).position
+            self._blocked_at = self.pose[:2]
             self._attempts += 1
             return State.BACKTRACK if self._attempts < ATTEMPTS else State.FAILED
         return State.SELECT if self._drive(robot, active.place) else State.BACKTRACK
@@ -267,7 +280,7 @@ class Explore(SteeredBehavior):
 
     def _turn(self, robot: Robot, heading: float) -> bool:
         """On the spot, to a heading (rad); True: it is there."""
-        error = wrapped(heading - self.other(Odometry).heading)
+        error = wrapped(heading - self.pose[2])
         if abs(error) < FACING:
             robot.drive_speed(0.0, 0.0)
             return True
@@ -276,12 +289,12 @@ class Explore(SteeredBehavior):
         return False
 
     def _face(self, robot: Robot, place: Point) -> bool:
-        x, y = self.other(Odometry).position
+        x, y = self.pose[:2]
         return self._turn(robot, math.atan2(place[1] - y, place[0] - x))
 
     def _drive(self, robot: Robot, place: Point) -> bool:
         """To a place (m); True: it is there."""
-        x, y, heading = self.other(Odometry).pose
+        x, y, heading = self.pose
         to_x, to_y = place[0] - x, place[1] - y
         away = math.hypot(to_x, to_y)
         if away < self.reach:
@@ -290,17 +303,12 @@ class Explore(SteeredBehavior):
         return False
 
     def _ahead(self, place: Point) -> bool:
-        x, y, heading = self.other(Odometry).pose
+        x, y, heading = self.pose
         return abs(wrapped(math.atan2(place[1] - y, place[0] - x) - heading)) < self.turn_below
 
     def _blocked(self, robot: Robot) -> bool:
         """Something is right before it, by its sonars or whiskers."""
-        if self.turning:
-            return False
-        if robot.has("whiskers") and (robot.whisker_left.pressed or robot.whisker_right.pressed):
-            return True
-        distances = (getattr(robot, name).distance for name in self.sonars if robot.has(name))
-        return any(distance is not None and distance < self.near for distance in distances)
+        return not self.turning and is_blocked(robot, self.near, self.sonars)
 
     @property
     def _graph(self) -> ExplorationGraph:
@@ -309,10 +317,11 @@ class Explore(SteeredBehavior):
 
     def _draw(self, robot: Robot) -> None:
         """The graph as it grows."""
-        nodes = self._graph.nodes
-        for status in ("pending", "completed", "unreachable"):
-            robot.sketch(status, points=[node.place for node in nodes if node.status == status])
-        robot.sketch("paths", lines=[[nodes[k].place for k in node.path] for node in self._graph.pending])
+        graph, frame = self._graph, "start" if self.localization is None else "arena"
+        for status in STATUSES:
+            robot.sketch(status, points=[node.place for node in graph.nodes if node.status == status], frame=frame)
+        legs = [[graph.nodes[number].place for number in sorted(leg)] for leg in graph.legs]
+        robot.sketch("legs", lines=legs, frame=frame)
 
     _states: ClassVar[dict[State, Callable[[Explore, Robot], State]]] = {
         State.INIT: _init,

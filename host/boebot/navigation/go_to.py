@@ -8,16 +8,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from boebot.brain import checks
+from boebot.cognition.odometry import Odometry
 from boebot.navigation.follow_path import FollowPath
 from boebot.navigation.lattice import Lattice
 from boebot.navigation.line_map import LineMap
 from boebot.navigation.localization import Localization
+from boebot.navigation.obstacle import is_blocked
 from boebot.navigation.search import search
 from boebot.navigation.tighten import tightened
 
 if TYPE_CHECKING:
     from boebot.navigation.frames import Point
     from boebot.robot import Robot
+
+BACKWARD = 0.1  # m from what is in the way
 
 
 @dataclass(kw_only=True)
@@ -33,16 +37,19 @@ class GoTo(FollowPath):
 
     localization: Localization
     """where the robot is, and in which map"""
-    margin: float = 0.05
+    margin: float = 0.1
     """m that the robot's body keeps from all lines"""
-    cell: float = 0.1
+    cell: float = 0.05
     """m: side of the cells of the grid on which a way is searched for"""
     slack: float = 0.3
     """m within which a free cell stands for where the robot believes to be, or for the goal"""
+    near: float = 0.03
+    """m before a sonar at which something is in the way: it goes back and asks for a scan, for it is not where it
+    believes to be"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checks.positive(self, "cell", "slack")
+        checks.positive(self, "cell", "slack", "near")
         checks.not_negative(self, "margin")
         self._grids: dict[float, Lattice] = {}
 
@@ -50,13 +57,19 @@ class GoTo(FollowPath):
         super().forget()
         self.go(None)
 
+    def enter(self, robot: Robot) -> None:
+        self._planned_after = -1
+        self._blocked_at: Point | None = None
+        if self.arrived and self.goal is not None and not self._is_there(self.goal):
+            self.arrived = False
+
     def go(self, goal: Point | None) -> None:
         """From now on to there (m, in the map); None: it stands."""
         self.goal = goal
         self.way: list[Point] = []
         self.no_path = False
-        self._scans = -1  # at the last plan
-        self._is_at_end = False
+        self._planned_after = -1  # so many scans
+        self._ended_after: int | None = None  # so many scans: it is at the end of its way, by odometry
         self.follow([])
 
     @property
@@ -67,24 +80,38 @@ class GoTo(FollowPath):
     def step(self, robot: Robot) -> None:
         if self.goal is None or self.lost or self.arrived:
             self.stand(robot)
-            return
+        elif self._blocked_at is not None:
+            self._go_back(robot, self._blocked_at)
+        elif not self.turning and is_blocked(robot, self.near):
+            self._blocked_at = self.other(Odometry).position
+        else:
+            self._go_on(robot, self.goal)
+
+    def _go_back(self, robot: Robot, begin: Point) -> None:
+        robot.drive_speed(-self.turn_speed, -self.turn_speed)
+        if math.dist(self.other(Odometry).position, begin) >= BACKWARD:
+            self._blocked_at = None
+            self._planned_after = -1
+            self.localization.ask()
+
+    def _go_on(self, robot: Robot, goal: Point) -> None:
         estimates = self.localization.estimates
-        if self._scans != len(estimates):
-            self._scans = len(estimates)
-            if self._is_at_end and estimates[-1][1].found and self._is_there(self.goal):
+        if self._planned_after != len(estimates):
+            is_confirmed = self._ended_after is not None and len(estimates) > self._ended_after
+            if is_confirmed and estimates[-1][1].found and self._is_there(goal):
                 self.arrived = True
                 return
-            self._plan(robot, self.goal)
+            self._plan(robot, goal)
         super().step(robot)
         if self.arrived:  # by odometry: a scan is to say so, too
-            self.arrived, self._is_at_end = False, True
+            self.arrived, self._ended_after = False, len(estimates)
             self.localization.ask()
 
     def _is_there(self, goal: Point) -> bool:
         return math.dist(self.localization.pose[:2], goal) < 2 * self.arrival
 
     def _plan(self, robot: Robot, goal: Point) -> None:
-        self._is_at_end = False
+        self._planned_after, self._ended_after = len(self.localization.estimates), None
         plan, radius = self.localization.plan, robot.dimensions.radius
         grid = self._grid(plan, radius)
         here = self.localization.pose[:2]
