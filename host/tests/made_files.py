@@ -6,7 +6,7 @@ import os
 
 from boebot.experiments import Experiment, Outcome
 
-ONE = "E57"
+ONE = "E30"
 
 
 def few_files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:

@@ -1,0 +1,67 @@
+"""Experiments fail when what they show is taken away: one row, a mutant, for each that has been doubted.
+
+A mutant replaces something in this process, by monkeypatch; the experiment with seed 1 must then miss a criterion. That
+it raises instead is no success: whoever reads its figures would not learn what is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import pytest
+
+from boebot.experiments import all_experiments, utility_theory
+
+pytestmark = pytest.mark.soak
+
+
+class Mutant(NamedTuple):
+    """An experiment, what is taken away from it, and how."""
+
+    experiment: str
+    taken_away: str
+    patch: Callable[[pytest.MonkeyPatch], None]
+
+
+# ---- section 7.1: utility theory -------------------------------------------------------------------------------------
+
+
+def chances_swapped(patch: pytest.MonkeyPatch) -> None:
+    def swapped(chances: Sequence[float], utilities: Sequence[float]) -> float:
+        return sum(p * u for p, u in zip(reversed(chances), utilities, strict=True))
+
+    patch.setattr(utility_theory, "expected_utility", swapped)
+
+
+def chances_unheeded(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility_theory, "expected_utility", lambda chances, utilities: sum(utilities) / len(utilities))
+
+
+def utility_straight(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility_theory, "money_utility", lambda amount, kappa: amount / utility_theory.MOST)
+
+
+def answers_by_payoff(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility_theory, "answer", lambda better, worse: (better + worse) / 2)
+
+
+OLD = [
+    Mutant("E57", "which chance belongs to which outcome", chances_swapped),
+    Mutant("E57", "the chances", chances_unheeded),
+    Mutant("E58", "the aversion to risks", utility_straight),
+    Mutant("E58", "the chances", chances_unheeded),
+    Mutant("elicitation", "the aversion to risks", answers_by_payoff),
+    Mutant("elicitation", "the chances", chances_unheeded),
+]
+"""Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
+
+NAVIGATION: list[Mutant] = []
+"""Of the experiments E36 to E55."""
+
+
+@pytest.mark.parametrize("mutant", [*OLD, *NAVIGATION], ids=lambda mutant: f"{mutant.experiment} {mutant.taken_away}")
+def test_without_what_it_shows_an_experiment_fails(mutant: Mutant, monkeypatch: pytest.MonkeyPatch) -> None:
+    mutant.patch(monkeypatch)
+    outcome = all_experiments()[mutant.experiment].run(1, lambda share: None)
+    assert not outcome.is_met, f"passes without {mutant.taken_away}"
