@@ -6,12 +6,15 @@ it raises instead is no success: whoever reads its figures would not learn what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import pytest
 
-from boebot.experiments import all_experiments, utility_theory
+from boebot.behaviors import RunAndTumble
+from boebot.brain import utility
+from boebot.experiments import all_experiments, chemotaxis, kinesis, predator, utility_theory
 
 pytestmark = pytest.mark.soak
 
@@ -46,6 +49,46 @@ def answers_by_payoff(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility_theory, "answer", lambda better, worse: (better + worse) / 2)
 
 
+# ---- section 4.4.2: E. coli, its predator, wood lice -----------------------------------------------------------------
+
+
+def no_tumbling(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(RunAndTumble, "_tumble", lambda self, robot: None)
+
+
+def attractant_everywhere(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(chemotaxis, "gaussian", chemotaxis.uniform)
+
+
+def attractant_repels(patch: pytest.MonkeyPatch) -> None:
+    drawn = chemotaxis.gaussian
+    patch.setattr(chemotaxis, "gaussian", lambda x, y, time: 1 - drawn(x, y, time))
+
+
+def runs_after_all_tumbles(patch: pytest.MonkeyPatch) -> None:
+    swarm = chemotaxis.swarm
+    patch.setattr(chemotaxis, "swarm", lambda *given, run_on=0.0: swarm(*given))
+
+
+def predator_stands_still(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(predator, "SLOWER", math.inf)
+
+
+def predator_without_attractant(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(predator, "lure", chemotaxis.uniform)
+
+
+def humid_or_not_alike(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(kinesis, "SLOW", kinesis.FAST)
+
+
+# ---- section 8.2: utility functions ----------------------------------------------------------------------------------
+
+
+def no_lag(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility.Utilities, "_factors_of", lambda self, elapsed: [(0.0, 0.0)] * len(self.values))
+
+
 OLD = [
     Mutant("E57", "which chance belongs to which outcome", chances_swapped),
     Mutant("E57", "the chances", chances_unheeded),
@@ -53,6 +96,14 @@ OLD = [
     Mutant("E58", "the chances", chances_unheeded),
     Mutant("elicitation", "the aversion to risks", answers_by_payoff),
     Mutant("elicitation", "the chances", chances_unheeded),
+    Mutant("E28", "that humidity slows it down", humid_or_not_alike),
+    Mutant("E31", "tumbling", no_tumbling),
+    Mutant("E31", "differences of the attractant", attractant_everywhere),
+    Mutant("E31", "that the attractant attracts", attractant_repels),
+    Mutant("E32", "tumbling on the spot", runs_after_all_tumbles),
+    Mutant("predator-prey", "the predator's motion", predator_stands_still),
+    Mutant("predator-prey", "the predator's attractant", predator_without_attractant),
+    Mutant("E62", "the utilities' lag", no_lag),
 ]
 """Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
 

@@ -11,7 +11,7 @@ from boebot.behaviors import FollowWall
 from boebot.behaviors.withdraw import ReflexIntensity
 from boebot.brain import Brain
 from boebot.experiments import all_experiments, fixed_action, homing, kinesis, predator, reflex, wall
-from boebot.experiments.chemotaxis import swarm
+from boebot.experiments.chemotaxis import Swarm, gaussian, swarm, uniform
 from boebot.experiments.experiment import Measured
 
 EXPERIMENTS = all_experiments()
@@ -39,7 +39,7 @@ def test_cheap_experiments_are_met(name: str) -> None:
 def test_experiments_say_what_they_run_on(name: str) -> None:
     one = EXPERIMENTS[name]
     assert one.robot and one.title and one.caption and one.source
-    assert bool(one.criterion) == ("shieldbot" in one.robot)
+    assert bool(one.criterion) == ("shieldbot" in one.robot or name in ("E28", "predator-prey"))
 
 
 def test_without_fatigue_the_reflex_does_not_fade() -> None:
@@ -106,7 +106,14 @@ def test_half_of_the_floor_is_humid() -> None:
     assert kinesis.humid_share(*places[:, :1]) == kinesis.humidity(*places[:, 0])
 
 
-def test_the_predator_lures_only_with_attractant() -> None:
-    draw = np.random.default_rng(1)
-    assert predator.density_ratio(swarm(draw, count=400, seconds=5.0, drift=0.005)) > 3
-    assert predator.density_ratio(swarm(draw, count=400, seconds=5.0, uniform=True)) < 3
+def test_prey_that_stays_with_the_predator_is_dense_and_left_behind_it_is_not() -> None:
+    times = np.arange(201.0)
+    with_it = np.repeat(predator.predators(times)[:, None], 10, axis=1)
+    left = np.zeros_like(with_it)
+    assert predator.density_ratio(Swarm(with_it, 1.0)) == pytest.approx(100 / (math.pi * 0.25))
+    assert predator.density_ratio(Swarm(left, 1.0)) == 0, "0.75 m away at least"
+
+
+def test_bacteria_gather_in_some_seconds_and_not_in_uniform_attractant() -> None:
+    lured, others = (swarm(1, attractant, count=12, seconds=6.0) for attractant in (gaussian, uniform))
+    assert lured.ratio < 0.6 < 0.9 < others.ratio < 1.1

@@ -1,23 +1,40 @@
-"""E. coli: running and tumbling by equation (4.1), Figs. 4.1 and 4.2, section 4.4.2 of the notes; E29 to E32."""
+"""E. coli: running and tumbling by equation (4.1), Figs. 4.1 and 4.2, section 4.4.2 of the notes; E29 to E32.
+
+E31 and E32 are runs of the kit's behavior `RunAndTumble`, one robot for each bacterium.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boebot import run
+from boebot.behaviors import RunAndTumble
+from boebot.brain import Brain
 from boebot.brain.leaky import LeakyIntegrator
+from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot.experiments.trials import trial_seeds
+from boebot.experiments.variants import varied
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from boebot.description.robots import RobotDescription
+    from boebot.robot import Robot
+
 STEP = 0.01  # s
-SIZE, SPREAD, SPEED = 10.0, 2.5, 1.0  # side of the square, width of the attractant, speed of a run
+SIZE, SPREAD, SPEED = 10.0, 2.5, 1.0  # side of the square (m), width of the attractant (m), speed of a run (m/s)
+COUNT, SECONDS = 100, 10.0
+RUN_ON = 0.05  # s that a bacterium runs after each tumble
+
+Attractant = Callable[[float, float, float], float]
+"""X at a place (m, m) and time (s)."""
 
 
 def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
@@ -95,16 +112,22 @@ def sign(seed: int, progress: Progress) -> Outcome:
 
 @dataclass(frozen=True)
 class Swarm:
-    """Bacteria after some time."""
+    """What bacteria did."""
 
-    begun: Floats
-    """positions at the beginning, shape (n, 2)"""
-    ended: Floats
-    """and at the end"""
+    path: Floats
+    """positions (m) each `STRIDE` seconds from the beginning to the end, shape (times, n, 2)"""
     running: float
     """share of steps that were runs"""
-    source: tuple[float, float] = (0.0, 0.0)
-    """where the attractant's middle was at the end"""
+
+    @property
+    def begun(self) -> Floats:
+        """Positions at the beginning, shape (n, 2)."""
+        return self.path[0]
+
+    @property
+    def ended(self) -> Floats:
+        """And at the end."""
+        return self.path[-1]
 
     @property
     def ratio(self) -> float:
@@ -117,43 +140,71 @@ class Swarm:
         return float((np.hypot(*self.ended.T) < SPREAD).mean())
 
 
+STRIDE = 1.0  # s
+
+
+def gaussian(x: float, y: float, time: float) -> float:
+    """The attractant of Fig. 4.2."""
+    return math.exp(-(x * x + y * y) / (2 * SPREAD * SPREAD))
+
+
+def uniform(x: float, y: float, time: float) -> float:
+    """The same everywhere: a control."""
+    return 0.5
+
+
+def bacterium() -> RobotDescription:
+    """arsim, but so narrow, light to turn and strong that it is at its speed after 6 ms, and that half a turn takes
+    31 ms."""
+    track = 0.02  # m
+    motor = RegulatedMotor(gain_n_s=25.0, torque_maximum_n_m=1000.0)
+    share = (track / 0.4) ** 2  # of arsim's inertia
+    body = {"wheel_speed_maximum_m_s": SPEED, "track_width_m": track, "inertia_kg_m2": 0.2 * share}
+    return varied(
+        "arsim", "bacterium", body | {"angular_damping_n_m_s": 0.1 * share}, motor_left=motor, motor_right=motor
+    )
+
+
 def swarm(
-    draw: np.random.Generator,
+    seed: int,
+    attractant: Attractant,
+    progress: Progress = lambda share: None,
     *,
-    uniform: bool = False,
-    jitter: bool = True,
-    count: int = 100,
-    seconds: float = 10.0,
-    drift: float = 0.0,
+    run_on: float = RUN_ON,
+    count: int = COUNT,
+    seconds: float = SECONDS,
+    period: float = STEP,
 ) -> Swarm:
-    """Bacteria that run and tumble by (4.1), a = b = 1, T = 0, in a Gaussian of attractant.
+    """Bacteria all over the square, each a robot that runs and tumbles by (4.1) with a = b = 1, T = 0.
 
     Args:
-        uniform: the same attractant everywhere: a control.
-        jitter: a tumble also moves by one step, which sets a bacterium free from where U has fallen to just below 0.
-        drift: speed of the attractant's middle, along x.
+        seed: of the first; the others follow.
+        run_on: seconds that each runs after a tumble.
+        period: of the brain (s).
     """
+    source = np.random.default_rng([seed, 31])
+    robot, every = bacterium(), round(STRIDE / STEP)
+    paths, running = [], []
+    for number in with_progress(range(count), progress):
+        x, y = source.uniform(-SIZE / 2, SIZE / 2, 2).tolist()
+        behavior = RunAndTumble(stimulus=_smelling(attractant), signal=1.0, turn=1.0, run_on=run_on)
+        result = run(
+            Brain([behavior], period=period),
+            robot=robot,
+            arena="empty",
+            seconds=seconds,
+            seed=seed + number,
+            pose=(x, y, float(source.uniform(-math.pi, math.pi))),
+        )
+        assert result.truth is not None
+        paths.append(np.column_stack((result.truth.x, result.truth.y))[::every])
+        running.append(np.mean([left == right for _, _, left, right in result.record.steps]))
+    return Swarm(np.stack(paths, axis=1), float(np.mean(running)))
 
-    def attractant(at: Floats, time: float) -> Floats:
-        if uniform:
-            return np.full(len(at), 0.5)
-        return np.asarray(np.exp(-((at - (drift * time, 0.0)) ** 2).sum(axis=1) / (2 * SPREAD**2)))
 
-    at = draw.uniform(-SIZE / 2, SIZE / 2, (count, 2))
-    begun = at.copy()
-    heading = draw.uniform(-np.pi, np.pi, count)
-    memory = attractant(at, 0.0)
-    lag = math.exp(-STEP)
-    runs = 0
-    for step in range(round(seconds / STEP)):
-        x = attractant(at, step * STEP)
-        run = x - memory > 0
-        heading = np.where(run, heading, draw.uniform(-np.pi, np.pi, count))
-        moves = run | jitter
-        at += np.where(moves, SPEED * STEP, 0.0)[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=1)
-        memory = x + (memory - x) * lag
-        runs += int(run.sum())
-    return Swarm(begun, at, runs / (count * round(seconds / STEP)), (drift * seconds, 0.0))
+def _smelling(attractant: Attractant) -> Callable[[Robot], float]:
+    """X where the robot is, by its exact odometer."""
+    return lambda robot: attractant(robot.odometer.x, robot.odometer.y, robot.time)
 
 
 def positions(group: Swarm) -> dict[str, Floats]:
@@ -161,10 +212,11 @@ def positions(group: Swarm) -> dict[str, Floats]:
     return {"x0": group.begun[:, 0], "y0": group.begun[:, 1], "x": group.ended[:, 0], "y": group.ended[:, 1]}
 
 
-def begin_and_end(figure: Figure, group: Swarm, title: str = "") -> Iterator[tuple[Axes, Floats]]:
+def begin_and_end(figure: Figure, group: Swarm, seconds: float, title: str = "") -> Iterator[tuple[Axes, Floats]]:
     """Axes for the beginning and for the end, and the bacteria's positions then."""
-    for axes, at, name in zip(figure.subplots(1, 2), (group.begun, group.ended), ("begin", "after 10 s"), strict=True):
-        axes.set(title=title + name, xlabel="x", ylabel="y", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
+    names = ("begin", f"after {seconds:g} s")
+    for axes, at, name in zip(figure.subplots(1, 2), (group.begun, group.ended), names, strict=True):
+        axes.set(title=title + name, xlabel="x (m)", ylabel="y (m)", aspect="equal", xlim=(-6, 6), ylim=(-6, 6))
         yield axes, at
 
 
@@ -175,7 +227,7 @@ def draw_circle(axes: Axes, radius: float, middle: tuple[float, float] = (0.0, 0
 
 
 def _draw_swarm(figure: Figure, group: Swarm, title: str) -> None:
-    for axes, at in begin_and_end(figure, group, f"{title}, "):
+    for axes, at in begin_and_end(figure, group, SECONDS, f"{title}, "):
         axes.plot(*at.T, ".", markersize=4)
         draw_circle(axes, SPREAD, linestyle="--", color="0.6")
 
@@ -185,30 +237,34 @@ def _draw_swarm(figure: Figure, group: Swarm, title: str) -> None:
     title="A hundred bacteria find the attractant",
     source="section 4.4.2, Fig. 4.2",
     caption="100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.",
+    robot="arsim, as narrow as a bacterium",
+    slow=True,
 )
 def accumulation(seed: int, progress: Progress) -> Outcome:
-    groups, controls = [], []
-    for number in with_progress(range(10), progress):
-        groups.append(swarm(np.random.default_rng([seed, number])))
-        controls.append(swarm(np.random.default_rng([seed, 100 + number]), uniform=True))
+    first = trial_seeds(seed, COUNT)[0]
+    group = swarm(first, gaussian, lambda share: progress(share / 2))
+    control = swarm(first + COUNT, uniform, lambda share: progress(0.5 + share / 2))
     measured = [
-        Measured("mean distance against the beginning", float(np.mean([one.ratio for one in groups])), most=0.3),
-        Measured("share within the width at the end", float(np.mean([one.share for one in groups])), least=0.85),
-        about("the same ratio in uniform attractant", float(np.mean([one.ratio for one in controls])), 1.0, 0.05),
+        Measured("mean distance against the beginning", group.ratio, most=0.3),
+        Measured("share within the width at the end", group.share, least=0.85),
+        about("the same ratio in uniform attractant", control.ratio, 1.0, 0.05),
     ]
-    return Outcome(measured, positions(groups[0]), lambda figure: _draw_swarm(figure, groups[0], "attractant"))
+    return Outcome(measured, positions(group), lambda figure: _draw_swarm(figure, group, "attractant"))
 
 
 @experiment(
     "E32",
     title="Bacteria that tumble on the spot do not gather",
     source="section 4.4.2, Fig. 4.2",
-    caption="The same bacteria, but a tumble does not move them: those whose utility has fallen to zero stay for ever.",
+    caption="The same bacteria, but they do not run after a tumble unless U > 0: those whose utility has fallen to "
+    "zero stay for ever.",
+    robot="arsim, as narrow as a bacterium",
+    slow=True,
 )
 def trap(seed: int, progress: Progress) -> Outcome:
-    group = swarm(np.random.default_rng([seed, 7]), jitter=False)
+    group = swarm(trial_seeds(seed, COUNT)[0] + 2 * COUNT, gaussian, progress, run_on=0.0)
     measured = [
         Measured("share of steps that were runs", group.running, most=0.01),
         about("mean distance against the beginning", group.ratio, 1.0, 0.05),
     ]
-    return Outcome(measured, positions(group), lambda figure: _draw_swarm(figure, group, "no jitter"))
+    return Outcome(measured, positions(group), lambda figure: _draw_swarm(figure, group, "no run after a tumble"))
