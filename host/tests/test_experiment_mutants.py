@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import pytest
 
-from boebot.behaviors import RunAndTumble
+from boebot.behaviors import ChargeBattery, RunAndTumble
 from boebot.brain import utility
-from boebot.experiments import all_experiments, chemotaxis, kinesis, predator, utility_theory
+from boebot.experiments import all_experiments, chemotaxis, economics, kinesis, predator, utility_theory
 
 pytestmark = pytest.mark.soak
 
@@ -89,6 +89,15 @@ def no_lag(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility.Utilities, "_factors_of", lambda self, elapsed: [(0.0, 0.0)] * len(self.values))
 
 
+def station_without_current(patch: pytest.MonkeyPatch) -> None:
+    described = economics.robot
+    patch.setattr(economics, "robot", lambda *, contacts=True: described(contacts=False))
+
+
+def station_not_sought(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(ChargeBattery, "seek", lambda self, robot: None)
+
+
 OLD = [
     Mutant("E57", "which chance belongs to which outcome", chances_swapped),
     Mutant("E57", "the chances", chances_unheeded),
@@ -104,6 +113,8 @@ OLD = [
     Mutant("predator-prey", "the predator's motion", predator_stands_still),
     Mutant("predator-prey", "the predator's attractant", predator_without_attractant),
     Mutant("E62", "the utilities' lag", no_lag),
+    Mutant("robot-economics", "what charging is good for", station_without_current),
+    Mutant("robot-economics", "the way to the station", station_not_sought),
 ]
 """Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
 

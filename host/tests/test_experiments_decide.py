@@ -10,9 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import boebot
-from boebot.brain import Utility
-from boebot.brain.utility import Utilities
-from boebot.experiments import Outcome, all_experiments, animals, contract, evolution, paradigms, stentor
+from boebot.experiments import Outcome, all_experiments, animals, contract, economics, evolution, paradigms, stentor
 from boebot.experiments import utility_functions as functions
 from boebot.experiments.same_commands import composed, disagreements
 from boebot.record.compare import command_difference, replayed, telemetry_difference
@@ -42,7 +40,7 @@ def test_criteria_are_met(name: str) -> None:
         ("E64", functions, "TAU", 0.35),
         ("E66", contract, "ALLOWED", ("builtins", "boebot.robot", "boebot.devices.equipment")),
         ("isocline", animals, "USE", 0.05),
-        ("robot-economics", evolution, "DRAIN", 0.025),
+        ("robot-economics", economics, "BEGIN_V", 7.8),
     ],
 )
 def test_criteria_can_fail(
@@ -100,17 +98,20 @@ def test_stentor_by_euler_comes_to_the_exact_one() -> None:
 # ---- evolution ----------------------------------------------------------------------------------------------------
 
 
-def test_toy_has_the_utilities_of_the_kit() -> None:
+def test_toy_has_the_utility_of_the_notes() -> None:
+    """(8.4) by the trapezoid rule, on what the robot saw, while the energy falls and rises."""
     genes = evolution.BY_HAND
     lives = evolution.live(np.array([genes]), traced=True, seconds=60)
     energy = np.concatenate(([1.0], lives.trace["energy"][:-1, 0]))
     on = np.concatenate(([0.0], lives.trace["place"][:-1, 0] <= 1e-9))
-    utility = Utility(b=genes.b, w={"energy": genes.w_energy, "on": genes.w_on}, tau=float(np.exp(genes.log_tau)))
-    kit = Utilities([utility], ["energy", "on"])
-    kit.start([1.0, 0.0])
-    for z, value in zip(zip(energy, on, strict=True), lives.trace["utility"][:, 0], strict=True):
-        kit.advance(z, evolution.STEP)
-        assert kit.values[0] == pytest.approx(value, abs=1e-12)
+    settled, tau = np.tanh(genes.b + genes.w_energy * energy + genes.w_on * on), float(np.exp(genes.log_tau))
+    fine, u, expected = 100, settled[0], []
+    for level in settled:
+        for _ in range(fine):
+            rate = evolution.STEP / fine / tau
+            u += rate * (level - u) / (1 + rate / 2)
+        expected.append(u)
+    assert lives.trace["utility"][:, 0] == pytest.approx(np.array(expected), abs=1e-6)
     assert lives.switches[0] == 2, "to the charger and back"
 
 

@@ -122,12 +122,12 @@ class Swarm:
     @property
     def begun(self) -> Floats:
         """Positions at the beginning, shape (n, 2)."""
-        return self.path[0]
+        return np.asarray(self.path[0])
 
     @property
     def ended(self) -> Floats:
         """And at the end."""
-        return self.path[-1]
+        return np.asarray(self.path[-1])
 
     @property
     def ratio(self) -> float:

@@ -1,24 +1,25 @@
-"""Utility functions found by evolution, and what performance is: section 8.2 of the notes and the opening of chapter 8.
+"""Utility functions found by evolution: section 8.2 of the notes.
 
-A toy: a robot patrols a place that is 5 s away from its charger for 300 s. Its
-battery, E = 1 at first, loses 0.02 in each second and gains 0.1 while the robot charges; at E = 0 the robot is dead.
-Two behaviors: B1 patrol with u_1 = tanh 0.5, and B2 charge, which goes to the charger and stays there, with
+A toy: a robot patrols a place that is 5 s away from its charger for 300 s. Its battery, E = 1 at first, loses 0.02 in
+each second and gains 0.1 while the robot charges; at E = 0 the robot is dead. Two behaviors: B1 patrol with u_1 =
+tanh 0.5, and B2 charge, which goes to the charger and stays there, with
 
     τ du_2/dt + u_2 = tanh(b + w_E E + w_on z_on),   z_on = 1 on the charger.                       (8.4)
 
-Performance counts the time of patrol in its place, and nothing else.
+Performance counts the time of patrol in its place, and nothing else. The toy is of this file; utilities are the kit's.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.brain import Utility
+from boebot.brain.utility import Utilities
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-PATROL = math.tanh(0.5)  # u_1
+PATROL = Utility(b=0.5)
 DRAIN, CHARGE = 0.02, 0.1  # 1/s
 WAY = 5.0  # s
 SECONDS, STEP = 300.0, 0.1
@@ -58,24 +59,36 @@ class Lives:
     times: Floats
     """s; with a trace only"""
     trace: dict[str, Floats]
-    """by name, shape (times, robots): energy, utility, place (s from the charger), work (s), charging"""
+    """by name, shape (times, robots): energy, utility of charging, place (s from the charger), work (s)"""
+
+
+def utilities_of(genes: Floats) -> Utilities:
+    """The kit's utilities of robots with genes of shape (robots, 4): u_1, u_2 of the first, of the second, ..., and
+    their state variables, E and z_on of the first, of the second, ..."""
+    functions, variables = [], []
+    for number, one in enumerate(Genes(*row) for row in genes.tolist()):
+        energy, on = f"energy {number}", f"on {number}"
+        functions += [PATROL, Utility(b=one.b, w={energy: one.w_energy, on: one.w_on}, tau=math.exp(one.log_tau))]
+        variables += [energy, on]
+    return Utilities(functions, variables)
 
 
 def live(genes: Floats, *, traced: bool = False, seconds: float = SECONDS) -> Lives:
-    """Robots with genes of shape (robots, 4), all at once."""
-    b, w_energy, w_on, log_tau = genes.T
-    lag = np.exp(-STEP / np.exp(log_tau))
+    """Robots with genes of shape (robots, 4), all at once; each does what has the greater utility."""
     count = len(genes)
+    utilities = utilities_of(genes)
     energy, place, work = np.ones(count), np.full(count, WAY), np.zeros(count)
     alive, switches = np.ones(count, dtype=bool), np.zeros(count, dtype=int)
-    u = np.tanh(b + w_energy)
-    charges = u > PATROL
+    z = np.zeros((count, 2))
+    z[:, 0] = energy
+    utilities.start(z.ravel().tolist())
+    charges = _wants_to_charge(utilities)
     rows: list[tuple[Floats, ...]] = []
     for _ in range(round(seconds / STEP)):
         on = place <= 1e-9
-        settled = np.tanh(b + w_energy * energy + w_on * on)
-        u = settled + (u - settled) * lag  # (8.4), held over the step
-        wanted = u > PATROL
+        z[:, 0], z[:, 1] = energy, on
+        utilities.advance(z.ravel().tolist(), STEP)
+        wanted = _wants_to_charge(utilities)
         switches += (wanted != charges) & alive
         charges = wanted
         work += np.where(alive & ~charges & (place >= WAY - 1e-9), STEP, 0.0)
@@ -84,11 +97,17 @@ def live(genes: Floats, *, traced: bool = False, seconds: float = SECONDS) -> Li
         place = np.where(alive, np.clip(place + np.where(charges, -STEP, STEP), 0.0, WAY), place)
         alive &= energy > 1e-9
         if traced:
-            rows.append((energy, u, place, work.copy(), (charges & on & alive).astype(float)))
-    names = ("energy", "utility", "place", "work", "charging")
+            rows.append((energy, np.array(utilities.values[1::2]), place, work.copy()))
+    names = ("energy", "utility", "place", "work")
     trace = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True)) if rows else {}
     times: Floats = np.arange(1, len(rows) + 1, dtype=np.float64) * STEP
     return Lives(work, alive, switches, times, trace)
+
+
+def _wants_to_charge(utilities: Utilities) -> NDArray[np.bool_]:
+    """Of each robot: u_2 > u_1."""
+    values = np.array(utilities.values)
+    return np.asarray(values[1::2] > values[::2])
 
 
 POPULATION, GENERATIONS, RESTARTS = 30, 40, 3
@@ -183,7 +202,7 @@ def evolution(seed: int, progress: Progress) -> Outcome:
 
 
 def _draw_life(utilities: Axes, energy: Axes, place: Axes, lives: Lives) -> None:
-    utilities.plot(lives.times, np.full(len(lives.times), PATROL), label="u1 patrol")
+    utilities.plot(lives.times, np.full(len(lives.times), math.tanh(PATROL.b)), label="u1 patrol")
     utilities.plot(lives.times, lives.trace["utility"][:, 0], label="u2 charge")
     utilities.set(ylabel="utility", ylim=(-1.05, 1.05), xticklabels=())
     utilities.legend(loc="lower right", fontsize="x-small")
@@ -191,66 +210,3 @@ def _draw_life(utilities: Axes, energy: Axes, place: Axes, lives: Lives) -> None
     energy.set(ylabel="battery E", ylim=(0, 1.05), xticklabels=())
     place.plot(lives.times, lives.trace["place"][:, 0], color="C3")
     place.set(xlabel="time (s)", ylabel="way to\ncharger (s)", ylim=(-0.3, WAY + 0.3))
-
-
-def planned_work(low: float, high: float, times: Sequence[float]) -> Floats:
-    """Performance until some times of a robot that goes to charge at E = low and goes back to work at E = high, at once
-    and exactly: the closed form that the toy comes near to."""
-    first, charging = (1.0 - low) / DRAIN, (high - (low - WAY * DRAIN)) / CHARGE
-    again = (high - WAY * DRAIN - low) / DRAIN
-    cycle = WAY + charging + WAY + again
-    found = []
-    for time in times:
-        whole, rest = divmod(max(time - first, 0.0), cycle)
-        found.append(min(time, first) + whole * again + max(0.0, rest - (cycle - again)))
-    return np.array(found)
-
-
-@experiment(
-    "robot-economics",
-    title="Charging earns nothing, and yet who charges earns most",
-    source="chapter 8, opening",
-    caption="Performance (time of patrol) until each instant of three robots: one that never charges, one that "
-    "always does, and one that schedules it by utility; grey: when that one charges. Dotted: its closed form.",
-    criterion="Patrolling alone empties the battery in 1 / 0.02 per s = 50 s. Utility by hand goes to charge where "
-    "1.5 - 3.2 E = 0.5 and leaves where 1.5 - 3.2 E + 1.9 = 0.5: while E goes evenly, a utility lags by its 0.3 s, "
-    "so that E goes on by 0.02 per s and 0.1 per s · 0.3 s. From these two levels follow cycle and performance; 2 % "
-    "is for steps and bends.",
-)
-def economics(seed: int, progress: Progress) -> Outcome:
-    names = ("never", "always", "by utility")
-    lives = live(np.array([NEVER, ALWAYS, BY_HAND]), traced=True)
-    work, charging = lives.trace["work"], lives.trace["charging"][:, 2] > 0
-    lag = math.exp(BY_HAND.log_tau)
-    low, high = (BY_HAND.b - 0.5) / -BY_HAND.w_energy, (BY_HAND.b + BY_HAND.w_on - 0.5) / -BY_HAND.w_energy
-    planned = planned_work(low - DRAIN * lag, high + CHARGE * lag, lives.times.tolist())
-    earned = np.diff(work[:, 2], prepend=0.0)[charging].sum()
-    overtakes = lives.times[np.flatnonzero(work[:, 2] > work[:, 0] + 1e-9)[:1]]
-    expected = np.append(lives.times[planned > 50.0], math.nan)[0]
-    measured = [
-        about("never charging: performance", work[-1, 0], 50.0, 0.1, "s"),
-        about("always charging: performance", work[-1, 1], 0.0, 0.1, "s"),
-        about("by utility: performance", work[-1, 2], float(planned[-1]), 0.02 * planned[-1], "s"),
-        exactly("by utility: alive at the end (1: yes)", float(lives.alive[2]), 1),
-        exactly("by utility: earned while it charges", float(earned), 0, "s"),
-        Measured("by utility: share of the time on the charger", float(charging.mean()), "", 0.1, 0.3),
-        Measured("after 50 s: never charging is ahead by", float(work[499, 0] - work[499, 2]), "s", least=5.0),
-        about("by utility overtakes it at", overtakes[0] if len(overtakes) else math.nan, float(expected), 2.0, "s"),
-    ]
-
-    def draw(figure: Figure) -> None:
-        upper, lower = figure.subplots(2, sharex=True, height_ratios=(3, 1))
-        for index, name in enumerate(names):
-            upper.plot(lives.times, work[:, index], label=name)
-            lower.plot(lives.times, lives.trace["energy"][:, index])
-        upper.plot(lives.times, planned, ":", color="black", label="closed form")
-        for axes in (upper, lower):
-            axes.fill_between(
-                lives.times, 0, 1, where=list(charging), color="0.9", transform=axes.get_xaxis_transform()
-            )
-        upper.set(ylabel="performance (s of patrol)")
-        upper.legend()
-        lower.set(xlabel="time (s)", ylabel="battery E", xlim=(0, SECONDS), ylim=(0, 1.05))
-
-    data = {"time_s": lives.times} | {f"work_{name.replace(' ', '_')}_s": work[:, i] for i, name in enumerate(names)}
-    return Outcome(measured, data, draw)

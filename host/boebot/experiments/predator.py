@@ -8,6 +8,7 @@ and stays with it wherever it goes.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,9 +72,9 @@ def density_ratio(group: Swarm) -> float:
 )
 def luring(seed: int, progress: Progress) -> Outcome:
     first = trial_seeds(seed, PREY)[0] + 400
-    terms = {"count": PREY, "seconds": LASTS, "period": PERIOD}
-    group = swarm(first, lure, lambda share: progress(share / 2), **terms)
-    control = swarm(first + PREY, uniform, lambda share: progress(0.5 + share / 2), **terms)
+    prey = partial(swarm, count=PREY, seconds=LASTS, period=PERIOD)
+    group = prey(first, lure, lambda share: progress(share / 2))
+    control = prey(first + PREY, uniform, lambda share: progress(0.5 + share / 2))
     middle = group.path[LATE].mean(axis=(0, 1))
     measured = [
         Measured("density around the predator, times uniform", density_ratio(group), least=3.0),
