@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import pytest
 
-from boebot.behaviors import ChargeBattery, RunAndTumble
+from boebot.behaviors import ChargeBattery, Phototaxis, RunAndTumble, Wander
 from boebot.brain import utility
-from boebot.experiments import all_experiments, chemotaxis, economics, kinesis, predator, utility_theory
+from boebot.experiments import all_experiments, chemotaxis, economics, evolution, kinesis, predator, utility_theory
 
 pytestmark = pytest.mark.soak
 
@@ -47,6 +47,17 @@ def utility_straight(patch: pytest.MonkeyPatch) -> None:
 
 def answers_by_payoff(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility_theory, "answer", lambda better, worse: (better + worse) / 2)
+
+
+# ---- sections 5.3.2 and 4.4.2: wandering, taxis ----------------------------------------------------------------------
+
+
+def no_turning(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Wander, "chance", lambda self, probability, per=None: False)
+
+
+def light_unheeded(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Phototaxis, "step", lambda self, robot: robot.drive(self.signal, self.signal))
 
 
 # ---- section 4.4.2: E. coli, its predator, wood lice -----------------------------------------------------------------
@@ -89,6 +100,17 @@ def no_lag(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility.Utilities, "_factors_of", lambda self, elapsed: [(0.0, 0.0)] * len(self.values))
 
 
+def fitness_unheeded(patch: pytest.MonkeyPatch) -> None:
+    offspring = evolution.offspring
+    patch.setattr(
+        evolution, "offspring", lambda genes, fitness, source: offspring(genes, source.random(len(genes)), source)
+    )
+
+
+def no_mutation(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(evolution, "MUTATION", 0.0)
+
+
 def station_without_current(patch: pytest.MonkeyPatch) -> None:
     described = economics.robot
     patch.setattr(economics, "robot", lambda *, contacts=True: described(contacts=False))
@@ -105,6 +127,10 @@ OLD = [
     Mutant("E58", "the chances", chances_unheeded),
     Mutant("elicitation", "the aversion to risks", answers_by_payoff),
     Mutant("elicitation", "the chances", chances_unheeded),
+    Mutant("E20", "turning", no_turning),
+    Mutant("E20-shieldbot", "turning", no_turning),
+    Mutant("E27", "the light", light_unheeded),
+    Mutant("E27-shieldbot", "the light", light_unheeded),
     Mutant("E28", "that humidity slows it down", humid_or_not_alike),
     Mutant("E31", "tumbling", no_tumbling),
     Mutant("E31", "differences of the attractant", attractant_everywhere),
@@ -113,6 +139,8 @@ OLD = [
     Mutant("predator-prey", "the predator's motion", predator_stands_still),
     Mutant("predator-prey", "the predator's attractant", predator_without_attractant),
     Mutant("E62", "the utilities' lag", no_lag),
+    Mutant("E65", "selection", fitness_unheeded),
+    Mutant("E65", "mutation", no_mutation),
     Mutant("robot-economics", "what charging is good for", station_without_current),
     Mutant("robot-economics", "the way to the station", station_not_sought),
 ]

@@ -165,8 +165,11 @@ def evolve(
     source="section 8.2 and Wahde (2003)",
     caption="Left: performance of the best individual over the generations of three restarts; dashed: never "
     "charging. Right: utilities of the best of all over time, its battery, and where it is.",
-    criterion="A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the robot "
-    "starts; going there and back costs energy; a charging robot loses none.",
+    criterion="A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the "
+    "robot starts; going there and back costs energy; a charging robot loses none. Of the 30 restarts of "
+    "the seeds 1 to 10, 17 came to 190 s (39 to 73 %), the others stayed mostly at never charging, 50 s: "
+    "all of three do so at one seed in twelve, not at 1 to 10. Without selection, or without mutation, the "
+    "best gets worse or stays where chance put it.",
     slow=True,
 )
 def evolution(seed: int, progress: Progress) -> Outcome:
@@ -176,6 +179,8 @@ def evolution(seed: int, progress: Progress) -> Outcome:
     worse = int((np.diff(evolved.best, axis=0) < -1e-9).sum())
     measured = [
         Measured("performance of the best of three restarts", float(best.work[0]), "s", least=190.0),
+        Measured("restarts that come to 190 s, of three", float((evolved.best[-1] >= 190.0).sum())),
+        Measured("best of the first generation", float(evolved.best[0].max()), "s"),
         exactly("the best is alive at the end (1: yes)", float(best.alive[0]), 1),
         exactly("generations in which a restart's best got worse", worse, 0),
         about("never charging: performance", known.work[0], 50.0, 0.1, "s"),

@@ -23,6 +23,7 @@ from boebot.experiments.experiment import Measured, Outcome, Progress, about, ex
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import Trial, trial_seeds, try_once
 from boebot.experiments.variants import arena_file, at_angle, varied
+from boebot.experiments.wall import RADIUS, small_arsim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,15 +49,16 @@ class Setting:
     """brightness of both sensors together"""
 
 
-def _arsim() -> RobotDescription:
-    """The notes' robot with two phototransistors on its rim, turned 0.5 rad outwards as the shieldbot's are."""
-    left, right = (Phototransistor(**at_angle(0.20, angle)) for angle in (0.5, -0.5))
-    return varied("arsim", "arsim-lights", light_left=left, light_right=right)
+def _small_arsim() -> RobotDescription:
+    """The notes' robot in the size of a Boe-Bot with two phototransistors on its rim, turned 0.5 rad outwards as the
+    shieldbot's are."""
+    left, right = (Phototransistor(**at_angle(RADIUS, angle)) for angle in (0.5, -0.5))
+    return small_arsim(0.3, light_left=left, light_right=right)
 
 
 # Ambient light of irradiance 1: 667 / s of each sensor (decay 1.5 ms); the lamp, 20 W at 2 m, adds 5 · 667 / s.
-# The straight way: 1.85 m at 0.682 m/s, and 0.15 s of rise; at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s, and 0.1 s.
-ARSIM = Setting(robot=_arsim(), on=None, seconds=9.0, straight=1.85 / 0.682 + 0.15)
+# The straight way: 1.85 m at 0.15 m/s; at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s, and 0.1 s.
+ARSIM = Setting(robot=_small_arsim(), on=None, seconds=24.0, straight=1.85 / 0.15)
 SHIELDBOT = Setting(
     robot=varied("shieldbot", "shieldbot-lights", light_left={"on": True}, light_right={"on": True}),
     on="native",
@@ -162,7 +164,7 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
     title="Taxis: to the lamp from everywhere",
     source="section 4.4.2",
     caption="Phototaxis from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, and times.",
-    robot="arsim",
+    robot="arsim in the size of a Boe-Bot",
     slow=True,
 )
 def taxis(seed: int, progress: Progress) -> Outcome:

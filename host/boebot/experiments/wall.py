@@ -11,6 +11,7 @@ from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
+from boebot.devices.device import Device
 from boebot.devices.infrared import InfraredProximity
 from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
@@ -38,8 +39,13 @@ def follower() -> Brain:
     return Brain([FollowWall(signal=SPEED / FULL_SPEED, gain=0.5 / FULL_SPEED, reference=0.25)])
 
 
-def small_arsim() -> RobotDescription:
-    """arsim in the size of a Boe-Bot (docs/reference/notes.md), one IR sensor ahead and one at -60 degrees."""
+def small_arsim(full_speed: float = FULL_SPEED, **devices: Device) -> RobotDescription:
+    """arsim in the size of a Boe-Bot (docs/reference/notes.md), one IR sensor ahead and one at -60 degrees.
+
+    Args:
+        full_speed: m/s at motor signal 1.
+        devices: more of them.
+    """
     sensor = partial(InfraredProximity, range_m=0.8, c1_m2=0.012, c2=0.02, sigma=0.03)
     motor = RegulatedMotor(gain_n_s=1.2, torque_maximum_n_m=0.268)
     body = {
@@ -51,7 +57,7 @@ def small_arsim() -> RobotDescription:
         "wheel_mass_kg": 0.03,
         "wheel_inertia_kg_m2": 1.7e-5,
         "angular_damping_n_m_s": 0.004,
-        "wheel_speed_maximum_m_s": FULL_SPEED,
+        "wheel_speed_maximum_m_s": full_speed,
     }
     return varied(
         "arsim",
@@ -61,6 +67,7 @@ def small_arsim() -> RobotDescription:
         motor_right=motor,
         infrared_left=sensor(**at_angle(RADIUS, 0.0)),
         infrared_right=sensor(**at_angle(RADIUS, -1.0472)),
+        **devices,
     )
 
 

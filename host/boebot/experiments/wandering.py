@@ -158,9 +158,30 @@ def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[
         ]
 
 
-def judge_alone(done: list[Trial]) -> list[Measured]:
-    """Without avoidance it is for empty space only: of 12 runs at least 10 end at something."""
-    return [Measured("runs that collide", sum(trial.has_collided for trial in done), least=round(10 / 12 * len(done)))]
+def turns_begun(done: list[Trial], setting: Setting) -> tuple[int, float]:
+    """How often the runs' brains began to turn, and how long in all they were ahead, from where they could (s)."""
+    turns = steps = 0
+    for trial in done:
+        ahead = np.array([left == right for *_, left, right in trial.result.record.steps])
+        turns += int((ahead[:-1] & ~ahead[1:]).sum())
+        steps += int(ahead[:-1].sum())
+    return turns, steps * setting.period
+
+
+def judge_alone(done: list[Trial], setting: Setting) -> list[Measured]:
+    """Without avoidance it is for empty space only: of 12 runs at least 10 end at something. And it is wandering: in
+    each step ahead it begins to turn with the listing's probability, in the whole of the runs.
+
+    Of n steps, each with probability p, np begin a turn, give or take √(np (1 - p)): 4 of these are allowed.
+    """
+    turns, ahead = turns_begun(done, setting)
+    chance = 1 - (1 - setting.turn) ** (setting.period / STEP)
+    expected, steps = chance / setting.period, ahead / setting.period
+    sigma = math.sqrt(chance * (1 - chance) / steps) / setting.period
+    return [
+        Measured("runs that collide", sum(trial.has_collided for trial in done), least=round(10 / 12 * len(done))),
+        about("turns begun in each second ahead", turns / ahead, expected, 4 * sigma, "1/s"),
+    ]
 
 
 def judge_avoiding(done: list[Trial]) -> list[Measured]:
@@ -190,7 +211,7 @@ def _alone(setting: Setting, seed: int, progress: Progress) -> Outcome:
         left.set_title(f"{len(done)} paths up to the first contact")
         _draw_survivors(right, done, setting.seconds)
 
-    return Outcome(judge_alone(done), _data(done, seed), draw)
+    return Outcome(judge_alone(done, setting), _data(done, seed), draw)
 
 
 def _draw_survivors(axes: Axes, done: list[Trial], seconds: float) -> None:
@@ -236,6 +257,9 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
     axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
 
 
+_WANDERS = "of n steps ahead, each with probability p, np ± 4 √(np (1 - p)) begin a turn, as the listing has it"
+
+
 @experiment(
     "E20",
     title="Wandering alone ends at a wall",
@@ -243,6 +267,7 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
     caption="Wandering in ARSim's arena without avoidance: paths up to the first contact, and how many runs are free "
     "of contact yet.",
     robot="arsim",
+    criterion=f"At least 10 of 12 runs collide, and that by wandering: {_WANDERS}.",
     slow=True,
 )
 def wandering(seed: int, progress: Progress) -> Outcome:
@@ -252,8 +277,8 @@ def wandering(seed: int, progress: Progress) -> Outcome:
 _SCALED = (
     "Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor signal 0.5 its servos "
     "run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything takes 0.35 · 0.682 / "
-    "0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against 4.447 "
-    "rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
+    "0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against "
+    "4.447 rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
 )
 
 
@@ -264,7 +289,7 @@ _SCALED = (
     caption="The shieldbot wandering without avoidance in ARSim's arena at its own scale: paths up to the first "
     "contact, and how many runs are free of contact yet.",
     robot="shieldbot (native)",
-    criterion=f"{_SCALED}, and so is the criterion of E20: at least 10 of 12 runs collide.",
+    criterion=f"{_SCALED}, and so is the criterion of E20: at least 10 of 12 runs collide; {_WANDERS}.",
     slow=True,
 )
 def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
